@@ -1,0 +1,130 @@
+//! What a backend does: whole time steps, observations, and the adjoint and tangent of each, for a batch.
+
+use crate::evaluate::{Evaluation, ParamBatch};
+use glam::DVec3;
+use palpate_model::plan::Plan;
+
+/// Why a backend refused a plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{message} (hint: {hint})")]
+pub struct BuildError {
+    /// What is missing or too small, with numbers.
+    pub message: String,
+    /// The way out.
+    pub hint: String,
+}
+
+/// Computes simulations of B members that share a [`Plan`] and differ in θ. State stays where the backend keeps it;
+/// nothing between [`Backend::set_params`] and [`Backend::read`] needs to wait for a result.
+///
+/// Shapes: B members, N simulation nodes, P parameters, Q tangent directions.
+pub trait Backend: Send {
+    /// Constants of a rollout: the plan, θ, and the state that passes need beside u and v.
+    type World: Send;
+    /// Displacement u [m] and velocity v [m/s] at one instant, `[B, N, 3]` each.
+    type State: Send;
+    /// dJ/du, dJ/dv on their way back, `[B, N, 3]` each.
+    type Adjoint: Send;
+    /// du/dθ_q, dv/dθ_q on their way forward, `[B, Q, N, 3]` each.
+    type Tangent: Send;
+    /// Everything that is read at the end: cost `[B]`, dJ/dθ `[B, P]`, curvature `[B, Q, Q]`, health `[B]`.
+    type Tally: Send;
+
+    /// Name for messages and result files.
+    fn name(&self) -> String;
+    /// Prepares a plan for up to `members` simulations at once.
+    fn build(&self, plan: &Plan, members: usize) -> Result<Self::World, BuildError>;
+    /// Sets θ `[B, P]`; B may be anything up to the `members` of [`Backend::build`].
+    fn set_params(&self, world: &mut Self::World, theta: &ParamBatch);
+    /// Memory for a state of the current batch.
+    fn new_state(&self, world: &Self::World) -> Self::State;
+    /// Zeroed memory for an adjoint.
+    fn new_adjoint(&self, world: &Self::World) -> Self::Adjoint;
+    /// Zeroed memory for tangents along the parameters `directions` (places in θ).
+    fn new_tangent(&self, world: &Self::World, directions: &[usize]) -> Self::Tangent;
+    /// A zeroed tally.
+    fn new_tally(&self, world: &Self::World, directions: &[usize]) -> Self::Tally;
+
+    /// The initial state: rest or static equilibrium, with its velocity.
+    fn start(&self, world: &mut Self::World, first: &mut Self::State, tally: &mut Self::Tally);
+    /// Step k (from time k Δt to (k + 1) Δt).
+    fn step(&self, world: &mut Self::World, k: usize, now: &Self::State, next: &mut Self::State, tally: &mut Self::Tally);
+    /// Adds the cost of every frame that lies in step k: `(k Δt, (k + 1) Δt]` on the simulation's clock. Frames at or before
+    /// the start belong to step 0, frames after the end to the last step (both held); in a static problem all belong to step 0
+    /// with `now` = `next`.
+    fn observe(&self, world: &Self::World, k: usize, now: &Self::State, next: &Self::State, tally: &mut Self::Tally);
+
+    /// Adjoint of [`Backend::observe`]: adds to dJ/d(next) in `adj` and to dJ/d(now) in `adj_now`, and to dJ/dθ.
+    fn observe_adjoint(
+        &self,
+        world: &Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        adj: &mut Self::Adjoint,
+        adj_now: &mut Self::Adjoint,
+        tally: &mut Self::Tally,
+    );
+    /// Adjoint of [`Backend::step`]: consumes dJ/d(next) in `adj`, adds dJ/d(now) to `adj_now`, and adds to dJ/dθ.
+    fn step_adjoint(
+        &self,
+        world: &mut Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        adj: &Self::Adjoint,
+        adj_now: &mut Self::Adjoint,
+        tally: &mut Self::Tally,
+    );
+    /// Adjoint of [`Backend::start`].
+    fn start_adjoint(&self, world: &mut Self::World, first: &Self::State, adj: &Self::Adjoint, tally: &mut Self::Tally);
+    /// Sets an adjoint to zero.
+    fn clear_adjoint(&self, adj: &mut Self::Adjoint);
+
+    /// Tangent of [`Backend::start`].
+    fn start_tangent(&self, world: &mut Self::World, first: &Self::State, tangent: &mut Self::Tangent, tally: &mut Self::Tally);
+    /// Tangent of [`Backend::step`]; call directly after it, so that a factorisation can be reused.
+    fn step_tangent(
+        &self,
+        world: &mut Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        tangent: &Self::Tangent,
+        tangent_next: &mut Self::Tangent,
+        tally: &mut Self::Tally,
+    );
+    /// Tangent of [`Backend::observe`]: adds to the Gauss–Newton gradient and matrix.
+    fn observe_tangent(
+        &self,
+        world: &Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        tangent: &Self::Tangent,
+        tangent_next: &Self::Tangent,
+        tally: &mut Self::Tally,
+    );
+
+    /// True when every member has failed, so that the rest of the rollout can be skipped. A backend that would have to
+    /// wait for the answer returns `false`.
+    fn all_failed(&self, tally: &Self::Tally) -> bool;
+    /// Costs, gradients and health; the only wait.
+    fn read(&self, world: &Self::World, tally: &Self::Tally) -> Vec<Evaluation>;
+    /// Displacements [m] and velocities [m/s] of one member `[N]` each, for reports and tests.
+    fn read_state(&self, world: &Self::World, state: &Self::State, member: usize) -> (Vec<DVec3>, Vec<DVec3>);
+    /// Residual of every observed point and marker of the frames in step k (order of [`Backend::observe`]) of one member:
+    /// frame number and signed distance [m] per depth point (`None` = unmatched), vector [m] per marker.
+    fn residuals(&self, world: &Self::World, k: usize, now: &Self::State, next: &Self::State, member: usize) -> Vec<FrameResiduals>;
+}
+
+/// Residuals of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameResiduals {
+    /// Number of the frame in the plan's observation.
+    pub frame: usize,
+    /// Signed distance of each point [m].
+    pub points: Vec<Option<f64>>,
+    /// Simulated minus measured position of each marker [m].
+    pub markers: Vec<DVec3>,
+}

@@ -1,0 +1,93 @@
+//! What an optimiser sees of physics: parameters in, cost and derivatives out.
+
+use crate::failure::Failure;
+
+/// Parameter vectors of a batch, shape `[B, P]`, SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamBatch {
+    /// Number of parameters P.
+    pub parameters: usize,
+    /// Values, member by member.
+    pub values: Vec<f64>,
+}
+
+impl ParamBatch {
+    /// A batch of rows; all must have the same length.
+    pub fn from_rows(rows: &[Vec<f64>]) -> ParamBatch {
+        let parameters = rows.first().map_or(0, Vec::len);
+        assert!(rows.iter().all(|r| r.len() == parameters), "rows of a batch have the same length");
+        ParamBatch { parameters, values: rows.concat() }
+    }
+
+    /// Number of members B.
+    pub fn members(&self) -> usize {
+        if self.parameters == 0 { 0 } else { self.values.len() / self.parameters }
+    }
+
+    /// Parameters of member b.
+    pub fn row(&self, b: usize) -> &[f64] {
+        &self.values[b * self.parameters..(b + 1) * self.parameters]
+    }
+}
+
+/// What is wanted besides the cost.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Request {
+    /// The adjoint gradient dJ/dθ, all P entries.
+    pub gradient: bool,
+    /// Gauss–Newton curvature (and gradient) by forward sensitivities for these places in θ; empty = none.
+    pub sensitivities: Vec<usize>,
+}
+
+/// Cost and derivatives of one member.
+///
+/// The cost is `J = (1/n) Σ ρ(r)/σ²`, over the n scalar residuals r of all frames (a depth point is one, a marker three),
+/// with ρ(r) ≈ r²/2 for small r: half the mean squared residual in units of the noise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Evaluation {
+    /// J, dimensionless. Infinite for a member that failed.
+    pub cost: f64,
+    /// dJ/dθ `[P]`; empty unless requested.
+    pub gradient: Vec<f64>,
+    /// Forward sensitivities' result; `None` unless requested.
+    pub curvature: Option<Curvature>,
+    /// Scalar residuals that met a surface or marker.
+    pub matched: usize,
+    /// Scalar residuals in all (n above).
+    pub residuals: usize,
+    /// Sum of squared matched residuals [m²].
+    pub sum_squares: f64,
+    /// Sum of matched residuals of depth points [m] (a bias shows here).
+    pub sum_signed: f64,
+    /// Why the member stopped, if it did.
+    pub failure: Option<Failure>,
+}
+
+impl Evaluation {
+    /// An evaluation that failed.
+    pub fn failed(failure: Failure) -> Evaluation {
+        Evaluation { cost: f64::INFINITY, failure: Some(failure), ..Evaluation::default() }
+    }
+
+    /// Root mean square distance of the matched residuals' points [m]: `sqrt(Σ r² / matched)` per scalar residual.
+    pub fn rms(&self) -> f64 {
+        if self.matched == 0 { f64::NAN } else { (self.sum_squares / self.matched as f64).sqrt() }
+    }
+}
+
+/// Gauss–Newton model from forward sensitivities of Q requested parameters.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Curvature {
+    /// dJ/dθ for the requested parameters `[Q]`.
+    pub gradient: Vec<f64>,
+    /// Positive semi-definite approximation of d²J/dθ² `[Q, Q]`, row-major: `(1/n) Σ w ∇r ∇rᵀ/σ²`, w the robust weight.
+    pub matrix: Vec<f64>,
+}
+
+/// Physics as a function; object-safe, so that a fit can be tested on a parabola.
+pub trait Evaluate: Send {
+    /// Number of parameters P that [`Self::evaluate`] expects.
+    fn parameters(&self) -> usize;
+    /// Cost and derivatives of every member of a batch; a failed member has infinite cost and says why.
+    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation>;
+}

@@ -1,0 +1,15 @@
+//! The seam between physics and everything that uses it: [`Backend`] (whole time steps and their adjoints on resident
+//! state, batch outermost) and [`Evaluate`] (parameters in, cost and derivatives out). [`Rollout`] joins the two and is
+//! written once for all backends.
+//!
+//! Invariant: this room does not know how a step is computed, nor what the parameters are for.
+
+mod backend;
+mod evaluate;
+mod failure;
+mod rollout;
+
+pub use backend::{Backend, BuildError, FrameResiduals};
+pub use evaluate::{Curvature, Evaluate, Evaluation, ParamBatch, Request};
+pub use failure::{Failure, FailureKind};
+pub use rollout::{Rollout, Snapshot};

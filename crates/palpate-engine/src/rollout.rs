@@ -1,0 +1,164 @@
+//! The driver: forward with tape, back with the adjoint, or forward with tangents. Written once for all backends.
+
+use crate::backend::{Backend, BuildError, FrameResiduals};
+use crate::evaluate::{Evaluate, Evaluation, ParamBatch, Request};
+use glam::DVec3;
+use palpate_model::plan::Plan;
+
+/// A plan on a backend, ready to be evaluated for batches of θ.
+pub struct Rollout<B: Backend> {
+    backend: B,
+    world: B::World,
+    plan: Plan,
+    members: usize,
+}
+
+/// One instant of one member, for reports.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Time since the initial state [s].
+    pub time: f64,
+    /// Displacement [m] of every simulation node.
+    pub displacement: Vec<DVec3>,
+    /// Velocity [m/s] of every simulation node.
+    pub velocity: Vec<DVec3>,
+}
+
+impl<B: Backend> Rollout<B> {
+    /// Prepares a plan for up to `members` simulations at once (more are evaluated in turns).
+    pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
+        let world = backend.build(plan, members)?;
+        Ok(Rollout { backend, world, plan: plan.clone(), members: members.max(1) })
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The backend.
+    pub fn backend(&self) -> &B {
+        &self.backend
+    }
+
+    fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        let b = &self.backend;
+        let w = &mut self.world;
+        b.set_params(w, theta);
+        let directions = &request.sensitivities;
+        let mut tally = b.new_tally(w, directions);
+        let steps = self.plan.clock.steps;
+
+        let mut now = b.new_state(w);
+        b.start(w, &mut now, &mut tally);
+        let mut tangent = (!directions.is_empty()).then(|| (b.new_tangent(w, directions), b.new_tangent(w, directions)));
+        if let Some((t, _)) = &mut tangent {
+            b.start_tangent(w, &now, t, &mut tally);
+        }
+        if steps == 0 {
+            b.observe(w, 0, &now, &now, &mut tally);
+            if let Some((t, _)) = &tangent {
+                b.observe_tangent(w, 0, &now, &now, t, t, &mut tally);
+            }
+        }
+        // The tape holds u and v of every step: 48 bytes a node and step in f64; everything else is rebuilt on the way back.
+        let mut tape = Vec::new();
+        for k in 0..steps {
+            if b.all_failed(&tally) {
+                break;
+            }
+            let mut next = b.new_state(w);
+            b.step(w, k, &now, &mut next, &mut tally);
+            b.observe(w, k, &now, &next, &mut tally);
+            if let Some((t, t_next)) = &mut tangent {
+                b.step_tangent(w, k, &now, &next, t, t_next, &mut tally);
+                b.observe_tangent(w, k, &now, &next, t, t_next, &mut tally);
+                std::mem::swap(t, t_next);
+            }
+            let old = std::mem::replace(&mut now, next);
+            if request.gradient {
+                tape.push(old);
+            }
+        }
+
+        if request.gradient && !b.all_failed(&tally) {
+            let mut adj = b.new_adjoint(w);
+            let mut adj_now = b.new_adjoint(w);
+            let mut next = now;
+            if steps == 0 {
+                // `now` and `next` are the same state: both halves of the gradient belong to it.
+                b.observe_adjoint(w, 0, &next, &next, &mut adj, &mut adj_now, &mut tally);
+                b.start_adjoint(w, &next, &adj_now, &mut tally);
+            }
+            for k in (0..steps).rev() {
+                let now = tape.pop().expect("one state per step is on the tape");
+                b.observe_adjoint(w, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
+                b.step_adjoint(w, k, &now, &next, &adj, &mut adj_now, &mut tally);
+                std::mem::swap(&mut adj, &mut adj_now);
+                b.clear_adjoint(&mut adj_now);
+                next = now;
+            }
+            b.start_adjoint(w, &next, &adj, &mut tally);
+        }
+        b.read(w, &tally)
+    }
+
+    /// Simulates one member and hands every state (the initial one first) to `visit` together with the residuals of the
+    /// frames of its step; stops early with the member's failure.
+    pub fn visit(
+        &mut self,
+        theta: &[f64],
+        mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>),
+    ) -> Result<Evaluation, crate::Failure> {
+        let b = &self.backend;
+        let w = &mut self.world;
+        b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+        let mut tally = b.new_tally(w, &[]);
+        let mut now = b.new_state(w);
+        b.start(w, &mut now, &mut tally);
+        let steps = self.plan.clock.steps;
+        let snapshot = |w: &B::World, k: usize, s: &B::State| {
+            let (displacement, velocity) = b.read_state(w, s, 0);
+            Snapshot { time: k as f64 * self.plan.clock.step, displacement, velocity }
+        };
+        if !b.all_failed(&tally) {
+            let residuals = if steps == 0 {
+                b.observe(w, 0, &now, &now, &mut tally);
+                b.residuals(w, 0, &now, &now, 0)
+            } else {
+                Vec::new()
+            };
+            visit(0, snapshot(w, 0, &now), residuals);
+        }
+        for k in 0..steps {
+            if b.all_failed(&tally) {
+                break;
+            }
+            let mut next = b.new_state(w);
+            b.step(w, k, &now, &mut next, &mut tally);
+            if b.all_failed(&tally) {
+                break;
+            }
+            b.observe(w, k, &now, &next, &mut tally);
+            let residuals = b.residuals(w, k, &now, &next, 0);
+            visit(k + 1, snapshot(w, k + 1, &next), residuals);
+            now = next;
+        }
+        let evaluation = b.read(w, &tally).remove(0);
+        match &evaluation.failure {
+            Some(f) => Err(f.clone()),
+            None => Ok(evaluation),
+        }
+    }
+}
+
+impl<B: Backend> Evaluate for Rollout<B> {
+    fn parameters(&self) -> usize {
+        self.plan.layout.len()
+    }
+
+    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        let rows: Vec<Vec<f64>> = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
+        rows.chunks(self.members).flat_map(|rows| self.run(&ParamBatch::from_rows(rows), request)).collect()
+    }
+}

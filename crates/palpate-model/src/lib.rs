@@ -1,0 +1,23 @@
+//! Nouns and laws of palpate, in f64: a body cut out of a grid, its element matrices, contact and
+//! cost laws, the list of parameters, and the [`plan::Plan`] that carries all of them to a backend.
+//!
+//! Invariant: this room knows no files, no device and no solver. Everything in it is either plain
+//! data in SI units or a small function whose derivative is tested beside it.
+
+pub mod body;
+pub mod contact;
+pub mod cut;
+pub mod element;
+pub mod extension;
+pub mod grid;
+pub mod kernel;
+pub mod material;
+pub mod motion;
+pub mod observation;
+pub mod params;
+pub mod plan;
+pub mod rotation;
+pub mod scene;
+pub mod shape;
+
+pub use glam::{DAffine3, DMat3, DQuat, DVec3};
