@@ -115,7 +115,14 @@ pub trait Backend: Send {
     fn read_state(&self, world: &Self::World, state: &Self::State, member: usize) -> (Vec<DVec3>, Vec<DVec3>);
     /// Residual of every observed point and marker of the frames in step k (order of [`Backend::observe`]) of one member:
     /// frame number and signed distance [m] per depth point (`None` = unmatched), vector [m] per marker.
-    fn residuals(&self, world: &Self::World, k: usize, now: &Self::State, next: &Self::State, member: usize) -> Vec<FrameResiduals>;
+    fn residuals(
+        &self,
+        world: &Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        member: usize,
+    ) -> Vec<FrameResiduals>;
 }
 
 /// Residuals of one frame.

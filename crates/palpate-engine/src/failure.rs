@@ -36,7 +36,9 @@ impl FailureKind {
         match self {
             FailureKind::NotFinite => "use a smaller [time] step, or narrower bounds for the parameters named",
             FailureKind::NewtonStalled => "use a smaller [time] step, or set solver.rotation = \"lagged\"",
-            FailureKind::LinearSolve => "set solver.linear = \"cholesky\", use a smaller [time] step, or poisson_ratio further below 0.5",
+            FailureKind::LinearSolve => {
+                "set solver.linear = \"cholesky\", use a smaller [time] step, or poisson_ratio further below 0.5"
+            }
             FailureKind::FellOut => "check gravity, planes and initial velocity, or shorten [time] duration",
             FailureKind::NoEquilibrium => "add a [[clamp]], or start from initial.state = \"rest\"",
             FailureKind::BadParameter => "set bounds for the parameter in [[fit.parameter]]",

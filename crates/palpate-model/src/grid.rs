@@ -3,8 +3,7 @@
 use glam::DVec3;
 
 /// Offsets of the eight corners of a cell; bit 0 of the corner number is +x, bit 1 +y, bit 2 +z.
-pub const CORNERS: [[i32; 3]; 8] =
-    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
+pub const CORNERS: [[i32; 3]; 8] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
 
 /// Signs (−1 or +1 per axis) of the eight corners of a cell, seen from its centre.
 pub const SIGNS: [[f64; 3]; 8] = [

@@ -80,14 +80,22 @@ impl ParamKey {
             PoissonRatio => ("material.poisson_ratio".into(), "1", Logit, -0.5, 0.4999, 0.1, "sideways contraction over stretch"),
             Density => ("material.density".into(), "kg/m³", Log, 1e-3, 1e5, 1e3, "mass per volume"),
             MassDamping => ("material.mass_damping".into(), "1/s", Log, 1e-9, 1e6, 0.1, "Rayleigh damping of slow motion (drag)"),
-            StiffnessDamping => ("material.stiffness_damping".into(), "s", Log, 1e-12, 1e3, 1e-3, "Rayleigh damping of fast vibration"),
+            StiffnessDamping => {
+                ("material.stiffness_damping".into(), "s", Log, 1e-12, 1e3, 1e-3, "Rayleigh damping of fast vibration")
+            }
             Gravity(a) => (format!("world.gravity.{}", AXES[a as usize]), "m/s²", Linear, -inf, inf, 9.81, "gravity"),
-            Velocity(a) => (format!("initial.velocity.{}", AXES[a as usize]), "m/s", Linear, -inf, inf, 1.0, "velocity at the start"),
+            Velocity(a) => {
+                (format!("initial.velocity.{}", AXES[a as usize]), "m/s", Linear, -inf, inf, 1.0, "velocity at the start")
+            }
             AngularVelocity(a) => {
                 (format!("initial.angular_velocity.{}", AXES[a as usize]), "rad/s", Linear, -inf, inf, 1.0, "spin at the start")
             }
-            TimeStart => ("time.start".into(), "s", Linear, -inf, inf, 0.01, "time of the initial state on the recording's clock"),
-            PlaneHeight(i) => (format!("plane.{i}.height"), "m", Linear, -inf, inf, 0.01, "distance of the plane along its normal"),
+            TimeStart => {
+                ("time.start".into(), "s", Linear, -inf, inf, 0.01, "time of the initial state on the recording's clock")
+            }
+            PlaneHeight(i) => {
+                (format!("plane.{i}.height"), "m", Linear, -inf, inf, 0.01, "distance of the plane along its normal")
+            }
             PlaneTheta(i) => (format!("plane.{i}.theta"), "rad", Linear, -inf, inf, 0.1, "polar angle of the plane's normal"),
             PlanePhi(i) => (format!("plane.{i}.phi"), "rad", Linear, -inf, inf, 0.1, "azimuth of the plane's normal"),
             PointMass(i) => (format!("mass.{i}.mass"), "kg", Log, 1e-9, 1e6, 1e-2, "point mass fixed to the body"),

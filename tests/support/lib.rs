@@ -1,0 +1,1 @@
+//! What the tests share: small plans, tolerances with their reasons.
