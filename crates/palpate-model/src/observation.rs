@@ -75,6 +75,17 @@ pub struct ObservedMarker {
     pub position: DVec3,
 }
 
+/// Where a marker sits on the body at rest, as the files say it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkerRest {
+    /// Label in the recording.
+    pub name: String,
+    /// The marker's centre in the rest configuration [m].
+    pub position: DVec3,
+    /// The surface point it is rigidly attached to [m]; `None` = the nearest one.
+    pub surface: Option<DVec3>,
+}
+
 /// A marker that is carried rigidly by the body at its surface point:
 /// `x = Σ position_weights·x_i + R·stalk`, R the rotation of `F = Σ x_i ⊗ gradient_weights`.
 #[derive(Clone, Debug, Default)]

@@ -2,6 +2,7 @@
 //! Reading and writing the TOML is `palpate-io`'s business.
 
 use crate::motion::RigidMotion;
+use crate::observation::MarkerRest;
 use crate::params::Layout;
 use crate::shape::TriMesh;
 use glam::{DAffine3, DVec3};
@@ -294,6 +295,8 @@ pub struct ObservationSpec {
     pub every: usize,
     /// Every n-th pixel per row and column is used.
     pub pixel_stride: usize,
+    /// Rest places of markers that the recording itself does not state.
+    pub markers: Vec<MarkerRest>,
 }
 
 /// Kinds of misfit.
