@@ -6,6 +6,7 @@
 
 pub mod body;
 pub mod contact;
+pub mod corotation;
 pub mod cut;
 pub mod element;
 pub mod extension;
