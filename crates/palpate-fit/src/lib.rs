@@ -1,1 +1,21 @@
-//! Under construction.
+//! Finds the parameters that explain a measurement: charts, optimisers, many starts in one batch, uncertainty.
+//!
+//! Invariant: this room does not know what is simulated, nor how. Of physics it sees [`palpate_engine::Evaluate`] (θ in, cost
+//! and derivatives out) and the transform and typical size of a parameter.
+
+mod chart;
+mod dense;
+mod fit;
+mod multistart;
+mod optimise;
+mod problem;
+mod settings;
+
+pub use chart::{AtBound, Chart};
+pub use fit::{FitError, FitResult, Hooks, Progress, Run, fit};
+pub use optimise::{Outcome, Sample, Search, Status, Stop};
+pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};
+pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance};
+
+#[cfg(test)]
+mod tests;

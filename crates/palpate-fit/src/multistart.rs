@@ -1,0 +1,195 @@
+//! Many starts at once: every start runs an optimiser on its own thread, and a broker gathers what they ask for into batches.
+//!
+//! A round waits until every live start either asks for an evaluation or has ended; the batch is ordered by start. What is
+//! computed, and in which company, therefore depends on the problem and the seed, never on timing.
+
+use crate::chart::Chart;
+use crate::fit::{FitError, Hooks, Progress};
+use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
+use crate::problem::{FreeParameter, Problem};
+use crate::settings::Settings;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// A start whose first evaluation fails is drawn anew so many times.
+const REDRAWS: usize = 4;
+/// Stack of a start's thread; optimisers keep their vectors on the heap.
+const STACK: usize = 1 << 20;
+
+/// One start and what came of it.
+#[derive(Clone, Debug)]
+pub struct StartRun {
+    /// z of the start `[q]`.
+    pub start: Vec<f64>,
+    /// The search from there.
+    pub outcome: Outcome,
+}
+
+enum Message {
+    Evaluate(Vec<f64>),
+    Iteration(usize, f64, Vec<f64>),
+    Done(Box<StartRun>),
+}
+
+/// Draws the start of a run in physical values `[q]`: log-uniform for parameters fitted as logarithms, else uniform.
+pub fn draw(free: &[FreeParameter], charts: &[Chart], rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let one = |(f, c): (&FreeParameter, &Chart)| {
+        let share: f64 = rng.random();
+        let (a, b) = (f.start.0.max(f.bounds.0), f.start.1.min(f.bounds.1));
+        if c.is_log() { (a.ln() + share * (b.ln() - a.ln())).exp().clamp(a, b) } else { a + share * (b - a) }
+    };
+    free.iter().zip(charts).map(one).collect()
+}
+
+/// The scene's own values where they lie in the start range, the drawn ones elsewhere.
+fn first_start(free: &[FreeParameter], own: &[f64], drawn: Vec<f64>) -> Vec<f64> {
+    let inside = |f: &FreeParameter, v: f64| v >= f.start.0.max(f.bounds.0) && v <= f.start.1.min(f.bounds.1);
+    drawn.into_iter().enumerate().map(|(i, v)| if inside(&free[i], own[i]) { own[i] } else { v }).collect()
+}
+
+/// What one start needs to know.
+struct Runner<'a> {
+    number: usize,
+    free: &'a [FreeParameter],
+    charts: &'a [Chart],
+    own: &'a [f64],
+    lower: &'a [f64],
+    upper: &'a [f64],
+    settings: &'a Settings,
+}
+
+impl Runner<'_> {
+    fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Sample, Stop>>) -> StartRun {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        rng.set_stream(self.number as u64);
+        let fixed = self.free.iter().all(|f| f.start.0 == f.start.1);
+        let mut spent = 0;
+        let mut attempt = 0;
+        loop {
+            let mut values = draw(self.free, self.charts, &mut rng);
+            if self.number == 0 && attempt == 0 {
+                values = first_start(self.free, self.own, values);
+            }
+            let start: Vec<f64> = self.charts.iter().zip(&values).map(|(c, &v)| c.coordinate(v)).collect();
+            let mut evaluate = |z: &[f64]| {
+                let sent = tell.send((self.number, Message::Evaluate(z.to_vec())));
+                // A broker that is gone cannot answer any more: the same as an interruption.
+                sent.map_err(|_| Stop::Interrupted)?;
+                answers.recv().unwrap_or(Err(Stop::Interrupted))
+            };
+            let mut progress = |n: usize, cost: f64, z: &[f64]| {
+                // Without a broker nobody listens, and the next evaluation ends the search.
+                let _ = tell.send((self.number, Message::Iteration(n, cost, z.to_vec())));
+            };
+            let search = Search::new(&mut evaluate, &mut progress, self.lower, self.upper, self.settings);
+            let mut outcome = search.run(self.settings.optimizer, &start);
+            spent += outcome.evaluations;
+            attempt += 1;
+            let lost = matches!(outcome.status, Status::Failed(_)) && outcome.cost.is_infinite();
+            if lost && attempt <= REDRAWS && !fixed {
+                continue;
+            }
+            outcome.evaluations = spent;
+            return StartRun { start, outcome };
+        }
+    }
+}
+
+/// Runs all starts; the result is ordered by start.
+pub fn run(problem: &mut Problem, settings: &Settings, hooks: &mut Hooks) -> Result<Vec<StartRun>, FitError> {
+    let free = problem.free().to_vec();
+    let charts = problem.charts().to_vec();
+    let own = problem.own_values();
+    let (lower, upper): (Vec<f64>, Vec<f64>) = charts.iter().map(Chart::range).unzip();
+    // Fixed starts are all the same.
+    let starts = if free.iter().all(|f| f.start.0 == f.start.1) { 1 } else { settings.starts.max(1) };
+
+    std::thread::scope(|scope| {
+        let (tell, inbox) = channel();
+        let mut lines = Vec::new();
+        for number in 0..starts {
+            let (answer, answers) = channel();
+            let tell = tell.clone();
+            let runner = Runner { number, free: &free, charts: &charts, own: &own, lower: &lower, upper: &upper, settings };
+            let work = move || {
+                let run = std::panic::AssertUnwindSafe(|| runner.run(&tell, &answers));
+                match std::panic::catch_unwind(run) {
+                    Ok(done) => drop(tell.send((number, Message::Done(Box::new(done))))),
+                    Err(panic) => {
+                        // The broker must not wait for this start; the panic itself surfaces at the end of the scope.
+                        let outcome = Outcome {
+                            z: Vec::new(),
+                            cost: f64::INFINITY,
+                            start_cost: f64::INFINITY,
+                            iterations: 0,
+                            evaluations: 0,
+                            status: Status::Failed("the optimiser broke off".into()),
+                        };
+                        let run = StartRun { start: Vec::new(), outcome };
+                        drop(tell.send((number, Message::Done(Box::new(run)))));
+                        std::panic::resume_unwind(panic);
+                    }
+                }
+            };
+            std::thread::Builder::new()
+                .stack_size(STACK)
+                .spawn_scoped(scope, work)
+                .map_err(|e| FitError::Threads(format!("start {number} got no thread: {e}")))?;
+            lines.push(answer);
+        }
+        drop(tell);
+        broker(problem, settings, hooks, &inbox, &lines)
+    })
+}
+
+/// Serves the starts until all have ended.
+fn broker(
+    problem: &mut Problem,
+    settings: &Settings,
+    hooks: &mut Hooks,
+    inbox: &Receiver<(usize, Message)>,
+    answers: &[Sender<Result<Sample, Stop>>],
+) -> Result<Vec<StartRun>, FitError> {
+    let starts = answers.len();
+    let mut done: Vec<Option<StartRun>> = vec![None; starts];
+    let mut asked: Vec<Option<Vec<f64>>> = vec![None; starts];
+    loop {
+        let mut heard: Vec<(usize, usize, f64, Vec<f64>)> = Vec::new();
+        while (0..starts).any(|s| done[s].is_none() && asked[s].is_none()) {
+            let Ok((s, message)) = inbox.recv() else {
+                return Err(FitError::Threads("a start ended without a result".into()));
+            };
+            match message {
+                Message::Evaluate(z) => asked[s] = Some(z),
+                Message::Iteration(n, cost, z) => heard.push((s, n, cost, z)),
+                Message::Done(run) => done[s] = Some(*run),
+            }
+        }
+        // Messages of one start come in order; a stable sort puts the starts in order.
+        heard.sort_by_key(|h| h.0);
+        for (start, iteration, cost, z) in heard {
+            if let Some(f) = &mut hooks.on_iteration {
+                f(&Progress { start, iteration, cost, values: problem.values(&z) });
+            }
+        }
+        let live: Vec<usize> = (0..starts).filter(|&s| asked[s].is_some()).collect();
+        if live.is_empty() {
+            return Ok(done.into_iter().flatten().collect());
+        }
+        if hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)) {
+            for s in live {
+                asked[s] = None;
+                let _ = answers[s].send(Err(Stop::Interrupted));
+            }
+            continue;
+        }
+        let z: Vec<Vec<f64>> = live.iter().filter_map(|&s| asked[s].take()).collect();
+        let samples = problem.evaluate(&z, want(settings.optimizer));
+        for (&s, sample) in live.iter().zip(samples) {
+            // A start that no longer listens has ended and said so.
+            let _ = answers[s].send(Ok(sample));
+        }
+    }
+}

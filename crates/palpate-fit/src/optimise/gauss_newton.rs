@@ -1,0 +1,93 @@
+//! Gauss–Newton with Levenberg–Marquardt damping in a box.
+//!
+//! Damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed. 2004,
+//! eq. 2.21 and algorithm 3.16). A step may also not exceed a length in z: parameters far from their optimum otherwise jump
+//! into regions where a simulation fails.
+
+use super::{Sample, Search, Status, Stop};
+use crate::dense::{box_step, dot, max_abs};
+
+/// Damping relative to the largest diagonal entry at the start.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Added to the diagonal, relative to its largest entry, so that undetermined directions stay put.
+const FLOOR: f64 = 1e-12;
+/// If an undamped step promises less than this share of the cost, rejections come from the accuracy of the cost itself.
+const COST_NOISE: f64 = 1e-5;
+
+pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
+    let q = z.len();
+    let tolerance = search.settings.tolerance.clone();
+    let mut damping = None;
+    let mut growth = 2.0;
+    let mut longest = search.settings.max_step;
+    loop {
+        if at.curvature.len() != q * q {
+            return Ok(Status::Failed("no sensitivities were computed".into()));
+        }
+        if search.is_flat(&z, &at) {
+            return Ok(Status::Converged);
+        }
+        if search.out_of_iterations() {
+            return Ok(Status::IterationLimit);
+        }
+        let scale = (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i]));
+        if scale <= 0.0 {
+            return Ok(Status::Stalled);
+        }
+        let lambda = *damping.get_or_insert(FIRST_DAMPING * scale);
+        let Some(p) = step(search, &z, &at, lambda + FLOOR * scale, longest) else {
+            damping = Some(lambda.max(FLOOR * scale) * growth);
+            growth *= 2.0;
+            if growth > 1e30 {
+                return Ok(Status::Stalled);
+            }
+            continue;
+        };
+        let length = max_abs(&p);
+        let promised = promise(&at, &p);
+        if length <= tolerance.step || promised <= tolerance.cost * at.cost {
+            return Ok(if settled(search, &z, &at, scale) { Status::Converged } else { Status::Stalled });
+        }
+        let trial_z = search.project(&(0..q).map(|i| z[i] + p[i]).collect::<Vec<_>>());
+        let trial = search.evaluate(&trial_z)?;
+        if trial.cost < at.cost {
+            let ratio = (at.cost - trial.cost) / promised;
+            damping = Some(lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0));
+            growth = 2.0;
+            if ratio > 0.75 {
+                longest = (2.0 * longest).min(search.settings.max_step);
+            }
+            z = trial_z;
+            at = trial;
+        } else {
+            damping = Some(lambda * growth);
+            growth *= 2.0;
+            // A failure says nothing about the curvature, only that the step was too long.
+            longest = length * if trial.failure.is_some() { 0.25 } else { 0.5 };
+        }
+        search.iterated(at.cost, &z);
+    }
+}
+
+/// Minimiser of the damped model within the box and the longest step.
+fn step(search: &Search, z: &[f64], at: &Sample, damping: f64, longest: f64) -> Option<Vec<f64>> {
+    let q = z.len();
+    let mut h = at.curvature.clone();
+    (0..q).for_each(|i| h[i * q + i] += damping);
+    let lower: Vec<f64> = (0..q).map(|i| (search.lower[i] - z[i]).clamp(-longest, 0.0)).collect();
+    let upper: Vec<f64> = (0..q).map(|i| (search.upper[i] - z[i]).clamp(0.0, longest)).collect();
+    box_step(&h, &at.gradient, &lower, &upper)
+}
+
+/// Decrease that the undamped model promises for a step.
+fn promise(at: &Sample, p: &[f64]) -> f64 {
+    let q = p.len();
+    let hp: Vec<f64> = (0..q).map(|i| dot(&at.curvature[i * q..(i + 1) * q], p)).collect();
+    -dot(&at.gradient, p) - 0.5 * dot(p, &hp)
+}
+
+/// True if even a free step would gain next to nothing.
+fn settled(search: &Search, z: &[f64], at: &Sample, scale: f64) -> bool {
+    let full = step(search, z, at, 1e-9 * scale, search.settings.max_step);
+    full.is_some_and(|p| max_abs(&p) <= search.settings.tolerance.step || promise(at, &p) <= COST_NOISE * at.cost)
+}

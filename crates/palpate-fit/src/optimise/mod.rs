@@ -1,0 +1,206 @@
+//! Optimisers over z: each walks a [`Search`], which counts, guards against failures and keeps the best point.
+
+mod gauss_newton;
+
+use crate::dense::max_abs;
+use crate::problem::Want;
+use crate::settings::Settings;
+use palpate_model::scene::Optimizer;
+
+/// Cost and derivatives at one point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Cost, infinite if it could not be computed.
+    pub cost: f64,
+    /// Gradient `[q]`; empty unless requested.
+    pub gradient: Vec<f64>,
+    /// Gauss–Newton matrix `[q, q]`, row-major; empty unless requested.
+    pub curvature: Vec<f64>,
+    /// Scalar residuals in all scenes.
+    pub residuals: usize,
+    /// Why there is no cost.
+    pub failure: Option<String>,
+}
+
+impl Sample {
+    /// A point where the cost could not be computed.
+    pub fn failed(why: String) -> Sample {
+        Sample { cost: f64::INFINITY, failure: Some(why), ..Sample::default() }
+    }
+
+    /// Multiplies cost and derivatives by one number.
+    pub fn scale(&mut self, by: f64) {
+        self.cost *= by;
+        self.gradient.iter_mut().chain(&mut self.curvature).for_each(|x| *x *= by);
+    }
+
+    /// Chain rule for a change of variable along each axis.
+    pub fn scale_axes(&mut self, slopes: &[f64]) {
+        let q = slopes.len();
+        self.gradient.iter_mut().zip(slopes).for_each(|(g, s)| *g *= s);
+        for (k, x) in self.curvature.iter_mut().enumerate() {
+            *x *= slopes[k / q] * slopes[k % q];
+        }
+    }
+}
+
+/// Why no sample came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The fit is to end now.
+    Interrupted,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// A stopping criterion was met.
+    Converged,
+    /// The iterations were used up.
+    IterationLimit,
+    /// No better point could be found although no criterion was met.
+    Stalled,
+    /// The start could not be evaluated, or the run broke off.
+    Failed(String),
+    /// The fit was interrupted.
+    Interrupted,
+}
+
+impl Status {
+    /// Name in result files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Status::Converged => "converged",
+            Status::IterationLimit => "iteration-limit",
+            Status::Stalled => "stalled",
+            Status::Failed(_) => "failed",
+            Status::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// What an optimiser asks for at every point.
+pub fn want(optimizer: Optimizer) -> Want {
+    match optimizer {
+        Optimizer::GaussNewton => Want::Curvature,
+        Optimizer::NelderMead => Want::Cost,
+        Optimizer::Rprop | Optimizer::GradientDescent | Optimizer::Lbfgs => Want::Gradient,
+    }
+}
+
+/// A search from one start.
+pub struct Search<'a> {
+    evaluate: &'a mut dyn FnMut(&[f64]) -> Result<Sample, Stop>,
+    progress: &'a mut dyn FnMut(usize, f64, &[f64]),
+    /// Smallest z `[q]`; may be −∞.
+    pub lower: &'a [f64],
+    /// Largest z `[q]`; may be ∞.
+    pub upper: &'a [f64],
+    /// Limits and tolerances.
+    pub settings: &'a Settings,
+    best: Option<(Vec<f64>, f64)>,
+    start_cost: f64,
+    evaluations: usize,
+    iterations: usize,
+}
+
+/// What a search found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Best point `[q]`.
+    pub z: Vec<f64>,
+    /// Its cost; infinite if no point could be evaluated.
+    pub cost: f64,
+    /// Cost at the start.
+    pub start_cost: f64,
+    /// Iterations done.
+    pub iterations: usize,
+    /// Evaluations used.
+    pub evaluations: usize,
+    /// How it ended.
+    pub status: Status,
+}
+
+impl<'a> Search<'a> {
+    /// A search in a box of z; `evaluate` gives samples, `progress` hears of every iteration (number, cost, z).
+    pub fn new(
+        evaluate: &'a mut dyn FnMut(&[f64]) -> Result<Sample, Stop>,
+        progress: &'a mut dyn FnMut(usize, f64, &[f64]),
+        lower: &'a [f64],
+        upper: &'a [f64],
+        settings: &'a Settings,
+    ) -> Search<'a> {
+        Search {
+            evaluate,
+            progress,
+            lower,
+            upper,
+            settings,
+            best: None,
+            start_cost: f64::INFINITY,
+            evaluations: 0,
+            iterations: 0,
+        }
+    }
+
+    /// Runs an optimiser from `z`.
+    pub fn run(mut self, optimizer: Optimizer, z: &[f64]) -> Outcome {
+        let start = self.project(z);
+        let status = match self.evaluate(&start) {
+            Err(Stop::Interrupted) => Status::Interrupted,
+            Ok(Sample { failure: Some(why), .. }) => Status::Failed(why),
+            Ok(first) => {
+                self.start_cost = first.cost;
+                (self.progress)(0, first.cost, &start);
+                let walk = match optimizer {
+                    Optimizer::GaussNewton => gauss_newton::minimise(&mut self, start.clone(), first),
+                    other => Ok(Status::Failed(format!("the optimiser {other:?} is not available yet"))),
+                };
+                walk.unwrap_or(Status::Interrupted)
+            }
+        };
+        let (z, cost) = self.best.unwrap_or((start, f64::INFINITY));
+        let Search { start_cost, iterations, evaluations, .. } = self;
+        Outcome { z, cost, start_cost, iterations, evaluations, status }
+    }
+
+    /// Evaluates a point. Whatever is not a number counts as a failed point with infinite cost.
+    fn evaluate(&mut self, z: &[f64]) -> Result<Sample, Stop> {
+        let mut sample = (self.evaluate)(z)?;
+        self.evaluations += 1;
+        if sample.failure.is_none() {
+            let derivatives = sample.gradient.iter().chain(&sample.curvature);
+            if !sample.cost.is_finite() || derivatives.into_iter().any(|x| !x.is_finite()) {
+                sample = Sample::failed("the cost or its derivatives are not finite".into());
+            } else if self.best.as_ref().is_none_or(|(_, cost)| sample.cost < *cost) {
+                self.best = Some((z.to_vec(), sample.cost));
+            }
+        }
+        Ok(sample)
+    }
+
+    /// Counts an iteration that ended at z.
+    fn iterated(&mut self, cost: f64, z: &[f64]) {
+        self.iterations += 1;
+        (self.progress)(self.iterations, cost, z);
+    }
+
+    fn out_of_iterations(&self) -> bool {
+        self.iterations >= self.settings.iterations
+    }
+
+    fn project(&self, z: &[f64]) -> Vec<f64> {
+        (0..z.len()).map(|i| z[i].clamp(self.lower[i], self.upper[i])).collect()
+    }
+
+    /// Gradient without the parts that push against a bound.
+    fn projected_gradient(&self, z: &[f64], g: &[f64]) -> Vec<f64> {
+        let against = |i: usize| (g[i] > 0.0 && z[i] <= self.lower[i]) || (g[i] < 0.0 && z[i] >= self.upper[i]);
+        (0..z.len()).map(|i| if against(i) { 0.0 } else { g[i] }).collect()
+    }
+
+    /// True where moving z by one would change the cost by no more than `tolerance.gradient` of itself.
+    fn is_flat(&self, z: &[f64], sample: &Sample) -> bool {
+        max_abs(&self.projected_gradient(z, &sample.gradient)) <= self.settings.tolerance.gradient * sample.cost.abs()
+    }
+}

@@ -1,0 +1,234 @@
+//! What is fitted to what: free parameters, and the scenes that share them.
+
+use crate::chart::Chart;
+use crate::optimise::Sample;
+use palpate_engine::{Evaluate, ParamBatch, Request};
+use palpate_model::params::Transform;
+
+/// Where a free parameter acts: `theta[scene][place] = value · factor`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slot {
+    /// Number of the scene in [`Problem::scenes`].
+    pub scene: usize,
+    /// Place in that scene's θ.
+    pub place: usize,
+    /// θ per unit of the parameter: 1, or a change of variable such as 1/volume for `material.mass` over density.
+    pub factor: f64,
+}
+
+/// One free number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeParameter {
+    /// Path as the user wrote it.
+    pub path: String,
+    /// SI unit, `1` for none.
+    pub unit: String,
+    /// How optimisers see it.
+    pub transform: Transform,
+    /// A size at which it matters, positive.
+    pub typical: f64,
+    /// Allowed range.
+    pub bounds: (f64, f64),
+    /// Where starts are drawn from; equal ends fix the start.
+    pub start: (f64, f64),
+    /// Places that follow it; at least one.
+    pub slots: Vec<Slot>,
+}
+
+/// One scene of a joint fit.
+pub struct FitScene<'a> {
+    /// Name for messages.
+    pub name: String,
+    /// Identifies what stands behind `evaluate` (recording, frames, grid), so that a journal of another problem is refused.
+    pub fingerprint: String,
+    /// θ with the scene's own values `[P]`.
+    pub base: Vec<f64>,
+    /// The physics.
+    pub evaluate: Box<dyn Evaluate + 'a>,
+}
+
+/// What a round of evaluations asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Want {
+    /// Cost alone.
+    Cost,
+    /// Cost and adjoint gradient.
+    Gradient,
+    /// Cost, and gradient and Gauss–Newton curvature from forward sensitivities.
+    Curvature,
+}
+
+/// A joint fit of one or more scenes. Its cost is `Σ n_s J_s / Σ n_s` with n_s the residual count of scene s, so that every
+/// residual counts once.
+pub struct Problem<'a> {
+    scenes: Vec<FitScene<'a>>,
+    free: Vec<FreeParameter>,
+    charts: Vec<Chart>,
+}
+
+impl<'a> Problem<'a> {
+    /// Checks a problem; the error names the parameter or scene and says what is allowed.
+    pub fn new(scenes: Vec<FitScene<'a>>, free: Vec<FreeParameter>) -> Result<Problem<'a>, String> {
+        if free.is_empty() {
+            return Err("nothing to fit: no free parameter is given".into());
+        }
+        for s in &scenes {
+            let p = s.evaluate.parameters();
+            if s.base.len() != p {
+                return Err(format!("scene {}: θ has {} values, {p} are expected", s.name, s.base.len()));
+            }
+        }
+        let mut charts = Vec::new();
+        let mut taken = Vec::new();
+        for f in &free {
+            let wrong = |message: String| format!("parameter {}: {message}", f.path);
+            charts.push(Chart::new(f.transform, f.typical, f.bounds.0, f.bounds.1).map_err(wrong)?);
+            let (a, b) = f.start;
+            if !(a.is_finite() && b.is_finite() && a <= b) {
+                return Err(wrong(format!("start [{a}, {b}] must be two finite numbers, the smaller one first")));
+            }
+            if b < f.bounds.0 || a > f.bounds.1 {
+                return Err(wrong(format!("start [{a}, {b}] lies outside the bounds [{}, {}]", f.bounds.0, f.bounds.1)));
+            }
+            if f.slots.is_empty() {
+                return Err(wrong("it acts on no scene".into()));
+            }
+            for s in &f.slots {
+                let scene = scenes.get(s.scene).ok_or_else(|| wrong(format!("scene number {} does not exist", s.scene)))?;
+                if s.place >= scene.base.len() {
+                    return Err(wrong(format!("place {} is not in θ of scene {}", s.place, scene.name)));
+                }
+                if !(s.factor.is_finite() && s.factor != 0.0) {
+                    return Err(wrong(format!("factor {} must be finite and not zero", s.factor)));
+                }
+                if taken.contains(&(s.scene, s.place)) {
+                    return Err(wrong("another free parameter already sets the same number".into()));
+                }
+                taken.push((s.scene, s.place));
+            }
+        }
+        Ok(Problem { scenes, free, charts })
+    }
+
+    /// Free parameters `[q]`.
+    pub fn free(&self) -> &[FreeParameter] {
+        &self.free
+    }
+
+    /// Charts of the free parameters `[q]`.
+    pub fn charts(&self) -> &[Chart] {
+        &self.charts
+    }
+
+    /// The scenes.
+    pub fn scenes(&self) -> &[FitScene<'a>] {
+        &self.scenes
+    }
+
+    /// Physical values `[q]` at z `[q]`.
+    pub fn values(&self, z: &[f64]) -> Vec<f64> {
+        self.charts.iter().zip(z).map(|(c, &z)| c.value(z)).collect()
+    }
+
+    /// The scenes' own values `[q]` of the free parameters (of the first scene that has each).
+    pub fn own_values(&self) -> Vec<f64> {
+        self.free.iter().map(|f| f.slots[0]).map(|s| self.scenes[s.scene].base[s.place] / s.factor).collect()
+    }
+
+    /// θ of one scene with the free parameters at `values` `[q]`.
+    pub fn theta(&self, scene: usize, values: &[f64]) -> Vec<f64> {
+        let mut theta = self.scenes[scene].base.clone();
+        for (f, v) in self.free.iter().zip(values) {
+            for s in f.slots.iter().filter(|s| s.scene == scene) {
+                theta[s.place] = v * s.factor;
+            }
+        }
+        theta
+    }
+
+    /// Cost and derivatives by the free parameters at each row of physical values `[B][q]`.
+    pub fn evaluate_values(&mut self, values: &[Vec<f64>], want: Want) -> Vec<Sample> {
+        let q = self.free.len();
+        let mut sums: Vec<Sample> = values
+            .iter()
+            .map(|_| Sample {
+                gradient: if want == Want::Cost { Vec::new() } else { vec![0.0; q] },
+                curvature: if want == Want::Curvature { vec![0.0; q * q] } else { Vec::new() },
+                ..Sample::default()
+            })
+            .collect();
+        let mut weights = vec![0.0; values.len()];
+        for s in 0..self.scenes.len() {
+            // A member that failed in one scene is not worth simulating in the next.
+            let live: Vec<usize> = (0..values.len()).filter(|&b| sums[b].failure.is_none()).collect();
+            if live.is_empty() {
+                break;
+            }
+            let slots: Vec<(usize, Slot)> = (0..q)
+                .flat_map(|i| self.free[i].slots.iter().map(move |slot| (i, *slot)))
+                .filter(|(_, slot)| slot.scene == s)
+                .collect();
+            let mut places: Vec<usize> = slots.iter().map(|(_, slot)| slot.place).collect();
+            places.sort_unstable();
+            let request = Request {
+                gradient: want == Want::Gradient,
+                sensitivities: if want == Want::Curvature { places.clone() } else { Vec::new() },
+            };
+            let rows: Vec<Vec<f64>> = live.iter().map(|&b| self.theta(s, &values[b])).collect();
+            let results = self.scenes[s].evaluate.evaluate(&ParamBatch::from_rows(&rows), &request);
+            for (&b, e) in live.iter().zip(&results) {
+                let sum = &mut sums[b];
+                if e.failure.is_some() || !e.cost.is_finite() {
+                    let why = e.failure.as_ref().map_or("the cost is not finite".into(), |f| f.to_string());
+                    *sum = Sample::failed(format!("{}: {why}", self.scenes[s].name));
+                    continue;
+                }
+                // Physics that counts no residuals (an analytic cost) weighs as one.
+                let n = e.residuals.max(1) as f64;
+                weights[b] += n;
+                sum.residuals += e.residuals;
+                sum.cost += n * e.cost;
+                if want == Want::Gradient {
+                    for (i, slot) in &slots {
+                        sum.gradient[*i] += n * slot.factor * e.gradient[slot.place];
+                    }
+                }
+                if want == Want::Curvature && !slots.is_empty() {
+                    let Some(c) = &e.curvature else {
+                        *sum = Sample::failed(format!("{}: no sensitivities were computed", self.scenes[s].name));
+                        continue;
+                    };
+                    let at = |place: usize| places.partition_point(|&p| p < place);
+                    for (i, a) in &slots {
+                        sum.gradient[*i] += n * a.factor * c.gradient[at(a.place)];
+                        for (j, b) in &slots {
+                            let entry = c.matrix[at(a.place) * places.len() + at(b.place)];
+                            sum.curvature[i * q + j] += n * a.factor * b.factor * entry;
+                        }
+                    }
+                }
+            }
+            for &b in live.iter().skip(results.len()) {
+                sums[b] = Sample::failed(format!("{}: the backend returned no result", self.scenes[s].name));
+            }
+        }
+        for (sum, n) in sums.iter_mut().zip(weights) {
+            if sum.failure.is_none() {
+                sum.scale(1.0 / n);
+            }
+        }
+        sums
+    }
+
+    /// Cost and derivatives by z at each row of z `[B][q]`; the curvature is the Gauss–Newton one (the chart's second
+    /// derivative times the gradient is left out, as it vanishes at the optimum).
+    pub fn evaluate(&mut self, z: &[Vec<f64>], want: Want) -> Vec<Sample> {
+        let values: Vec<Vec<f64>> = z.iter().map(|z| self.values(z)).collect();
+        let mut samples = self.evaluate_values(&values, want);
+        for (sample, z) in samples.iter_mut().zip(z) {
+            let slopes: Vec<f64> = self.charts.iter().zip(z).map(|(c, &z)| c.slope(z)).collect();
+            sample.scale_axes(&slopes);
+        }
+        samples
+    }
+}

@@ -1,0 +1,4 @@
+//! Tests on cheap physics.
+
+mod fits;
+mod models;
