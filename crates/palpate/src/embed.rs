@@ -1,0 +1,162 @@
+//! A fine surface carried by the coarse grid: points of the rest configuration as weights of simulation nodes.
+
+use glam::DVec3;
+use palpate_model::body::Body;
+use palpate_model::grid::shape_functions;
+
+/// Points of the rest configuration that follow the simulation's nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Embedding {
+    /// Rest positions [m], shape `[V]`.
+    pub rest: Vec<DVec3>,
+    /// Nodes of each point's cell, shape `[V]`.
+    pub nodes: Vec<[u32; 8]>,
+    /// Shape functions at each point, shape `[V]`; they sum to one.
+    pub weights: Vec<[f64; 8]>,
+    /// Largest distance of a point from the cell that carries it [m]; zero when all lie in active cells.
+    pub farthest: f64,
+}
+
+impl Embedding {
+    /// Finds the active cell of every point. A point outside all of them follows the nearest one, whose trilinear field is
+    /// continued to it (exact for affine motion).
+    pub fn new(body: &Body, rest: Vec<DVec3>) -> Embedding {
+        let grid = &body.grid;
+        let mut cell_at = vec![u32::MAX; grid.len()];
+        for (number, cell) in body.cells.iter().enumerate() {
+            cell_at[grid.index(cell.lattice)] = number as u32;
+        }
+        let mut farthest: f64 = 0.0;
+        let (mut nodes, mut weights) = (Vec::with_capacity(rest.len()), Vec::with_capacity(rest.len()));
+        for p in &rest {
+            let (number, distance) = nearest_cell(body, &cell_at, *p);
+            farthest = farthest.max(distance);
+            let cell = &body.cells[number];
+            nodes.push(cell.nodes);
+            weights.push(shape_functions((*p - grid.position(cell.lattice)) / grid.h));
+        }
+        Embedding { rest, nodes, weights, farthest }
+    }
+
+    /// Deformed positions [m] of the points at node displacements `[N]` [m].
+    pub fn deform(&self, displacement: &[DVec3]) -> Vec<DVec3> {
+        self.rest.iter().zip(self.carry(displacement)).map(|(x, u)| x + u).collect()
+    }
+
+    /// Values of a node field `[N]` at the points.
+    pub fn carry<'a>(&'a self, field: &'a [DVec3]) -> impl Iterator<Item = DVec3> + 'a {
+        self.nodes
+            .iter()
+            .zip(&self.weights)
+            .map(|(n, w)| n.iter().zip(w).fold(DVec3::ZERO, |s, (n, w)| s + field[*n as usize] * *w))
+    }
+}
+
+/// Number of the active cell nearest to a point, and its distance [m]; the lowest number among equals.
+fn nearest_cell(body: &Body, cell_at: &[u32], p: DVec3) -> (usize, f64) {
+    let grid = &body.grid;
+    let distance = |number: usize| {
+        let low = grid.position(body.cells[number].lattice);
+        (p - p.clamp(low, low + DVec3::splat(grid.h))).length()
+    };
+    if let Some((ijk, _)) = grid.locate(p) {
+        let own = cell_at[grid.index(ijk)];
+        if own != u32::MAX {
+            return (own as usize, 0.0);
+        }
+        // Rings of cells around the point's own, until no farther ring can hold a nearer one.
+        let reach = *grid.size.iter().max().expect("a grid has three sides");
+        let mut best: Option<(usize, f64)> = None;
+        for ring in 1..=reach {
+            if best.is_some_and(|(_, d)| d <= (ring as f64 - 1.0) * grid.h) {
+                break;
+            }
+            let range = |a: usize| ijk[a].saturating_sub(ring)..=(ijk[a] + ring).min(grid.size[a] - 1);
+            for k in range(2) {
+                for j in range(1) {
+                    for i in range(0) {
+                        let on_ring = [i, j, k].iter().zip(ijk).any(|(c, o)| c.abs_diff(o) == ring);
+                        let number = cell_at[grid.index([i, j, k])];
+                        if !on_ring || number == u32::MAX {
+                            continue;
+                        }
+                        let d = distance(number as usize);
+                        if best.is_none_or(|(n, e)| d < e || (d == e && (number as usize) < n)) {
+                            best = Some((number as usize, d));
+                        }
+                    }
+                }
+            }
+        }
+        if let Some(best) = best {
+            return best;
+        }
+    }
+    // Outside the lattice altogether: look at every cell.
+    (0..body.cells.len()).map(|n| (n, distance(n))).min_by(|a, b| a.1.total_cmp(&b.1)).expect("a body has at least one cell")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+    use palpate_model::body::{Band, Cell};
+    use palpate_model::grid::{CORNERS, Grid};
+
+    /// Two cells in a row, side 0.1.
+    fn body() -> Body {
+        let grid = Grid { offset: [-2, -2, -2], size: [8, 6, 6], h: 0.1 };
+        let mut nodes = Vec::new();
+        let mut number = std::collections::BTreeMap::new();
+        let mut cells = Vec::new();
+        for i in 0..2 {
+            let lattice = [2 + i, 2, 2];
+            let nodes = CORNERS.map(|c| {
+                let ijk = [0, 1, 2].map(|a| lattice[a] + c[a] as usize);
+                *number.entry(ijk).or_insert_with(|| {
+                    nodes.push(grid.position(ijk));
+                    nodes.len() as u32 - 1
+                })
+            });
+            cells.push(Cell { lattice, nodes, fraction: 1.0, weights: [1.0 / 27.0; 27] });
+        }
+        Body {
+            node_volume: vec![0.0; nodes.len()],
+            nodes,
+            grid,
+            cells,
+            patches: vec![],
+            ghosts: vec![],
+            band: Band::default(),
+            volume: 0.002,
+            area: 0.1,
+            center: DVec3::new(0.1, 0.05, 0.05),
+        }
+    }
+
+    #[test]
+    fn affine_motion_is_carried_exactly_inside_and_outside_the_cells() {
+        let body = body();
+        let points = vec![
+            DVec3::new(0.03, 0.05, 0.09),
+            DVec3::new(0.17, 0.0, 0.1),
+            DVec3::new(0.21, 0.12, -0.01),
+            DVec3::new(0.9, 0.0, 0.0),
+        ];
+        let f = DMat3::from_cols_array(&[1.2, 0.3, -0.1, 0.0, 0.9, 0.2, 0.1, 0.0, 1.1]);
+        let e = Embedding::new(&body, points.clone());
+        let u: Vec<DVec3> = body.nodes.iter().map(|x| f * *x - *x + DVec3::X).collect();
+        for (p, x) in points.iter().zip(e.deform(&u)) {
+            // Rounding only; the last point lies seven cells away, which amplifies it.
+            assert!((f * *p + DVec3::X - x).length() < 1e-12);
+        }
+        assert!((e.farthest - 0.7).abs() < 1e-12, "{}", e.farthest);
+    }
+
+    #[test]
+    fn a_point_outside_takes_the_nearest_cell() {
+        let e = Embedding::new(&body(), vec![DVec3::new(0.12, 0.13, 0.05), DVec3::new(0.08, 0.13, 0.05)]);
+        assert_eq!((e.nodes[0], e.nodes[1]), (body().cells[1].nodes, body().cells[0].nodes));
+        assert!((e.farthest - 0.03).abs() < 1e-12);
+    }
+}
