@@ -1,1 +1,17 @@
-//! Under construction.
+//! Scenes, recordings and meshes from files to checked model types, and back.
+//!
+//! Invariant: everything that leaves this room is in SI units, finite and within its documented range; everything
+//! that is wrong with a file is said here, once, with file, line, key, what is wrong and what is allowed. This room does
+//! not know grids, solvers or optimisers.
+
+mod document;
+mod error;
+mod keys;
+mod rigid;
+
+pub mod mesh;
+pub mod scene;
+
+pub use error::{InputError, Loaded, OutputError};
+pub use mesh::read_mesh;
+pub use scene::{parse_scene, read_scene, write_scene};

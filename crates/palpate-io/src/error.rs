@@ -1,0 +1,81 @@
+//! What can be wrong with files, in one line each.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Something is wrong with an input file. Displays as one line: `file:line: key: what is wrong and what is allowed`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputError {
+    /// The file, as it was named.
+    pub file: PathBuf,
+    /// Line in the file, counted from 1, where there is one.
+    pub line: Option<usize>,
+    /// Dotted path of the key in the file; empty when the whole file is meant.
+    pub key: String,
+    /// What is wrong and what is allowed.
+    pub message: String,
+}
+
+impl InputError {
+    /// An error about a whole file.
+    pub fn file(file: impl AsRef<Path>, message: impl Into<String>) -> InputError {
+        InputError { file: file.as_ref().to_path_buf(), line: None, key: String::new(), message: message.into() }
+    }
+
+    /// An error about one line (from 1) of a file without keys.
+    pub fn line(file: impl AsRef<Path>, line: usize, message: impl Into<String>) -> InputError {
+        InputError { line: Some(line), ..InputError::file(file, message) }
+    }
+
+    /// An error of the operating system.
+    pub(crate) fn io(file: impl AsRef<Path>, cause: &std::io::Error) -> InputError {
+        let what = match cause.kind() {
+            std::io::ErrorKind::NotFound => "no such file".to_string(),
+            std::io::ErrorKind::PermissionDenied => "may not be read (permission denied)".to_string(),
+            std::io::ErrorKind::InvalidData => "is not UTF-8 text".to_string(),
+            _ => format!("cannot be read: {cause}"),
+        };
+        InputError::file(file, what)
+    }
+}
+
+impl fmt::Display for InputError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.file.display())?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
+        if !self.key.is_empty() {
+            write!(f, ": {}", self.key)?;
+        }
+        // Messages of parsers may span lines; ours must not.
+        write!(f, ": {}", self.message.split_whitespace().collect::<Vec<_>>().join(" "))
+    }
+}
+
+impl std::error::Error for InputError {}
+
+/// A file could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be written: {cause}", file.display())]
+pub struct OutputError {
+    /// The file.
+    pub file: PathBuf,
+    /// Why.
+    pub cause: String,
+}
+
+impl OutputError {
+    pub(crate) fn new(file: impl AsRef<Path>, cause: impl fmt::Display) -> OutputError {
+        OutputError { file: file.as_ref().to_path_buf(), cause: cause.to_string() }
+    }
+}
+
+/// Something read from a file, and what looked suspicious without being wrong.
+#[derive(Clone, Debug)]
+pub struct Loaded<T> {
+    /// What was read.
+    pub value: T,
+    /// One line each.
+    pub warnings: Vec<String>,
+}

@@ -1,0 +1,96 @@
+//! The three mesh formats to vertices and triangles, nothing more.
+
+use glam::DVec3;
+use palpate_model::shape::TriMesh;
+use ply_rs_bw::parser::Parser;
+use ply_rs_bw::ply::{DefaultElement, Property};
+use std::io::Cursor;
+
+/// Fan of a polygon with vertices `at(0..n)`; the solid is the same for planar polygons that are convex.
+fn fan(n: usize, at: impl Fn(usize) -> u32, out: &mut Vec<[u32; 3]>) {
+    out.extend((2..n).map(|i| [at(0), at(i - 1), at(i)]));
+}
+
+fn finite(mesh: TriMesh) -> Result<TriMesh, String> {
+    match mesh.vertices.iter().position(|v| !v.is_finite()) {
+        Some(i) => Err(format!("vertex {} is not finite", i + 1)),
+        None => Ok(mesh),
+    }
+}
+
+/// Wavefront OBJ; materials, normals, groups are passed over.
+pub(super) fn obj(bytes: &[u8]) -> Result<TriMesh, String> {
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
+        .map_err(|e| format!("not a readable OBJ file: {e}"))?;
+    let mut mesh = TriMesh::default();
+    for model in models {
+        let base = mesh.vertices.len() as u32;
+        let m = model.mesh;
+        mesh.vertices.extend(m.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])));
+        let mut first = 0;
+        let arities = if m.face_arities.is_empty() { vec![3; m.indices.len() / 3] } else { m.face_arities };
+        for n in arities {
+            fan(n as usize, |i| base + m.indices[first + i], &mut mesh.triangles);
+            first += n as usize;
+        }
+    }
+    finite(mesh)
+}
+
+fn number(p: Option<&Property>) -> Option<f64> {
+    match p? {
+        Property::Float(x) => Some(f64::from(*x)),
+        Property::Double(x) => Some(*x),
+        Property::Int(x) => Some(f64::from(*x)),
+        Property::Short(x) => Some(f64::from(*x)),
+        _ => None,
+    }
+}
+
+/// Stanford PLY, ASCII or binary.
+pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
+    let ply =
+        Parser::<DefaultElement>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| format!("not a readable PLY file: {e}"))?;
+    let part = |name: &str| ply.payload.get(name).ok_or_else(|| format!("has no element \"{name}\""));
+    let mut mesh = TriMesh::default();
+    for (i, v) in part("vertex")?.iter().enumerate() {
+        let get = |k: &str| number(v.get(k)).ok_or_else(|| format!("vertex {} has no coordinate \"{k}\"", i + 1));
+        mesh.vertices.push(DVec3::new(get("x")?, get("y")?, get("z")?));
+    }
+    for (i, f) in part("face")?.iter().enumerate() {
+        let list = f.get("vertex_indices").or_else(|| f.get("vertex_index")).and_then(Property::to_u32_list);
+        let list = list.ok_or_else(|| format!("face {} has no list \"vertex_indices\"", i + 1))?;
+        if let Some(v) = list.iter().find(|v| **v as usize >= mesh.vertices.len()) {
+            return Err(format!("face {} names vertex {v}, there are {}", i + 1, mesh.vertices.len()));
+        }
+        fan(list.len(), |k| list[k], &mut mesh.triangles);
+    }
+    finite(mesh)
+}
+
+/// STL, ASCII or binary; corners come unconnected and are merged later.
+pub(super) fn stl(bytes: &[u8]) -> Result<TriMesh, String> {
+    // A binary header may begin with "solid"; only a text whose size is not the binary one is ASCII.
+    let count = bytes.get(80..84).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
+    let binary = count.is_some_and(|n| n.checked_mul(50).and_then(|b| b.checked_add(84)) == Some(bytes.len()));
+    if !binary && !bytes.starts_with(b"solid") {
+        return Err("not a readable STL file: neither text nor a whole binary file (truncated?)".to_string());
+    }
+    let mut bytes = bytes.to_vec();
+    if binary {
+        // The crate takes any file that begins with "solid " for text; the header is free text anyway.
+        bytes[0] = b' ';
+    }
+    let broken = |e: std::io::Error| format!("not a readable STL file: {e}");
+    let mut cursor = Cursor::new(&bytes[..]);
+    let mut mesh = TriMesh::default();
+    for triangle in stl_io::create_stl_reader(&mut cursor).map_err(broken)? {
+        let corners = triangle.map_err(broken)?.vertices;
+        let base = mesh.vertices.len() as u32;
+        mesh.vertices.extend(corners.map(|p| DVec3::new(f64::from(p.0[0]), f64::from(p.0[1]), f64::from(p.0[2]))));
+        mesh.triangles.push([base, base + 1, base + 2]);
+    }
+    finite(mesh)
+}

@@ -1,0 +1,294 @@
+//! Format `scene/1`: one TOML file ↔ [`Scene`].
+
+mod fit;
+mod motion;
+mod object;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use write::write_scene;
+
+use crate::document::{Source, Table};
+use crate::error::{InputError, Loaded};
+use crate::keys::SCENE;
+use glam::DVec3;
+use palpate_model::observation::MarkerRest;
+use palpate_model::scene::*;
+use std::path::{Path, PathBuf};
+
+/// The scene format this version reads and writes.
+pub const FORMAT: &str = "scene/1";
+
+/// Kinds of `[[effect]]` known to this version.
+pub const EFFECTS: &[&str] = &[];
+
+/// More steps than this are a slip of units, not a simulation.
+const MOST_STEPS: f64 = 1e7;
+
+/// Reads a scene and every file it names except the recording.
+///
+/// Where a key is absent: damping 0, gravity (0, 0, −9.81) m/s², θ 0.6, start 0, state `rest`, band 4 cells, all frames,
+/// every pixel, optimiser `gauss-newton`, 50 iterations, one start, seed 1, all threads, [`Solver::default`]. Relative paths start from the scene's
+/// folder and are not expanded.
+///
+/// # Errors
+/// The first thing that is wrong, in the order: TOML, format, unknown keys, then table by table.
+pub fn read_scene(path: impl AsRef<Path>) -> Result<Loaded<Scene>, InputError> {
+    let source = Source::read(path.as_ref())?;
+    scene(&source)
+}
+
+/// Reads a scene from text; relative paths start from the folder of `path`.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn parse_scene(text: &str, path: impl AsRef<Path>) -> Result<Loaded<Scene>, InputError> {
+    let source = Source::parse(path.as_ref(), text.to_string())?;
+    scene(&source)
+}
+
+fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
+    let root = source.root();
+    check_format(&root, FORMAT)?;
+    for effect in root.tables("effect")? {
+        let known = if EFFECTS.is_empty() { "none".to_string() } else { EFFECTS.join(", ") };
+        let kind = effect.optional_str("kind")?.ok_or_else(|| effect.missing("kind", "the name of an effect"))?;
+        return Err(effect.error("kind", format!("\"{kind}\" is not known to this version; effects it knows: {known}")));
+    }
+    root.check_keys(&SCENE)?;
+
+    let mut warnings = Vec::new();
+    let object = object::object(source, &root, &mut warnings)?;
+    let material = material(&root, &mut warnings)?;
+    let gravity = match root.optional_table("world")? {
+        Some(w) => w.optional_vec3("gravity")?,
+        None => None,
+    };
+    let initial = initial(&root)?;
+    let mut scene = Scene {
+        path: source.path.clone(),
+        title: root.optional_str("title")?.unwrap_or_default().to_string(),
+        object,
+        material,
+        gravity: gravity.unwrap_or(DVec3::new(0.0, 0.0, -9.81)),
+        clamps: clamps(source, &root)?,
+        planes: planes(&root)?,
+        masses: masses(&root)?,
+        time: time(&root, initial.state)?,
+        initial,
+        solver: solver(&root)?,
+        observation: observation(source, &root)?,
+        fit: None,
+    };
+    if scene.gravity.length() > 100.0 {
+        warnings.push(format!(
+            "{}: world.gravity is {} m/s² long; is it in m/s²?",
+            source.path.display(),
+            scene.gravity.length()
+        ));
+    }
+    scene.fit = fit::fit(&root, &scene)?;
+    Ok(Loaded { value: scene, warnings })
+}
+
+/// The `format` key must be there and be one that is understood.
+pub(crate) fn check_format(root: &Table, format: &str) -> Result<(), InputError> {
+    match root.optional_str("format")? {
+        Some(f) if f == format => Ok(()),
+        Some(f) => Err(root.error("format", format!("\"{f}\" is not understood; this version reads \"{format}\""))),
+        None => Err(root.missing("format", &format!("format = \"{format}\""))),
+    }
+}
+
+fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputError> {
+    let t = root.optional_table("material")?.ok_or_else(|| root.missing("material", "a table [material]"))?;
+    t.optional_choice("model", &[("corotated-linear", ())])?;
+    let positive = |key: &str| t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0");
+    let zero_up = |key: &str| t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0");
+    let inertia = match (positive("density")?, positive("mass")?) {
+        (Some(d), None) => Inertia::Density(d),
+        (None, Some(m)) => Inertia::Mass(m),
+        (None, None) => return Err(t.missing("density", "density (kg/m³) or mass (kg)")),
+        (Some(_), Some(_)) => return Err(t.error("mass", "density and mass exclude each other; give one")),
+    };
+    let youngs_modulus = positive("youngs_modulus")?.ok_or_else(|| t.missing("youngs_modulus", "a number > 0 (Pa)"))?;
+    let poisson_ratio = t
+        .f64_where("poisson_ratio", |x| x > -1.0 && x < 0.5, "is not allowed: must lie in (-1, 0.5)")?
+        .ok_or_else(|| t.missing("poisson_ratio", "a number in (-1, 0.5)"))?;
+    if !(10.0..=1e12).contains(&youngs_modulus) {
+        let e = t
+            .error("youngs_modulus", format!("{youngs_modulus} Pa is unusual (jelly 1e3, rubber 1e6, steel 2e11); is it in Pa?"));
+        warnings.push(e.to_string());
+    }
+    if let Inertia::Density(d) = inertia
+        && !(10.0..=30000.0).contains(&d)
+    {
+        let e = t.error("density", format!("{d} kg/m³ is unusual (water 1000); is it in kg/m³? 1 g/cm³ is 1000 kg/m³"));
+        warnings.push(e.to_string());
+    }
+    Ok(Material {
+        inertia,
+        youngs_modulus,
+        poisson_ratio,
+        mass_damping: zero_up("mass_damping")?.unwrap_or(0.0),
+        stiffness_damping: zero_up("stiffness_damping")?.unwrap_or(0.0),
+    })
+}
+
+/// `min` and `max` of a box table, in order.
+fn corners(t: &Table) -> Result<(DVec3, DVec3), InputError> {
+    let (min, max) = (t.vec3("min")?, t.vec3("max")?);
+    for (a, axis) in ["x", "y", "z"].iter().enumerate() {
+        if min[a] >= max[a] {
+            return Err(t.error("max", format!("{axis}: {} must be larger than min = {}", max[a], min[a])));
+        }
+    }
+    Ok((min, max))
+}
+
+fn clamps(source: &Source, root: &Table) -> Result<Vec<Clamp>, InputError> {
+    let mut clamps = Vec::new();
+    for t in root.tables("clamp")? {
+        let b = t.optional_table("box")?.ok_or_else(|| t.missing("box", "box = { min = [x, y, z], max = [x, y, z] }"))?;
+        let (min, max) = corners(&b)?;
+        let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?.unwrap_or(false);
+        let motion_path = t.optional_str("motion")?.map(|p| source.folder().join(p));
+        let motion = motion_path.as_deref().map(motion::read_motion).transpose()?;
+        clamps.push(Clamp { min, max, object_frame, motion, motion_path });
+    }
+    Ok(clamps)
+}
+
+fn planes(root: &Table) -> Result<Vec<Plane>, InputError> {
+    let mut planes = Vec::new();
+    for t in root.tables("plane")? {
+        let normal = t.vec3("normal")?;
+        // Shorter than this, the direction is rounding noise.
+        if normal.length() < 1e-12 {
+            return Err(t.error("normal", "has no length; give a direction out of the forbidden half-space"));
+        }
+        let stiffness = t.f64_where("stiffness", |x| x > 0.0, "is not allowed: must be > 0 (Pa/m)")?;
+        planes.push(Plane { point: t.vec3("point")?, normal: normal.normalize(), stiffness });
+    }
+    Ok(planes)
+}
+
+fn masses(root: &Table) -> Result<Vec<PointMass>, InputError> {
+    let mut masses = Vec::new();
+    for t in root.tables("mass")? {
+        let mass = t.f64_where("mass", |x| x >= 0.0, "is not allowed: must be ≥ 0 (kg)")?;
+        masses.push(PointMass { point: t.vec3("point")?, mass: mass.ok_or_else(|| t.missing("mass", "a number ≥ 0 (kg)"))? });
+    }
+    Ok(masses)
+}
+
+fn initial(root: &Table) -> Result<Initial, InputError> {
+    let mut initial = Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest };
+    if let Some(t) = root.optional_table("initial")? {
+        initial.velocity = t.optional_vec3("velocity")?.unwrap_or_default();
+        initial.angular_velocity = t.optional_vec3("angular_velocity")?.unwrap_or_default();
+        initial.pivot = t.optional_vec3("pivot")?;
+        let states = [("rest", InitialShape::Rest), ("static-equilibrium", InitialShape::StaticEquilibrium)];
+        initial.state = t.optional_choice("state", &states)?.unwrap_or(InitialShape::Rest);
+    }
+    Ok(initial)
+}
+
+fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
+    let t = root.optional_table("time")?.ok_or_else(|| root.missing("time", "a table [time] with step and duration"))?;
+    let step = t.f64_where("step", |x| x > 0.0, "is not allowed: must be > 0 (s)")?;
+    let duration = t.f64_where("duration", |x| x >= 0.0, "is not allowed: must be ≥ 0 (s)")?;
+    let steps = t.optional_count("steps", 0..=MOST_STEPS as u64)?;
+    let (key, count) = match (duration, steps) {
+        (Some(_), Some(_)) => return Err(t.error("steps", "duration and steps exclude each other; give one")),
+        (None, None) => return Err(t.missing("duration", "duration (s) or steps")),
+        (None, Some(n)) => ("steps", n as f64),
+        (Some(0.0), None) => ("duration", 0.0),
+        (Some(d), None) => {
+            let step = step.ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
+            let n = (d / step).round();
+            if n < 1.0 {
+                return Err(t.error("duration", format!("{d} s is shorter than half a step ({step} s)")));
+            }
+            ("duration", n)
+        }
+    };
+    if count > MOST_STEPS {
+        return Err(t.error(key, format!("asks for {count:.0} steps, at most {MOST_STEPS:.0} are allowed; is step in seconds?")));
+    }
+    if count == 0.0 && state != InitialShape::StaticEquilibrium {
+        return Err(t.error(key, "0 needs initial.state = \"static-equilibrium\" (a static problem)"));
+    }
+    // A static problem has no step; any positive length serves.
+    let step = step.or((count == 0.0).then_some(1.0)).ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
+    let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
+    Ok(Time { step, steps: count as usize, start: t.optional_f64("start")?.unwrap_or(0.0), theta: theta.unwrap_or(0.6) })
+}
+
+fn solver(root: &Table) -> Result<Solver, InputError> {
+    let mut s = Solver::default();
+    let Some(t) = root.optional_table("solver")? else { return Ok(s) };
+    let rotations = [("lagged", RotationUpdate::Lagged), ("converged", RotationUpdate::Converged)];
+    s.rotation = t.optional_choice("rotation", &rotations)?.unwrap_or(s.rotation);
+    let elements = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
+    s.element = t.optional_choice("element", &elements)?.unwrap_or(s.element);
+    let linear = [("auto", LinearSolver::Auto), ("cholesky", LinearSolver::Cholesky), ("cg", LinearSolver::ConjugateGradient)];
+    s.linear = t.optional_choice("linear", &linear)?.unwrap_or(s.linear);
+    let tolerance = t.f64_where("tolerance", |x| x > 0.0 && x < 1.0, "is not allowed: must lie in (0, 1)")?;
+    s.tolerance = tolerance.unwrap_or(s.tolerance);
+    if let Some(n) = t.optional_count("newton_iterations", 1..=10_000)? {
+        s.newton_iterations = n as usize;
+    }
+    s.ghost = t.f64_where("ghost", |x| x >= 0.0, "is not allowed: must be ≥ 0")?.unwrap_or(s.ghost);
+    Ok(s)
+}
+
+fn observation(source: &Source, root: &Table) -> Result<Option<ObservationSpec>, InputError> {
+    let Some(t) = root.optional_table("observation")? else { return Ok(None) };
+    let recording: PathBuf = match t.optional_str("recording")? {
+        Some(r) => source.folder().join(r),
+        None => return Err(t.missing("recording", "the folder of a recording")),
+    };
+    if t.optional_str("cost").is_ok_and(|c| c == Some("silhouette")) {
+        return Err(t.error("cost", "\"silhouette\" is not available in this version; allowed: \"sparse-surface\", \"markers\""));
+    }
+    let kinds = [("sparse-surface", CostKind::SparseSurface), ("markers", CostKind::Markers)];
+    let costs = t
+        .optional_choices("cost", &kinds)?
+        .ok_or_else(|| t.missing("cost", "\"sparse-surface\", \"markers\", or an array of these"))?;
+    let (mut from, mut to, mut every) = (f64::NEG_INFINITY, f64::INFINITY, 1);
+    if let Some(f) = t.optional_table("frames")? {
+        from = f.optional_f64("from")?.unwrap_or(from);
+        to = f.optional_f64("to")?.unwrap_or(to);
+        every = f.optional_count("every", 1..=u64::MAX)?.unwrap_or(1) as usize;
+        if from > to {
+            return Err(f.error("to", format!("{to} lies before from = {from}")));
+        }
+    }
+    let mut markers: Vec<MarkerRest> = Vec::new();
+    for m in t.tables("marker")? {
+        let marker = marker_rest(&m)?;
+        if markers.iter().any(|o| o.name == marker.name) {
+            return Err(m.error("name", format!("\"{}\" is given twice", marker.name)));
+        }
+        markers.push(marker);
+    }
+    Ok(Some(ObservationSpec {
+        recording,
+        file: t.optional_str("file")?.unwrap_or("recording.toml").to_string(),
+        costs,
+        band: t.f64_where("band", |x| x > 0.0, "is not allowed: must be > 0 (cells)")?.unwrap_or(4.0),
+        from,
+        to,
+        every,
+        pixel_stride: t.optional_count("pixel_stride", 1..=100_000)?.unwrap_or(1) as usize,
+        markers,
+    }))
+}
+
+/// `name`, `position` and perhaps `surface` of a marker at rest.
+pub(crate) fn marker_rest(t: &Table) -> Result<MarkerRest, InputError> {
+    let name = t.optional_str("name")?.filter(|n| !n.is_empty()).ok_or_else(|| t.missing("name", "a marker's label"))?;
+    Ok(MarkerRest { name: name.to_string(), position: t.vec3("position")?, surface: t.optional_vec3("surface")? })
+}

@@ -1,0 +1,108 @@
+//! `[object]`: the rest shape.
+
+use super::corners;
+use crate::document::{Source, Table};
+use crate::error::InputError;
+use crate::mesh::{LARGEST_SIDE, read_mesh};
+use crate::rigid::rigid;
+use glam::{DAffine3, DVec3};
+use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
+
+pub(super) fn object(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
+    let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
+    let (body, extent) = match (t.optional_str("mesh")?, t.optional_table("shape")?) {
+        (Some(_), Some(_)) => return Err(t.error("shape", "mesh and shape exclude each other; give one")),
+        (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
+        (Some(file), None) => {
+            let path = source.folder().join(file);
+            let loaded = read_mesh(&path)?;
+            warnings.extend(loaded.warnings);
+            let (min, max) = crate::mesh::bounds(&loaded.value.vertices);
+            (BodySource::Mesh { path, mesh: loaded.value }, max - min)
+        }
+        (None, Some(shape)) => {
+            let analytic = analytic(&shape)?;
+            let extent = extent(&analytic);
+            if extent.max_element() > LARGEST_SIDE {
+                return Err(t.error(
+                    "shape",
+                    format!(
+                        "its longest side is {} m; in millimetres? lengths are in metres: scale by 0.001",
+                        extent.max_element()
+                    ),
+                ));
+            }
+            (BodySource::Analytic(analytic), extent)
+        }
+    };
+    let pose = match t.optional_matrix4("pose")? {
+        None => DAffine3::IDENTITY,
+        Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
+    };
+    let longest = extent.max_element();
+    let resolution =
+        match (t.f64_where("cell_size", |x| x > 0.0, "is not allowed: must be > 0 (m)")?, t.optional_count("cells", 1..=4096)?) {
+            (Some(_), Some(_)) => return Err(t.error("cells", "cell_size and cells exclude each other; give one")),
+            (None, None) => return Err(t.missing("cell_size", "cell_size (m) or cells")),
+            (None, Some(n)) => Resolution::Cells(n as u32),
+            (Some(h), None) if h > longest => {
+                return Err(
+                    t.error("cell_size", format!("{h} m is larger than the object, whose longest side is {longest:.4} m"))
+                );
+            }
+            (Some(h), None) if longest / h > 4096.0 => {
+                return Err(t.error(
+                    "cell_size",
+                    format!("{h} m makes {:.0} cells along the longest side, at most 4096 are allowed", longest / h),
+                ));
+            }
+            (Some(h), None) => Resolution::CellSize(h),
+        };
+    Ok(Object { source: body, pose, resolution })
+}
+
+fn analytic(shape: &Table) -> Result<Analytic, InputError> {
+    const KINDS: &str = "one of ball, torus, box, cylinder";
+    let names = shape.names();
+    let [name] = names[..] else {
+        return Err(shape.own_error(format!("expected exactly {KINDS}, found {}", names.len())));
+    };
+    let t = shape.optional_table(name)?.ok_or_else(|| shape.missing(name, KINDS))?;
+    let length = |key: &str| {
+        t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0 (m)")?.ok_or_else(|| t.missing(key, "a number > 0 (m)"))
+    };
+    let center = || Ok::<_, InputError>(t.optional_vec3("center")?.unwrap_or(DVec3::ZERO));
+    let axis = || match t.optional_vec3("axis")? {
+        None => Ok(DVec3::Z),
+        Some(a) if a.length() < 1e-12 => Err(t.error("axis", "has no length")),
+        Some(a) => Ok(a),
+    };
+    Ok(match name {
+        "ball" => Analytic::Ball { radius: length("radius")?, center: center()? },
+        "torus" => {
+            let (major, minor) = (length("major")?, length("minor")?);
+            if minor >= major {
+                return Err(t.error("minor", format!("{minor} must be smaller than major = {major}, or the torus has no hole")));
+            }
+            Analytic::Torus { major, minor, center: center()?, axis: axis()? }
+        }
+        "box" => {
+            let (min, max) = corners(&t)?;
+            Analytic::Box { min, max }
+        }
+        "cylinder" => {
+            Analytic::Cylinder { radius: length("radius")?, height: length("height")?, center: center()?, axis: axis()? }
+        }
+        _ => return Err(shape.error(name, format!("unknown shape; expected {KINDS}"))),
+    })
+}
+
+/// Sides of a box that holds the shape whatever its axis [m]; the shape's own longest side is the largest of them.
+fn extent(shape: &Analytic) -> DVec3 {
+    match *shape {
+        Analytic::Ball { radius, .. } => DVec3::splat(2.0 * radius),
+        Analytic::Torus { major, minor, .. } => DVec3::splat(2.0 * (major + minor)),
+        Analytic::Box { min, max } => max - min,
+        Analytic::Cylinder { radius, height, .. } => DVec3::new(2.0 * radius, 2.0 * radius, height),
+    }
+}

@@ -1,0 +1,246 @@
+use super::*;
+use palpate_model::scene::FitParameter;
+
+const BASE: &str = r#"format = "scene/1"
+[object]
+shape = { ball = { radius = 0.05 } }   # a ball
+cell_size = 0.01
+[material]
+density = 1000
+youngs_modulus = 1e5   # soft
+poisson_ratio = 0.4
+[[plane]]
+point = [0.1, 0, -0.06]
+normal = [0, 0, 2]
+[[mass]]
+point = [0, 0, 0]
+mass = 0.05
+[time]
+step = 0.008333
+duration = 1.5
+"#;
+
+fn read(extra: &str) -> Result<Loaded<Scene>, InputError> {
+    parse_scene(&format!("{BASE}{extra}"), "some/scene.toml")
+}
+
+fn error(text: &str) -> String {
+    parse_scene(text, "scene.toml").expect_err("must be refused").to_string()
+}
+
+/// The base scene with one text replaced by another, and the error it gives.
+fn error_with(from: &str, to: &str) -> String {
+    assert!(BASE.contains(from));
+    error(&BASE.replace(from, to))
+}
+
+fn fit_error(parameter: &str) -> String {
+    error(&format!("{BASE}[fit]\n[[fit.parameter]]\n{parameter}"))
+}
+
+#[test]
+fn absent_keys_take_the_documented_defaults() {
+    let s = read("").unwrap().value;
+    assert_eq!(s.time, Time { step: 0.008333, steps: 180, start: 0.0, theta: 0.6 });
+    assert_eq!(s.gravity, DVec3::new(0.0, 0.0, -9.81));
+    assert_eq!(s.solver, Solver::default());
+    assert_eq!(s.planes[0].normal, DVec3::Z);
+    assert_eq!((s.material.mass_damping, s.material.stiffness_damping), (0.0, 0.0));
+    let s = read("[observation]\nrecording = \"r\"\ncost = [\"markers\", \"sparse-surface\"]\n[fit]\n").unwrap().value;
+    let o = s.observation.unwrap();
+    assert_eq!(o.recording, Path::new("some/r"));
+    assert_eq!((o.file.as_str(), o.band, o.every, o.pixel_stride), ("recording.toml", 4.0, 1, 1));
+    assert_eq!(o.costs, [CostKind::Markers, CostKind::SparseSurface]);
+    assert_eq!((o.from, o.to), (f64::NEG_INFINITY, f64::INFINITY));
+    let f = s.fit.unwrap();
+    assert_eq!((f.optimizer, f.iterations, f.starts, f.seed, f.threads), (Optimizer::GaussNewton, 50, 1, 1, 0));
+}
+
+#[test]
+fn a_full_scene_is_read() {
+    let s = read(
+        r#"[solver]
+rotation = "lagged"
+element = "corner"
+linear = "cg"
+tolerance = 1e-6
+newton_iterations = 7
+ghost = 0
+[initial]
+velocity = [1, 2, 3]
+pivot = [0, 0, 1]
+[[clamp]]
+box = { min = [-1, -1, -1], max = [1, 1, 0] }
+frame = "object"
+[observation]
+recording = "../r"
+file = "silhouettes.toml"
+cost = "markers"
+frames = { from = -0.5, to = 0.5, every = 2 }
+[[observation.marker]]
+name = "m"
+position = [0, 0, 0.05]
+"#,
+    )
+    .unwrap()
+    .value;
+    assert_eq!(s.solver.rotation, RotationUpdate::Lagged);
+    assert_eq!((s.solver.element, s.solver.linear), (Element::Corner, LinearSolver::ConjugateGradient));
+    assert_eq!((s.solver.tolerance, s.solver.newton_iterations, s.solver.ghost), (1e-6, 7, 0.0));
+    assert_eq!((s.initial.velocity, s.initial.pivot), (DVec3::new(1.0, 2.0, 3.0), Some(DVec3::Z)));
+    assert!(s.clamps[0].object_frame && s.clamps[0].motion.is_none());
+    let o = s.observation.unwrap();
+    assert_eq!((o.from, o.to, o.every, o.file.as_str()), (-0.5, 0.5, 2, "silhouettes.toml"));
+    assert_eq!(o.markers[0].position, DVec3::new(0.0, 0.0, 0.05));
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest_and_its_line() {
+    let e = error_with("youngs_modulus", "youngs_modul");
+    assert_eq!(e, "scene.toml:7: material.youngs_modul: unknown key; did you mean \"youngs_modulus\"?");
+    assert!(error_with("radius = 0.05", "radius = 0.05, centre = [0, 0, 0]").contains("did you mean \"center\"?"));
+    assert!(error_with("mass = 0.05", "mas = 0.05").starts_with("scene.toml:14: mass.0.mas: unknown key"));
+    assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
+    assert!(error_with("cell_size", "zzz").contains("known: mesh, pose, cell_size, cells, shape"));
+    assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
+    assert!(error("[object]\n").contains("format = \"scene/1\""));
+}
+
+#[test]
+fn numbers_out_of_range_say_what_is_allowed() {
+    for (from, to, wanted) in [
+        ("poisson_ratio = 0.4", "poisson_ratio = 0.6", "0.6 is not allowed: must lie in (-1, 0.5)"),
+        ("youngs_modulus = 1e5", "youngs_modulus = nan", "NaN is not a number that can be used"),
+        ("youngs_modulus = 1e5", "youngs_modulus = -1", "must be > 0"),
+        ("youngs_modulus = 1e5", "youngs_modulus = \"1e5\"", "expected a number, found a string"),
+        ("cell_size = 0.01", "cell_size = 0", "must be > 0"),
+        ("cell_size = 0.01", "cell_size = inf", "inf is not a number"),
+        ("cell_size = 0.01", "cell_size = 0.2", "larger than the object"),
+        ("step = 0.008333", "step = 0", "must be > 0"),
+        ("step = 0.008333", "step = 0.01\ntheta = 0.4", "must lie in [0.5, 1)"),
+        ("step = 0.008333", "step = 0.01\ntheta = 1.0", "must lie in [0.5, 1)"),
+        ("step = 0.008333", "", "time.step: missing"),
+        ("duration = 1.5", "duration = 0", "static-equilibrium"),
+        ("duration = 1.5", "duration = 1.5\nsteps = 3", "exclude each other"),
+        ("normal = [0, 0, 2]", "normal = [0, 0, 0]", "has no length"),
+        ("normal = [0, 0, 2]", "normal = [0, 0]", "array of 3 numbers, found 2"),
+        ("cell_size = 0.01", "cell_size = 0.01\nmesh = \"a.obj\"", "exclude each other"),
+        ("radius = 0.05", "radius = 60", "in millimetres? lengths are in metres: scale by 0.001"),
+        ("density = 1000", "density = 1000\nmass = 1", "exclude each other"),
+        ("density = 1000", "model = \"neo-hookean\"\ndensity = 1000", "allowed: \"corotated-linear\""),
+        ("[time]", "[[effect]]\nkind = \"coulomb-friction\"\n[time]", "effects it knows: none"),
+        ("[time]", "[[clamp]]\nbox = { min = [0, 0, 0], max = [1, -1, 1] }\n[time]", "y: -1 must be larger than min = 0"),
+        ("[time]", "[fit]\noptimizer = \"adam\"\n[time]", "\"adam\" is not known; allowed: \"rprop\", \"gradient-descent\""),
+        ("[time]", "[observation]\nrecording = \"r\"\ncost = \"silhouette\"\n[time]", "not available in this version"),
+        ("[time]", "[fit]\nstarts = 0\n[time]", "0 is out of range"),
+        ("[object]", "[object]\npose = [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]", "scales by 2"),
+    ] {
+        let e = error_with(from, to);
+        assert!(e.contains(wanted), "{to}: {e}");
+        assert!(e.starts_with("scene.toml:") && !e.contains('\n'), "{e}");
+    }
+}
+
+#[test]
+fn broken_toml_names_the_line() {
+    let e = error("format = \"scene/1\"\n[object\n");
+    assert!(e.starts_with("scene.toml:2: not valid TOML"), "{e}");
+}
+
+#[test]
+fn suspicious_units_are_warnings() {
+    let w = parse_scene(&BASE.replace("1e5", "5").replace("density = 1000", "density = 1.07"), "s.toml").unwrap().warnings;
+    assert_eq!(w.len(), 2, "{w:?}");
+    assert!(w[0].contains("is it in Pa?") && w[1].contains("1 g/cm³ is 1000 kg/m³"));
+}
+
+#[test]
+fn a_static_problem_needs_no_step() {
+    let s = parse_scene(
+        &BASE.replace("step = 0.008333\nduration = 1.5", "duration = 0\n[initial]\nstate = \"static-equilibrium\""),
+        "s.toml",
+    );
+    assert_eq!(s.unwrap().value.time.steps, 0);
+}
+
+fn parameters(text: &str) -> Vec<FitParameter> {
+    read(&format!("[fit]\n{text}")).unwrap().value.fit.unwrap().parameters
+}
+
+#[test]
+fn fit_parameters_take_bounds_from_the_registry_and_starts_from_the_scene() {
+    let p = parameters("[[fit.parameter]]\npath = \"material.youngs_modulus\"\n[[fit.parameter]]\npath = \"plane.0.height\"\n");
+    assert_eq!((p[0].start, p[0].bounds), ((1e5, 1e5), (1e-3, 1e13)));
+    assert_eq!(p[1].start, (-0.06, -0.06));
+    let p = parameters("[[fit.parameter]]\npath = \"world.gravity\"\n");
+    assert_eq!(p.iter().map(|p| p.path.as_str()).collect::<Vec<_>>(), ["world.gravity.x", "world.gravity.y", "world.gravity.z"]);
+    assert_eq!(p[2].start, (-9.81, -9.81));
+    let p = parameters("[[fit.parameter]]\npath = \"world.gravity\"\nstart = [0, [-1, 1], -9]\nbounds = [-20, 20]\n");
+    assert_eq!((p[0].start, p[1].start, p[2].start), ((0.0, 0.0), (-1.0, 1.0), (-9.0, -9.0)));
+    assert!(p.iter().all(|p| p.bounds == (-20.0, 20.0)));
+    let p = parameters("[[fit.parameter]]\npath = \"initial.velocity.y\"\nper_scene = true\n");
+    assert!(p[0].per_scene && p.len() == 1);
+}
+
+#[test]
+fn impossible_fits_are_refused_with_the_way_out() {
+    for (text, wanted) in [
+        ("path = \"material.youngs_modulos\"", "did you mean \"material.youngs_modulus\"?"),
+        ("path = \"plane.1.height\"", "no [[plane]] number 1"),
+        ("path = \"material.mass\"", "this scene gives material.density"),
+        ("path = \"material.youngs_modulus\"\nbounds = [1, 10]", "[1, 10] excludes the scene's value 100000"),
+        ("path = \"material.youngs_modulus\"\nstart = [1, 100]\nbounds = [10, 1000]", "[10, 1000] excludes start [1, 100]"),
+        ("path = \"material.mass_damping\"", "set start to a number > 0"),
+        ("path = \"material.youngs_modulus\"\nbounds = [0, 1e7]", "must be > 0"),
+        ("path = \"material.poisson_ratio\"\nbounds = [0, 0.5]", "must lie in (-1, 0.5)"),
+        ("path = \"mass.0.mass\"\nbounds = [2, 1]", "low must not exceed high"),
+        ("path = \"mass.0.mass\"\nstart = \"x\"", "found a string"),
+        ("path = \"mass.0.mass\"\n[[fit.parameter]]\npath = \"mass.0.mass\"", "given twice"),
+    ] {
+        let e = fit_error(text);
+        assert!(e.contains(wanted), "{text}: {e}");
+    }
+}
+
+#[test]
+fn found_values_are_written_in_place_and_read_again() {
+    let scene = read("").unwrap().value;
+    let values: Vec<(String, f64)> = [
+        ("material.youngs_modulus", 123456.789),
+        ("material.mass_damping", 0.25),
+        ("world.gravity.x", 0.5),
+        ("initial.velocity.z", -2.0),
+        ("mass.0.mass", 0.07),
+        ("time.start", 0.125),
+        ("plane.0.height", -0.05),
+        ("plane.0.theta", 1.5),
+    ]
+    .map(|(p, v)| (p.to_string(), v))
+    .to_vec();
+    let text = write_scene(BASE, &scene, &values, Path::new("some/out")).unwrap();
+    assert!(text.contains("# a ball") && text.contains("youngs_modulus = 123456.789   # soft"), "{text}");
+    let again = parse_scene(&text, "some/out/model.toml").unwrap().value;
+    assert_eq!(again.material.youngs_modulus, 123456.789);
+    assert_eq!(again.material.mass_damping, 0.25);
+    assert_eq!(again.gravity, DVec3::new(0.5, 0.0, -9.81));
+    assert_eq!(again.initial.velocity, DVec3::new(0.0, 0.0, -2.0));
+    assert_eq!((again.masses[0].mass, again.time.start), (0.07, 0.125));
+    let plane = again.planes[0];
+    let site = palpate_model::plan::PlaneSite { polar_axis: 0, stiffness: None };
+    // Two trigonometric round trips.
+    assert!((plane.point.dot(plane.normal) + 0.05).abs() < 1e-15);
+    assert!((site.angles(plane.normal).0 - 1.5).abs() < 1e-14, "the normal z is measured from axis x");
+    assert!(write_scene(BASE, &scene, &[("plane.3.height".to_string(), 0.0)], Path::new(".")).is_err());
+    assert!(write_scene(BASE, &scene, &[("time.start".to_string(), f64::NAN)], Path::new(".")).is_err());
+}
+
+#[test]
+fn relative_paths_hold_from_another_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("a/b")).unwrap();
+    let extra = "[observation]\nrecording = \"../rec\"  # mine\ncost = \"markers\"\n";
+    let text = format!("{BASE}{extra}");
+    let scene = parse_scene(&text, folder.path().join("a/b/scene.toml")).unwrap().value;
+    let out = write_scene(&text, &scene, &[], &folder.path().join("a/out/deep")).unwrap();
+    assert!(out.contains("recording = \"../../rec\"  # mine"), "{out}");
+}

@@ -1,0 +1,170 @@
+//! A scene written back with found values in place; comments and layout of the user's file are kept.
+
+use crate::error::InputError;
+use glam::DVec3;
+use palpate_model::plan::PlaneSite;
+use palpate_model::scene::Scene;
+use std::path::{Component, Path, PathBuf};
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
+
+/// The text of `scene` with `values` (dotted path, value in SI units) in place, readable from `folder`.
+///
+/// `template` is the scene's own text. A plane's height and angles are written back as its point and normal; relative
+/// paths are rewritten so that they hold from `folder`.
+///
+/// # Errors
+/// A template that is no TOML, a path that the scene does not have, a value that is not finite.
+pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], folder: &Path) -> Result<String, InputError> {
+    let mut doc: DocumentMut = template
+        .parse()
+        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
+    let mut planes: Vec<Option<[Option<f64>; 3]>> = vec![None; scene.planes.len()];
+    for (path, value) in values {
+        let wrong = |message: String| InputError { key: path.clone(), ..InputError::file(&scene.path, message) };
+        if !value.is_finite() {
+            return Err(wrong(format!("{value} cannot be written")));
+        }
+        let parts: Vec<&str> = path.split('.').collect();
+        let axis = |a: &str| ["x", "y", "z"].iter().position(|n| *n == a);
+        let unknown = || wrong("not a number of this scene".to_string());
+        match parts[..] {
+            ["plane", i, what] => {
+                let plane = i.parse().ok().and_then(|i: usize| planes.get_mut(i)).ok_or_else(unknown)?;
+                let slot = ["height", "theta", "phi"].iter().position(|n| *n == what).ok_or_else(unknown)?;
+                plane.get_or_insert([None; 3])[slot] = Some(*value);
+            }
+            ["mass", i, "mass"] => {
+                let i: usize = i.parse().map_err(|_| unknown())?;
+                set(row(&mut doc, "mass", i).ok_or_else(unknown)?, "mass", Value::from(*value));
+            }
+            [group @ ("world" | "initial"), name, a] => {
+                let a = axis(a).ok_or_else(unknown)?;
+                let before = match name {
+                    "gravity" => scene.gravity,
+                    "velocity" => scene.initial.velocity,
+                    "angular_velocity" => scene.initial.angular_velocity,
+                    _ => return Err(unknown()),
+                };
+                let table = section(&mut doc, group).ok_or_else(unknown)?;
+                if !table.contains_key(name) {
+                    set(table, name, vector(before));
+                }
+                let array = table.get_mut(name).and_then(Item::as_array_mut).ok_or_else(unknown)?;
+                replace(array.get_mut(a).ok_or_else(unknown)?, Value::from(*value));
+            }
+            [group @ ("material" | "time"), name] => {
+                let table = section(&mut doc, group).ok_or_else(unknown)?;
+                match name {
+                    "density" => drop(table.remove("mass")),
+                    "mass" => drop(table.remove("density")),
+                    _ => {}
+                }
+                set(table, name, Value::from(*value));
+            }
+            _ => return Err(unknown()),
+        }
+    }
+    for (i, change) in planes.iter().enumerate() {
+        let Some(change) = change else { continue };
+        let (point, normal) = moved_plane(scene.planes[i].point, scene.planes[i].normal, *change);
+        let missing = || InputError { key: format!("plane.{i}"), ..InputError::file(&scene.path, "not in the file") };
+        let table = row(&mut doc, "plane", i).ok_or_else(missing)?;
+        set(table, "point", vector(point));
+        set(table, "normal", vector(normal));
+    }
+    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    Ok(doc.to_string())
+}
+
+/// A plane's point and unit normal with a new height, θ or φ; the point moves as little as the new plane allows.
+fn moved_plane(point: DVec3, normal: DVec3, [height, theta, phi]: [Option<f64>; 3]) -> (DVec3, DVec3) {
+    let site = PlaneSite { polar_axis: PlaneSite::polar_axis_for(normal), stiffness: None };
+    let (theta0, phi0) = site.angles(normal);
+    let height = height.unwrap_or(point.dot(normal));
+    let n = match (theta, phi) {
+        (None, None) => normal,
+        _ => site.normal(theta.unwrap_or(theta0), phi.unwrap_or(phi0))[0],
+    };
+    (point + n * (height - point.dot(n)), n)
+}
+
+fn vector(v: DVec3) -> Value {
+    Value::from(v.to_array().into_iter().collect::<Array>())
+}
+
+/// A table under a top-level key, made when absent.
+fn section<'a>(doc: &'a mut DocumentMut, key: &str) -> Option<&'a mut dyn TableLike> {
+    doc.as_table_mut().entry(key).or_insert_with(|| Item::Table(Table::new())).as_table_like_mut()
+}
+
+/// Table `i` of a top-level array of tables.
+fn row<'a>(doc: &'a mut DocumentMut, key: &str, i: usize) -> Option<&'a mut dyn TableLike> {
+    match doc.get_mut(key)? {
+        Item::ArrayOfTables(a) => a.get_mut(i).map(|t| t as &mut dyn TableLike),
+        Item::Value(Value::Array(a)) => a.get_mut(i)?.as_inline_table_mut().map(|t| t as &mut dyn TableLike),
+        _ => None,
+    }
+}
+
+/// Replaces a value and keeps the blanks and comments around it.
+fn replace(old: &mut Value, new: Value) {
+    let decor = old.decor().clone();
+    *old = new;
+    *old.decor_mut() = decor;
+}
+
+fn set(table: &mut dyn TableLike, key: &str, new: Value) {
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => replace(old, new),
+        None => drop(table.insert(key, Item::Value(new))),
+    }
+}
+
+/// Rewrites the paths in a scene that lies in `from` so that they hold from `to`.
+fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
+    let fix = |table: &mut dyn TableLike, key: &str| {
+        if let Some(Value::String(s)) = table.get_mut(key).and_then(Item::as_value_mut)
+            && Path::new(s.value()).is_relative()
+        {
+            let path = relative(&absolute(&from.join(s.value())), &absolute(to));
+            replace(table.get_mut(key).and_then(Item::as_value_mut).expect("the key was just read"), Value::from(path));
+        }
+    };
+    if let Some(t) = doc.get_mut("object").and_then(Item::as_table_like_mut) {
+        fix(t, "mesh");
+    }
+    if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
+        fix(t, "recording");
+    }
+    let mut i = 0;
+    while let Some(t) = row(doc, "clamp", i) {
+        fix(t, "motion");
+        i += 1;
+    }
+}
+
+/// The absolute path without links, `.` and `..`, as far as the file system knows it.
+fn absolute(path: &Path) -> PathBuf {
+    if let Ok(p) = path.canonicalize() {
+        return p;
+    }
+    // The output folder may not exist yet: resolve what does.
+    match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) if !parent.as_os_str().is_empty() => absolute(parent).join(name),
+        _ => std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()),
+    }
+}
+
+/// `path` as seen from `folder`, both absolute, with forward slashes.
+fn relative(path: &Path, folder: &Path) -> String {
+    let a: Vec<Component> = path.components().collect();
+    let b: Vec<Component> = folder.components().collect();
+    let common = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
+    if common == 0 {
+        return path.to_string_lossy().into_owned();
+    }
+    let up = std::iter::repeat_n("..".to_string(), b.len() - common);
+    let down = a[common..].iter().map(|c| c.as_os_str().to_string_lossy().into_owned());
+    let parts: Vec<String> = up.chain(down).collect();
+    if parts.is_empty() { ".".to_string() } else { parts.join("/") }
+}
