@@ -1,1 +1,14 @@
-//! Under construction.
+//! Reference backend in f64: plain loops and faer, the oracle of every other backend. Clear before fast, but fast.
+//!
+//! Invariant: this room does not know where a plan comes from nor what gradients are for.
+
+mod backend;
+mod elements;
+pub mod linear;
+mod newton;
+pub mod passes;
+mod simulate;
+mod world;
+
+pub use backend::CpuBackend;
+pub use world::{Adjoint, State, Tally, Tangent, World};

@@ -17,6 +17,8 @@ pub mod motion;
 pub mod observation;
 pub mod params;
 pub mod plan;
+pub mod pullback;
+pub mod plan_build;
 pub mod rotation;
 pub mod scene;
 pub mod shape;

@@ -1,0 +1,311 @@
+//! [`Backend`] on the CPU: every pass over all members of the batch, side by side.
+
+use crate::newton;
+use crate::passes::cells::zeros;
+use crate::passes::frames::{self, Instant};
+use crate::simulate;
+use crate::world::{Adjoint, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
+use glam::DVec3;
+use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use rayon::prelude::*;
+
+/// The reference backend.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuBackend;
+
+fn blank(world: &World) -> Vec<MemberState> {
+    let n = world.shared.plan.body.nodes.len();
+    world.members.iter().map(|_| MemberState { u: zeros(n), v: zeros(n) }).collect()
+}
+
+fn displacement(at: &Instant, now: &MemberState, next: &MemberState) -> Vec<DVec3> {
+    frames::blend(&at.value, [&now.u, &now.v, &next.u, &next.v])
+}
+
+impl Backend for CpuBackend {
+    type World = World;
+    type State = State;
+    type Adjoint = Adjoint;
+    type Tangent = Tangent;
+    type Tally = Tally;
+
+    fn name(&self) -> String {
+        "cpu".into()
+    }
+
+    fn build(&self, plan: &Plan, _members: usize) -> Result<World, BuildError> {
+        // One factorisation at a time per member: parallel ones would make results depend on the number of threads.
+        faer::set_global_parallelism(faer::Par::Seq);
+        Ok(World::new(plan))
+    }
+
+    fn set_params(&self, world: &mut World, theta: &ParamBatch) {
+        world.set_params(theta);
+    }
+
+    fn new_state(&self, world: &World) -> State {
+        State { members: blank(world) }
+    }
+
+    fn new_adjoint(&self, world: &World) -> Adjoint {
+        Adjoint { members: blank(world) }
+    }
+
+    fn new_tangent(&self, world: &World, directions: &[usize]) -> Tangent {
+        let n = world.shared.plan.body.nodes.len();
+        let blank = || MemberTangent { du: vec![zeros(n); directions.len()], dv: vec![zeros(n); directions.len()] };
+        Tangent { directions: directions.to_vec(), members: world.members.iter().map(|_| blank()).collect() }
+    }
+
+    fn new_tally(&self, world: &World, directions: &[usize]) -> Tally {
+        let q = directions.len();
+        let evaluation = Evaluation {
+            gradient: vec![0.0; world.shared.plan.layout.len()],
+            curvature: (q > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
+            residuals: world.shared.plan.observation.residuals(),
+            ..Evaluation::default()
+        };
+        Tally { members: vec![MemberTally { evaluation, compared: Vec::new() }; world.members.len()] }
+    }
+
+    fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {
+        let shared = &world.shared;
+        (&mut world.members, &mut first.members, &mut tally.members).into_par_iter().for_each(|(m, s, t)| {
+            if let Err(reason) = simulate::start(shared, m, s) {
+                t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+            }
+        });
+    }
+
+    fn step(&self, world: &mut World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
+        let shared = &world.shared;
+        let time = (k + 1) as f64 * shared.plan.clock.step;
+        (&mut world.members, &now.members, &mut next.members, &mut tally.members).into_par_iter().for_each(|(m, a, b, t)| {
+            if !t.failed()
+                && let Err(reason) = simulate::step(shared, m, k, a, b)
+            {
+                t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+            }
+        });
+    }
+
+    fn observe(&self, world: &World, k: usize, now: &State, next: &State, tally: &mut Tally) {
+        let shared = &world.shared;
+        (&world.members, &now.members, &next.members, &mut tally.members).into_par_iter().for_each(|(m, a, b, t)| {
+            if t.failed() {
+                return;
+            }
+            for at in frames::instants(&shared.plan, m.physics.start, k) {
+                let u = displacement(&at, a, b);
+                let compared = frames::compare(&shared.plan, &shared.hashes[at.frame], at.frame, &u);
+                let e = &mut t.evaluation;
+                e.cost += shared.scale * compared.cost;
+                e.matched += compared.matched;
+                e.sum_squares += compared.sum_squares;
+                e.sum_signed += compared.sum_signed;
+                t.compared.push((at.frame, u, compared));
+            }
+        });
+    }
+
+    fn observe_adjoint(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        adj: &mut Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        let shared = &world.shared;
+        let start = shared.plan.layout.index(ParamKey::TimeStart);
+        (&world.members, &now.members, &next.members, &mut adj.members, &mut adj_now.members, &mut tally.members)
+            .into_par_iter()
+            .for_each(|(m, a, b, to_next, to_now, t)| {
+                if t.failed() {
+                    return;
+                }
+                for at in frames::instants(&shared.plan, m.physics.start, k) {
+                    let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
+                    let g = frames::gradient(&shared.plan, at.frame, &found.2, &found.1, shared.scale);
+                    let rate = frames::blend(&at.rate, [&a.u, &a.v, &b.u, &b.v]);
+                    // A later start means an earlier place on the curve.
+                    t.evaluation.gradient[start] -= crate::linear::vector::dot(&g, &rate);
+                    for i in 0..g.len() {
+                        to_now.u[i] += at.value[0] * g[i];
+                        to_now.v[i] += at.value[1] * g[i];
+                        to_next.u[i] += at.value[2] * g[i];
+                        to_next.v[i] += at.value[3] * g[i];
+                    }
+                }
+            });
+    }
+
+    fn step_adjoint(
+        &self,
+        world: &mut World,
+        k: usize,
+        now: &State,
+        next: &State,
+        adj: &Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        let shared = &world.shared;
+        let time = (k + 1) as f64 * shared.plan.clock.step;
+        (&mut world.members, &now.members, &next.members, &adj.members, &mut adj_now.members, &mut tally.members)
+            .into_par_iter()
+            .for_each(|(m, a, b, from, to, t)| {
+                if !t.failed()
+                    && let Err(reason) = simulate::step_adjoint(shared, m, k, a, b, from, to, &mut t.evaluation.gradient)
+                {
+                    t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+                }
+            });
+    }
+
+    fn start_adjoint(&self, world: &mut World, first: &State, adj: &Adjoint, tally: &mut Tally) {
+        let shared = &world.shared;
+        (&mut world.members, &first.members, &adj.members, &mut tally.members).into_par_iter().for_each(|(m, s, a, t)| {
+            if !t.failed()
+                && let Err(reason) = simulate::start_adjoint(shared, m, s, a, &mut t.evaluation.gradient)
+            {
+                t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+            }
+        });
+    }
+
+    fn clear_adjoint(&self, adj: &mut Adjoint) {
+        for m in &mut adj.members {
+            m.u.fill(DVec3::ZERO);
+            m.v.fill(DVec3::ZERO);
+        }
+    }
+
+    fn start_tangent(&self, world: &mut World, first: &State, tangent: &mut Tangent, tally: &mut Tally) {
+        let shared = &world.shared;
+        let directions = &tangent.directions;
+        (&mut world.members, &first.members, &mut tangent.members, &mut tally.members).into_par_iter().for_each(|(m, s, d, t)| {
+            if !t.failed()
+                && let Err(reason) = simulate::start_tangent(shared, m, s, directions, d)
+            {
+                t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+            }
+        });
+    }
+
+    fn step_tangent(
+        &self,
+        world: &mut World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &mut Tangent,
+        tally: &mut Tally,
+    ) {
+        let shared = &world.shared;
+        let directions = &tangent.directions;
+        let time = (k + 1) as f64 * shared.plan.clock.step;
+        (
+            &mut world.members,
+            &now.members,
+            &next.members,
+            &tangent.members,
+            &mut tangent_next.members,
+            &mut tally.members,
+        )
+            .into_par_iter()
+            .for_each(|(m, a, b, d, d_next, t)| {
+                if !t.failed()
+                    && let Err(reason) = simulate::step_tangent(shared, m, k, a, b, directions, d, d_next)
+                {
+                    t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+                }
+            });
+    }
+
+    fn observe_tangent(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &Tangent,
+        tally: &mut Tally,
+    ) {
+        let shared = &world.shared;
+        let keys = &shared.plan.layout.keys;
+        (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members, &mut tally.members)
+            .into_par_iter()
+            .for_each(|(m, a, b, d0, d1, t)| {
+                if t.failed() {
+                    return;
+                }
+                for at in frames::instants(&shared.plan, m.physics.start, k) {
+                    let du: Vec<_> = (0..tangent.directions.len())
+                        .map(|q| {
+                            let mut du = frames::blend(&at.value, [&d0.du[q], &d0.dv[q], &d1.du[q], &d1.dv[q]]);
+                            if keys[tangent.directions[q]] == ParamKey::TimeStart {
+                                let rate = frames::blend(&at.rate, [&a.u, &a.v, &b.u, &b.v]);
+                                crate::linear::vector::add_scaled(&mut du, -1.0, &rate);
+                            }
+                            du
+                        })
+                        .collect();
+                    let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
+                    let c = t.evaluation.curvature.as_mut().expect("tangents go with a curvature");
+                    frames::gauss_newton(
+                        &shared.plan,
+                        at.frame,
+                        &found.2,
+                        &found.1,
+                        &du,
+                        shared.scale,
+                        &mut c.gradient,
+                        &mut c.matrix,
+                    );
+                }
+            });
+    }
+
+    fn all_failed(&self, tally: &Tally) -> bool {
+        tally.members.iter().all(MemberTally::failed)
+    }
+
+    fn read(&self, _world: &World, tally: &Tally) -> Vec<Evaluation> {
+        tally
+            .members
+            .iter()
+            .map(|t| {
+                let mut e = t.evaluation.clone();
+                if t.failed() {
+                    e.cost = f64::INFINITY;
+                }
+                e
+            })
+            .collect()
+    }
+
+    fn read_state(&self, _world: &World, state: &State, member: usize) -> (Vec<DVec3>, Vec<DVec3>) {
+        let s = &state.members[member];
+        (s.u.clone(), s.v.clone())
+    }
+
+    fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
+        let shared = &world.shared;
+        let (a, b) = (&now.members[member], &next.members[member]);
+        frames::instants(&shared.plan, world.members[member].physics.start, k)
+            .iter()
+            .map(|at| {
+                let u = displacement(at, a, b);
+                let compared = frames::compare(&shared.plan, &shared.hashes[at.frame], at.frame, &u);
+                frames::residuals(&shared.plan, at.frame, &compared, &u)
+            })
+            .collect()
+    }
+}

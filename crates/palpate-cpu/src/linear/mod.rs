@@ -1,0 +1,119 @@
+//! Linear algebra of the backend: the block matrix, direct and iterative solvers, and the choice between them.
+
+pub mod cholesky;
+pub mod conjugate_gradient;
+pub mod jacobi;
+pub mod matrix;
+pub mod pattern;
+pub mod vector;
+
+use cholesky::{Analysis, Factor};
+use conjugate_gradient::{CgEnd, Precondition};
+use glam::DVec3;
+use matrix::Matrix;
+use palpate_model::scene::LinearSolver;
+use pattern::Pattern;
+use std::sync::OnceLock;
+
+/// Most CG iterations; a solve that needs more is a symptom.
+const MOST_ITERATIONS: usize = 4000;
+/// Largest body (nodes) whose Cholesky factor is worth its cost in a static problem: 3D fill grows like N^(4/3).
+const DIRECT_STATIC: usize = 9000;
+/// Largest body (nodes) and fewest right-hand sides for which a factor pays in a time step.
+const DIRECT_STEP: (usize, usize) = (1500, 4);
+
+/// Solves with the matrices of one plan.
+#[derive(Debug)]
+pub struct Solvers {
+    choice: LinearSolver,
+    analysis: OnceLock<Result<Analysis, String>>,
+}
+
+/// What a linear solve is for; decides between direct and iterative.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// No inertia: the matrix is badly conditioned.
+    Static,
+    /// A time step with so many right-hand sides.
+    Step(usize),
+}
+
+/// A matrix made ready for solves.
+pub enum Prepared<'a> {
+    /// Factorised.
+    Direct(Factor),
+    /// With a preconditioner.
+    Iterative(&'a Pattern, &'a Matrix, Box<dyn Precondition + Send + Sync + 'a>),
+}
+
+/// A solve that failed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Trouble {
+    /// The matrix is not positive definite.
+    Indefinite(String),
+    /// CG stopped at this relative residual.
+    Unconverged(f64),
+}
+
+impl Solvers {
+    /// Solvers for a choice made in the scene.
+    pub fn new(choice: LinearSolver) -> Solvers {
+        Solvers { choice, analysis: OnceLock::new() }
+    }
+
+    fn direct(&self, nodes: usize, purpose: Purpose) -> bool {
+        match (self.choice, purpose) {
+            (LinearSolver::Cholesky, _) => true,
+            (LinearSolver::ConjugateGradient, _) => false,
+            (LinearSolver::Auto, Purpose::Static) => nodes <= DIRECT_STATIC,
+            (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP.0 && columns >= DIRECT_STEP.1,
+        }
+    }
+
+    /// Factorises or preconditions a matrix.
+    pub fn prepare<'a>(&self, pattern: &'a Pattern, matrix: &'a Matrix, purpose: Purpose) -> Result<Prepared<'a>, Trouble> {
+        if self.direct(pattern.nodes(), purpose) {
+            let analysis = self.analysis.get_or_init(|| Analysis::new(pattern));
+            let analysis = analysis.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
+            return analysis.factor(matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
+        }
+        let jacobi = jacobi::BlockJacobi::new(pattern, matrix).map_err(|a| Trouble::Indefinite(format!("diagonal block of node {a}")))?;
+        Ok(Prepared::Iterative(pattern, matrix, Box::new(jacobi)))
+    }
+}
+
+impl Prepared<'_> {
+    /// Solves A x = b; `x` comes in as a guess (used by CG only).
+    pub fn solve(&self, b: &[DVec3], x: &mut [DVec3], relative: f64, absolute: f64) -> Result<(), Trouble> {
+        match self {
+            Prepared::Direct(factor) => {
+                x.copy_from_slice(b);
+                factor.solve(&mut [x]);
+                Ok(())
+            }
+            Prepared::Iterative(pattern, matrix, precondition) => {
+                match conjugate_gradient::solve(pattern, matrix, precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS) {
+                    CgEnd::Converged(_) => Ok(()),
+                    CgEnd::Unconverged(left) => Err(Trouble::Unconverged(left)),
+                    CgEnd::Indefinite => Err(Trouble::Indefinite("a direction of negative curvature".into())),
+                }
+            }
+        }
+    }
+
+    /// Solves for many right-hand sides in place, from zero guesses.
+    pub fn solve_many(&self, columns: &mut [Vec<DVec3>], relative: f64) -> Result<(), Trouble> {
+        match self {
+            Prepared::Direct(factor) => {
+                factor.solve(&mut columns.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
+                Ok(())
+            }
+            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| {
+                let mut x = vec![DVec3::ZERO; b.len()];
+                self.solve(b, &mut x, relative, 0.0)?;
+                *b = x;
+                Ok(())
+            }),
+        }
+    }
+}

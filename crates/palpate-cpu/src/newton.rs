@@ -1,0 +1,151 @@
+//! Solves a balance by Newton's method with the exact symmetric tangent and a line search on the potential.
+
+use crate::linear::jacobi::BlockJacobi;
+use crate::linear::matrix::Matrix;
+use crate::linear::vector::{Nodes, add_scaled, dot, is_finite};
+use crate::linear::{Prepared, Purpose, Solvers, Trouble};
+use crate::passes::balance::{Balance, States};
+use glam::DVec3;
+use palpate_engine::{Failure, FailureKind};
+
+/// A failure without its time.
+pub type Reason = (FailureKind, String);
+
+/// Accuracy of linear solves whose results are differentiated or summed into gradients.
+pub const DERIVATIVE_TOLERANCE: f64 = 1e-12;
+
+/// Attaches the time of the simulation to a reason.
+pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
+    move |(kind, detail)| Failure { kind, time, detail }
+}
+
+fn trouble(t: Trouble) -> Reason {
+    match t {
+        Trouble::Indefinite(what) => (FailureKind::LinearSolve, format!("the matrix is not positive definite ({what})")),
+        Trouble::Unconverged(left) => (FailureKind::LinearSolve, format!("conjugate gradients stopped at a relative residual of {left:.1e}")),
+    }
+}
+
+/// Finds u₁ with r(u₁) = 0 from the guess in `u1`. Converged when the residual, scaled by the inverse diagonal blocks,
+/// is below `tolerance` times the scaled sizes of the forces that it is the sum of.
+pub fn solve(
+    balance: &Balance,
+    solvers: &Solvers,
+    matrix: &mut Matrix,
+    purpose: Purpose,
+    u1: &mut Nodes,
+    u0: &[DVec3],
+    v0: &[DVec3],
+    tolerance: f64,
+    most: usize,
+) -> Result<(), Reason> {
+    let mut residual = balance.residual(States { u1, u0, v0 });
+    let mut scale = None;
+    let mut history = Vec::new();
+    for _ in 0..most {
+        if !is_finite(&residual) {
+            return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
+        }
+        let s = States { u1, u0, v0 };
+        let (direction, norm) = direction(balance, solvers, matrix, purpose, s, &residual, tolerance, &mut scale)?;
+        let Some(direction) = direction else { return Ok(()) };
+        history.push(norm);
+        residual = line_search(balance, u1, u0, v0, &residual, &direction);
+        let norm = current_norm(balance, matrix, &residual);
+        if norm <= tolerance * scale.unwrap_or(0.0) {
+            return Ok(());
+        }
+    }
+    let reference = scale.unwrap_or(1.0);
+    let (first, last) = (history.first().copied().unwrap_or(0.0), history.last().copied().unwrap_or(0.0));
+    // A solve that has lost ten digits is at rounding, whatever the tolerance asks for.
+    if last <= 1e-10 * reference {
+        return Ok(());
+    }
+    Err((
+        FailureKind::NewtonStalled,
+        format!("{most} iterations took the scaled residual from {:.1e} to {:.1e} of the forces", first / reference, last / reference),
+    ))
+}
+
+fn current_norm(balance: &Balance, matrix: &Matrix, residual: &[DVec3]) -> f64 {
+    BlockJacobi::new(balance.pattern, matrix).map_or(f64::INFINITY, |d| d.norm(residual))
+}
+
+/// Newton direction −A⁻¹ r, or `None` when the residual is small already; and the residual's norm. Where the exact tangent is
+/// not positive definite its convex part gives a descent direction instead.
+fn direction(
+    balance: &Balance,
+    solvers: &Solvers,
+    matrix: &mut Matrix,
+    purpose: Purpose,
+    s: States,
+    residual: &[DVec3],
+    tolerance: f64,
+    scale: &mut Option<f64>,
+) -> Result<(Option<Nodes>, f64), Reason> {
+    for convex in [false, true] {
+        balance.tangent(s, convex, matrix);
+        let norm = match BlockJacobi::new(balance.pattern, matrix) {
+            Ok(diagonal) => {
+                let reference = *scale.get_or_insert_with(|| balance.scale(s, |f| diagonal.norm(f)));
+                let norm = diagonal.norm(residual);
+                if norm <= tolerance * reference || norm == 0.0 {
+                    return Ok((None, norm));
+                }
+                norm
+            }
+            Err(_) if !convex => continue,
+            Err(a) => return Err((FailureKind::LinearSolve, format!("the stiffness of node {a} is not positive"))),
+        };
+        // The next Newton step squares the error anyway: three digits now, and never more than the end needs.
+        let absolute = 0.1 * tolerance * scale.unwrap_or(0.0);
+        let solved = solvers.prepare(balance.pattern, matrix, purpose).and_then(|prepared| {
+            let mut d = vec![DVec3::ZERO; residual.len()];
+            let minus: Nodes = residual.iter().map(|r| -*r).collect();
+            prepared.solve(&minus, &mut d, 1e-3, absolute).map(|()| d)
+        });
+        match solved {
+            Ok(d) if is_finite(&d) => return Ok((Some(d), norm)),
+            Ok(_) => return Err((FailureKind::NotFinite, "displacement of a Newton step".into())),
+            Err(Trouble::Indefinite(_)) if !convex => {}
+            Err(t) => return Err(trouble(t)),
+        }
+    }
+    unreachable!("the second pass always returns")
+}
+
+/// Takes the longest of the steps 1, ½, ¼ … that lowers the potential (Armijo 1966) and returns the residual there.
+fn line_search(balance: &Balance, u1: &mut Nodes, u0: &[DVec3], v0: &[DVec3], residual: &[DVec3], d: &[DVec3]) -> Nodes {
+    let slope = dot(residual, d);
+    let start = u1.clone();
+    let before = balance.potential(States { u1: &start, u0, v0 });
+    let mut step = 1.0;
+    for _ in 0..30 {
+        u1.copy_from_slice(&start);
+        add_scaled(u1, step, d);
+        let s = States { u1, u0, v0 };
+        let after = balance.potential(s);
+        // Close to the solution the change drowns in rounding; then the residual decides.
+        let rounding = 1e-12 * (before.abs() + after.abs());
+        if after <= before + 1e-4 * step * slope + rounding {
+            return balance.residual(s);
+        }
+        step *= 0.5;
+    }
+    balance.residual(States { u1, u0, v0 })
+}
+
+/// Solves A x = b with the exact tangent at a converged state, for derivatives.
+pub fn solve_exact(
+    balance: &Balance,
+    solvers: &Solvers,
+    matrix: &mut Matrix,
+    purpose: Purpose,
+    s: States,
+    columns: &mut [Vec<DVec3>],
+) -> Result<(), Reason> {
+    balance.tangent(s, false, matrix);
+    let prepared: Prepared = solvers.prepare(balance.pattern, matrix, purpose).map_err(trouble)?;
+    prepared.solve_many(columns, DERIVATIVE_TOLERANCE).map_err(trouble)
+}

@@ -1,0 +1,398 @@
+//! The balance of forces that one solve must satisfy: residual, derivatives by both states and by every parameter.
+//!
+//! Dynamic (a step of the θ-scheme) and static problems are the same sum with and without inertia:
+//! `r(u₁) = M[(1/(θΔt²))(u₁−u₀) − v₀/(θΔt)] + αM(u₁−u₀)/Δt + cells(u₁,u₀) + ghost + clamps(u₁) + contact(u₁) − weight`.
+//! Contact and clamps act at the new state only, so their stiffness limits no time step.
+
+use crate::elements::Elements;
+use crate::linear::matrix::Matrix;
+use crate::linear::pattern::{Pattern, Places};
+use crate::linear::vector::{Nodes, dot};
+use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
+use crate::passes::supports::{self, PlaneNow};
+use glam::{DMat3, DVec3};
+use palpate_model::contact;
+use palpate_model::params::ParamKey;
+use palpate_model::plan::{Physics, Plan};
+use rayon::prelude::*;
+
+/// Factors of the inertia terms; `None` in a static problem.
+#[derive(Clone, Copy, Debug)]
+pub struct Inertia {
+    /// 1/(θΔt²): factor of M(u₁ − u₀) [1/s²].
+    pub displacement: f64,
+    /// 1/(θΔt): factor of −M v₀ [1/s].
+    pub velocity: f64,
+    /// 1/Δt [1/s].
+    pub rate: f64,
+}
+
+/// One balance of one member.
+#[derive(Clone, Copy)]
+pub struct Balance<'a> {
+    /// Everything common to the batch.
+    pub plan: &'a Plan,
+    /// Pattern of the matrix.
+    pub pattern: &'a Pattern,
+    /// Where terms add into it.
+    pub places: &'a Places,
+    /// Matrices at the member's Poisson ratio.
+    pub elements: &'a Elements,
+    /// The member's parameters.
+    pub physics: &'a Physics,
+    /// The member's planes.
+    pub planes: &'a [PlaneNow],
+    /// Inertia; `None` = static.
+    pub inertia: Option<Inertia>,
+    /// How the two states enter the elastic force.
+    pub mix: Mix,
+    /// Time of the new state on the recording's clock [s].
+    pub time: f64,
+}
+
+/// The states of a balance: the unknown new displacement, and the old displacement and velocity.
+#[derive(Clone, Copy)]
+pub struct States<'a> {
+    /// u₁ [m].
+    pub u1: &'a [DVec3],
+    /// u₀ [m].
+    pub u0: &'a [DVec3],
+    /// v₀ [m/s].
+    pub v0: &'a [DVec3],
+}
+
+impl<'a> Balance<'a> {
+    /// The elastic part.
+    pub fn elasticity(&self) -> Elasticity<'a> {
+        Elasticity { body: &self.plan.body, pattern: self.pattern, elements: self.elements, young: self.physics.youngs_modulus }
+    }
+
+    fn ghost_scale(&self, shear: f64) -> f64 {
+        self.plan.solver.ghost * self.plan.body.grid.h * shear
+    }
+
+    /// Adds ghost forces for a shear modulus.
+    fn ghost(&self, shear: f64, mix: &Mix, s: States, out: &mut [DVec3]) {
+        if self.plan.body.ghosts.is_empty() {
+            return;
+        }
+        let scale = self.ghost_scale(shear);
+        supports::ghost_product(&self.plan.body, scale * (mix.new + mix.rate), s.u1, out);
+        if mix.old != mix.rate {
+            supports::ghost_product(&self.plan.body, scale * (mix.old - mix.rate), s.u0, out);
+        }
+    }
+
+    /// Adds M a for accelerations a(node) of the body alone and of the point masses.
+    fn masses(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        let rho = self.physics.density;
+        for (i, w) in self.plan.body.node_volume.iter().enumerate() {
+            out[i] += rho * w * body(i);
+        }
+        for (site, m) in self.plan.masses.iter().zip(&self.physics.masses) {
+            let mut a = DVec3::ZERO;
+            for i in 0..8 {
+                a += site.weights[i] * points(site.nodes[i] as usize);
+            }
+            for i in 0..8 {
+                out[site.nodes[i] as usize] += *m * site.weights[i] * a;
+            }
+        }
+    }
+
+    /// Adds inertia, mass damping and weight.
+    fn bodily(&self, s: States, out: &mut [DVec3]) {
+        let g = self.physics.gravity;
+        match self.inertia {
+            None => self.masses(|_| -g, |_| -g, out),
+            Some(t) => {
+                let drag = self.physics.mass_damping * t.rate;
+                let newton = |i: usize| t.displacement * (s.u1[i] - s.u0[i]) - t.velocity * s.v0[i] - g;
+                self.masses(|i| newton(i) + drag * (s.u1[i] - s.u0[i]), newton, out);
+            }
+        }
+    }
+
+    /// r(u₁), shape `[N]` [N].
+    pub fn residual(&self, s: States) -> Nodes {
+        let mut r = zeros(s.u1.len());
+        self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut r);
+        self.ghost(self.physics.youngs_modulus * self.elements.shear[0], &self.mix, s, &mut r);
+        self.supports(s.u1, &mut r);
+        self.bodily(s, &mut r);
+        r
+    }
+
+    /// Adds clamps and contact.
+    fn supports(&self, u: &[DVec3], out: &mut [DVec3]) {
+        for (i, clamp) in self.plan.clamps.iter().enumerate() {
+            let pose = supports::pose_at(clamp, self.time);
+            supports::clamp_force(self.plan, i, self.elements, Matrices::Stiffness, pose, self.physics.youngs_modulus, u, out);
+        }
+        for plane in self.planes {
+            for t in supports::touches(&self.plan.body, plane, u) {
+                for i in 0..8 {
+                    out[t.nodes[i] as usize] -= t.area * t.pressure * t.weights[i] * plane.normal[0];
+                }
+            }
+        }
+    }
+
+    /// Sizes of the forces that the residual is the sum of, in the given norm: what "small" is measured against.
+    pub fn scale(&self, s: States, norm: impl Fn(&[DVec3]) -> f64) -> f64 {
+        let n = s.u1.len();
+        let g = self.physics.gravity;
+        let mut weight = zeros(n);
+        self.masses(|_| g, |_| g, &mut weight);
+        let mut momentum = zeros(n);
+        if let Some(t) = self.inertia {
+            self.masses(|i| t.velocity * s.v0[i], |i| t.velocity * s.v0[i], &mut momentum);
+        }
+        let mut elastic = zeros(n);
+        self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut elastic);
+        let mut support = zeros(n);
+        self.supports(s.u1, &mut support);
+        norm(&weight) + norm(&momentum) + norm(&elastic) + norm(&support)
+    }
+
+    /// Potential whose gradient by u₁ is the residual, up to a constant [J].
+    pub fn potential(&self, s: States) -> f64 {
+        let young = self.physics.youngs_modulus;
+        let mut w = self.elasticity().potential(&self.mix, s.u1, s.u0);
+        if !self.plan.body.ghosts.is_empty() {
+            let scale = self.ghost_scale(young * self.elements.shear[0]);
+            let mut gu = zeros(s.u1.len());
+            supports::ghost_product(&self.plan.body, scale * (self.mix.new + self.mix.rate), s.u1, &mut gu);
+            supports::ghost_product(&self.plan.body, 2.0 * scale * (self.mix.old - self.mix.rate), s.u0, &mut gu);
+            w += 0.5 * dot(s.u1, &gu);
+        }
+        for (i, clamp) in self.plan.clamps.iter().enumerate() {
+            w += supports::clamp_energy(self.plan, i, self.elements, supports::pose_at(clamp, self.time), young, s.u1);
+        }
+        let width = contact::WIDTH * self.plan.body.grid.h;
+        for plane in self.planes {
+            w += supports::touches(&self.plan.body, plane, s.u1).map(|t| t.area * contact::energy(t.gap, plane.stiffness, width)).sum::<f64>();
+        }
+        // Inertia and weight are quadratic and linear: ½ (r(u₁) + r(0))·u₁.
+        let mut at_new = zeros(s.u1.len());
+        self.bodily(s, &mut at_new);
+        let zero = zeros(s.u1.len());
+        self.bodily(States { u1: &zero, ..s }, &mut at_new);
+        w + 0.5 * dot(s.u1, &at_new)
+    }
+
+    /// ∂r/∂u₁, symmetric. With `convex` the indefinite part of the elastic tangent is left out.
+    pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
+        let (plan, pattern) = (self.plan, self.pattern);
+        matrix.values.resize(pattern.columns.len(), DMat3::ZERO);
+        let elasticity = self.elasticity();
+        let mut slices = Vec::new();
+        let mut rest = matrix.values.as_mut_slice();
+        for part in &pattern.parts {
+            let (a, b) = rest.split_at_mut(pattern.rows[part.end] - pattern.rows[part.start]);
+            slices.push((part.clone(), a));
+            rest = b;
+        }
+        slices.into_par_iter().for_each(|(rows, values)| {
+            values.fill(DMat3::ZERO);
+            let base = pattern.rows[rows.start];
+            let mut h = [0.0; 576];
+            for (e, cell) in plan.body.cells.iter().enumerate() {
+                let inside = cell.nodes.map(|n| rows.contains(&(n as usize)));
+                if !inside.contains(&true) {
+                    continue;
+                }
+                elasticity.tangent(&self.mix, e, s.u1, s.u0, convex, &mut h);
+                for i in (0..8).filter(|&i| inside[i]) {
+                    for j in 0..8 {
+                        values[self.places.cells[e][8 * i + j] as usize - base] += block(&h, i, j);
+                    }
+                }
+            }
+        });
+        self.add_sparse(s.u1, matrix);
+    }
+
+    /// Adds everything but the cells to the matrix.
+    fn add_sparse(&self, u: &[DVec3], matrix: &mut Matrix) {
+        let (plan, pattern, physics) = (self.plan, self.pattern, self.physics);
+        let values = &mut matrix.values;
+        let ghost = self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.rate);
+        const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
+        for (g, line) in plan.body.ghosts.iter().enumerate() {
+            for k in 0..9 {
+                let s = ghost * line.weight * STENCIL[k / 3] * STENCIL[k % 3];
+                values[self.places.ghosts[g][k] as usize] += DMat3::from_diagonal(DVec3::splat(s));
+            }
+        }
+        if let Some(t) = self.inertia {
+            let factor = t.displacement + physics.mass_damping * t.rate;
+            for (i, w) in plan.body.node_volume.iter().enumerate() {
+                values[pattern.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(physics.density * w * factor));
+            }
+            for (k, (site, m)) in plan.masses.iter().zip(&physics.masses).enumerate() {
+                for b in 0..64 {
+                    let s = m * t.displacement * site.weights[b / 8] * site.weights[b % 8];
+                    values[self.places.masses[k][b] as usize] += DMat3::from_diagonal(DVec3::splat(s));
+                }
+            }
+        }
+        for (c, clamp) in plan.clamps.iter().enumerate() {
+            let (a, _) = supports::pose_at(clamp, self.time);
+            for (m, cell) in clamp.cells.iter().enumerate() {
+                let k = &self.elements.clamps[c][m].k;
+                let places = &self.places.cells[cell.cell as usize];
+                for b in 0..64 {
+                    values[places[b] as usize] += a * block(k, b / 8, b % 8) * a.transpose() * physics.youngs_modulus;
+                }
+            }
+        }
+        for plane in self.planes {
+            let n = plane.normal[0];
+            let nn = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+            for (patch, t) in supports::patch_touches(&plan.body, plane, u) {
+                let places = &self.places.cells[patch.cell as usize];
+                for b in 0..64 {
+                    values[places[b] as usize] += nn * (-t.area * t.slope * t.weights[b / 8] * t.weights[b % 8]);
+                }
+            }
+        }
+    }
+
+    /// (∂r/∂u₀) du₀ + (∂r/∂v₀) dv₀.
+    pub fn by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
+        let mut out = self.by_old_inertia(du0, dv0);
+        self.elasticity().by_old(&self.mix, s.u1, s.u0, du0, &mut out);
+        out
+    }
+
+    /// Transposes of both: ((∂r/∂u₀)ᵀ z, (∂r/∂v₀)ᵀ z).
+    pub fn by_old_transposed(&self, s: States, z: &[DVec3]) -> (Nodes, Nodes) {
+        let zero = zeros(z.len());
+        let mut to_u = self.by_old_inertia(z, &zero);
+        self.elasticity().by_old_transposed(&self.mix, s.u1, s.u0, z, &mut to_u);
+        (to_u, self.by_old_inertia(&zero, z))
+    }
+
+    /// The symmetric parts (inertia, ghost) of the derivative by the old state.
+    fn by_old_inertia(&self, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
+        let mut out = zeros(du0.len());
+        if let Some(t) = self.inertia {
+            let drag = self.physics.mass_damping * t.rate;
+            let newton = |i: usize| -t.displacement * du0[i] - t.velocity * dv0[i];
+            self.masses(|i| newton(i) - drag * du0[i], newton, &mut out);
+        }
+        let factor = self.mix.old - self.mix.rate;
+        if factor != 0.0 && !self.plan.body.ghosts.is_empty() {
+            let scale = self.ghost_scale(self.physics.youngs_modulus * self.elements.shear[0]);
+            supports::ghost_product(&self.plan.body, scale * factor, du0, &mut out);
+        }
+        out
+    }
+
+    /// ∂r/∂p at fixed states, or `None` when the residual does not depend on p.
+    pub fn column(&self, key: ParamKey, s: States) -> Option<Nodes> {
+        let n = s.u1.len();
+        let mut out = zeros(n);
+        let young = self.physics.youngs_modulus;
+        let elements = self.elements;
+        match key {
+            ParamKey::YoungsModulus | ParamKey::PoissonRatio => {
+                let (which, factor, shear) = match key {
+                    ParamKey::YoungsModulus => (Matrices::Stiffness, 1.0, elements.shear[0]),
+                    _ => (Matrices::ByPoisson, young, young * elements.shear[1]),
+                };
+                self.elasticity().force(&self.mix, which, factor, s.u1, s.u0, &mut out);
+                self.ghost(shear, &self.mix, s, &mut out);
+                for (i, clamp) in self.plan.clamps.iter().enumerate() {
+                    let pose = supports::pose_at(clamp, self.time);
+                    supports::clamp_force(self.plan, i, elements, which, pose, factor, s.u1, &mut out);
+                }
+                if which == Matrices::Stiffness {
+                    for plane in self.planes.iter().filter(|p| p.scales) {
+                        self.contact_column(plane, s.u1, |t| (t.pressure / young) * plane.normal[0], &mut out);
+                    }
+                }
+            }
+            ParamKey::Density => {
+                let rho = self.physics.density;
+                let g = self.physics.gravity;
+                let drag = self.physics.mass_damping;
+                let acceleration = |i: usize| match self.inertia {
+                    None => -g,
+                    Some(t) => (t.displacement + drag * t.rate) * (s.u1[i] - s.u0[i]) - t.velocity * s.v0[i] - g,
+                };
+                self.masses(|i| acceleration(i) / rho, |_| DVec3::ZERO, &mut out);
+            }
+            ParamKey::MassDamping => {
+                let t = self.inertia?;
+                self.masses(|i| t.rate * (s.u1[i] - s.u0[i]), |_| DVec3::ZERO, &mut out);
+            }
+            ParamKey::StiffnessDamping => {
+                let t = self.inertia?;
+                let mix = Mix { new: 0.0, old: 0.0, rate: t.rate, ..self.mix };
+                self.elasticity().force(&mix, Matrices::Stiffness, young, s.u1, s.u0, &mut out);
+                self.ghost(young * elements.shear[0], &mix, s, &mut out);
+            }
+            ParamKey::Gravity(a) => self.masses(|_| -DVec3::AXES[a as usize], |_| -DVec3::AXES[a as usize], &mut out),
+            ParamKey::PointMass(k) => {
+                let site = &self.plan.masses[k as usize];
+                let g = self.physics.gravity;
+                let mut a = -g;
+                if let Some(t) = self.inertia {
+                    for i in 0..8 {
+                        let m = site.nodes[i] as usize;
+                        a += site.weights[i] * (t.displacement * (s.u1[m] - s.u0[m]) - t.velocity * s.v0[m]);
+                    }
+                }
+                for i in 0..8 {
+                    out[site.nodes[i] as usize] += site.weights[i] * a;
+                }
+            }
+            ParamKey::PlaneHeight(k) => {
+                let plane = &self.planes[k as usize];
+                self.contact_column(plane, s.u1, |t| -t.slope * plane.normal[0], &mut out);
+            }
+            ParamKey::PlaneTheta(k) | ParamKey::PlanePhi(k) => {
+                let plane = &self.planes[k as usize];
+                let dn = plane.normal[if matches!(key, ParamKey::PlaneTheta(_)) { 1 } else { 2 }];
+                self.contact_column(plane, s.u1, |t| t.slope * dn.dot(t.point) * plane.normal[0] + t.pressure * dn, &mut out);
+            }
+            ParamKey::TimeStart => {
+                if self.plan.clamps.iter().all(|c| c.motion.is_none()) {
+                    return None;
+                }
+                // The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10.
+                let d = 1e-6;
+                for (sign, time) in [(0.5 / d, self.time + d), (-0.5 / d, self.time - d)] {
+                    for (i, clamp) in self.plan.clamps.iter().enumerate() {
+                        let pose = supports::pose_at(clamp, time);
+                        supports::clamp_force(self.plan, i, elements, Matrices::Stiffness, pose, sign * young, s.u1, &mut out);
+                    }
+                }
+            }
+            ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => return None,
+        }
+        Some(out)
+    }
+
+    /// Adds −area · weight · f(touch) over the patches that touch a plane.
+    fn contact_column(&self, plane: &PlaneNow, u: &[DVec3], f: impl Fn(&supports::Touch) -> DVec3, out: &mut [DVec3]) {
+        for t in supports::touches(&self.plan.body, plane, u) {
+            let v = t.area * f(&t);
+            for i in 0..8 {
+                out[t.nodes[i] as usize] -= t.weights[i] * v;
+            }
+        }
+    }
+}
+
+/// Block (i, j) of a 24 × 24 row-major matrix.
+fn block(k: &[f64; 576], i: usize, j: usize) -> DMat3 {
+    let at = |r: usize, c: usize| k[24 * (3 * i + r) + 3 * j + c];
+    DMat3::from_cols(
+        DVec3::new(at(0, 0), at(1, 0), at(2, 0)),
+        DVec3::new(at(0, 1), at(1, 1), at(2, 1)),
+        DVec3::new(at(0, 2), at(1, 2), at(2, 2)),
+    )
+}

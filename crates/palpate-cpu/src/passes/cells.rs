@@ -1,0 +1,289 @@
+//! Elastic and viscous force of the cells, its derivatives by both states, and its energy.
+//!
+//! With q = Rᵀ(x − x_c) − X the body-frame displacement of a cell's corners, K its matrix and E Young's modulus, the force on
+//! the new state x₁ is the gradient by x₁ of
+//! `E [θ ½ q₁ᵀKq₁ + (β/2Δt) (q₁−q₀)ᵀK(q₁−q₀)] + (1−θ) f(x₀)·x₁`,
+//! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
+//! With lagged rotation both q use R(x₀) and R is not differentiated by x₁, as in the paper.
+
+use crate::elements::Elements;
+use crate::linear::pattern::Pattern;
+use crate::linear::vector::Nodes;
+use glam::DVec3;
+use palpate_model::body::Body;
+use palpate_model::corotation::{CellPose, M24, V24, multiply};
+use palpate_model::scene::RotationUpdate;
+use rayon::prelude::*;
+
+/// Eight vectors, one per corner.
+pub type Corners = [DVec3; 8];
+
+/// How the two states enter the force.
+#[derive(Clone, Copy, Debug)]
+pub struct Mix {
+    /// Weight of the new state's elastic force.
+    pub new: f64,
+    /// Weight of the old state's elastic force.
+    pub old: f64,
+    /// β/Δt: weight of the change between them.
+    pub rate: f64,
+    /// When the rotation is taken.
+    pub rotation: RotationUpdate,
+}
+
+impl Mix {
+    /// The elastic force of one state alone.
+    pub const STATIC: Mix = Mix { new: 1.0, old: 0.0, rate: 0.0, rotation: RotationUpdate::Converged };
+}
+
+/// Positions of a cell's corners at displacement `u`.
+pub fn corners(body: &Body, e: usize, u: &[DVec3]) -> Corners {
+    body.cells[e].nodes.map(|n| body.nodes[n as usize] + u[n as usize])
+}
+
+fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
+    body.cells[e].nodes.map(|n| v[n as usize])
+}
+
+fn times(k: &M24, q: &V24, scale: f64) -> V24 {
+    multiply(k, q).map(|y| scale * y)
+}
+
+fn dot24(a: &V24, b: &V24) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn vector(a: &V24, i: usize) -> DVec3 {
+    DVec3::new(a[3 * i], a[3 * i + 1], a[3 * i + 2])
+}
+
+/// The two poses of a cell. With lagged rotation both carry R(x₀), and `spin` is the pose that knows how R(x₀) turns.
+struct Poses {
+    new: CellPose,
+    old: Option<CellPose>,
+    spin: Option<CellPose>,
+}
+
+impl Poses {
+    fn new(mix: &Mix, h: f64, x1: &Corners, x0: &Corners) -> Poses {
+        match mix.rotation {
+            RotationUpdate::Converged => {
+                let needs_old = mix.old != 0.0 || mix.rate != 0.0;
+                Poses { new: CellPose::new(x1, h), old: needs_old.then(|| CellPose::new(x0, h)), spin: None }
+            }
+            RotationUpdate::Lagged => {
+                let spin = CellPose::new(x0, h);
+                let r = spin.polar.r;
+                Poses { new: CellPose::lagged(x1, r, h), old: Some(CellPose::lagged(x0, r, h)), spin: Some(spin) }
+            }
+        }
+    }
+
+    /// Body-frame force that goes with the new pose, and the one that goes with the old pose.
+    fn stress(&self, mix: &Mix, k: &M24, e: f64) -> (V24, Option<V24>) {
+        let (a, b) = self.factors(mix);
+        let zero = [0.0; 24];
+        let q0 = self.old.as_ref().map_or(&zero, |p| &p.q);
+        let combined: V24 = std::array::from_fn(|i| a * self.new.q[i] + b * q0[i]);
+        let old = (self.spin.is_none() && mix.old != 0.0).then(|| times(k, q0, e * mix.old));
+        (times(k, &combined, e), old)
+    }
+
+    /// Factors of q₁ and q₀ in the new pose's force.
+    fn factors(&self, mix: &Mix) -> (f64, f64) {
+        let b = if self.spin.is_some() { mix.old - mix.rate } else { -mix.rate };
+        (mix.new + mix.rate, b)
+    }
+
+    fn force(&self, y: &(V24, Option<V24>)) -> Corners {
+        let mut f = self.new.force(&y.0);
+        if let (Some(old), Some(y0)) = (&self.old, &y.1) {
+            let g = old.force(y0);
+            for i in 0..8 {
+                f[i] += g[i];
+            }
+        }
+        f
+    }
+}
+
+/// Which matrix a force is made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Matrices {
+    /// The stiffness.
+    Stiffness,
+    /// Its derivative by Poisson's ratio.
+    ByPoisson,
+}
+
+/// Elasticity of one member: what all passes below share.
+#[derive(Clone, Copy)]
+pub struct Elasticity<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// Who neighbours whom.
+    pub pattern: &'a Pattern,
+    /// Matrices at E = 1.
+    pub elements: &'a Elements,
+    /// Young's modulus [Pa].
+    pub young: f64,
+}
+
+impl<'a> Elasticity<'a> {
+    fn matrix(&self, e: usize, which: Matrices) -> &'a M24 {
+        let m = self.elements.cell(e);
+        match which {
+            Matrices::Stiffness => &m.k,
+            Matrices::ByPoisson => &m.k_nu,
+        }
+    }
+
+    fn poses(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> Poses {
+        Poses::new(mix, self.body.grid.h, &corners(self.body, e, u1), &corners(self.body, e, u0))
+    }
+
+    /// Adds per-cell corner vectors to nodes, always in the same order.
+    fn gather(&self, cell: impl Fn(usize) -> Corners + Sync + Send, out: &mut [DVec3]) {
+        let parts: Vec<Corners> = (0..self.body.cells.len()).into_par_iter().with_min_len(256).map(cell).collect();
+        let p = self.pattern;
+        let sum = |a: usize, v: &mut DVec3| {
+            for &(e, i) in &p.cell_list[p.cell_rows[a]..p.cell_rows[a + 1]] {
+                *v += parts[e as usize][i as usize];
+            }
+        };
+        out.par_iter_mut().with_min_len(2048).enumerate().for_each(|(a, v)| sum(a, v));
+    }
+
+    /// Adds the force (left side of the balance) with modulus `young`, which may differ from the member's own (1 gives the
+    /// derivative by Young's modulus).
+    pub fn force(&self, mix: &Mix, which: Matrices, young: f64, u1: &[DVec3], u0: &[DVec3], out: &mut [DVec3]) {
+        self.gather(
+            |e| {
+                let poses = self.poses(mix, e, u1, u0);
+                poses.force(&poses.stress(mix, self.matrix(e, which), young))
+            },
+            out,
+        );
+    }
+
+    /// Incremental potential whose gradient by u₁ is [`Elasticity::force`], up to a constant.
+    pub fn potential(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3]) -> f64 {
+        let cell = |e: usize| {
+            let poses = self.poses(mix, e, u1, u0);
+            let k = self.matrix(e, Matrices::Stiffness);
+            let (a, b) = poses.factors(mix);
+            let kq = times(k, &poses.new.q, self.young);
+            let mut w = 0.5 * a * dot24(&poses.new.q, &kq);
+            if let Some(old) = &poses.old {
+                w += b * dot24(&old.q, &kq);
+                if poses.spin.is_none() && mix.old != 0.0 {
+                    let f0 = old.force(&times(k, &old.q, self.young * mix.old));
+                    w += pick(self.body, e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
+                }
+            }
+            w
+        };
+        (0..self.body.cells.len()).into_par_iter().with_min_len(256).map(cell).collect::<Vec<_>>().iter().sum()
+    }
+
+    /// Derivative of cell e's force by the new state, world frame, 24 × 24. With `convex` the part that may be indefinite
+    /// (second derivative of the rotation) is left out.
+    pub fn tangent(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3], convex: bool, out: &mut M24) {
+        let poses = self.poses(mix, e, u1, u0);
+        let k = self.matrix(e, Matrices::Stiffness);
+        let scale = self.young * poses.factors(mix).0;
+        if convex || poses.spin.is_some() {
+            poses.new.gauss_newton(k, scale, out);
+        } else {
+            let y = poses.stress(mix, k, self.young).0;
+            poses.new.hessian(k, scale, &y, out);
+        }
+    }
+
+    /// Adds (∂force/∂u₀) du₀.
+    pub fn by_old(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], du0: &[DVec3], out: &mut [DVec3]) {
+        self.gather(
+            |e| {
+                let poses = self.poses(mix, e, u1, u0);
+                let k = self.matrix(e, Matrices::Stiffness);
+                let d = pick(self.body, e, du0);
+                let (a, b) = poses.factors(mix);
+                if let Some(turn) = &poses.spin {
+                    let old = poses.old.as_ref().expect("lagged rotation has an old pose");
+                    let y = poses.stress(mix, k, self.young).0;
+                    let w = turn.spin_of(&d);
+                    let direct = old.strain_rate(&d);
+                    let dq: V24 = std::array::from_fn(|i| {
+                        let (c, r) = (i / 3, i % 3);
+                        b * direct[i] - w.cross(a * vector(&poses.new.z, c) + b * vector(&old.z, c))[r]
+                    });
+                    let ky = times(k, &dq, self.young);
+                    let turned: V24 = std::array::from_fn(|i| ky[i] + w.cross(vector(&y, i / 3))[i % 3]);
+                    poses.new.force(&turned)
+                } else if let Some(old) = &poses.old {
+                    let dq = old.strain_rate(&d);
+                    let mut f = poses.new.force(&times(k, &dq, self.young * b));
+                    if mix.old != 0.0 {
+                        let y0 = times(k, &old.q, self.young * mix.old);
+                        let g = old.hessian_product(k, self.young * mix.old, &y0, &d);
+                        for i in 0..8 {
+                            f[i] += g[i];
+                        }
+                    }
+                    f
+                } else {
+                    [DVec3::ZERO; 8]
+                }
+            },
+            out,
+        );
+    }
+
+    /// Adds (∂force/∂u₀)ᵀ z.
+    pub fn by_old_transposed(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], z: &[DVec3], out: &mut [DVec3]) {
+        self.gather(
+            |e| {
+                let poses = self.poses(mix, e, u1, u0);
+                let k = self.matrix(e, Matrices::Stiffness);
+                let d = pick(self.body, e, z);
+                let (a, b) = poses.factors(mix);
+                if let Some(turn) = &poses.spin {
+                    let old = poses.old.as_ref().expect("lagged rotation has an old pose");
+                    let y = poses.stress(mix, k, self.young).0;
+                    let s = poses.new.strain_rate(&d);
+                    let t = times(k, &s, self.young);
+                    let mut g = DVec3::ZERO;
+                    for i in 0..8 {
+                        g += vector(&y, i).cross(vector(&s, i));
+                        g -= (a * vector(&poses.new.z, i) + b * vector(&old.z, i)).cross(vector(&t, i));
+                    }
+                    let mut f = old.force(&std::array::from_fn(|i| b * t[i]));
+                    let c = turn.spin_adjoint(g);
+                    for i in 0..8 {
+                        f[i] += c[i];
+                    }
+                    f
+                } else if let Some(old) = &poses.old {
+                    let s = poses.new.strain_rate(&d);
+                    let mut f = old.force(&times(k, &s, self.young * b));
+                    if mix.old != 0.0 {
+                        let y0 = times(k, &old.q, self.young * mix.old);
+                        let g = old.hessian_product(k, self.young * mix.old, &y0, &d);
+                        for i in 0..8 {
+                            f[i] += g[i];
+                        }
+                    }
+                    f
+                } else {
+                    [DVec3::ZERO; 8]
+                }
+            },
+            out,
+        );
+    }
+}
+
+/// A zero vector for `n` nodes.
+pub fn zeros(n: usize) -> Nodes {
+    vec![DVec3::ZERO; n]
+}

@@ -1,0 +1,161 @@
+//! Which place of the deformed body an observed point is: sparse surface inversion on a spatial hash of each frame's points.
+//!
+//! The points of a frame never move, so they are hashed once; each deformed cell asks for the points in its bounding box. The
+//! cost per point does not depend on the number of cells.
+
+use crate::passes::cells::Corners;
+use glam::DVec3;
+use palpate_model::body::Body;
+use palpate_model::grid::shape_functions;
+use palpate_model::observation::{Camera, ObservedPoint};
+use palpate_model::pullback::{Pullback, pull_back};
+use rayon::prelude::*;
+
+/// A surface that is turned away from the camera by more than this (cosine between its outward normal and the line of sight)
+/// cannot have been seen. Not zero: normals at the silhouette are uncertain by some degrees.
+const TURNED_AWAY: f64 = 0.3;
+
+/// Points sorted by the hash of the cube they lie in.
+#[derive(Clone, Debug, Default)]
+pub struct PointHash {
+    edge: f64,
+    starts: Vec<u32>,
+    order: Vec<u32>,
+}
+
+impl PointHash {
+    /// Hashes points into cubes of an edge [m].
+    pub fn new(points: &[ObservedPoint], edge: f64) -> PointHash {
+        let slots = points.len().next_power_of_two().max(16);
+        let mut hash = PointHash { edge, starts: vec![0; slots + 1], order: vec![0; points.len()] };
+        let slot: Vec<usize> = points.iter().map(|p| hash.slot((p.position / edge).floor().as_i64vec3().to_array())).collect();
+        for &s in &slot {
+            hash.starts[s + 1] += 1;
+        }
+        for s in 0..slots {
+            hash.starts[s + 1] += hash.starts[s];
+        }
+        let mut next = hash.starts.clone();
+        for (p, &s) in slot.iter().enumerate() {
+            hash.order[next[s] as usize] = p as u32;
+            next[s] += 1;
+        }
+        hash
+    }
+
+    fn slot(&self, cube: [i64; 3]) -> usize {
+        let mixed = cube[0].wrapping_mul(73_856_093) ^ cube[1].wrapping_mul(19_349_663) ^ cube[2].wrapping_mul(83_492_791);
+        mixed as usize & (self.starts.len() - 2)
+    }
+
+    /// Calls `found` with every point that may lie in a box (and perhaps some that do not, or one twice).
+    fn visit(&self, min: DVec3, max: DVec3, mut found: impl FnMut(u32)) {
+        let lo = (min / self.edge).floor().as_i64vec3();
+        let hi = (max / self.edge).floor().as_i64vec3();
+        let span = (hi - lo + 1).as_dvec3();
+        if span.x * span.y * span.z > self.starts.len() as f64 {
+            // A cell blown up beyond all measure: look at every point once instead of at every empty cube.
+            self.order.iter().for_each(|&p| found(p));
+            return;
+        }
+        for z in lo.z..=hi.z {
+            for y in lo.y..=hi.y {
+                for x in lo.x..=hi.x {
+                    let s = self.slot([x, y, z]);
+                    self.order[self.starts[s] as usize..self.starts[s + 1] as usize].iter().for_each(|&p| found(p));
+                }
+            }
+        }
+    }
+}
+
+/// An observed point's place in the band.
+#[derive(Clone, Copy, Debug)]
+pub struct Match {
+    /// Number of the observed point.
+    pub point: u32,
+    /// Number of the band cell.
+    pub cell: u32,
+    /// Place, distance and gradient.
+    pub place: Pullback,
+}
+
+impl Match {
+    /// Extended nodes and shape functions of the place.
+    pub fn stencil<'a>(&self, body: &'a Body) -> (&'a [u32; 8], [f64; 8]) {
+        (&body.band.cells[self.cell as usize].nodes, shape_functions(self.place.xi))
+    }
+}
+
+/// Displacements of all extended nodes `[N + M]`: those of the body, then those extended to the band.
+pub fn extend(body: &Body, u: &[DVec3]) -> Vec<DVec3> {
+    let band = &body.band;
+    let mut all = Vec::with_capacity(u.len() + band.nodes.len());
+    all.extend_from_slice(u);
+    all.par_extend((0..band.nodes.len()).into_par_iter().with_min_len(1024).map(|p| {
+        let row = band.rows[p] as usize..band.rows[p + 1] as usize;
+        let mut sum = DVec3::ZERO;
+        for (c, v) in band.columns[row.clone()].iter().zip(&band.values[row]) {
+            sum += *v * u[*c as usize];
+        }
+        sum
+    }));
+    all
+}
+
+/// Transpose of [`extend`]: folds a gradient on the extended nodes back onto the body.
+pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
+    let n = body.nodes.len();
+    let band = &body.band;
+    let mut out = extended[..n].to_vec();
+    for p in 0..band.nodes.len() {
+        let g = extended[n + p];
+        if g != DVec3::ZERO {
+            for k in band.rows[p] as usize..band.rows[p + 1] as usize {
+                out[band.columns[k] as usize] += band.values[k] * g;
+            }
+        }
+    }
+    out
+}
+
+/// Matches a frame's points with the deformed band (extended displacements `u`): among all cells that hold a point and whose
+/// surface faces its camera the one with the smallest |φ| wins, then the lowest cell number. Ordered by point.
+pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[ObservedPoint], cameras: &[Camera]) -> Vec<Match> {
+    let n = body.nodes.len();
+    let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
+    let candidates: Vec<Vec<Match>> = body
+        .band
+        .cells
+        .par_iter()
+        .with_min_len(256)
+        .enumerate()
+        .map(|(c, cell)| {
+            let x: Corners = cell.nodes.map(|a| rest(a) + u[a as usize]);
+            let min = x.iter().copied().fold(x[0], DVec3::min);
+            let max = x.iter().copied().fold(x[0], DVec3::max);
+            let mut found = Vec::new();
+            hash.visit(min, max, |p| {
+                let seen = &points[p as usize];
+                if seen.position.cmplt(min).any() || seen.position.cmpgt(max).any() {
+                    return;
+                }
+                if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
+                    let sight = (seen.position - cameras[seen.camera as usize].center).normalize_or_zero();
+                    if place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length() {
+                        found.push(Match { point: p, cell: c as u32, place });
+                    }
+                }
+            });
+            found
+        })
+        .collect();
+    let mut best: Vec<Option<Match>> = vec![None; points.len()];
+    for m in candidates.into_iter().flatten() {
+        let slot = &mut best[m.point as usize];
+        if slot.is_none_or(|b| m.place.phi.abs() < b.place.phi.abs()) {
+            *slot = Some(m);
+        }
+    }
+    best.into_iter().flatten().collect()
+}

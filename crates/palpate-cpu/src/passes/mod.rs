@@ -1,0 +1,8 @@
+//! The passes of a simulation, one idea a file.
+
+pub mod balance;
+pub mod cells;
+pub mod frames;
+pub mod markers;
+pub mod matching;
+pub mod supports;

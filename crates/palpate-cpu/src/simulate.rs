@@ -1,0 +1,265 @@
+//! One member's start and steps, with their adjoints and tangents.
+
+use crate::linear::Purpose;
+use crate::linear::vector::{Nodes, dot, is_finite};
+use crate::newton::{self, Reason};
+use crate::passes::balance::{Balance, Inertia, States};
+use crate::passes::cells::{Mix, zeros};
+use crate::world::{Member, MemberState, MemberTangent, Shared};
+use glam::DVec3;
+use palpate_engine::FailureKind;
+use palpate_model::params::ParamKey;
+use palpate_model::scene::InitialShape;
+
+/// A body that has moved this many times its own size has left the world.
+const WORLD_SIZE: f64 = 1000.0;
+/// A static problem starts far from its solution, so it gets more Newton iterations than a step.
+const STATIC_ITERATIONS: usize = 200;
+
+/// The balance of step k, or of the static problem (`None`).
+fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Balance<'a> {
+    let clock = &shared.plan.clock;
+    let (dt, theta) = (clock.step, clock.theta);
+    let p = &member.physics;
+    let (inertia, mix, time) = match k {
+        None => (None, Mix::STATIC, p.start),
+        Some(k) => (
+            Some(Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt }),
+            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / dt, rotation: shared.plan.solver.rotation },
+            p.start + (k + 1) as f64 * dt,
+        ),
+    };
+    Balance {
+        plan: &shared.plan,
+        pattern: &shared.pattern,
+        places: &shared.places,
+        elements: &member.elements,
+        physics: p,
+        planes: &member.planes,
+        inertia,
+        mix,
+        time,
+    }
+}
+
+/// Takes the scratch matrix out of a member, so that a balance can borrow the rest.
+fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut crate::linear::matrix::Matrix) -> T) -> T {
+    let mut matrix = std::mem::take(&mut member.matrix);
+    let result = f(member, &mut matrix);
+    member.matrix = matrix;
+    result
+}
+
+fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
+    if !is_finite(&s.u) || !is_finite(&s.v) {
+        return Err((FailureKind::NotFinite, "displacement or velocity of a node".into()));
+    }
+    let body = &shared.plan.body;
+    let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
+    let far = s.u.iter().map(|u| u.length()).fold(0.0, f64::max);
+    if far > WORLD_SIZE * size {
+        return Err((FailureKind::FellOut, format!("a node moved {far:.3} m, {:.0} times the body's size", far / size)));
+    }
+    Ok(())
+}
+
+/// The initial state.
+pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
+    let plan = &shared.plan;
+    let p = &member.physics;
+    let positive = [(p.youngs_modulus, "material.youngs_modulus"), (p.density, "material.density")];
+    if let Some((value, path)) = positive.iter().find(|(v, _)| v.is_nan() || *v <= 0.0) {
+        return Err((FailureKind::BadParameter, format!("{path} = {value} must be positive")));
+    }
+    if !(p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5) {
+        return Err((FailureKind::BadParameter, format!("material.poisson_ratio = {} must lie in (-1, 0.5)", p.poisson_ratio)));
+    }
+    s.u.fill(DVec3::ZERO);
+    for (v, x) in s.v.iter_mut().zip(&plan.body.nodes) {
+        *v = p.velocity + p.angular_velocity.cross(*x - plan.pivot);
+    }
+    if plan.initial == InitialShape::StaticEquilibrium {
+        if plan.clamps.is_empty() {
+            return Err((FailureKind::NoEquilibrium, "no clamp holds the body".into()));
+        }
+        let zero = zeros(s.u.len());
+        with_matrix(member, |member, matrix| {
+            let b = balance(shared, member, None);
+            let iterations = plan.solver.newton_iterations.max(STATIC_ITERATIONS);
+            newton::solve(&b, &shared.solvers, matrix, Purpose::Static, &mut s.u, &zero, &zero, plan.solver.tolerance, iterations)
+        })
+        .map_err(|(kind, detail)| match kind {
+            FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
+            _ => (kind, detail),
+        })?;
+    }
+    check(shared, s)
+}
+
+/// dJ/dθ of the start: adds to `gradient` `[P]`.
+pub fn start_adjoint(shared: &Shared, member: &mut Member, s: &MemberState, adj: &MemberState, gradient: &mut [f64]) -> Result<(), Reason> {
+    let plan = &shared.plan;
+    for (p, key) in plan.layout.keys.iter().enumerate() {
+        match key {
+            ParamKey::Velocity(a) => gradient[p] += adj.v.iter().map(|v| v[*a as usize]).sum::<f64>(),
+            ParamKey::AngularVelocity(a) => {
+                gradient[p] += adj.v.iter().zip(&plan.body.nodes).map(|(v, x)| (*x - plan.pivot).cross(*v)[*a as usize]).sum::<f64>();
+            }
+            _ => {}
+        }
+    }
+    if plan.initial == InitialShape::Rest {
+        return Ok(());
+    }
+    let zero = zeros(s.u.len());
+    with_matrix(member, |member, matrix| {
+        let b = balance(shared, member, None);
+        let states = States { u1: &s.u, u0: &zero, v0: &zero };
+        let mut z = [adj.u.clone()];
+        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Static, states, &mut z)?;
+        add_columns(&b, states, &z[0], gradient);
+        Ok(())
+    })
+}
+
+/// gradient −= z · ∂r/∂p for every parameter.
+fn add_columns(b: &Balance, s: States, z: &[DVec3], gradient: &mut [f64]) {
+    for (p, key) in b.plan.layout.keys.iter().enumerate() {
+        if let Some(column) = b.column(*key, s) {
+            gradient[p] -= dot(z, &column);
+        }
+    }
+}
+
+/// Derivatives of the start along some parameters.
+pub fn start_tangent(
+    shared: &Shared,
+    member: &mut Member,
+    s: &MemberState,
+    directions: &[usize],
+    t: &mut MemberTangent,
+) -> Result<(), Reason> {
+    let plan = &shared.plan;
+    for (q, &p) in directions.iter().enumerate() {
+        match plan.layout.keys[p] {
+            ParamKey::Velocity(a) => t.dv[q].fill(DVec3::AXES[a as usize]),
+            ParamKey::AngularVelocity(a) => {
+                for (v, x) in t.dv[q].iter_mut().zip(&plan.body.nodes) {
+                    *v = DVec3::AXES[a as usize].cross(*x - plan.pivot);
+                }
+            }
+            _ => {}
+        }
+    }
+    if plan.initial == InitialShape::Rest {
+        return Ok(());
+    }
+    let zero = zeros(s.u.len());
+    with_matrix(member, |member, matrix| {
+        let b = balance(shared, member, None);
+        let states = States { u1: &s.u, u0: &zero, v0: &zero };
+        t.du = directions.iter().map(|&p| minus(b.column(plan.layout.keys[p], states).unwrap_or_else(|| zero.clone()))).collect();
+        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Static, states, &mut t.du)
+    })
+}
+
+fn minus(mut v: Nodes) -> Nodes {
+    v.iter_mut().for_each(|v| *v = -*v);
+    v
+}
+
+/// Step k.
+pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, next: &mut MemberState) -> Result<(), Reason> {
+    let clock = shared.plan.clock;
+    for i in 0..now.u.len() {
+        next.u[i] = now.u[i] + clock.step * now.v[i];
+    }
+    let solver = shared.plan.solver;
+    with_matrix(member, |member, matrix| {
+        let b = balance(shared, member, Some(k));
+        newton::solve(
+            &b,
+            &shared.solvers,
+            matrix,
+            Purpose::Step(1),
+            &mut next.u,
+            &now.u,
+            &now.v,
+            solver.tolerance,
+            solver.newton_iterations,
+        )
+    })?;
+    let (a, c) = velocity_factors(clock.step, clock.theta);
+    for i in 0..now.u.len() {
+        next.v[i] = a * (next.u[i] - now.u[i]) - c * now.v[i];
+    }
+    check(shared, next)
+}
+
+/// v₁ = a (u₁ − u₀) − c v₀.
+fn velocity_factors(dt: f64, theta: f64) -> (f64, f64) {
+    (1.0 / (theta * dt), (1.0 - theta) / theta)
+}
+
+/// Adjoint of step k: adds dJ/d(now) to `adj_now` and dJ/dθ to `gradient`.
+pub fn step_adjoint(
+    shared: &Shared,
+    member: &mut Member,
+    k: usize,
+    now: &MemberState,
+    next: &MemberState,
+    adj: &MemberState,
+    adj_now: &mut MemberState,
+    gradient: &mut [f64],
+) -> Result<(), Reason> {
+    let (a, c) = velocity_factors(shared.plan.clock.step, shared.plan.clock.theta);
+    let mut z = [adj.u.iter().zip(&adj.v).map(|(u, v)| *u + a * *v).collect::<Nodes>()];
+    with_matrix(member, |member, matrix| {
+        let b = balance(shared, member, Some(k));
+        let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
+        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Step(1), states, &mut z)?;
+        let (to_u, to_v) = b.by_old_transposed(states, &z[0]);
+        for i in 0..now.u.len() {
+            adj_now.u[i] -= a * adj.v[i] + to_u[i];
+            adj_now.v[i] -= c * adj.v[i] + to_v[i];
+        }
+        add_columns(&b, states, &z[0], gradient);
+        if is_finite(&z[0]) { Ok(()) } else { Err((FailureKind::NotFinite, "adjoint of a step".into())) }
+    })
+}
+
+/// Tangent of step k.
+pub fn step_tangent(
+    shared: &Shared,
+    member: &mut Member,
+    k: usize,
+    now: &MemberState,
+    next: &MemberState,
+    directions: &[usize],
+    t: &MemberTangent,
+    t_next: &mut MemberTangent,
+) -> Result<(), Reason> {
+    let (a, c) = velocity_factors(shared.plan.clock.step, shared.plan.clock.theta);
+    with_matrix(member, |member, matrix| {
+        let b = balance(shared, member, Some(k));
+        let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
+        t_next.du = directions
+            .iter()
+            .enumerate()
+            .map(|(q, &p)| {
+                let mut rhs = b.by_old(states, &t.du[q], &t.dv[q]);
+                if let Some(column) = b.column(shared.plan.layout.keys[p], states) {
+                    rhs.iter_mut().zip(column).for_each(|(r, c)| *r += c);
+                }
+                minus(rhs)
+            })
+            .collect();
+        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Step(directions.len()), states, &mut t_next.du)
+    })?;
+    for q in 0..directions.len() {
+        for i in 0..now.u.len() {
+            t_next.dv[q][i] = a * (t_next.du[q][i] - t.du[q][i]) - c * t.dv[q][i];
+        }
+    }
+    Ok(())
+}

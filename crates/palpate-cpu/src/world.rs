@@ -1,0 +1,145 @@
+//! What the backend holds: a world of members, their states, adjoints, tangents and tallies.
+
+use crate::elements::{Classes, Elements};
+use crate::linear::Solvers;
+use crate::linear::matrix::Matrix;
+use crate::linear::pattern::{Pattern, Places};
+use crate::linear::vector::Nodes;
+use crate::passes::frames::Compared;
+use crate::passes::matching::PointHash;
+use crate::passes::supports::{self, PlaneNow};
+use palpate_engine::{Evaluation, Failure, ParamBatch};
+use palpate_model::plan::{Physics, Plan};
+use std::sync::Arc;
+
+/// A plan made ready, and the current batch.
+#[derive(Debug)]
+pub struct World {
+    pub(crate) shared: Shared,
+    pub(crate) members: Vec<Member>,
+}
+
+/// What all members of all batches share.
+#[derive(Debug)]
+pub struct Shared {
+    pub(crate) plan: Plan,
+    pub(crate) pattern: Pattern,
+    pub(crate) places: Places,
+    pub(crate) classes: Classes,
+    pub(crate) solvers: Solvers,
+    pub(crate) hashes: Vec<PointHash>,
+    /// 1/n: one over the number of scalar residuals of the whole recording.
+    pub(crate) scale: f64,
+}
+
+/// One member's parameters and scratch.
+#[derive(Debug)]
+pub struct Member {
+    pub(crate) theta: Vec<f64>,
+    pub(crate) physics: Physics,
+    pub(crate) planes: Vec<PlaneNow>,
+    pub(crate) elements: Arc<Elements>,
+    pub(crate) matrix: Matrix,
+}
+
+impl World {
+    pub(crate) fn new(plan: &Plan) -> World {
+        let plan = plan.clone();
+        let pattern = Pattern::new(&plan.body);
+        let places = Places::new(&plan, &pattern);
+        let classes = Classes::new(&plan.body);
+        let hashes = plan.observation.frames.iter().map(|f| PointHash::new(&f.points, plan.body.grid.h)).collect();
+        let residuals = plan.observation.residuals();
+        let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
+        let solvers = Solvers::new(plan.solver.linear);
+        World { shared: Shared { plan, pattern, places, classes, solvers, hashes, scale }, members: Vec::new() }
+    }
+
+    pub(crate) fn set_params(&mut self, theta: &ParamBatch) {
+        let shared = &self.shared;
+        // Element matrices depend on Poisson's ratio alone: reuse those of this batch and of the one before.
+        let mut known: Vec<Arc<Elements>> = self.members.iter().map(|m| m.elements.clone()).collect();
+        let mut scratch: Vec<Matrix> = self.members.drain(..).map(|m| m.matrix).collect();
+        for b in 0..theta.members() {
+            let row = theta.row(b);
+            let physics = Physics::new(&shared.plan.layout, row);
+            let elements = known.iter().find(|e| e.nu == physics.poisson_ratio).cloned().unwrap_or_else(|| {
+                let e = Arc::new(Elements::new(&shared.plan, &shared.classes, physics.poisson_ratio));
+                known.push(e.clone());
+                e
+            });
+            let planes = supports::planes(&shared.plan, &physics);
+            self.members.push(Member { theta: row.to_vec(), physics, planes, elements, matrix: scratch.pop().unwrap_or_default() });
+        }
+    }
+}
+
+/// u [m] and v [m/s] of every member, `[B, N, 3]`.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub(crate) members: Vec<MemberState>,
+}
+
+/// u and v of one member.
+#[derive(Clone, Debug)]
+pub struct MemberState {
+    pub(crate) u: Nodes,
+    pub(crate) v: Nodes,
+}
+
+/// dJ/du and dJ/dv of every member.
+#[derive(Clone, Debug)]
+pub struct Adjoint {
+    pub(crate) members: Vec<MemberState>,
+}
+
+/// du/dθ_q and dv/dθ_q of every member.
+#[derive(Clone, Debug)]
+pub struct Tangent {
+    pub(crate) directions: Vec<usize>,
+    pub(crate) members: Vec<MemberTangent>,
+}
+
+/// Tangents of one member, one vector per direction.
+#[derive(Clone, Debug)]
+pub struct MemberTangent {
+    pub(crate) du: Vec<Nodes>,
+    pub(crate) dv: Vec<Nodes>,
+}
+
+/// Everything to be read of every member.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    pub(crate) members: Vec<MemberTally>,
+}
+
+/// Everything to be read of one member.
+#[derive(Clone, Debug, Default)]
+pub struct MemberTally {
+    pub(crate) evaluation: Evaluation,
+    /// Frames already compared at the state that they were observed in: number, displacement, result.
+    pub(crate) compared: Vec<(usize, Nodes, Compared)>,
+}
+
+impl MemberTally {
+    pub(crate) fn failed(&self) -> bool {
+        self.evaluation.failure.is_some()
+    }
+
+    /// Marks the member as failed; the values of its parameters go into the message.
+    pub(crate) fn fail(&mut self, mut failure: Failure, plan: &Plan, theta: &[f64]) {
+        let values: Vec<String> = plan
+            .layout
+            .keys
+            .iter()
+            .zip(theta)
+            .filter(|(_, v)| **v != 0.0)
+            .map(|(k, v)| {
+                let spec = k.spec();
+                format!("{} = {v:.6} {}", spec.path, spec.unit)
+            })
+            .collect();
+        failure.detail = format!("{}, with {}", failure.detail, values.join(", "));
+        self.evaluation.failure = Some(failure);
+    }
+}
