@@ -186,7 +186,7 @@ pub(crate) mod tests {
 
         pub(crate) fn rotation(&mut self) -> DMat3 {
             let axis = self.vector(1.0).try_normalize().unwrap_or(DVec3::X);
-            DMat3::from_axis_angle(axis, self.uniform(-3.14, 3.14))
+            DMat3::from_axis_angle(axis, self.uniform(-1.0, 1.0) * std::f64::consts::PI)
         }
     }
 
