@@ -10,8 +10,11 @@ mod keys;
 mod rigid;
 
 pub mod mesh;
+pub mod output;
+pub mod recording;
 pub mod scene;
 
 pub use error::{InputError, Loaded, OutputError};
 pub use mesh::read_mesh;
+pub use recording::{Recording, check_overlap, read_recording, write_recording};
 pub use scene::{parse_scene, read_scene, write_scene};

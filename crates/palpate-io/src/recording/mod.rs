@@ -1,0 +1,243 @@
+//! Format `recording/1`: a folder of depth images, masks and markers ↔ [`Recording`].
+
+mod c3d;
+mod camera;
+mod image;
+mod markers;
+mod observation;
+mod overlap;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use camera::RecordedCamera;
+pub use image::DepthImage;
+pub use markers::{MarkerSample, RecordedMarkers};
+pub use overlap::check_overlap;
+pub use write::write_recording;
+
+use crate::document::{Source, Table};
+use crate::error::InputError;
+use crate::keys::{RECORDING, suggest};
+use crate::scene::{check_format, marker_rest};
+use palpate_model::observation::MarkerRest;
+use rayon::prelude::*;
+use std::path::{Component, Path, PathBuf};
+
+/// The recording format this version reads and writes.
+pub const FORMAT: &str = "recording/1";
+
+/// Everything measured of one object; SI units, checked.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The TOML file.
+    pub path: PathBuf,
+    /// Free text.
+    pub title: String,
+    /// Where the data come from, licence.
+    pub source: String,
+    /// Cameras.
+    pub cameras: Vec<RecordedCamera>,
+    /// Images, ordered by time.
+    pub frames: Vec<RecordedFrame>,
+    /// Tracked points.
+    pub markers: Option<RecordedMarkers>,
+    /// What looks suspicious without being wrong.
+    pub warnings: Vec<String>,
+}
+
+/// What one camera saw at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedFrame {
+    /// Number of the camera in [`Recording::cameras`].
+    pub camera: usize,
+    /// Time on the recording's clock [s].
+    pub time: f64,
+    /// Depth image; absent in a silhouette.
+    pub depth: Option<DepthImage>,
+    /// True where the object is, row by row, shape `[height · width]`; absent = every pixel may be the object.
+    pub mask: Option<Vec<bool>>,
+}
+
+/// Reads a recording: its folder (then `recording.toml` in it) or a TOML file of the format.
+///
+/// # Errors
+/// The first thing that is wrong, naming file, line and key; see the format's description for what is allowed.
+pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
+    let path = path.as_ref();
+    let file = if path.is_dir() { path.join("recording.toml") } else { path.to_path_buf() };
+    let source = Source::read(&file)?;
+    let root = source.root();
+    check_format(&root, FORMAT)?;
+    root.check_keys(&RECORDING)?;
+    if let Some(units) = root.optional_str("units")?
+        && units.split(',').map(str::trim).ne(["m", "s"])
+    {
+        return Err(root.error("units", format!("\"{units}\" is not understood; a recording is in \"m, s\"")));
+    }
+    let mut warnings = Vec::new();
+    let cameras = camera::cameras(&root)?;
+    let frames = frames(&source, &root, &cameras, &mut warnings)?;
+    let markers = markers(&source, &root, &mut warnings)?;
+    if frames.is_empty() && markers.is_none() {
+        return Err(root.own_error("holds neither a [[frame]] nor [markers]: nothing was measured"));
+    }
+    image::check_depth_unit(&root, &cameras, &frames)?;
+    Ok(Recording {
+        title: root.optional_str("title")?.unwrap_or_default().to_string(),
+        source: root.optional_str("source")?.unwrap_or_default().to_string(),
+        path: source.path.clone(),
+        cameras,
+        frames,
+        markers,
+        warnings,
+    })
+}
+
+/// A path in the file, which must stay inside the recording's folder.
+fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, InputError> {
+    let Some(text) = t.optional_str(key)? else { return Ok(None) };
+    let mut depth = 0i32;
+    for c in Path::new(text).components() {
+        match c {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => depth = i32::MIN / 2,
+        }
+        if depth < 0 {
+            return Err(
+                t.error(key, format!("\"{text}\" leaves the recording's folder; paths are relative to it and stay inside"))
+            );
+        }
+    }
+    let path = source.folder().join(text);
+    // A link may lead out of the folder where the text does not.
+    if let (Ok(real), Ok(folder)) = (path.canonicalize(), source.folder().canonicalize())
+        && !real.starts_with(&folder)
+    {
+        return Err(t.error(key, format!("\"{text}\" is a link out of the recording's folder")));
+    }
+    Ok(Some(path))
+}
+
+/// A frame's table, before its images are loaded.
+struct Header<'a> {
+    table: Table<'a>,
+    camera: usize,
+    time: f64,
+    depth: Option<PathBuf>,
+    mask: Option<PathBuf>,
+}
+
+fn frames(
+    source: &Source,
+    root: &Table,
+    cameras: &[RecordedCamera],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<RecordedFrame>, InputError> {
+    let tables = root.tables("frame")?;
+    if !tables.is_empty() && cameras.is_empty() {
+        return Err(root.error("frame", format!("{} frames but no [[camera]]; every frame needs one", tables.len())));
+    }
+    let names: Vec<&str> = cameras.iter().map(|c| c.name.as_str()).collect();
+    let mut headers: Vec<Header> = Vec::new();
+    for table in tables {
+        let name = table.optional_str("camera")?.ok_or_else(|| table.missing("camera", "the name of a camera"))?;
+        let camera = (names.iter().position(|n| *n == name))
+            .ok_or_else(|| table.error("camera", format!("no [[camera]] is named \"{name}\"; {}", suggest(name, &names))))?;
+        let time = table.optional_f64("time")?.ok_or_else(|| table.missing("time", "a number (s)"))?;
+        if let Some(before) = headers.last().filter(|b| b.time > time) {
+            return Err(
+                table.error("time", format!("{time} comes after {} in the file; frames are ordered by time", before.time))
+            );
+        }
+        if headers.iter().rev().take_while(|b| b.time == time).any(|b| b.camera == camera) {
+            return Err(table.error("time", format!("camera \"{name}\" has two frames at {time}")));
+        }
+        let (depth, mask) = (inside(source, &table, "depth")?, inside(source, &table, "mask")?);
+        if depth.is_none() && mask.is_none() {
+            return Err(table.missing("depth", "a depth image, a mask, or both"));
+        }
+        headers.push(Header { table, camera, time, depth, mask });
+    }
+    let load = |path: &PathBuf| std::fs::read(path).map_err(|e| InputError::io(path, &e));
+    // Files are read and decoded side by side; what is wrong is still reported in the order of the file.
+    type Loaded = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);
+    let images: Vec<Loaded> = (headers.iter().map(|h| (h.camera, h.depth.clone(), h.mask.clone())).collect::<Vec<_>>())
+        .into_par_iter()
+        .map(|(c, depth, mask)| {
+            let size = (cameras[c].width, cameras[c].height);
+            (
+                depth.map(|p| load(&p).and_then(|b| image::depth(&p, &b, size))),
+                mask.map(|p| load(&p).and_then(|b| image::mask(&p, &b, size))),
+            )
+        })
+        .collect();
+    let mut frames = Vec::new();
+    for (h, (depth, mask)) in headers.iter().zip(images) {
+        let frame = RecordedFrame { camera: h.camera, time: h.time, depth: depth.transpose()?, mask: mask.transpose()? };
+        if frame.mask.as_ref().is_some_and(|m| !m.contains(&true)) {
+            let e = h.table.error("mask", "is empty: no pixel is marked as the object (255)");
+            return Err(e);
+        }
+        if frame.depth.is_some() && frame.readings().next().is_none() {
+            let e = h.table.error("depth", "holds no reading of the object; the frame is of no use");
+            warnings.push(e.to_string());
+        }
+        frames.push(frame);
+    }
+    Ok(frames)
+}
+
+impl RecordedFrame {
+    /// Pixels (column u, row v) of the object with a reading, and their counts, row by row.
+    pub fn readings(&self) -> impl Iterator<Item = (usize, usize, u16)> + '_ {
+        let width = self.depth.as_ref().map_or(1, |d| d.width);
+        let counts = self.depth.as_ref().map_or(&[][..], |d| &d.counts[..]);
+        (counts.iter().enumerate())
+            .filter(|(i, c)| **c > 0 && self.mask.as_ref().is_none_or(|m| m[*i]))
+            .map(move |(i, c)| (i % width, i / width, *c))
+    }
+}
+
+fn markers(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<Option<RecordedMarkers>, InputError> {
+    let Some(t) = root.optional_table("markers")? else { return Ok(None) };
+    let file = inside(source, &t, "file")?.ok_or_else(|| t.missing("file", "a .csv or .c3d file"))?;
+    let extension = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let bytes = std::fs::read(&file).map_err(|e| InputError::io(&file, &e))?;
+    let (names, samples) = match extension.as_str() {
+        "csv" => markers::read_csv(&file, &bytes)?,
+        "c3d" => c3d::read_c3d(&file, &bytes, warnings)?,
+        _ => return Err(t.error("file", format!("\"{}\" is neither a .csv nor a .c3d file", file.display()))),
+    };
+    let mut rest: Vec<MarkerRest> = Vec::new();
+    for r in t.tables("rest")? {
+        let m = marker_rest(&r)?;
+        if rest.iter().any(|o| o.name == m.name) {
+            return Err(r.error("name", format!("\"{}\" is given twice", m.name)));
+        }
+        if !names.contains(&m.name) {
+            let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            let hint = suggest(&m.name, &known);
+            return Err(r.error("name", format!("\"{}\" does not occur in {}; {hint}", m.name, file.display())));
+        }
+        rest.push(m);
+    }
+    Ok(Some(RecordedMarkers {
+        file,
+        names,
+        samples,
+        noise_sigma: noise(&t, "noise_sigma")?,
+        noise_systematic: noise(&t, "noise_systematic")?.unwrap_or(0.0),
+        rest,
+    }))
+}
+
+/// A noise in metres; zero would be an infinite weight.
+fn noise(t: &Table, key: &str) -> Result<Option<f64>, InputError> {
+    match key {
+        "noise_sigma" => t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0 (m)"),
+        _ => t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0 (m)"),
+    }
+}

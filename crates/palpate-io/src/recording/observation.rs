@@ -1,0 +1,178 @@
+//! A recording as an [`Observation`]: pixels to world points, markers to frames.
+
+use super::{RecordedMarkers, Recording};
+use crate::error::InputError;
+use palpate_model::observation::Observation;
+use palpate_model::observation::{Camera, Frame, MarkerRest, ObservedMarker, ObservedPoint};
+use palpate_model::scene::{CostKind, ObservationSpec};
+
+/// Noise of a depth reading where the recording states none [m]: that of common depth cameras at half a metre.
+const DEPTH_NOISE: f64 = 0.002;
+
+/// Noise of a marker coordinate where the recording states none [m].
+const MARKER_NOISE: f64 = 0.001;
+
+/// Times closer than this are one instant [s]; clocks in files have microseconds.
+const SAME_TIME: f64 = 1e-9;
+
+impl Recording {
+    /// What a scene's `[observation]` uses of this recording, in world coordinates; sites are left to the caller, who
+    /// knows the body: `ObservedMarker::site` counts the returned rest places.
+    ///
+    /// Of images and of marker times in `from..=to`, every `every`-th is used; pixels on every `pixel_stride`-th row and column.
+    /// What was assumed is added to `warnings`.
+    ///
+    /// # Errors
+    /// Nothing to use for a cost in the spec, or a marker without a rest place.
+    pub fn observation(
+        &self,
+        spec: &ObservationSpec,
+        warnings: &mut Vec<String>,
+    ) -> Result<(Observation, Vec<MarkerRest>), InputError> {
+        let mut o = Observation {
+            cameras: self.cameras.iter().map(|c| Camera { center: c.position() }).collect(),
+            depth_noise: DEPTH_NOISE,
+            marker_noise: MARKER_NOISE,
+            // Displacements come from other simulators, not from recordings; one metre keeps the weight neutral.
+            displacement_noise: 1.0,
+            ..Observation::default()
+        };
+        if spec.costs.contains(&CostKind::SparseSurface) {
+            self.add_depth(spec, &mut o, warnings)?;
+        }
+        let mut rest = Vec::new();
+        if spec.costs.contains(&CostKind::Markers) {
+            rest = self.add_markers(spec, &mut o, warnings)?;
+        }
+        o.frames.sort_by(|a, b| a.time.total_cmp(&b.time));
+        o.frames.dedup_by(|later, first| {
+            let same = later.time - first.time < SAME_TIME;
+            if same {
+                first.points.append(&mut later.points);
+                first.markers.append(&mut later.markers);
+            }
+            same
+        });
+        Ok((o, rest))
+    }
+
+    fn no_data(&self, spec: &ObservationSpec, what: &str) -> InputError {
+        InputError::file(&self.path, format!("has no {what} between {} s and {} s", spec.from, spec.to))
+    }
+
+    fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), InputError> {
+        let mut used = vec![false; self.cameras.len()];
+        let images = self.frames.iter().filter(|f| f.depth.is_some() && (spec.from..=spec.to).contains(&f.time));
+        let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
+        for f in images {
+            if f.time - last > SAME_TIME {
+                instants += 1;
+                last = f.time;
+            }
+            if !(instants - 1).is_multiple_of(spec.every) {
+                continue;
+            }
+            used[f.camera] = true;
+            let camera = &self.cameras[f.camera];
+            let strided =
+                f.readings().filter(|(u, v, _)| u.is_multiple_of(spec.pixel_stride) && v.is_multiple_of(spec.pixel_stride));
+            let points = strided
+                .map(|(u, v, count)| {
+                    let position = camera.point(u as f64, v as f64, camera.depth(count)).ok_or_else(|| {
+                        let text = format!("distortion of camera \"{}\" cannot be inverted at pixel ({u}, {v})", camera.name);
+                        InputError::file(&self.path, text)
+                    })?;
+                    Ok(ObservedPoint { position, camera: f.camera as u32 })
+                })
+                .collect::<Result<Vec<_>, InputError>>()?;
+            o.frames.push(Frame { time: f.time, points, ..Frame::default() });
+            if f.mask.is_none() {
+                warnings.push(format!(
+                    "{}: frame at {} s has no mask; every pixel may be the object",
+                    self.path.display(),
+                    f.time
+                ));
+            }
+        }
+        if o.frames.iter().all(|f| f.points.is_empty()) {
+            return Err(self.no_data(spec, "depth reading of the object"));
+        }
+        // One noise serves all cameras: the root mean square of those in use.
+        let cameras = || self.cameras.iter().zip(&used).filter(|(_, u)| **u).map(|(c, _)| c);
+        let n = cameras().count() as f64;
+        for c in cameras().filter(|c| c.noise_sigma.is_none()) {
+            warnings.push(format!(
+                "{}: camera \"{}\" states no noise_sigma; {DEPTH_NOISE} m is assumed",
+                self.path.display(),
+                c.name
+            ));
+        }
+        o.depth_noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
+        o.depth_systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        Ok(())
+    }
+
+    fn add_markers(
+        &self,
+        spec: &ObservationSpec,
+        o: &mut Observation,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<MarkerRest>, InputError> {
+        let m = self
+            .markers
+            .as_ref()
+            .ok_or_else(|| InputError::file(&self.path, "has no [markers], which cost \"markers\" needs"))?;
+        let rest = self.rest_places(m, spec)?;
+        let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
+        let before = o.frames.len();
+        for s in m.samples.iter().filter(|s| (spec.from..=spec.to).contains(&s.time)) {
+            let fresh = s.time - last > SAME_TIME;
+            if fresh {
+                instants += 1;
+                last = s.time;
+            }
+            if !(instants - 1).is_multiple_of(spec.every) {
+                continue;
+            }
+            if fresh {
+                o.frames.push(Frame { time: s.time, ..Frame::default() });
+            }
+            if let Some(f) = o.frames.last_mut() {
+                f.markers.push(ObservedMarker { site: s.marker as u32, position: s.position });
+            }
+        }
+        if o.frames.len() == before {
+            return Err(self.no_data(spec, "marker"));
+        }
+        if m.noise_sigma.is_none() {
+            warnings.push(format!("{}: markers state no noise_sigma; {MARKER_NOISE} m is assumed", self.path.display()));
+        }
+        o.marker_noise = m.noise_sigma.unwrap_or(MARKER_NOISE);
+        o.marker_systematic = m.noise_systematic;
+        Ok(rest)
+    }
+
+    /// The rest place of every marker, the scene's word before the recording's. A first sample would not do: a body is
+    /// seldom at rest when recording begins.
+    fn rest_places(&self, m: &RecordedMarkers, spec: &ObservationSpec) -> Result<Vec<MarkerRest>, InputError> {
+        if let Some(r) = spec.markers.iter().find(|r| !m.names.contains(&r.name)) {
+            let known: Vec<&str> = m.names.iter().map(String::as_str).collect();
+            let text = format!(
+                "the scene's [[observation.marker]] \"{}\" does not occur; {}",
+                r.name,
+                crate::keys::suggest(&r.name, &known)
+            );
+            return Err(InputError::file(&m.file, text));
+        }
+        let place = |name: &String| spec.markers.iter().chain(&m.rest).find(|r| r.name == *name).cloned();
+        let missing: Vec<&str> = m.names.iter().filter(|n| place(n).is_none()).map(String::as_str).collect();
+        if !missing.is_empty() {
+            let text = format!(
+                "no rest position for {}; give [[markers.rest]] in the recording or [[observation.marker]] in the scene (name, position, surface)",
+                missing.join(", ")
+            );
+            return Err(InputError { key: "markers".into(), ..InputError::file(&self.path, text) });
+        }
+        Ok(m.names.iter().filter_map(place).collect())
+    }
+}

@@ -1,0 +1,111 @@
+//! Synthetic recordings, in the format that is read.
+
+use super::{FORMAT, RecordedMarkers, Recording};
+use crate::error::OutputError;
+use crate::output::{make_folder, write_file};
+use glam::{DAffine3, DVec3};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `markers.csv`. [`super::read_recording`] gives it back.
+///
+/// # Errors
+/// The file that could not be written and why.
+pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Result<(), OutputError> {
+    let folder = folder.as_ref();
+    make_folder(folder)?;
+    let mut toml = String::new();
+    // Writing to a string cannot fail.
+    let _ = head(&mut toml, recording);
+    let mut counts = vec![0usize; recording.cameras.len()];
+    for f in &recording.frames {
+        let camera = &recording.cameras[f.camera];
+        let number = counts[f.camera];
+        counts[f.camera] += 1;
+        // Folders are numbered: a camera's name may hold characters that a file name may not.
+        let place = |kind: &str| format!("{kind}/cam{}/{number:06}.png", f.camera);
+        let _ = write!(toml, "\n[[frame]]\ncamera = {}\ntime = {:?}\n", quoted(&camera.name), f.time);
+        let size = (camera.width as u32, camera.height as u32);
+        if let Some(d) = &f.depth {
+            let bytes: Vec<u8> = d.counts.iter().flat_map(|c| c.to_ne_bytes()).collect();
+            png(folder, &place("depth"), &bytes, size, ExtendedColorType::L16)?;
+            let _ = writeln!(toml, "depth = \"{}\"", place("depth"));
+        }
+        if let Some(m) = &f.mask {
+            let bytes: Vec<u8> = m.iter().map(|b| if *b { 255 } else { 0 }).collect();
+            png(folder, &place("mask"), &bytes, size, ExtendedColorType::L8)?;
+            let _ = writeln!(toml, "mask = \"{}\"", place("mask"));
+        }
+    }
+    if let Some(m) = &recording.markers {
+        write_markers(folder, &mut toml, m)?;
+    }
+    // Last, so that a folder with this file is complete.
+    write_file(folder.join("recording.toml"), |w| w.write_all(toml.as_bytes()))
+}
+
+fn quoted(text: &str) -> String {
+    toml_edit::Value::from(text).to_string()
+}
+
+fn vector(v: DVec3) -> String {
+    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+fn matrix(a: &DAffine3) -> String {
+    let m = a.matrix3;
+    let row = |i: usize| format!("  [{:?}, {:?}, {:?}, {:?}],\n", m.col(0)[i], m.col(1)[i], m.col(2)[i], a.translation[i]);
+    format!("[\n{}{}{}  [0, 0, 0, 1],\n]", row(0), row(1), row(2))
+}
+
+fn head(toml: &mut String, r: &Recording) -> std::fmt::Result {
+    writeln!(toml, "format = \"{FORMAT}\"\ntitle = {}\nsource = {}\nunits = \"m, s\"", quoted(&r.title), quoted(&r.source))?;
+    for c in &r.cameras {
+        writeln!(toml, "\n[[camera]]\nname = {}\nwidth = {}\nheight = {}", quoted(&c.name), c.width, c.height)?;
+        writeln!(toml, "fx = {:?}\nfy = {:?}\ncx = {:?}\ncy = {:?}", c.focal[0], c.focal[1], c.center[0], c.center[1])?;
+        writeln!(toml, "distortion = {:?}", c.distortion)?;
+        writeln!(toml, "world_from_camera = {}", matrix(&c.world_from_camera))?;
+        if let Some(s) = c.depth_scale {
+            writeln!(toml, "depth_scale = {s:?}")?;
+        }
+        writeln!(toml, "depth_offset = {:?}", c.depth_offset)?;
+        if let Some(s) = c.noise_sigma {
+            writeln!(toml, "noise_sigma = {s:?}")?;
+        }
+        writeln!(toml, "noise_systematic = {:?}", c.noise_systematic)?;
+    }
+    Ok(())
+}
+
+fn png(folder: &Path, place: &str, bytes: &[u8], (w, h): (u32, u32), color: ExtendedColorType) -> Result<(), OutputError> {
+    let path = folder.join(place);
+    if let Some(parent) = path.parent() {
+        make_folder(parent)?;
+    }
+    write_file(&path, |out| PngEncoder::new(out).write_image(bytes, w, h, color).map_err(std::io::Error::other))
+}
+
+fn write_markers(folder: &Path, toml: &mut String, m: &RecordedMarkers) -> Result<(), OutputError> {
+    let _ = writeln!(toml, "\n[markers]\nfile = \"markers.csv\"");
+    if let Some(s) = m.noise_sigma {
+        let _ = writeln!(toml, "noise_sigma = {s:?}");
+    }
+    let _ = writeln!(toml, "noise_systematic = {:?}", m.noise_systematic);
+    for r in &m.rest {
+        let _ = writeln!(toml, "\n[[markers.rest]]\nname = {}\nposition = {}", quoted(&r.name), vector(r.position));
+        if let Some(s) = r.surface {
+            let _ = writeln!(toml, "surface = {}", vector(s));
+        }
+    }
+    write_file(folder.join("markers.csv"), |out| {
+        let mut csv = csv::Writer::from_writer(out);
+        csv.write_record(["time", "name", "x", "y", "z"])?;
+        for s in &m.samples {
+            let p = s.position;
+            let numbers = [s.time, p.x, p.y, p.z].map(|x| format!("{x:?}"));
+            csv.write_record([&numbers[0], &m.names[s.marker], &numbers[1], &numbers[2], &numbers[3]])?;
+        }
+        csv.flush()
+    })
+}
