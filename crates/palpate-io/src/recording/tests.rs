@@ -266,38 +266,3 @@ fn a_recording_elsewhere_is_refused_with_numbers() {
     assert!(e.contains("nowhere near") && e.contains("diagonal of 0.3464 m") && e.contains("object.pose"), "{e}");
     assert_eq!(check_overlap(&Observation::default(), far, far), Ok(()), "nothing measured is another error");
 }
-
-#[test]
-fn motion_capture_files_are_read() {
-    use c3dio::{C3d, MarkerPoint};
-    let folder = tempfile::tempdir().unwrap();
-    let mut c = C3d::new();
-    c.points.labels = vec!["tip".into(), "base".into()];
-    c.points.descriptions = vec!["".into(), "".into()];
-    c.points.units = ['m', 'm', ' ', ' '];
-    c.points.frame_rate = 50.0;
-    c.points.scale_factor = -0.1;
-    (c.points.first_frame, c.points.last_frame) = (1, 3);
-    c.points.points.push_row(vec![MarkerPoint::new(100.0, 0.0, 20.0), MarkerPoint::new(1.0, 2.0, 3.0)]);
-    let mut gone = MarkerPoint::new(0.0, 0.0, 0.0);
-    (gone.residual, gone.cameras) = (0.1, [true; 7]);
-    c.points.points.push_row(vec![gone, MarkerPoint::new(1.0, 2.0, 4.0)]);
-    c.points.points.push_row(vec![MarkerPoint::new(110.0, 0.0, 20.0), MarkerPoint::new(1.0, 2.0, 5.0)]);
-    c.write_path(folder.path().join("m.c3d")).unwrap();
-    let toml = "format = \"recording/1\"\n[markers]\nfile = \"m.c3d\"\n";
-    fs::write(folder.path().join("recording.toml"), toml).unwrap();
-    let r = read_recording(folder.path()).unwrap();
-    let m = r.markers.unwrap();
-    assert_eq!(m.names, ["tip", "base"]);
-    assert_eq!(m.samples.len(), 5, "an unseen point has no sample: {:?}", m.samples);
-    assert_eq!((m.samples[0].time, m.samples[4].time), (0.0, 0.04));
-    // Single precision in the file.
-    assert!((m.samples[3].position - DVec3::new(0.11, 0.0, 0.02)).length() < 1e-8);
-
-    let bytes = fs::read(folder.path().join("m.c3d")).unwrap();
-    for n in [0, 100, 512, 700] {
-        fs::write(folder.path().join("m.c3d"), &bytes[..n.min(bytes.len())]).unwrap();
-        let e = read_recording(folder.path()).unwrap_err().to_string();
-        assert!(e.contains("m.c3d: not a readable C3D file"), "{e}");
-    }
-}
