@@ -1,5 +1,6 @@
 //! The fit itself: starts, the best of them, and what is known about it.
 
+use crate::journal::{Journal, JournalError, JournalFile};
 use crate::multistart;
 use crate::optimise::Status;
 use crate::problem::Problem;
@@ -16,6 +17,17 @@ pub enum FitError {
     /// Interrupted before anything was evaluated.
     #[error("interrupted before the first evaluation")]
     Interrupted,
+    /// The number of residuals changed from one evaluation to another.
+    #[error("the number of residuals changed from {before} to {now}; was the recording changed since the journal was begun?")]
+    Residuals {
+        /// At the first evaluation.
+        before: usize,
+        /// At a later one.
+        now: usize,
+    },
+    /// The journal cannot be used.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
     /// The operating system refused a thread, or one was lost.
     #[error("{0}")]
     Threads(String),
@@ -41,6 +53,8 @@ pub struct Hooks<'a> {
     pub on_iteration: Option<&'a mut dyn FnMut(&Progress)>,
     /// When set, every start stops before its next evaluation and keeps its best point.
     pub interrupt: Option<&'a AtomicBool>,
+    /// Journal of evaluations, for resuming.
+    pub journal: Option<JournalFile>,
 }
 
 /// One start's search.
@@ -84,7 +98,8 @@ pub struct FitResult {
 /// Fits the free parameters of a problem.
 pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Result<FitResult, FitError> {
     let clock = Instant::now();
-    let starts = multistart::run(problem, settings, &mut hooks)?;
+    let journal = hooks.journal.as_ref().map(|place| Journal::open(place, problem, settings)).transpose()?;
+    let starts = multistart::run(problem, settings, &mut hooks, journal)?;
     let runs: Vec<Run> = starts
         .iter()
         .map(|s| Run {

@@ -6,6 +6,7 @@
 mod chart;
 mod dense;
 mod fit;
+mod journal;
 mod multistart;
 mod optimise;
 mod problem;
@@ -13,6 +14,7 @@ mod settings;
 
 pub use chart::{AtBound, Chart};
 pub use fit::{FitError, FitResult, Hooks, Progress, Run, fit};
+pub use journal::{JournalError, JournalFile};
 pub use optimise::{Outcome, Sample, Search, Status, Stop};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};
 pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance};

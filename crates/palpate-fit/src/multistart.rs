@@ -5,6 +5,7 @@
 
 use crate::chart::Chart;
 use crate::fit::{FitError, Hooks, Progress};
+use crate::journal::Journal;
 use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
 use crate::problem::{FreeParameter, Problem};
 use crate::settings::Settings;
@@ -98,7 +99,12 @@ impl Runner<'_> {
 }
 
 /// Runs all starts; the result is ordered by start.
-pub fn run(problem: &mut Problem, settings: &Settings, hooks: &mut Hooks) -> Result<Vec<StartRun>, FitError> {
+pub fn run(
+    problem: &mut Problem,
+    settings: &Settings,
+    hooks: &mut Hooks,
+    journal: Option<Journal>,
+) -> Result<Vec<StartRun>, FitError> {
     let free = problem.free().to_vec();
     let charts = problem.charts().to_vec();
     let own = problem.own_values();
@@ -140,7 +146,7 @@ pub fn run(problem: &mut Problem, settings: &Settings, hooks: &mut Hooks) -> Res
             lines.push(answer);
         }
         drop(tell);
-        broker(problem, settings, hooks, &inbox, &lines)
+        broker(problem, settings, hooks, journal, &inbox, &lines)
     })
 }
 
@@ -149,12 +155,15 @@ fn broker(
     problem: &mut Problem,
     settings: &Settings,
     hooks: &mut Hooks,
+    mut journal: Option<Journal>,
     inbox: &Receiver<(usize, Message)>,
     answers: &[Sender<Result<Sample, Stop>>],
 ) -> Result<Vec<StartRun>, FitError> {
     let starts = answers.len();
     let mut done: Vec<Option<StartRun>> = vec![None; starts];
     let mut asked: Vec<Option<Vec<f64>>> = vec![None; starts];
+    let mut served = vec![0; starts];
+    let mut residuals = 0;
     loop {
         let mut heard: Vec<(usize, usize, f64, Vec<f64>)> = Vec::new();
         while (0..starts).any(|s| done[s].is_none() && asked[s].is_none()) {
@@ -178,16 +187,41 @@ fn broker(
         if live.is_empty() {
             return Ok(done.into_iter().flatten().collect());
         }
-        if hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)) {
-            for s in live {
+        // What an earlier run has computed is served even when the fit is being interrupted: it costs nothing.
+        let mut answered = Vec::new();
+        if let Some(journal) = &mut journal {
+            for &s in &live {
+                if let Some(sample) = asked[s].as_ref().map_or(Ok(None), |z| journal.find(s, served[s], z))? {
+                    answered.push((s, sample));
+                }
+            }
+        }
+        let fresh: Vec<usize> = live.iter().copied().filter(|s| answered.iter().all(|(a, _)| a != s)).collect();
+        let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
+        if interrupted {
+            for &s in &fresh {
                 asked[s] = None;
                 let _ = answers[s].send(Err(Stop::Interrupted));
             }
-            continue;
+        } else if !fresh.is_empty() {
+            let z: Vec<Vec<f64>> = fresh.iter().filter_map(|&s| asked[s].clone()).collect();
+            let samples = problem.evaluate(&z, want(settings.optimizer));
+            if let Some(journal) = &mut journal {
+                let round: Vec<_> =
+                    fresh.iter().zip(&z).zip(&samples).map(|((&s, z), sample)| (s, served[s], z.as_slice(), sample)).collect();
+                journal.add(&round)?;
+            }
+            answered.extend(fresh.iter().copied().zip(samples));
         }
-        let z: Vec<Vec<f64>> = live.iter().filter_map(|&s| asked[s].take()).collect();
-        let samples = problem.evaluate(&z, want(settings.optimizer));
-        for (&s, sample) in live.iter().zip(samples) {
+        for (s, sample) in answered {
+            if sample.failure.is_none() && residuals != sample.residuals {
+                if residuals != 0 {
+                    return Err(FitError::Residuals { before: residuals, now: sample.residuals });
+                }
+                residuals = sample.residuals;
+            }
+            asked[s] = None;
+            served[s] += 1;
             // A start that no longer listens has ended and said so.
             let _ = answers[s].send(Ok(sample));
         }

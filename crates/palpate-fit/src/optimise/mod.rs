@@ -1,11 +1,19 @@
 //! Optimisers over z: each walks a [`Search`], which counts, guards against failures and keeps the best point.
 
+mod descent;
 mod gauss_newton;
+mod lbfgs;
+mod line;
+mod rprop;
+mod simplex;
 
 use crate::dense::max_abs;
 use crate::problem::Want;
 use crate::settings::Settings;
 use palpate_model::scene::Optimizer;
+
+/// Relative change of the cost per unit of z above which a point is not taken for an optimum without a second try.
+const STEEP: f64 = 1e-3;
 
 /// Cost and derivatives at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -154,7 +162,10 @@ impl<'a> Search<'a> {
                 (self.progress)(0, first.cost, &start);
                 let walk = match optimizer {
                     Optimizer::GaussNewton => gauss_newton::minimise(&mut self, start.clone(), first),
-                    other => Ok(Status::Failed(format!("the optimiser {other:?} is not available yet"))),
+                    Optimizer::Rprop => rprop::minimise(&mut self, start.clone(), first),
+                    Optimizer::GradientDescent => descent::minimise(&mut self, start.clone(), first),
+                    Optimizer::Lbfgs => lbfgs::minimise(&mut self, start.clone(), first),
+                    Optimizer::NelderMead => simplex::minimise(&mut self, start.clone(), first),
                 };
                 walk.unwrap_or(Status::Interrupted)
             }
@@ -202,5 +213,10 @@ impl<'a> Search<'a> {
     /// True where moving z by one would change the cost by no more than `tolerance.gradient` of itself.
     fn is_flat(&self, z: &[f64], sample: &Sample) -> bool {
         max_abs(&self.projected_gradient(z, &sample.gradient)) <= self.settings.tolerance.gradient * sample.cost.abs()
+    }
+
+    /// True where the gradient is so steep that a short step is no sign of convergence but of a misjudged curvature.
+    fn is_steep(&self, z: &[f64], sample: &Sample) -> bool {
+        max_abs(&self.projected_gradient(z, &sample.gradient)) > STEEP * sample.cost.abs()
     }
 }

@@ -25,3 +25,34 @@ fn several_starts_find_an_oscillator() {
     assert!((result.values[1] / 0.3 - 1.0).abs() < 1e-6, "{:?}", result.values);
     assert_eq!(result.runs.len(), 8);
 }
+
+const ALL: [Optimizer; 5] =
+    [Optimizer::Rprop, Optimizer::GradientDescent, Optimizer::Lbfgs, Optimizer::GaussNewton, Optimizer::NelderMead];
+
+#[test]
+fn every_optimiser_finds_an_oscillator() {
+    for optimizer in ALL {
+        let settings = Settings { starts: 6, iterations: 200, ..settings(optimizer) };
+        let r = fit(&mut oscillator_problem(), &settings, Hooks::default()).expect("it can be evaluated");
+        for run in &r.runs {
+            eprintln!(
+                "{optimizer:?} {:?} -> {:?} {} it {} ev {} {:?}",
+                run.start, run.end, run.cost, run.iterations, run.evaluations, run.status
+            );
+        }
+    }
+}
+
+#[test]
+fn every_optimiser_rosen() {
+    for optimizer in ALL {
+        let settings = Settings { starts: 3, iterations: 2000, ..settings(optimizer) };
+        let r = fit(&mut rosenbrock(), &settings, Hooks::default()).expect("it can be evaluated");
+        for run in &r.runs {
+            eprintln!(
+                "{optimizer:?} {:?} -> {:?} {} it {} ev {} {:?}",
+                run.start, run.end, run.cost, run.iterations, run.evaluations, run.status
+            );
+        }
+    }
+}
