@@ -9,21 +9,32 @@ use std::collections::VecDeque;
 const MEMORY: usize = 8;
 /// First step in z.
 const FIRST: f64 = 0.3;
-/// First step in z of a second try where steps have become too short.
-const AGAIN: f64 = 1e-2;
 
 pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
+    loop {
+        let (status, cost) = descend(search, z, at)?;
+        let Some((best, best_cost)) = search.best.clone() else { return Ok(status) };
+        if !matches!(status, Status::Converged | Status::Stalled) || best_cost >= cost {
+            return Ok(status);
+        }
+        // Costs may rise on the way, and the path ended in a worse place: once more from the best point. Costs never exceed
+        // the one a descent begins with, so that each ends lower than the one before.
+        at = search.evaluate(&best)?;
+        z = best;
+    }
+}
+
+/// Descends until a criterion is met. Returns the last cost too.
+fn descend(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<(Status, f64), Stop> {
     let q = z.len();
     let mut recent = VecDeque::from([at.cost]);
     let mut length = FIRST / max_abs(&search.projected_gradient(&z, &at.gradient)).max(f64::MIN_POSITIVE);
-    // Set while a second try is under way.
-    let mut again = false;
     loop {
         if search.is_flat(&z, &at) {
-            return Ok(Status::Converged);
+            return Ok((Status::Converged, at.cost));
         }
         if search.out_of_iterations() {
-            return Ok(Status::IterationLimit);
+            return Ok((Status::IterationLimit, at.cost));
         }
         let g = search.projected_gradient(&z, &at.gradient);
         length = length.min(search.settings.max_step / max_abs(&g));
@@ -32,12 +43,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         let ceiling = recent.iter().fold(f64::NEG_INFINITY, |m, &c| m.max(c));
         let (next, trial) = match line::backtrack(search, &z, &at, &d, ceiling)? {
             Ok(step) => step,
-            Err(_) if !again && search.is_steep(&z, &at) => {
-                again = true;
-                length = AGAIN / max_abs(&g);
-                continue;
-            }
-            Err(status) => return Ok(status),
+            Err(status) => return Ok((status, at.cost)),
         };
         let s: Vec<f64> = (0..q).map(|i| next[i] - z[i]).collect();
         let y: Vec<f64> = (0..q).map(|i| trial.gradient[i] - at.gradient[i]).collect();
@@ -55,13 +61,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         let (best, worst) = recent.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), &c| (a.min(c), b.max(c)));
         let level = recent.len() == MEMORY && worst - best <= search.settings.tolerance.cost * best;
         if max_abs(&s) <= search.settings.tolerance.step || level {
-            if again || !search.is_steep(&z, &at) {
-                return Ok(Status::Converged);
-            }
-            length = AGAIN / max_abs(&search.projected_gradient(&z, &at.gradient));
-            again = true;
-        } else {
-            again = false;
+            return Ok((Status::Converged, at.cost));
         }
     }
 }

@@ -16,8 +16,6 @@ const FIRST: f64 = 0.3;
 pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
     let q = z.len();
     let mut pairs: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
-    // Set after the memory was dropped because steps had become too short.
-    let mut again = false;
     loop {
         if search.is_flat(&z, &at) {
             return Ok(Status::Converged);
@@ -56,13 +54,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         at = trial;
         search.iterated(at.cost, &z);
         if max_abs(&s) <= search.settings.tolerance.step || gained <= search.settings.tolerance.cost * at.cost {
-            if pairs.is_empty() || again || !search.is_steep(&z, &at) {
-                return Ok(Status::Converged);
-            }
-            pairs.clear();
-            again = true;
-        } else {
-            again = false;
+            return Ok(Status::Converged);
         }
     }
 }

@@ -12,9 +12,6 @@ use crate::problem::Want;
 use crate::settings::Settings;
 use palpate_model::scene::Optimizer;
 
-/// Relative change of the cost per unit of z above which a point is not taken for an optimum without a second try.
-const STEEP: f64 = 1e-3;
-
 /// Cost and derivatives at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
@@ -213,10 +210,5 @@ impl<'a> Search<'a> {
     /// True where moving z by one would change the cost by no more than `tolerance.gradient` of itself.
     fn is_flat(&self, z: &[f64], sample: &Sample) -> bool {
         max_abs(&self.projected_gradient(z, &sample.gradient)) <= self.settings.tolerance.gradient * sample.cost.abs()
-    }
-
-    /// True where the gradient is so steep that a short step is no sign of convergence but of a misjudged curvature.
-    fn is_steep(&self, z: &[f64], sample: &Sample) -> bool {
-        max_abs(&self.projected_gradient(z, &sample.gradient)) > STEEP * sample.cost.abs()
     }
 }
