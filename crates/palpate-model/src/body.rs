@@ -1,5 +1,10 @@
 //! The body on its grid: active cells, nodes, weights, surface patches, ghost penalty, the band around it.
 
+mod build;
+
+pub use build::{BodyError, MAX_CELLS, SUBDIVISIONS};
+pub(crate) use build::{Parts, build_parts, world_cell};
+
 use crate::grid::Grid;
 use glam::DVec3;
 
@@ -35,7 +40,7 @@ pub struct Cell {
     pub lattice: [usize; 3],
     /// The eight simulation nodes, order of [`crate::grid::CORNERS`].
     pub nodes: [u32; 8],
-    /// Volume of the body inside, divided by h³; 1 for a full cell.
+    /// Volume of the body inside, divided by h³; 1 for a full cell, a trace more if a neighbour's sliver was merged into it.
     pub fraction: f64,
     /// Weights of the 3 × 3 × 3 Gauss points [`crate::cut::POINTS27`] (x fastest), divided by h³, fitted so that every
     /// polynomial of degree ≤ 2 in each variable is integrated exactly over the part of the cell inside the
@@ -44,9 +49,9 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// True when the body fills the whole cell.
+    /// True when the body fills exactly the whole cell (one that also carries a merged neighbour's sliver is not full).
     pub fn is_full(&self) -> bool {
-        self.fraction >= 1.0 - 1e-9
+        (self.fraction - 1.0).abs() <= 1e-9
     }
 }
 

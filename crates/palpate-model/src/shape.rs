@@ -1,6 +1,16 @@
 //! Rest shapes as signed distances: analytic bodies and triangle meshes.
 
+mod analytic;
+mod mesh;
+mod trimesh;
+
+pub use analytic::Placed;
+pub use mesh::MeshShape;
+pub use trimesh::TriMesh;
+
+use crate::scene::{BodySource, Object};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A closed body given by its signed distance.
 pub trait Shape: Send + Sync + std::fmt::Debug {
@@ -8,15 +18,38 @@ pub trait Shape: Send + Sync + std::fmt::Debug {
     fn signed_distance(&self, p: DVec3) -> f64;
     /// Corners (min, max) of the axis-aligned bounding box [m].
     fn bounds(&self) -> (DVec3, DVec3);
-    /// A triangle mesh of the surface, edges about `edge` long or shorter [m] where the shape is curved.
+    /// A triangle mesh of the surface, edges about `edge` long or shorter [m].
     fn surface(&self, edge: f64) -> TriMesh;
+
+    /// A nearest point of the surface [m]; where several are equally near, one of them.
+    fn closest_point(&self, p: DVec3) -> DVec3 {
+        let (lo, hi) = self.bounds();
+        let size = (hi - lo).length();
+        // Central differences of an exact distance: rounding 1e-16/1e-6 and curvature both leave the direction good to 1e-9.
+        let step = 1e-6 * size;
+        let mut x = p;
+        for round in 0..8 {
+            let d = self.signed_distance(x);
+            if d.abs() <= 1e-12 * size {
+                break;
+            }
+            let slope = |e: DVec3| self.signed_distance(x + e * step) - self.signed_distance(x - e * step);
+            let g = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)) / (2.0 * step);
+            if g.length() > 0.9 {
+                x -= g.normalize() * d;
+            } else {
+                // Several surface points are equally near here: step aside towards one of them.
+                x += DVec3::new(0.37, 0.61, 0.7) * (1e-4 * size * f64::from(round + 1));
+            }
+        }
+        x
+    }
 }
 
-/// A triangle mesh; triangles counter-clockwise seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TriMesh {
-    /// Vertex positions [m].
-    pub vertices: Vec<DVec3>,
-    /// Vertex numbers of each triangle.
-    pub triangles: Vec<[u32; 3]>,
+/// The rest shape of a scene's object, placed by its pose.
+pub fn shape_of(object: &Object) -> Arc<dyn Shape> {
+    match &object.source {
+        BodySource::Mesh { mesh, .. } => Arc::new(MeshShape::new(mesh.transformed(&object.pose))),
+        BodySource::Analytic(body) => Arc::new(Placed::new(body.clone(), object.pose)),
+    }
 }
