@@ -1,1 +1,101 @@
-//! Under construction.
+//! Contact law of a plane: a smooth, compactly supported penalty pressure.
+//!
+//! p = stiffness · g(gap) with g = 0 for gap ≥ w, g = −gap for gap ≤ −w and a C² blend between. Unlike a softplus
+//! layer it acts at no distance beyond w, and unlike max(−gap, 0) Newton's method sees no kink.
+
+/// Default penalty stiffness in units of E / h, i.e. stiffness = `DEFAULT_STIFFNESS` · E / h [Pa/m].
+///
+/// A body that rests on a plane carries a pressure p; it yields g = p h / (10 E), a tenth of a cell times the strain p / E
+/// that its own weight causes. Up to p = E/2 this stays inside the layer: at p / E = 0.05 the surface hovers 0.01 h above the
+/// plane, at 0.094 it lies in the plane, and it is never more than [`WIDTH`] · h off on either side of it.
+pub const DEFAULT_STIFFNESS: f64 = 10.0;
+
+/// Half width w of the blend as a fraction of the cell edge h.
+pub const WIDTH: f64 = 0.05;
+
+/// Pressure [Pa] at a signed `gap` [m] (negative = penetration) and its derivative by the gap [Pa/m].
+///
+/// `stiffness` [Pa/m] and the half `width` w of the blend [m] are positive. With s = (w − gap) / 2w in the blend:
+/// g = 2w (s³ − s⁴/2), g′ = −(3s² − 2s³). The pressure is linear in the stiffness: dp/dstiffness = p / stiffness.
+pub fn pressure(gap: f64, stiffness: f64, width: f64) -> (f64, f64) {
+    if gap >= width {
+        (0.0, 0.0)
+    } else if gap <= -width {
+        (-stiffness * gap, -stiffness)
+    } else {
+        let s = (width - gap) / (2.0 * width);
+        let s2 = s * s;
+        (stiffness * 2.0 * width * s2 * s * (1.0 - 0.5 * s), -stiffness * s2 * (3.0 - 2.0 * s))
+    }
+}
+
+/// Energy per area [J/m²] of a `gap` [m]: the integral of the pressure from the gap to infinity.
+pub fn energy(gap: f64, stiffness: f64, width: f64) -> f64 {
+    if gap >= width {
+        0.0
+    } else if gap <= -width {
+        // ½ gap² and what the blend adds: 0.6 w² at gap = −w instead of ½ w².
+        stiffness * (0.5 * gap * gap + 0.1 * width * width)
+    } else {
+        let s = (width - gap) / (2.0 * width);
+        stiffness * 4.0 * width * width * s * s * s * s * (0.25 - 0.1 * s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const K: f64 = 3.0e5;
+    const W: f64 = 2.0e-4;
+
+    #[test]
+    fn slope_is_the_derivative_of_pressure() {
+        for i in -200..=200 {
+            let gap = 0.0101 * f64::from(i) * W;
+            let d = 1e-5 * W;
+            let difference = (pressure(gap + d, K, W).0 - pressure(gap - d, K, W).0) / (2.0 * d);
+            // Truncation (d/w)² and rounding 1e-16 / 1e-5, both below 1e-9; at the ends g‴ jumps: still (d/w)².
+            assert!((difference - pressure(gap, K, W).1).abs() < 1e-9 * K, "gap {gap}");
+        }
+    }
+
+    #[test]
+    fn pressure_is_the_derivative_of_energy() {
+        for i in -200..=200 {
+            let gap = 0.0101 * f64::from(i) * W;
+            let d = 1e-5 * W;
+            let difference = -(energy(gap + d, K, W) - energy(gap - d, K, W)) / (2.0 * d);
+            assert!((difference - pressure(gap, K, W).0).abs() < 1e-8 * K * W, "gap {gap}");
+        }
+    }
+
+    #[test]
+    fn curvature_is_continuous_at_both_ends() {
+        let curvature = |gap: f64| {
+            let d = 1e-4 * W;
+            (pressure(gap + d, K, W).1 - pressure(gap - d, K, W).1) / (2.0 * d)
+        };
+        // p″ is at most 0.75 K/w in the blend; it vanishes at the ends up to its slope 1.5 K/w² times the step.
+        for end in [-W, W] {
+            assert!(curvature(end).abs() < 1e-3 * K / W);
+        }
+        assert!((curvature(0.0) / (0.75 * K / W) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn is_exactly_zero_outside_and_linear_inside() {
+        assert_eq!(pressure(W, K, W), (0.0, 0.0));
+        assert_eq!(pressure(1.0, K, W), (0.0, 0.0));
+        assert_eq!(pressure(-2.0 * W, K, W), (2.0 * W * K, -K));
+        assert!((pressure(-W * (1.0 - 1e-12), K, W).0 / (K * W) - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn documented_penetrations_hold() {
+        // With h = 1 and E = 1 the stiffness is DEFAULT_STIFFNESS and the width WIDTH.
+        assert!((pressure(0.01, DEFAULT_STIFFNESS, WIDTH).0 - 0.05).abs() < 0.005);
+        assert!((pressure(0.0, DEFAULT_STIFFNESS, WIDTH).0 - 0.094).abs() < 0.0005);
+        assert!((pressure(-WIDTH, DEFAULT_STIFFNESS, WIDTH).0 - 0.5).abs() < 1e-12);
+    }
+}
