@@ -171,8 +171,10 @@ fn minus(mut v: Nodes) -> Nodes {
 /// Step k.
 pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, next: &mut MemberState) -> Result<(), Reason> {
     let clock = shared.plan.clock;
+    // Free flight is the guess: exact while nothing touches or deforms.
+    let fall = clock.theta * clock.step * clock.step * member.physics.gravity;
     for i in 0..now.u.len() {
-        next.u[i] = now.u[i] + clock.step * now.v[i];
+        next.u[i] = now.u[i] + clock.step * now.v[i] + fall;
     }
     let solver = shared.plan.solver;
     with_matrix(member, |member, matrix| {

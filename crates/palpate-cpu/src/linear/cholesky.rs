@@ -1,7 +1,7 @@
 //! Direct solver: faer's sparse Cholesky factorisation over a pattern that is analysed once.
 
 use super::matrix::Matrix;
-use super::pattern::Pattern;
+use super::pattern::BlockRows;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Side, linalg::solvers::Solve};
@@ -18,28 +18,29 @@ pub struct Analysis {
 
 impl Analysis {
     /// Orders the unknowns and finds the factor's pattern.
-    pub fn new(pattern: &Pattern) -> Result<Analysis, String> {
-        let n = pattern.nodes();
+    pub fn new(rows: &BlockRows) -> Result<Analysis, String> {
+        let n = rows.len();
         let mut starts = vec![0];
-        let mut rows = Vec::with_capacity(pattern.lower_entries());
-        let mut entries = Vec::with_capacity(pattern.lower_entries());
+        let lower = (9 * rows.columns.len() + 3 * n) / 2;
+        let mut indices = Vec::with_capacity(lower);
+        let mut entries = Vec::with_capacity(lower);
         for a in 0..n {
             // The pattern is symmetric: column a of the lower triangle is row a from the diagonal on. Block (b, a) is the
             // transpose of block (a, b), so entry (row r, column c) of it is entry (c, r) of the stored block.
             for c in 0..3 {
-                for k in pattern.rows[a]..pattern.rows[a + 1] {
-                    let b = pattern.columns[k] as usize;
+                for k in rows.rows[a]..rows.rows[a + 1] {
+                    let b = rows.columns[k] as usize;
                     for r in 0..3 {
                         if 3 * b + r >= 3 * a + c {
-                            rows.push(3 * b + r);
+                            indices.push(3 * b + r);
                             entries.push((k as u32, (3 * r + c) as u8));
                         }
                     }
                 }
-                starts.push(rows.len());
+                starts.push(indices.len());
             }
         }
-        let structure = SymbolicSparseColMat::new_checked(3 * n, 3 * n, starts, None, rows);
+        let structure = SymbolicSparseColMat::new_checked(3 * n, 3 * n, starts, None, indices);
         let symbolic = SymbolicLlt::try_new(structure.as_ref(), Side::Lower).map_err(|e| format!("{e:?}"))?;
         Ok(Analysis { structure, symbolic, entries })
     }

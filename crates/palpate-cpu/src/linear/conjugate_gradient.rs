@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradients with a residual norm that small cells cannot hide from.
 
 use super::matrix::Matrix;
-use super::pattern::Pattern;
+use super::pattern::BlockRows;
 use super::vector::{add_scaled, dot};
 use glam::DVec3;
 
@@ -25,7 +25,7 @@ pub enum CgEnd {
 /// Solves A x = b from the given x. Stops when `‖r‖ ≤ max(relative·‖b‖, absolute)` in the norm `sqrt(rᵀ M⁻¹ r)`: scaled by the
 /// preconditioner, a nearly massless node counts as much as any other (plain norms are blind to it).
 pub fn solve(
-    pattern: &Pattern,
+    rows: &BlockRows,
     matrix: &Matrix,
     precondition: &dyn Precondition,
     b: &[DVec3],
@@ -46,7 +46,7 @@ pub fn solve(
     }
     let target = (relative * scale).max(absolute);
     if x.iter().any(|v| *v != DVec3::ZERO) {
-        matrix.multiply(pattern, x, &mut q);
+        matrix.multiply(rows, x, &mut q);
         add_scaled(&mut r, -1.0, &q);
         precondition.apply(&r, &mut z);
     }
@@ -56,7 +56,7 @@ pub fn solve(
         if rz.max(0.0).sqrt() <= target {
             return CgEnd::Converged(iteration);
         }
-        matrix.multiply(pattern, &p, &mut q);
+        matrix.multiply(rows, &p, &mut q);
         let curvature = dot(&p, &q);
         if !curvature.is_finite() {
             return CgEnd::Unconverged(f64::NAN);

@@ -2,7 +2,7 @@
 
 use super::conjugate_gradient::Precondition;
 use super::matrix::Matrix;
-use super::pattern::Pattern;
+use super::pattern::BlockRows;
 use super::vector::{Nodes, dot};
 use glam::{DMat3, DVec3};
 
@@ -14,8 +14,8 @@ pub struct BlockJacobi {
 
 impl BlockJacobi {
     /// Inverts the diagonal; the error names a node whose block is not positive definite.
-    pub fn new(pattern: &Pattern, matrix: &Matrix) -> Result<BlockJacobi, usize> {
-        Ok(BlockJacobi { inverse: matrix.diagonal_inverses(pattern)? })
+    pub fn new(rows: &BlockRows, matrix: &Matrix) -> Result<BlockJacobi, usize> {
+        Ok(BlockJacobi { inverse: matrix.diagonal_inverses(rows)? })
     }
 
     /// `sqrt(rᵀ D⁻¹ r)`: every node counts by what its residual would move it.

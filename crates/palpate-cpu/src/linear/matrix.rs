@@ -1,10 +1,10 @@
 //! The system matrix: symmetric block-compressed rows of 3 × 3 blocks.
 
-use super::pattern::Pattern;
+use super::pattern::BlockRows;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Values of a [`Pattern`]; row-major blocks: entry (r, c) of a block is the effect of component c on component r.
+/// Values of a [`BlockRows`]; row-major blocks: entry (r, c) of a block is the effect of component c on component r.
 #[derive(Debug, Default)]
 pub struct Matrix {
     /// One 3 × 3 block per place.
@@ -13,11 +13,11 @@ pub struct Matrix {
 
 impl Matrix {
     /// y = A x.
-    pub fn multiply(&self, pattern: &Pattern, x: &[DVec3], y: &mut [DVec3]) {
+    pub fn multiply(&self, rows: &BlockRows, x: &[DVec3], y: &mut [DVec3]) {
         let row = |a: usize| -> DVec3 {
             let mut sum = DVec3::ZERO;
-            let range = pattern.rows[a]..pattern.rows[a + 1];
-            for (block, &b) in self.values[range.clone()].iter().zip(&pattern.columns[range]) {
+            let range = rows.rows[a]..rows.rows[a + 1];
+            for (block, &b) in self.values[range.clone()].iter().zip(&rows.columns[range]) {
                 sum += *block * x[b as usize];
             }
             sum
@@ -30,8 +30,8 @@ impl Matrix {
     }
 
     /// Inverses of the diagonal blocks `[N]`; `None` at the first block that is not positive definite.
-    pub fn diagonal_inverses(&self, pattern: &Pattern) -> Result<Vec<DMat3>, usize> {
-        pattern
+    pub fn diagonal_inverses(&self, rows: &BlockRows) -> Result<Vec<DMat3>, usize> {
+        rows
             .diagonal
             .iter()
             .enumerate()

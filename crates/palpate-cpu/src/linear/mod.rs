@@ -1,6 +1,7 @@
 //! Linear algebra of the backend: the block matrix, direct and iterative solvers, and the choice between them.
 
 pub mod cholesky;
+pub mod coarse;
 pub mod conjugate_gradient;
 pub mod jacobi;
 pub mod matrix;
@@ -8,11 +9,14 @@ pub mod pattern;
 pub mod vector;
 
 use cholesky::{Analysis, Factor};
+use coarse::Coarsening;
 use conjugate_gradient::{CgEnd, Precondition};
 use glam::DVec3;
+use jacobi::BlockJacobi;
 use matrix::Matrix;
+use palpate_model::body::Body;
 use palpate_model::scene::LinearSolver;
-use pattern::Pattern;
+use pattern::{BlockRows, Pattern};
 use std::sync::OnceLock;
 
 /// Most CG iterations; a solve that needs more is a symptom.
@@ -21,12 +25,17 @@ const MOST_ITERATIONS: usize = 4000;
 const DIRECT_STATIC: usize = 9000;
 /// Largest body (nodes) and fewest right-hand sides for which a factor pays in a time step.
 const DIRECT_STEP: (usize, usize) = (1500, 4);
+/// Smallest body (nodes) for which the second level of the preconditioner pays.
+const COARSE_FROM: usize = 600;
+/// Edge of a group of nodes on the second level.
+const GROUP: i64 = 4;
 
 /// Solves with the matrices of one plan.
 #[derive(Debug)]
 pub struct Solvers {
     choice: LinearSolver,
     analysis: OnceLock<Result<Analysis, String>>,
+    coarsening: OnceLock<Result<Coarsening, String>>,
 }
 
 /// What a linear solve is for; decides between direct and iterative.
@@ -43,7 +52,7 @@ pub enum Prepared<'a> {
     /// Factorised.
     Direct(Factor),
     /// With a preconditioner.
-    Iterative(&'a Pattern, &'a Matrix, Box<dyn Precondition + Send + Sync + 'a>),
+    Iterative(&'a BlockRows, &'a Matrix, Box<dyn Precondition + Send + Sync + 'a>),
 }
 
 /// A solve that failed.
@@ -58,7 +67,7 @@ pub enum Trouble {
 impl Solvers {
     /// Solvers for a choice made in the scene.
     pub fn new(choice: LinearSolver) -> Solvers {
-        Solvers { choice, analysis: OnceLock::new() }
+        Solvers { choice, analysis: OnceLock::new(), coarsening: OnceLock::new() }
     }
 
     fn direct(&self, nodes: usize, purpose: Purpose) -> bool {
@@ -70,15 +79,29 @@ impl Solvers {
         }
     }
 
-    /// Factorises or preconditions a matrix.
-    pub fn prepare<'a>(&self, pattern: &'a Pattern, matrix: &'a Matrix, purpose: Purpose) -> Result<Prepared<'a>, Trouble> {
-        if self.direct(pattern.nodes(), purpose) {
-            let analysis = self.analysis.get_or_init(|| Analysis::new(pattern));
+    /// Factorises or preconditions the matrix of a body at displacement u.
+    pub fn prepare<'a>(
+        &'a self,
+        body: &Body,
+        pattern: &'a Pattern,
+        matrix: &'a Matrix,
+        purpose: Purpose,
+        u: &[DVec3],
+    ) -> Result<Prepared<'a>, Trouble> {
+        let rows = &pattern.blocks;
+        if self.direct(rows.len(), purpose) {
+            let analysis = self.analysis.get_or_init(|| Analysis::new(rows));
             let analysis = analysis.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
             return analysis.factor(matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
         }
-        let jacobi = jacobi::BlockJacobi::new(pattern, matrix).map_err(|a| Trouble::Indefinite(format!("diagonal block of node {a}")))?;
-        Ok(Prepared::Iterative(pattern, matrix, Box::new(jacobi)))
+        let jacobi = BlockJacobi::new(rows, matrix).map_err(|a| Trouble::Indefinite(format!("diagonal block of node {a}")))?;
+        if rows.len() < COARSE_FROM {
+            return Ok(Prepared::Iterative(rows, matrix, Box::new(jacobi)));
+        }
+        let coarsening = self.coarsening.get_or_init(|| Coarsening::new(body, pattern, GROUP));
+        let coarsening = coarsening.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
+        let two_level = coarsening.prepare(body, rows, matrix, jacobi, u).map_err(Trouble::Indefinite)?;
+        Ok(Prepared::Iterative(rows, matrix, Box::new(two_level)))
     }
 }
 
@@ -91,8 +114,8 @@ impl Prepared<'_> {
                 factor.solve(&mut [x]);
                 Ok(())
             }
-            Prepared::Iterative(pattern, matrix, precondition) => {
-                match conjugate_gradient::solve(pattern, matrix, precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS) {
+            Prepared::Iterative(rows, matrix, precondition) => {
+                match conjugate_gradient::solve(rows, matrix, precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS) {
                     CgEnd::Converged(_) => Ok(()),
                     CgEnd::Unconverged(left) => Err(Trouble::Unconverged(left)),
                     CgEnd::Indefinite => Err(Trouble::Indefinite("a direction of negative curvature".into())),

@@ -7,18 +7,59 @@ use palpate_model::plan::Plan;
 /// masses add. The pattern is symmetric and every row's columns increase.
 #[derive(Debug)]
 pub struct Pattern {
-    /// Start of each row, shape `[N + 1]`.
-    pub rows: Vec<usize>,
-    /// Column of each block.
-    pub columns: Vec<u32>,
-    /// Place of each diagonal block.
-    pub diagonal: Vec<usize>,
+    /// The blocks.
+    pub blocks: BlockRows,
     /// Start of each node's entries in `cell_list`, shape `[N + 1]`.
     pub cell_rows: Vec<usize>,
     /// (cell, corner) pairs of each node, increasing.
     pub cell_list: Vec<(u32, u8)>,
     /// Row ranges that are assembled side by side; fixed by the size alone, so results do not depend on threads.
     pub parts: Vec<std::ops::Range<usize>>,
+}
+
+/// Block-compressed rows alone.
+#[derive(Clone, Debug)]
+pub struct BlockRows {
+    /// Start of each row, shape `[N + 1]`.
+    pub rows: Vec<usize>,
+    /// Column of each block, increasing in a row.
+    pub columns: Vec<u32>,
+    /// Place of each diagonal block.
+    pub diagonal: Vec<usize>,
+}
+
+impl BlockRows {
+    /// Rows from lists of neighbours (with repetitions, each holding the row itself).
+    pub fn new(mut neighbours: Vec<Vec<u32>>) -> BlockRows {
+        let mut rows = vec![0];
+        let mut columns = Vec::new();
+        let mut diagonal = Vec::with_capacity(neighbours.len());
+        for (a, list) in neighbours.iter_mut().enumerate() {
+            list.sort_unstable();
+            list.dedup();
+            let own = list.binary_search(&(a as u32)).expect("every node belongs to a cell");
+            diagonal.push(columns.len() + own);
+            columns.extend_from_slice(list);
+            rows.push(columns.len());
+        }
+        BlockRows { rows, columns, diagonal }
+    }
+
+    /// Number of block rows.
+    pub fn len(&self) -> usize {
+        self.diagonal.len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.diagonal.is_empty()
+    }
+
+    /// Place of block (a, b).
+    pub fn find(&self, a: u32, b: u32) -> usize {
+        let row = self.rows[a as usize]..self.rows[a as usize + 1];
+        row.start + self.columns[row].binary_search(&b).expect("block is in the pattern")
+    }
 }
 
 impl Pattern {
@@ -38,17 +79,7 @@ impl Pattern {
                 neighbours[a as usize].extend_from_slice(&ghost.nodes);
             }
         }
-        let mut rows = vec![0];
-        let mut columns = Vec::new();
-        let mut diagonal = Vec::with_capacity(n);
-        for (a, list) in neighbours.iter_mut().enumerate() {
-            list.sort_unstable();
-            list.dedup();
-            let own = list.binary_search(&(a as u32)).expect("every node belongs to a cell");
-            diagonal.push(columns.len() + own);
-            columns.extend_from_slice(list);
-            rows.push(columns.len());
-        }
+        let blocks = BlockRows::new(neighbours);
         let mut cell_rows = vec![0];
         let mut cell_list = Vec::new();
         for list in cells {
@@ -58,28 +89,17 @@ impl Pattern {
         // About 600 rows are worth a task of their own; each part repeats the cells it shares with its neighbours.
         let count = (n / 600).clamp(1, 16);
         let parts = (0..count).map(|p| p * n / count..(p + 1) * n / count).collect();
-        Pattern { rows, columns, diagonal, cell_rows, cell_list, parts }
+        Pattern { blocks, cell_rows, cell_list, parts }
     }
 
     /// Number of nodes N.
     pub fn nodes(&self) -> usize {
-        self.diagonal.len()
-    }
-
-    /// Place of block (a, b).
-    pub fn find(&self, a: u32, b: u32) -> usize {
-        let row = self.rows[a as usize]..self.rows[a as usize + 1];
-        row.start + self.columns[row].binary_search(&b).expect("block is in the pattern")
+        self.blocks.len()
     }
 
     /// Places of all 64 blocks of a group of eight nodes, row by row.
     pub fn blocks8(&self, nodes: &[u32; 8]) -> [u32; 64] {
-        std::array::from_fn(|k| self.find(nodes[k / 8], nodes[k % 8]) as u32)
-    }
-
-    /// Scalar entries in the lower triangle, for memory forecasts.
-    pub fn lower_entries(&self) -> usize {
-        (9 * self.columns.len() + 3 * self.nodes()) / 2
+        std::array::from_fn(|k| self.blocks.find(nodes[k / 8], nodes[k % 8]) as u32)
     }
 }
 
@@ -103,7 +123,7 @@ impl Places {
                 .body
                 .ghosts
                 .iter()
-                .map(|g| std::array::from_fn(|k| pattern.find(g.nodes[k / 3], g.nodes[k % 3]) as u32))
+                .map(|g| std::array::from_fn(|k| pattern.blocks.find(g.nodes[k / 3], g.nodes[k % 3]) as u32))
                 .collect(),
             masses: plan.masses.iter().map(|m| pattern.blocks8(&m.nodes)).collect(),
         }

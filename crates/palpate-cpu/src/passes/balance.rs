@@ -2,7 +2,8 @@
 //!
 //! Dynamic (a step of the θ-scheme) and static problems are the same sum with and without inertia:
 //! `r(u₁) = M[(1/(θΔt²))(u₁−u₀) − v₀/(θΔt)] + αM(u₁−u₀)/Δt + cells(u₁,u₀) + ghost + clamps(u₁) + contact(u₁) − weight`.
-//! Contact and clamps act at the new state only, so their stiffness limits no time step.
+//! Contact acts at the new state only: its work is never less than its energy's change, so it limits no time step. Clamps are
+//! weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
 use crate::elements::Elements;
 use crate::linear::matrix::Matrix;
@@ -114,23 +115,36 @@ impl<'a> Balance<'a> {
     }
 
     /// r(u₁), shape `[N]` [N].
-    pub fn residual(&self, s: States) -> Nodes {
+    pub fn residual(&self, s: States<'a>) -> Nodes {
         let mut r = zeros(s.u1.len());
         self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut r);
         self.ghost(self.physics.youngs_modulus * self.elements.shear[0], &self.mix, s, &mut r);
-        self.supports(s.u1, &mut r);
+        self.supports(s, &mut r);
         self.bodily(s, &mut r);
         r
     }
 
-    /// Adds clamps and contact.
-    fn supports(&self, u: &[DVec3], out: &mut [DVec3]) {
+    /// The two instants that clamps act at, each with its weight, time on the recording's clock and displacement.
+    fn instants(&self, s: States<'a>) -> impl Iterator<Item = (f64, f64, &'a [DVec3])> {
+        let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
+        [(self.mix.new, self.time, s.u1), (self.mix.old, self.time - dt, s.u0)].into_iter().filter(|i| i.0 != 0.0)
+    }
+
+    /// Adds the clamps' force, moved in time by `shift`, with matrices scaled by `young`.
+    fn clamps(&self, which: Matrices, young: f64, shift: f64, s: States<'a>, out: &mut [DVec3]) {
         for (i, clamp) in self.plan.clamps.iter().enumerate() {
-            let pose = supports::pose_at(clamp, self.time);
-            supports::clamp_force(self.plan, i, self.elements, Matrices::Stiffness, pose, self.physics.youngs_modulus, u, out);
+            for (weight, time, u) in self.instants(s) {
+                let pose = supports::pose_at(clamp, time + shift);
+                supports::clamp_force(self.plan, i, self.elements, which, pose, weight * young, u, out);
+            }
         }
+    }
+
+    /// Adds clamps and contact.
+    fn supports(&self, s: States<'a>, out: &mut [DVec3]) {
+        self.clamps(Matrices::Stiffness, self.physics.youngs_modulus, 0.0, s, out);
         for plane in self.planes {
-            for t in supports::touches(&self.plan.body, plane, u) {
+            for t in supports::touches(&self.plan.body, plane, s.u1) {
                 for i in 0..8 {
                     out[t.nodes[i] as usize] -= t.area * t.pressure * t.weights[i] * plane.normal[0];
                 }
@@ -139,7 +153,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Sizes of the forces that the residual is the sum of, in the given norm: what "small" is measured against.
-    pub fn scale(&self, s: States, norm: impl Fn(&[DVec3]) -> f64) -> f64 {
+    pub fn scale(&self, s: States<'a>, norm: impl Fn(&[DVec3]) -> f64) -> f64 {
         let n = s.u1.len();
         let g = self.physics.gravity;
         let mut weight = zeros(n);
@@ -151,12 +165,12 @@ impl<'a> Balance<'a> {
         let mut elastic = zeros(n);
         self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut elastic);
         let mut support = zeros(n);
-        self.supports(s.u1, &mut support);
+        self.supports(s, &mut support);
         norm(&weight) + norm(&momentum) + norm(&elastic) + norm(&support)
     }
 
     /// Potential whose gradient by u₁ is the residual, up to a constant [J].
-    pub fn potential(&self, s: States) -> f64 {
+    pub fn potential(&self, s: States<'a>) -> f64 {
         let young = self.physics.youngs_modulus;
         let mut w = self.elasticity().potential(&self.mix, s.u1, s.u0);
         if !self.plan.body.ghosts.is_empty() {
@@ -167,7 +181,14 @@ impl<'a> Balance<'a> {
             w += 0.5 * dot(s.u1, &gu);
         }
         for (i, clamp) in self.plan.clamps.iter().enumerate() {
-            w += supports::clamp_energy(self.plan, i, self.elements, supports::pose_at(clamp, self.time), young, s.u1);
+            let pose = supports::pose_at(clamp, self.time);
+            w += supports::clamp_energy(self.plan, i, self.elements, pose, self.mix.new * young, s.u1);
+        }
+        if self.mix.old != 0.0 && !self.plan.clamps.is_empty() {
+            // The old state's force does not change with u₁: its potential is linear.
+            let mut old = zeros(s.u1.len());
+            Balance { mix: Mix { new: 0.0, ..self.mix }, ..*self }.clamps(Matrices::Stiffness, young, 0.0, s, &mut old);
+            w += dot(s.u1, &old);
         }
         let width = contact::WIDTH * self.plan.body.grid.h;
         for plane in self.planes {
@@ -184,18 +205,18 @@ impl<'a> Balance<'a> {
     /// ∂r/∂u₁, symmetric. With `convex` the indefinite part of the elastic tangent is left out.
     pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
         let (plan, pattern) = (self.plan, self.pattern);
-        matrix.values.resize(pattern.columns.len(), DMat3::ZERO);
+        matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
         let elasticity = self.elasticity();
         let mut slices = Vec::new();
         let mut rest = matrix.values.as_mut_slice();
         for part in &pattern.parts {
-            let (a, b) = rest.split_at_mut(pattern.rows[part.end] - pattern.rows[part.start]);
+            let (a, b) = rest.split_at_mut(pattern.blocks.rows[part.end] - pattern.blocks.rows[part.start]);
             slices.push((part.clone(), a));
             rest = b;
         }
         slices.into_par_iter().for_each(|(rows, values)| {
             values.fill(DMat3::ZERO);
-            let base = pattern.rows[rows.start];
+            let base = pattern.blocks.rows[rows.start];
             let mut h = [0.0; 576];
             for (e, cell) in plan.body.cells.iter().enumerate() {
                 let inside = cell.nodes.map(|n| rows.contains(&(n as usize)));
@@ -228,7 +249,7 @@ impl<'a> Balance<'a> {
         if let Some(t) = self.inertia {
             let factor = t.displacement + physics.mass_damping * t.rate;
             for (i, w) in plan.body.node_volume.iter().enumerate() {
-                values[pattern.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(physics.density * w * factor));
+                values[pattern.blocks.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(physics.density * w * factor));
             }
             for (k, (site, m)) in plan.masses.iter().zip(&physics.masses).enumerate() {
                 for b in 0..64 {
@@ -243,7 +264,7 @@ impl<'a> Balance<'a> {
                 let k = &self.elements.clamps[c][m].k;
                 let places = &self.places.cells[cell.cell as usize];
                 for b in 0..64 {
-                    values[places[b] as usize] += a * block(k, b / 8, b % 8) * a.transpose() * physics.youngs_modulus;
+                    values[places[b] as usize] += a * block(k, b / 8, b % 8) * a.transpose() * (self.mix.new * physics.youngs_modulus);
                 }
             }
         }
@@ -261,7 +282,7 @@ impl<'a> Balance<'a> {
 
     /// (∂r/∂u₀) du₀ + (∂r/∂v₀) dv₀.
     pub fn by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
-        let mut out = self.by_old_inertia(du0, dv0);
+        let mut out = self.by_old_linear(du0, dv0);
         self.elasticity().by_old(&self.mix, s.u1, s.u0, du0, &mut out);
         out
     }
@@ -269,13 +290,13 @@ impl<'a> Balance<'a> {
     /// Transposes of both: ((∂r/∂u₀)ᵀ z, (∂r/∂v₀)ᵀ z).
     pub fn by_old_transposed(&self, s: States, z: &[DVec3]) -> (Nodes, Nodes) {
         let zero = zeros(z.len());
-        let mut to_u = self.by_old_inertia(z, &zero);
+        let mut to_u = self.by_old_linear(z, &zero);
         self.elasticity().by_old_transposed(&self.mix, s.u1, s.u0, z, &mut to_u);
-        (to_u, self.by_old_inertia(&zero, z))
+        (to_u, self.by_old_linear(&zero, z))
     }
 
-    /// The symmetric parts (inertia, ghost) of the derivative by the old state.
-    fn by_old_inertia(&self, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
+    /// The symmetric parts (inertia, ghost, clamps) of the derivative by the old state.
+    fn by_old_linear(&self, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
         let mut out = zeros(du0.len());
         if let Some(t) = self.inertia {
             let drag = self.physics.mass_damping * t.rate;
@@ -287,11 +308,18 @@ impl<'a> Balance<'a> {
             let scale = self.ghost_scale(self.physics.youngs_modulus * self.elements.shear[0]);
             supports::ghost_product(&self.plan.body, scale * factor, du0, &mut out);
         }
+        if self.mix.old != 0.0 {
+            let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
+            for (i, clamp) in self.plan.clamps.iter().enumerate() {
+                let turn = supports::pose_at(clamp, self.time - dt).0;
+                supports::clamp_product(self.plan, i, self.elements, turn, self.mix.old * self.physics.youngs_modulus, du0, &mut out);
+            }
+        }
         out
     }
 
     /// ∂r/∂p at fixed states, or `None` when the residual does not depend on p.
-    pub fn column(&self, key: ParamKey, s: States) -> Option<Nodes> {
+    pub fn column(&self, key: ParamKey, s: States<'a>) -> Option<Nodes> {
         let n = s.u1.len();
         let mut out = zeros(n);
         let young = self.physics.youngs_modulus;
@@ -304,10 +332,7 @@ impl<'a> Balance<'a> {
                 };
                 self.elasticity().force(&self.mix, which, factor, s.u1, s.u0, &mut out);
                 self.ghost(shear, &self.mix, s, &mut out);
-                for (i, clamp) in self.plan.clamps.iter().enumerate() {
-                    let pose = supports::pose_at(clamp, self.time);
-                    supports::clamp_force(self.plan, i, elements, which, pose, factor, s.u1, &mut out);
-                }
+                self.clamps(which, factor, 0.0, s, &mut out);
                 if which == Matrices::Stiffness {
                     for plane in self.planes.iter().filter(|p| p.scales) {
                         self.contact_column(plane, s.u1, |t| (t.pressure / young) * plane.normal[0], &mut out);
@@ -364,11 +389,8 @@ impl<'a> Balance<'a> {
                 }
                 // The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10.
                 let d = 1e-6;
-                for (sign, time) in [(0.5 / d, self.time + d), (-0.5 / d, self.time - d)] {
-                    for (i, clamp) in self.plan.clamps.iter().enumerate() {
-                        let pose = supports::pose_at(clamp, time);
-                        supports::clamp_force(self.plan, i, elements, Matrices::Stiffness, pose, sign * young, s.u1, &mut out);
-                    }
+                for sign in [1.0, -1.0] {
+                    self.clamps(Matrices::Stiffness, sign * young / (2.0 * d), sign * d, s, &mut out);
                 }
             }
             ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => return None,

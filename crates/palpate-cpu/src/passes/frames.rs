@@ -90,10 +90,10 @@ pub fn compare(plan: &Plan, hash: &PointHash, frame: usize, u: &[DVec3]) -> Comp
     let matches = if f.points.is_empty() { Vec::new() } else { match_points(body, &extend(body, u), hash, &f.points, &obs.cameras) };
     let per_point = 1.0 / (obs.depth_noise * obs.depth_noise);
     // A point without a match costs what one at the edge of the band costs.
-    let mut cost = (f.points.len() - matches.len()) as f64 * kernel::rho(plan.band, plan.band) * per_point;
+    let mut cost = (f.points.len() - matches.len()) as f64 * kernel::unmatched(plan.band) * per_point;
     let (mut matched, mut sum_squares, mut sum_signed) = (matches.len(), 0.0, 0.0);
     for m in &matches {
-        cost += kernel::rho(m.place.phi, plan.band) * per_point;
+        cost += kernel::cost(m.place.phi, plan.band) * per_point;
         sum_squares += m.place.phi * m.place.phi;
         sum_signed += m.place.phi;
     }

@@ -5,7 +5,7 @@ use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
 use palpate_model::body::{Body, Patch};
 use palpate_model::contact;
-use palpate_model::corotation::{M24, V24, multiply};
+use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
 use palpate_model::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
 
 /// Rest position of corner i of a clamp cell.
@@ -50,6 +50,18 @@ pub fn clamp_force(
         let nodes = &body.cells[c.cell as usize].nodes;
         for i in 0..8 {
             out[nodes[i] as usize] += young * (pose.0 * DVec3::from_slice(&f[3 * i..3 * i + 3]));
+        }
+    }
+}
+
+/// Adds A K Aᵀ du of clamp `index`, with the matrices scaled by `young`.
+pub fn clamp_product(plan: &Plan, index: usize, elements: &Elements, turn: DMat3, young: f64, du: &[DVec3], out: &mut [DVec3]) {
+    for (m, c) in plan.clamps[index].cells.iter().enumerate() {
+        let nodes = &plan.body.cells[c.cell as usize].nodes;
+        let d: [DVec3; 8] = nodes.map(|n| turn.transpose() * du[n as usize]);
+        let f = corners(&multiply(matrix(elements, index, m, Matrices::Stiffness), &flatten(&d)));
+        for i in 0..8 {
+            out[nodes[i] as usize] += young * (turn * f[i]);
         }
     }
 }

@@ -1,0 +1,175 @@
+//! Two-level preconditioner: block-Jacobi on the nodes plus a direct solve for the rigid motions of small groups of nodes.
+//!
+//! What block-Jacobi is slow at is stiffness over long distances: bending and stretching of the whole body. Groups of a few
+//! nodes across move almost rigidly in such modes, so six rigid modes per group carry them (aggregation with rigid-body modes,
+//! as in Vaněk, Mandel & Brezina 1996, here unsmoothed and additive: one pass, no extra product with the matrix).
+
+use super::cholesky::{Analysis, Factor};
+use super::conjugate_gradient::Precondition;
+use super::jacobi::BlockJacobi;
+use super::matrix::Matrix;
+use super::pattern::{BlockRows, Pattern};
+use glam::{DMat3, DVec3};
+use palpate_model::body::Body;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A group of fewer nodes joins a neighbour: it may have no rotation of its own.
+const SMALLEST_GROUP: usize = 8;
+
+/// Groups of nodes; depends on the geometry only.
+#[derive(Debug)]
+pub struct Coarsening {
+    group_of: Vec<u32>,
+    // Nodes of each group, and the centre and size that its rotation is measured with.
+    groups: Vec<Vec<u32>>,
+    centers: Vec<DVec3>,
+    size: f64,
+    // Two 3 × 3 block rows per group: translation and rotation.
+    blocks: BlockRows,
+    analysis: Analysis,
+}
+
+impl Coarsening {
+    /// Groups the nodes of a body into cubes of `across` nodes.
+    pub fn new(body: &Body, pattern: &Pattern, across: i64) -> Result<Coarsening, String> {
+        let n = body.nodes.len();
+        let h = body.grid.h;
+        let mut cubes: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+        let mut group_of: Vec<u32> = body
+            .nodes
+            .iter()
+            .map(|x| {
+                let cube = (*x / h).round().as_i64vec3().to_array().map(|c| c.div_euclid(across));
+                let next = cubes.len() as u32;
+                *cubes.entry(cube).or_insert(next)
+            })
+            .collect();
+        let mut sizes = vec![0usize; cubes.len()];
+        group_of.iter().for_each(|&g| sizes[g as usize] += 1);
+        // Small groups, in order, join the biggest group that they touch.
+        for g in 0..sizes.len() as u32 {
+            if sizes[g as usize] >= SMALLEST_GROUP {
+                continue;
+            }
+            let touching = (0..n).filter(|&i| group_of[i] == g).flat_map(|i| {
+                pattern.blocks.columns[pattern.blocks.rows[i]..pattern.blocks.rows[i + 1]].iter().map(|&j| group_of[j as usize])
+            });
+            let best = touching.filter(|&o| o != g).max_by_key(|&o| (sizes[o as usize], std::cmp::Reverse(o)));
+            if let Some(o) = best {
+                group_of.iter_mut().filter(|x| **x == g).for_each(|x| *x = o);
+                sizes[o as usize] += sizes[g as usize];
+                sizes[g as usize] = 0;
+            }
+        }
+        let mut number = vec![u32::MAX; sizes.len()];
+        let mut groups: Vec<Vec<u32>> = Vec::new();
+        for (i, g) in group_of.iter_mut().enumerate() {
+            let slot = &mut number[*g as usize];
+            if *slot == u32::MAX {
+                *slot = groups.len() as u32;
+                groups.push(Vec::new());
+            }
+            *g = *slot;
+            groups[*slot as usize].push(i as u32);
+        }
+        let centers = groups.iter().map(|g| g.iter().map(|&i| body.nodes[i as usize]).sum::<DVec3>() / g.len() as f64).collect();
+        let mut neighbours = vec![Vec::new(); 2 * groups.len()];
+        for i in 0..n {
+            let a = group_of[i];
+            for &j in &pattern.blocks.columns[pattern.blocks.rows[i]..pattern.blocks.rows[i + 1]] {
+                let b = group_of[j as usize];
+                for part in 0..2 {
+                    neighbours[(2 * a + part) as usize].extend([2 * b, 2 * b + 1]);
+                }
+            }
+            if i % 64 == 0 {
+                // Keep the lists short while they grow.
+                for part in 0..2 {
+                    let list = &mut neighbours[(2 * a + part) as usize];
+                    list.sort_unstable();
+                    list.dedup();
+                }
+            }
+        }
+        let blocks = BlockRows::new(neighbours);
+        let analysis = Analysis::new(&blocks)?;
+        Ok(Coarsening { group_of, groups, centers, size: across as f64 * h, blocks, analysis })
+    }
+
+    /// Arm of node i from its group's centre at displacement u, in units of the group's size.
+    fn arms(&self, body: &Body, u: &[DVec3]) -> Vec<DVec3> {
+        let center = |g: &Vec<u32>| g.iter().map(|&i| u[i as usize]).sum::<DVec3>() / g.len() as f64;
+        let moved: Vec<DVec3> = self.groups.iter().zip(&self.centers).map(|(g, c)| *c + center(g)).collect();
+        (0..u.len()).map(|i| (body.nodes[i] + u[i] - moved[self.group_of[i] as usize]) / self.size).collect()
+    }
+
+    /// The groups' 6 × 6 blocks QᵀAQ, Q = [I, −[arm]×] per node.
+    fn project(&self, rows: &BlockRows, matrix: &Matrix, arms: &[DVec3]) -> Matrix {
+        let strips: Vec<Vec<DMat3>> = self
+            .groups
+            .par_iter()
+            .enumerate()
+            .map(|(g, nodes)| {
+                let start = self.blocks.rows[2 * g];
+                let length = self.blocks.rows[2 * g + 1] - start;
+                let columns = &self.blocks.columns[start..start + length];
+                // Rows of translation, then of rotation.
+                let mut strip = vec![DMat3::ZERO; 2 * length];
+                for &i in nodes {
+                    let left = cross(arms[i as usize]);
+                    for k in rows.rows[i as usize]..rows.rows[i as usize + 1] {
+                        let j = rows.columns[k];
+                        let a = matrix.values[k];
+                        let b = a * -cross(arms[j as usize]);
+                        let at = columns.binary_search(&(2 * self.group_of[j as usize])).expect("groups of neighbours are neighbours");
+                        strip[at] += a;
+                        strip[at + 1] += b;
+                        strip[length + at] += left * a;
+                        strip[length + at + 1] += left * b;
+                    }
+                }
+                strip
+            })
+            .collect();
+        Matrix { values: strips.concat() }
+    }
+
+    /// A preconditioner for a matrix at displacement u.
+    pub fn prepare(&self, body: &Body, rows: &BlockRows, matrix: &Matrix, jacobi: BlockJacobi, u: &[DVec3]) -> Result<TwoLevel<'_>, String> {
+        let arms = self.arms(body, u);
+        let factor = self.analysis.factor(&self.project(rows, matrix, &arms))?;
+        Ok(TwoLevel { coarsening: self, jacobi, arms, factor })
+    }
+}
+
+fn cross(w: DVec3) -> DMat3 {
+    palpate_model::rotation::cross_matrix(w)
+}
+
+/// Block-Jacobi plus the coarse solve.
+pub struct TwoLevel<'a> {
+    coarsening: &'a Coarsening,
+    jacobi: BlockJacobi,
+    arms: Vec<DVec3>,
+    factor: Factor,
+}
+
+impl Precondition for TwoLevel<'_> {
+    fn apply(&self, r: &[DVec3], z: &mut [DVec3]) {
+        self.jacobi.apply(r, z);
+        let c = self.coarsening;
+        let mut coarse = vec![DVec3::ZERO; 2 * c.groups.len()];
+        for (g, nodes) in c.groups.iter().enumerate() {
+            for &i in nodes {
+                coarse[2 * g] += r[i as usize];
+                coarse[2 * g + 1] += self.arms[i as usize].cross(r[i as usize]);
+            }
+        }
+        self.factor.solve(&mut [&mut coarse]);
+        for (i, z) in z.iter_mut().enumerate() {
+            let g = c.group_of[i] as usize;
+            *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.arms[i]);
+        }
+    }
+}

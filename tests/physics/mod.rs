@@ -1,0 +1,5 @@
+//! What mechanics says must come out: motion in free space, beams, contact.
+
+mod beam;
+mod contact;
+mod free;

@@ -1,0 +1,167 @@
+//! Adjoint = sensitivities = central differences, for every parameter, on a small scene with everything active: contact on two
+//! planes, cut cells, damping, a clamp that moves, a point mass, depth points, markers and displacements in frames that lie
+//! between steps.
+
+use glam::{DQuat, DVec3};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
+use palpate_model::motion::RigidMotion;
+use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
+use palpate_model::plan::Plan;
+use palpate_model::plan_build::build_plan;
+use palpate_model::scene::*;
+use support::scenes;
+
+fn ball() -> Scene {
+    let mut s = scenes::body(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, -0.002, 0.06) }, 0.022);
+    s.material.mass_damping = 0.3;
+    s.material.stiffness_damping = 0.004;
+    s.gravity = DVec3::new(0.4, -0.3, -9.0);
+    s.planes = vec![
+        scenes::plane(DVec3::ZERO, DVec3::new(0.1, 0.05, 1.0)),
+        scenes::plane(DVec3::new(-0.045, 0.0, 0.0), DVec3::new(1.0, 0.2, 0.1)),
+    ];
+    s.masses = vec![PointMass { point: DVec3::new(0.0, 0.02, 0.09), mass: 0.02 }];
+    s.initial.velocity = DVec3::new(-0.3, 0.1, -0.8);
+    s.initial.angular_velocity = DVec3::new(2.0, -5.0, 1.0);
+    s.time = Time { step: 0.01, steps: 6, start: 0.002, theta: 0.6 };
+    s.solver.tolerance = 1e-13;
+    s
+}
+
+/// Points on the surface of the body as it is after some steps of other parameters, so that no residual is zero.
+fn observed(scene: &Scene, times: &[f64]) -> Plan {
+    let marker = MarkerRest { name: "m".into(), position: DVec3::new(0.0, 0.01, 0.118), surface: Some(DVec3::new(0.0, 0.005, 0.11)) };
+    let plain = build_plan(scene, Observation { depth_noise: 1e-3, marker_noise: 1e-3, ..Observation::default() }, &[]).unwrap();
+    let mut theta = plain.theta.clone();
+    theta[0] *= 1.15;
+    let mut states = Vec::new();
+    Rollout::new(CpuBackend, &plain, 1).unwrap().visit(&theta, |_, s, _| states.push(s)).unwrap();
+    let body = &plain.body;
+    let frames = times
+        .iter()
+        .map(|&time| {
+            let k = (((time - scene.time.start) / scene.time.step).round().max(0.0) as usize).min(states.len() - 1);
+            let u = &states[k].displacement;
+            let points = body
+                .patches
+                .iter()
+                .map(|p| {
+                    let nodes = body.cells[p.cell as usize].nodes;
+                    let moved: DVec3 = (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum();
+                    // A little off the surface, in and out.
+                    let off = 0.002 * (1.0 + 40.0 * p.point.x).sin();
+                    ObservedPoint { position: p.point + moved + off * p.normal, camera: 0 }
+                })
+                .collect();
+            Frame {
+                time,
+                points,
+                markers: vec![ObservedMarker { site: 0, position: DVec3::new(0.001, 0.012, 0.11) }],
+                displacements: u.iter().map(|u| *u + DVec3::new(1e-4, -2e-4, 3e-4)).collect(),
+            }
+        })
+        .collect();
+    let observation = Observation {
+        // The camera sits inside the body: it sees every side, so no point is dropped by visibility.
+        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 0.05) }],
+        frames,
+        markers: Vec::new(),
+        depth_noise: 1e-3,
+        marker_noise: 2e-3,
+        displacement_noise: 5e-3,
+        depth_systematic: 0.0,
+        marker_systematic: 0.0,
+    };
+    build_plan(scene, observation, &[marker]).unwrap()
+}
+
+fn evaluate(rollout: &mut Rollout<CpuBackend>, theta: &[f64], request: &Request) -> Evaluation {
+    let e = rollout.evaluate(&ParamBatch::from_rows(&[theta.to_vec()]), request).remove(0);
+    if let Some(f) = &e.failure {
+        panic!("{f}");
+    }
+    e
+}
+
+/// Compares all three derivatives of every parameter.
+fn check(plan: &Plan, name: &str) {
+    let p = plan.layout.len();
+    let mut rollout = Rollout::new(CpuBackend, plan, 2 * p).unwrap();
+    let adjoint = evaluate(&mut rollout, &plan.theta, &Request { gradient: true, sensitivities: Vec::new() });
+    let all: Vec<usize> = (0..p).collect();
+    let forward = evaluate(&mut rollout, &plan.theta, &Request { gradient: false, sensitivities: all.clone() });
+    let forward = forward.curvature.unwrap().gradient;
+    assert!(adjoint.matched > 0, "{name}: something is compared");
+    // Differences are of fourth order, over 1e-4 of a size that matters. No frame lies on a step boundary: there the curve through
+    // the states has a kink in its second derivative.
+    let size = |i: usize| {
+        let spec = plan.layout.keys[i].spec();
+        match spec.transform {
+            palpate_model::params::Transform::Linear => spec.typical.min(1.0),
+            _ => plan.theta[i],
+        }
+    };
+    let largest = (0..p).map(|i| (adjoint.gradient[i] * size(i)).abs()).fold(0.0, f64::max);
+    let rows: Vec<Vec<f64>> = all
+        .iter()
+        .flat_map(|&i| {
+            [-2.0, -1.0, 1.0, 2.0].map(|s| {
+                let mut t = plan.theta.clone();
+                t[i] += s * 1e-4 * size(i);
+                t
+            })
+        })
+        .collect();
+    let costs: Vec<f64> =
+        rollout.evaluate(&ParamBatch::from_rows(&rows), &Request::default()).iter().map(|e| e.cost).collect();
+    let mut worst = (0.0f64, 0.0f64);
+    for i in 0..p {
+        let c = &costs[4 * i..4 * i + 4];
+        let difference = (c[0] - 8.0 * c[1] + 8.0 * c[2] - c[3]) / (12.0 * 1e-4);
+        let (a, f) = (adjoint.gradient[i] * size(i), forward[i] * size(i));
+        println!("{name} {:32} adjoint {a:+.10e} forward {f:+.10e} differences {difference:+.10e}", plan.layout.keys[i].spec().path);
+        // Relative to the parameter's own derivative, or to a thousandth of the largest for those that hardly matter.
+        let scale = a.abs().max(1e-3 * largest);
+        worst = (worst.0.max((a - f).abs() / scale), worst.1.max((a - difference).abs() / scale));
+    }
+    println!("{name}: adjoint - forward {:.1e}, adjoint - differences {:.1e}", worst.0, worst.1);
+    assert!(worst.0 < 1e-9, "{name}: adjoint and sensitivities differ by {:.1e}", worst.0);
+    assert!(worst.1 < 1e-6, "{name}: adjoint and differences differ by {:.1e}", worst.1);
+}
+
+#[test]
+fn bouncing_ball_with_converged_rotation() {
+    check(&observed(&ball(), &[0.025, 0.0437, 0.06]), "converged");
+}
+
+#[test]
+fn bouncing_ball_with_lagged_rotation() {
+    let mut s = ball();
+    s.solver.rotation = RotationUpdate::Lagged;
+    check(&observed(&s, &[0.025, 0.0437, 0.06]), "lagged");
+}
+
+#[test]
+fn static_equilibrium_then_motion() {
+    let mut s = ball();
+    s.initial.state = InitialShape::StaticEquilibrium;
+    s.initial.velocity = DVec3::ZERO;
+    let motion = RigidMotion {
+        times: vec![0.0, 0.03, 0.06, 0.09],
+        translations: vec![DVec3::ZERO, DVec3::new(0.004, 0.0, 0.002), DVec3::new(0.003, -0.004, 0.0), DVec3::ZERO],
+        rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_x(0.1), DQuat::from_rotation_x(0.15), DQuat::from_rotation_y(0.1)],
+    };
+    s.clamps =
+        vec![Clamp { motion: Some(motion), ..scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2)) }];
+    check(&observed(&s, &[0.0, 0.03, 0.055]), "static start");
+}
+
+#[test]
+fn static_problem() {
+    let mut s = ball();
+    s.initial = Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::StaticEquilibrium };
+    s.time.steps = 0;
+    s.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+    check(&observed(&s, &[0.0]), "static");
+}

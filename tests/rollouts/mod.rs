@@ -1,0 +1,3 @@
+//! Whole simulations: adjoint, sensitivities and differences agree.
+
+mod gradients;

@@ -1,0 +1,27 @@
+//! Energies computed from the model's laws alone, independently of any backend.
+
+use glam::DVec3;
+use palpate_model::corotation::CellPose;
+use palpate_model::element;
+use palpate_model::plan::Plan;
+use palpate_model::scene::Scene;
+
+/// Elastic energy of the cells at displacement u [J]; ghost penalty and clamps are left out.
+pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
+    let body = &plan.body;
+    let h = body.grid.h;
+    let (mut k, mut k_nu) = (Box::new([0.0; 576]), Box::new([0.0; 576]));
+    let mut last: Option<[f64; 27]> = None;
+    body.cells
+        .iter()
+        .map(|cell| {
+            if last != Some(cell.weights) {
+                let nu = scene.material.poisson_ratio;
+                element::stiffness(scene.solver.element, h, &cell.weights, cell.fraction, nu, &mut k, &mut k_nu);
+                last = Some(cell.weights);
+            }
+            let x = cell.nodes.map(|n| body.nodes[n as usize] + u[n as usize]);
+            CellPose::new(&x, h).energy(&k, scene.material.youngs_modulus)
+        })
+        .sum()
+}
