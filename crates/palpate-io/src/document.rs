@@ -45,6 +45,29 @@ impl Source {
         }
     }
 
+    /// Line of a dotted path (`clamp.0.box`), or of the deepest part of it that is in the file.
+    pub fn line_of_key(&self, key: &str) -> Option<usize> {
+        let parts: Vec<&str> = key.split('.').collect();
+        let (mut table, mut line, mut i) = (self.root(), None, 0);
+        while i < parts.len() && table.has(parts[i]) {
+            let name = parts[i];
+            line = table.error(name, "").line.or(line);
+            i += 1;
+            let row = parts.get(i).and_then(|n| n.parse::<usize>().ok());
+            let row = row.and_then(|n| table.tables(name).ok()?.into_iter().nth(n));
+            if let Some(row) = row {
+                line = row.own_error("").line.or(line);
+                table = row;
+                i += 1;
+            } else if let Ok(Some(inner)) = table.optional_table(name) {
+                table = inner;
+            } else {
+                break;
+            }
+        }
+        line
+    }
+
     fn line(&self, span: Option<Range<usize>>) -> Option<usize> {
         span.map(|s| line_of(self.document.raw(), s.start))
     }

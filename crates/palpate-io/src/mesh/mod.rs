@@ -1,6 +1,10 @@
 //! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh.
 
+mod check;
+mod crossing;
 mod parse;
+#[cfg(test)]
+mod tests;
 
 use crate::error::{InputError, Loaded};
 use glam::DVec3;
@@ -16,7 +20,8 @@ const SMALLEST_SIDE: f64 = 1e-4;
 /// Reads a closed surface (`.obj`, `.ply`, `.stl`; metres). Polygons are split into triangles and equal vertices merged.
 ///
 /// # Errors
-/// A file that cannot be parsed, holds no triangle, is in the wrong unit, or encloses no volume.
+/// A file that cannot be parsed, holds no triangle, is in the wrong unit, is open, one-sided, or encloses no volume. Small holes
+/// are closed and inward faces turned, with a warning.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Loaded<TriMesh>, InputError> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
@@ -36,7 +41,7 @@ pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
     points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)))
 }
 
-/// Equal vertices become one, unused ones and triangles without area go; the order of the rest is kept.
+/// Equal vertices become one, unused ones, repeated triangles and those without area go; the order of the rest is kept.
 fn merge(mesh: TriMesh) -> TriMesh {
     let mut number = std::collections::BTreeMap::new();
     let mut out = TriMesh::default();
@@ -53,6 +58,18 @@ fn merge(mesh: TriMesh) -> TriMesh {
             out.triangles.push(corners);
         }
     }
+    // The same triangle twice would count its solid angle twice.
+    let mut seen = std::collections::BTreeSet::new();
+    out.triangles.retain(|&[a, b, c]| {
+        let first = a.min(b).min(c);
+        seen.insert(if first == a {
+            [a, b, c]
+        } else if first == b {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        })
+    });
     out
 }
 
@@ -69,16 +86,12 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
     if side < SMALLEST_SIDE {
         return refuse(format!("its longest side is {side:e} m; lengths are in metres: convert the file"));
     }
-    repair(path, mesh, side)
-}
-
-/// Thin until the model can report on and repair meshes.
-fn repair(path: &Path, mesh: TriMesh, side: f64) -> Result<Loaded<TriMesh>, InputError> {
-    let volume: f64 =
-        (mesh.triangles.iter().map(|t| t.map(|v| mesh.vertices[v as usize]))).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
-    // A flat sheet's volume is rounding noise; a sheet a thousandth as thick as long is far above it.
-    if volume.abs() < 1e-9 * side.powi(3) {
-        return Err(InputError::file(path, format!("encloses no volume ({volume:e} m³); a closed surface is needed")));
+    let mut warnings = Vec::new();
+    let mesh = check::solid(mesh, &mut warnings).map_err(|e| InputError::file(path, e))?;
+    let crossings = crossing::crossings(&mesh);
+    if crossings > 0 {
+        warnings.push(format!("passes through itself in {crossings} triangles; overlaps are counted once"));
     }
-    Ok(Loaded { value: mesh, warnings: Vec::new() })
+    let warnings = warnings.into_iter().map(|w| InputError::file(path, w).to_string()).collect();
+    Ok(Loaded { value: mesh, warnings })
 }

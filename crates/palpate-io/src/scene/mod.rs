@@ -48,6 +48,12 @@ pub fn parse_scene(text: &str, path: impl AsRef<Path>) -> Result<Loaded<Scene>, 
     scene(&source)
 }
 
+/// An error about a key of a scene (`clamp.0.box`) that was found after reading, with its line where the file has the key.
+pub fn scene_error(scene: &Scene, key: &str, message: impl Into<String>) -> InputError {
+    let line = Source::read(&scene.path).ok().and_then(|s| s.line_of_key(key));
+    InputError { line, key: key.to_string(), ..InputError::file(&scene.path, message) }
+}
+
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
     let root = source.root();
     check_format(&root, FORMAT)?;

@@ -244,3 +244,15 @@ fn relative_paths_hold_from_another_folder() {
     let out = write_scene(&text, &scene, &[], &folder.path().join("a/out/deep")).unwrap();
     assert!(out.contains("recording = \"../../rec\"  # mine"), "{out}");
 }
+
+#[test]
+fn errors_found_later_still_name_the_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, BASE).unwrap();
+    let scene = read_scene(&path).unwrap().value;
+    for (key, line) in [("object.cell_size", Some(4)), ("mass.0.point", Some(13)), ("plane.0", Some(9)), ("clamp.0.box", None)] {
+        let e = scene_error(&scene, key, "no");
+        assert_eq!((e.line, e.key.as_str()), (line, key));
+    }
+}
