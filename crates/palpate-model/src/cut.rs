@@ -50,11 +50,11 @@ pub struct CellCut {
     pub fraction: f64,
     /// Weights of [`POINTS27`] divided by h³; integrate every polynomial of degree ≤ 2 per variable exactly over the part inside.
     pub weights: [f64; 27],
-    /// Surface in the cell, at most one piece per octant.
+    /// Surface in the cell: one piece per octant, more where it has a sharp edge there.
     pub pieces: Vec<SurfacePiece>,
 }
 
-/// Surface inside one octant of a cell.
+/// Surface inside one octant of a cell, without sharp edges.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePiece {
     /// Area [m²].
@@ -84,18 +84,19 @@ impl CellCut {
 /// polynomials are continued beyond it.
 pub fn cut_cell(lattice: &Lattice, cell: [i64; 3], basis: [i64; 3]) -> CellCut {
     let shift = DVec3::new((cell[0] - basis[0]) as f64, (cell[1] - basis[1]) as f64, (cell[2] - basis[2]) as f64);
-    let mut sum = Sum { shift, moments: [0.0; 27], octants: [Octant::default(); 8] };
+    let mut sum = Sum { shift, moments: [0.0; 27], octants: Default::default() };
     walk(lattice, cell, &mut sum);
-    let fraction = sum.moments[0];
-    let mut weights = lagrange_weights(&sum.moments);
+    let (mut fraction, mut weights) = (sum.moments[0], lagrange_weights(&sum.moments));
+    // A cell cut only along its faces is full; what is missing is the rounding of a sum over tetrahedra.
     if fraction > 1.0 - 1e-12 && shift == DVec3::ZERO {
-        weights = FULL_WEIGHTS;
+        (fraction, weights) = (1.0, FULL_WEIGHTS);
     }
     let h = lattice.h;
     let corner = DVec3::new(basis[0] as f64, basis[1] as f64, basis[2] as f64) * h;
     let pieces = sum
         .octants
         .iter()
+        .flatten()
         // Below 1e-12 h² there are only degenerate triangles of a surface that touches a corner or an edge.
         .filter(|o| o.area > 1e-12)
         .map(|o| SurfacePiece {
@@ -105,11 +106,15 @@ pub fn cut_cell(lattice: &Lattice, cell: [i64; 3], basis: [i64; 3]) -> CellCut {
             point: corner + o.moment / o.area * h,
         })
         .collect();
-    CellCut { fraction: fraction.min(1.0), weights, pieces }
+    CellCut { fraction, weights, pieces }
 }
 
+/// Triangles whose normals differ from their piece's mean by more than this cosine (37 degrees) begin a new piece: an edge
+/// of a box is not rounded off, while a smooth surface stays one piece per octant down to radii of about a cell.
+const SHARP: f64 = 0.8;
+
 #[derive(Clone, Copy, Default)]
-struct Octant {
+struct Piece {
     area: f64,
     weights: [f64; 8],
     vector: DVec3,
@@ -120,7 +125,7 @@ struct Octant {
 struct Sum {
     shift: DVec3,
     moments: [f64; 27],
-    octants: [Octant; 8],
+    octants: [Vec<Piece>; 8],
 }
 
 impl Sink for Sum {
@@ -157,7 +162,13 @@ impl Sink for Sum {
         let vector = 0.5 * (v[1] - v[0]).cross(v[2] - v[0]);
         let area = vector.length();
         let v = v.map(|p| p + self.shift);
-        let o = &mut self.octants[octant];
+        let pieces = &mut self.octants[octant];
+        let same = |p: &Piece| p.vector.dot(vector) >= SHARP * p.vector.length() * area;
+        let n = pieces.iter().position(same).unwrap_or(pieces.len());
+        if n == pieces.len() {
+            pieces.push(Piece::default());
+        }
+        let o = &mut pieces[n];
         o.area += area;
         o.vector += vector;
         o.moment += (v[0] + v[1] + v[2]) * (area / 3.0);

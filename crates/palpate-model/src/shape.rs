@@ -2,10 +2,12 @@
 
 mod analytic;
 mod mesh;
+mod repair;
 mod trimesh;
 
 pub use analytic::Placed;
 pub use mesh::MeshShape;
+pub use repair::{MeshReport, diagnose, repair};
 pub use trimesh::TriMesh;
 
 use crate::scene::{BodySource, Object};
@@ -22,20 +24,21 @@ pub trait Shape: Send + Sync + std::fmt::Debug {
     fn surface(&self, edge: f64) -> TriMesh;
 
     /// A nearest point of the surface [m]; where several are equally near, one of them.
+    /// The default follows the distance's gradient and is meant for sampled distances; exact shapes have closed forms.
     fn closest_point(&self, p: DVec3) -> DVec3 {
         let (lo, hi) = self.bounds();
         let size = (hi - lo).length();
-        // Central differences of an exact distance: rounding 1e-16/1e-6 and curvature both leave the direction good to 1e-9.
+        // Small against any cell, large against rounding.
         let step = 1e-6 * size;
         let mut x = p;
-        for round in 0..8 {
+        for round in 0..20 {
             let d = self.signed_distance(x);
-            if d.abs() <= 1e-12 * size {
+            if d.abs() <= 1e-8 * size {
                 break;
             }
             let slope = |e: DVec3| self.signed_distance(x + e * step) - self.signed_distance(x - e * step);
             let g = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)) / (2.0 * step);
-            if g.length() > 0.9 {
+            if g.length() > 0.5 {
                 x -= g.normalize() * d;
             } else {
                 // Several surface points are equally near here: step aside towards one of them.

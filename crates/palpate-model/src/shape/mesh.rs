@@ -90,6 +90,22 @@ impl MeshShape {
         Some((best.1, best.2 as usize))
     }
 
+    /// Visits the triangles whose bounding boxes' leaf touches the box `lo..hi`.
+    pub(super) fn overlapping(&self, lo: DVec3, hi: DVec3, visit: &mut impl FnMut(usize)) {
+        let mut stack = if self.tree.is_empty() { Vec::new() } else { vec![0u32] };
+        while let Some(n) = stack.pop() {
+            let node = &self.tree[n as usize];
+            if node.lo.cmpgt(hi).any() || node.hi.cmplt(lo).any() {
+                continue;
+            }
+            if node.second == 0 {
+                (node.range.0..node.range.1).for_each(|t| visit(self.numbers[t as usize] as usize));
+            } else {
+                stack.extend([node.second, n + 1]);
+            }
+        }
+    }
+
     /// Generalized winding number: 1 inside a closed mesh, 0 outside, between them near holes.
     pub fn winding_number(&self, p: DVec3) -> f64 {
         let mut sum = 0.0;
