@@ -1,1 +1,6 @@
 //! The ladder of tests: each rung trusts only the rungs above it in this list.
+
+mod bad_input;
+mod physics;
+mod real_data;
+mod rollouts;

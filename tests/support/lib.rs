@@ -1,1 +1,6 @@
-//! What the tests share: small plans, tolerances with their reasons.
+//! What the tests share: small scenes built in code, runs, energies.
+
+pub mod data;
+pub mod energy;
+pub mod run;
+pub mod scenes;

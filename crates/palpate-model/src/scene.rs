@@ -238,7 +238,7 @@ impl Default for Solver {
             rotation: RotationUpdate::Converged,
             element: Element::Enhanced,
             linear: LinearSolver::Auto,
-            tolerance: 1e-9,
+            tolerance: 1e-8,
             newton_iterations: 30,
             ghost: 0.02,
         }
