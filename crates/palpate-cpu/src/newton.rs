@@ -11,8 +11,10 @@ use palpate_engine::{Failure, FailureKind};
 /// A failure without its time.
 pub type Reason = (FailureKind, String);
 
-/// Accuracy of linear solves whose results are differentiated or summed into gradients.
-pub const DERIVATIVE_TOLERANCE: f64 = 1e-12;
+/// Accuracy that linear solves for derivatives cannot usefully pass in f64.
+const FINEST: f64 = 1e-12;
+/// Accuracy of a Newton direction far from the solution: contact and rotation leave more error than this anyway.
+const COARSEST: f64 = 0.1;
 
 /// Attaches the time of the simulation to a reason.
 pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
@@ -41,20 +43,23 @@ pub fn solve(
 ) -> Result<(), Reason> {
     let mut residual = balance.residual(States { u1, u0, v0 });
     let mut scale = None;
-    let mut history = Vec::new();
+    let mut history: Vec<f64> = Vec::new();
+    let mut forcing = COARSEST;
     for _ in 0..most {
         if !is_finite(&residual) {
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
         }
         let s = States { u1, u0, v0 };
-        let (direction, norm) = direction(balance, solvers, matrix, purpose, s, &residual, tolerance, &mut scale)?;
+        let (direction, norm) = direction(balance, solvers, matrix, purpose, s, &residual, forcing, tolerance, &mut scale)?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
-        residual = line_search(balance, u1, u0, v0, &residual, &direction);
-        let norm = current_norm(balance, matrix, &residual);
-        if norm <= tolerance * scale.unwrap_or(0.0) {
+        let after;
+        (residual, after) = line_search(balance, matrix, u1, u0, v0, &residual, norm, &direction);
+        if after <= tolerance * scale.unwrap_or(0.0) {
             return Ok(());
         }
+        // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
+        forcing = (0.9 * (after / norm).powi(2)).clamp(1e-4, COARSEST);
     }
     let reference = scale.unwrap_or(1.0);
     let (first, last) = (history.first().copied().unwrap_or(0.0), history.last().copied().unwrap_or(0.0));
@@ -88,6 +93,7 @@ fn direction(
     purpose: Purpose,
     s: States,
     residual: &[DVec3],
+    forcing: f64,
     tolerance: f64,
     scale: &mut Option<f64>,
 ) -> Result<(Option<Nodes>, f64), Reason> {
@@ -105,12 +111,11 @@ fn direction(
             Err(_) if !convex => continue,
             Err(a) => return Err((FailureKind::LinearSolve, format!("the stiffness of node {a} is not positive"))),
         };
-        // The next Newton step squares the error anyway: three digits now, and never more than the end needs.
         let absolute = 0.1 * tolerance * scale.unwrap_or(0.0);
         let solved = solvers.prepare(&balance.plan.body, balance.pattern, matrix, purpose, s.u1).and_then(|prepared| {
             let mut d = vec![DVec3::ZERO; residual.len()];
             let minus: Nodes = residual.iter().map(|r| -*r).collect();
-            prepared.solve(&minus, &mut d, 1e-3, absolute).map(|()| d)
+            prepared.solve(&minus, &mut d, forcing, absolute).map(|()| d)
         });
         match solved {
             Ok(d) if is_finite(&d) => return Ok((Some(d), norm)),
@@ -122,25 +127,42 @@ fn direction(
     unreachable!("the second pass always returns")
 }
 
-/// Takes the longest of the steps 1, ½, ¼ … that lowers the potential (Armijo 1966) and returns the residual there.
-fn line_search(balance: &Balance, u1: &mut Nodes, u0: &[DVec3], v0: &[DVec3], residual: &[DVec3], d: &[DVec3]) -> Nodes {
-    let slope = dot(residual, d);
+/// Takes the full step where it halves the residual; otherwise the longest of the steps 1, ½, ¼ … that lowers the potential
+/// (Armijo 1966). Returns the residual there and its norm.
+fn line_search(
+    balance: &Balance,
+    matrix: &Matrix,
+    u1: &mut Nodes,
+    u0: &[DVec3],
+    v0: &[DVec3],
+    residual: &[DVec3],
+    norm: f64,
+    d: &[DVec3],
+) -> (Nodes, f64) {
     let start = u1.clone();
+    add_scaled(u1, 1.0, d);
+    let full = balance.residual(States { u1, u0, v0 });
+    let full_norm = current_norm(balance, matrix, &full);
+    if full_norm <= 0.5 * norm {
+        return (full, full_norm);
+    }
+    let slope = dot(residual, d);
     let before = balance.potential(States { u1: &start, u0, v0 });
     let mut step = 1.0;
     for _ in 0..30 {
-        u1.copy_from_slice(&start);
-        add_scaled(u1, step, d);
-        let s = States { u1, u0, v0 };
-        let after = balance.potential(s);
-        // Close to the solution the change drowns in rounding; then the residual decides.
+        let after = balance.potential(States { u1, u0, v0 });
+        // Close to the solution the change drowns in rounding; then the step is as good as any.
         let rounding = 1e-12 * (before.abs() + after.abs());
         if after <= before + 1e-4 * step * slope + rounding {
-            return balance.residual(s);
+            break;
         }
         step *= 0.5;
+        u1.copy_from_slice(&start);
+        add_scaled(u1, step, d);
     }
-    balance.residual(States { u1, u0, v0 })
+    let residual = if step == 1.0 { full } else { balance.residual(States { u1, u0, v0 }) };
+    let norm = current_norm(balance, matrix, &residual);
+    (residual, norm)
 }
 
 /// Solves A x = b with the exact tangent at a converged state, for derivatives.
@@ -154,5 +176,5 @@ pub fn solve_exact(
 ) -> Result<(), Reason> {
     balance.tangent(s, false, matrix);
     let prepared: Prepared = solvers.prepare(&balance.plan.body, balance.pattern, matrix, purpose, s.u1).map_err(trouble)?;
-    prepared.solve_many(columns, DERIVATIVE_TOLERANCE).map_err(trouble)
+    prepared.solve_many(columns, balance.plan.solver.tolerance.clamp(FINEST, 1e-6)).map_err(trouble)
 }
