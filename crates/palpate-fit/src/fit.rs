@@ -1,11 +1,13 @@
 //! The fit itself: starts, the best of them, and what is known about it.
 
+use crate::chart::AtBound;
 use crate::journal::{Journal, JournalError, JournalFile};
 use crate::multistart;
-use crate::optimise::Status;
-use crate::problem::Problem;
+use crate::optimise::{Sample, Status};
+use crate::problem::{Problem, Want};
 use crate::settings::Settings;
-use std::sync::atomic::AtomicBool;
+use crate::uncertainty::{self, Uncertainty};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Why a fit has no result.
@@ -76,17 +78,40 @@ pub struct Run {
     pub status: Status,
 }
 
+/// One found number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedParameter {
+    /// Path as the user wrote it.
+    pub path: String,
+    /// Best value.
+    pub value: f64,
+    /// Standard error in the same unit; `None` if it could not be computed.
+    pub standard_error: Option<f64>,
+    /// SI unit, `1` for none.
+    pub unit: String,
+    /// The bound that holds the value, if one does.
+    pub at_bound: Option<AtBound>,
+}
+
 /// What a fit found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FitResult {
-    /// Best values `[q]`.
-    pub values: Vec<f64>,
+    /// The free parameters at the best point `[q]`.
+    pub parameters: Vec<FittedParameter>,
+    /// Correlation matrix of their errors `[q][q]` (of the logarithms where these are fitted).
+    pub correlation: Vec<Vec<f64>>,
+    /// Mean square residual over the squared noise; 1 if the model is right and the noise as stated.
+    pub reduced_chi_square: f64,
+    /// Number of the best start.
+    pub best: usize,
     /// Cost of the first start; infinite if it could not be evaluated.
     pub initial_cost: f64,
     /// Cost of the best point.
     pub cost: f64,
     /// θ of every scene at the best point.
     pub theta: Vec<Vec<f64>>,
+    /// Plain sentences on what the data do not determine and what went wrong.
+    pub warnings: Vec<String>,
     /// Every start, in order.
     pub runs: Vec<Run>,
     /// Evaluations of all starts.
@@ -119,13 +144,63 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         return Err(why.map_or(FitError::Interrupted, FitError::NoStart));
     };
     let values = runs[best].end.clone();
+    let z = starts[best].outcome.z.clone();
+    let (u, extra) = curvature(problem, &z, settings, &hooks);
+    let mut warnings = u.warnings.clone();
+    warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
+    let failed: Vec<usize> = (0..runs.len()).filter(|&s| runs[s].cost.is_infinite()).collect();
+    if let Some(&first) = failed.first() {
+        let why = if let Status::Failed(why) = &runs[first].status { why } else { runs[first].status.name() };
+        warnings.push(format!("{} of {} starts could not be evaluated (start {first}: {why})", failed.len(), runs.len()));
+    }
+    if settings.starts > runs.len() {
+        warnings
+            .push(format!("all {} starts would be the same, so one was run: give start ranges to draw from", settings.starts));
+    }
+    if runs[best].status == Status::IterationLimit {
+        warnings.push(format!("the best start used up its {} iterations; more may lower the cost", settings.iterations));
+    }
+    let parameters = problem
+        .free()
+        .iter()
+        .enumerate()
+        .map(|(i, f)| FittedParameter {
+            path: f.path.clone(),
+            value: values[i],
+            standard_error: u.standard_errors[i],
+            unit: f.unit.clone(),
+            at_bound: problem.charts()[i].at_bound(values[i]),
+        })
+        .collect();
     Ok(FitResult {
+        parameters,
+        correlation: u.correlation,
+        reduced_chi_square: u.reduced_chi_square,
+        best,
         theta: (0..problem.scenes().len()).map(|s| problem.theta(s, &values)).collect(),
         initial_cost: runs[0].start_cost,
         cost: runs[best].cost,
-        evaluations: runs.iter().map(|r| r.evaluations).sum(),
-        values,
+        evaluations: runs.iter().map(|r| r.evaluations).sum::<usize>() + extra,
+        warnings,
         runs,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// Uncertainty at the best point, and how many evaluations that took.
+fn curvature(problem: &mut Problem, z: &[f64], settings: &Settings, hooks: &Hooks) -> (Uncertainty, usize) {
+    // A sample without curvature still tells of bounds.
+    let without = |problem: &Problem, why: &str| {
+        let mut u = uncertainty::assess(problem, z, &Sample::default(), &settings.errors);
+        u.warnings.push(format!("no standard errors: {why}"));
+        u
+    };
+    if hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)) {
+        return (without(problem, "the fit was interrupted"), 0);
+    }
+    let sample = problem.evaluate(&[z.to_vec()], Want::Curvature).swap_remove(0);
+    match &sample.failure {
+        Some(why) => (without(problem, why), 1),
+        None => (uncertainty::assess(problem, z, &sample, &settings.errors), 1),
+    }
 }

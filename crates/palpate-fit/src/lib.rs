@@ -11,9 +11,10 @@ mod multistart;
 mod optimise;
 mod problem;
 mod settings;
+mod uncertainty;
 
 pub use chart::{AtBound, Chart};
-pub use fit::{FitError, FitResult, Hooks, Progress, Run, fit};
+pub use fit::{FitError, FitResult, FittedParameter, Hooks, Progress, Run, fit};
 pub use journal::{JournalError, JournalFile};
 pub use optimise::{Outcome, Sample, Search, Status, Stop};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};

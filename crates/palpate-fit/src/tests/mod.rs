@@ -1,4 +1,6 @@
 //! Tests on cheap physics.
 
+mod errors;
 mod fits;
 mod models;
+mod resume;

@@ -7,12 +7,15 @@ use palpate_model::params::Transform;
 /// Residuals r(θ) over σ; `None` where the model fails.
 pub type Residuals = dyn Fn(&[f64]) -> Option<Vec<f64>> + Send;
 
-/// Least squares `J = (1/n) Σ r²/2` with derivatives by complex-free central differences of the residuals.
+/// Sizes of the batches that a model has evaluated.
+pub type Batches = std::sync::Arc<std::sync::Mutex<Vec<usize>>>;
+
+/// Least squares `J = (1/n) Σ r²/2` with derivatives by central differences of the residuals.
 pub struct LeastSquares {
     pub parameters: usize,
     pub residuals: Box<Residuals>,
     /// Sizes of the batches so far.
-    pub batches: std::sync::Arc<std::sync::Mutex<Vec<usize>>>,
+    pub batches: Batches,
 }
 
 impl LeastSquares {
@@ -102,11 +105,17 @@ pub fn oscillator(k: f64, c: f64, times: usize) -> Vec<f64> {
 
 /// Oscillator seen with σ = 0.01, true stiffness 4 and damping 0.3; fails for stiffness above 400.
 pub fn oscillator_problem() -> Problem<'static> {
+    counted_oscillator().0
+}
+
+/// The same, with the sizes of the batches evaluated so far.
+pub fn counted_oscillator() -> (Problem<'static>, Batches) {
     let truth = oscillator(4.0, 0.3, 60);
     let model = LeastSquares::new(2, move |t| {
         (t[0] < 400.0).then(|| oscillator(t[0], t[1], 60).iter().zip(&truth).map(|(a, b)| (a - b) / 0.01).collect())
     });
     let free =
         vec![parameter(0, Transform::Log, (1e-2, 1e4), (0.5, 30.0)), parameter(1, Transform::Log, (1e-4, 10.0), (0.01, 2.0))];
-    Problem::new(vec![scene(&[2.0, 0.1], model)], free).expect("the problem is valid")
+    let batches = model.batches.clone();
+    (Problem::new(vec![scene(&[2.0, 0.1], model)], free).expect("the problem is valid"), batches)
 }

@@ -1,0 +1,243 @@
+//! How well the data determine the parameters, and which of them they cannot tell apart.
+//!
+//! With n scalar residuals r of noise σ the cost is `J = (1/n) Σ r²/(2σ²)`, and its Gauss–Newton matrix
+//! `H = (1/n) Σ ∇r ∇rᵀ/σ²`. Then
+//!
+//! - `s² = max(1, 2 n J/(n − q))`: the reduced χ², so that residuals larger than the stated noise widen the errors, while
+//!   residuals that happen to be smaller do not narrow them;
+//! - independent errors give the covariance `s² H⁻¹/n`;
+//! - an error of `systematic · σ` that all residuals of a group share does not average out within the group. As a bound, each
+//!   group counts like one residual with the average sensitivity: `systematic² H⁻¹/groups`.
+//!
+//! Altogether `cov = τ H⁻¹`, `τ = s²/n + systematic²/groups`. All of this is done in z (relative errors for logarithms);
+//! standard errors in units of the parameter follow by the slope of its chart.
+
+use crate::chart::AtBound;
+use crate::dense::eigen;
+use crate::multistart::StartRun;
+use crate::optimise::Sample;
+use crate::problem::Problem;
+use crate::settings::ErrorModel;
+use palpate_model::params::Transform;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Correlation beyond which two parameters are reported together.
+const CORRELATED: f64 = 0.95;
+/// Standard error in z beyond which a direction counts as undetermined (a factor 1.6 for logarithms).
+const UNDETERMINED: f64 = 0.5;
+/// Correlated parameters whose standard errors in z are all smaller are known well enough to be told apart.
+const KNOWN: f64 = 0.02;
+/// Confidence with which costs are called equal.
+const CONFIDENCE: f64 = 0.95;
+/// Eigenvalues below this share of the largest are rounding errors.
+const RANK: f64 = 1e-12;
+/// Components of a unit vector below this share of the largest are not named.
+const NAMED: f64 = 0.3;
+/// Other optima closer than this in z are not worth a sentence.
+const CLOSE: f64 = 0.1;
+
+/// What the curvature at the optimum says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Uncertainty {
+    /// Standard error of every parameter in its unit `[q]`; `None` at a bound or without curvature.
+    pub standard_errors: Vec<Option<f64>>,
+    /// Correlation matrix `[q][q]` in z; rows of parameters without standard error are those of the identity.
+    pub correlation: Vec<Vec<f64>>,
+    /// Mean square residual over the squared noise, `2 n J/(n − q)`; NaN when there are too few residuals.
+    pub reduced_chi_square: f64,
+    /// Plain sentences about what is not determined.
+    pub warnings: Vec<String>,
+    /// Standard errors in z `[q]`.
+    pub(crate) errors_z: Vec<Option<f64>>,
+    /// τ above; 0 if it is not known.
+    pub(crate) tau: f64,
+}
+
+/// Uncertainty at z `[q]`, from a sample by z there; without curvature there are no standard errors.
+pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel) -> Uncertainty {
+    let q = z.len();
+    let values = problem.values(z);
+    let mut u = Uncertainty {
+        standard_errors: vec![None; q],
+        errors_z: vec![None; q],
+        correlation: (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
+        reduced_chi_square: f64::NAN,
+        ..Uncertainty::default()
+    };
+    let n = sample.residuals as f64;
+    if n > q as f64 {
+        u.reduced_chi_square = 2.0 * n * sample.cost / (n - q as f64);
+    } else if n > 0.0 {
+        u.warnings.push(format!("there are only {n} residuals for {q} free parameters"));
+    }
+    if n > 0.0 {
+        u.tau = u.reduced_chi_square.max(1.0) / n + errors.systematic.powi(2) / errors.groups.max(1) as f64;
+    }
+
+    // A parameter held by a bound is a known number for the others.
+    let mut inner = Vec::new();
+    for (i, f) in problem.free().iter().enumerate() {
+        let (side, bound) = match problem.charts()[i].at_bound(values[i]) {
+            None => {
+                inner.push(i);
+                continue;
+            }
+            Some(AtBound::Lower) => ("lower", f.bounds.0),
+            Some(AtBound::Upper) => ("upper", f.bounds.1),
+        };
+        u.warnings.push(format!(
+            "{} ended at its {side} bound {bound}: the best value may lie beyond it, and has no standard error",
+            f.path
+        ));
+    }
+    let m = inner.len();
+    if m == 0 || sample.curvature.is_empty() {
+        return u;
+    }
+    if n == 0.0 {
+        u.warnings.push("no standard errors: the cost counts no residuals".into());
+        return u;
+    }
+    let h: Vec<f64> = inner.iter().flat_map(|&i| inner.iter().map(move |&j| sample.curvature[i * q + j])).collect();
+    let Some((values_h, vectors)) = eigen(&h, m) else {
+        u.warnings.push("no standard errors: the curvature of the cost is not finite".into());
+        return u;
+    };
+    let largest = values_h.iter().fold(0.0, |a: f64, &b| a.max(b));
+    if largest <= 0.0 {
+        u.warnings.push("no standard errors: no free parameter changes the cost".into());
+        return u;
+    }
+    let variances: Vec<f64> = values_h.iter().map(|v| u.tau / v.max(RANK * largest)).collect();
+    let covariance = |a: usize, b: usize| -> f64 { (0..m).map(|k| variances[k] * vectors[k][a] * vectors[k][b]).sum() };
+    let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
+    for (a, &i) in inner.iter().enumerate() {
+        u.errors_z[i] = Some(sd[a]);
+        u.standard_errors[i] = Some(sd[a] * problem.charts()[i].slope(z[i]));
+        for (b, &j) in inner.iter().enumerate().filter(|(b, _)| *b != a) {
+            u.correlation[i][j] = (covariance(a, b) / (sd[a] * sd[b])).clamp(-1.0, 1.0);
+        }
+    }
+
+    let names = Names { problem };
+    let mut told: Vec<Vec<usize>> = Vec::new();
+    // The least determined direction first.
+    for k in 0..m {
+        let spread = variances[k].sqrt();
+        if spread <= UNDETERMINED {
+            break;
+        }
+        let top = vectors[k].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let members: Vec<usize> = (0..m).filter(|&a| vectors[k][a].abs() > NAMED * top).collect();
+        let sentence = match members.as_slice() {
+            [a] => names.undetermined(inner[*a], spread, values[inner[*a]], z[inner[*a]]),
+            [a, b] => names.alike(inner[*a], inner[*b], covariance(*a, *a), covariance(*b, *b), covariance(*a, *b)),
+            many => {
+                let list: Vec<&str> = many.iter().map(|&a| names.path(inner[a])).collect();
+                let (last, first) = list.split_last().expect("more than two members are here");
+                format!("{} and {last} cannot be told apart: only some of their combinations are determined", first.join(", "))
+            }
+        };
+        u.warnings.push(sentence);
+        told.push(members);
+    }
+    for a in 0..m {
+        for b in a + 1..m {
+            let r = u.correlation[inner[a]][inner[b]];
+            if r.abs() <= CORRELATED || told.iter().any(|t| t.contains(&a) && t.contains(&b)) {
+                continue;
+            }
+            u.warnings.push(if sd[a].max(sd[b]) > KNOWN {
+                names.alike(inner[a], inner[b], covariance(a, a), covariance(b, b), covariance(a, b))
+            } else {
+                let (a, b) = (names.path(inner[a]), names.path(inner[b]));
+                format!("{a} and {b} are known, but their errors go together (correlation {r:.3})")
+            });
+        }
+    }
+    u
+}
+
+/// Sentences about starts that ended elsewhere with a cost that noise alone could explain: `n ΔJ` below half the χ² quantile
+/// of q degrees of freedom, widened by the errors of [`Uncertainty`].
+pub fn compare_starts(problem: &Problem, runs: &[StartRun], best: usize, u: &Uncertainty) -> Vec<String> {
+    let q = problem.free().len();
+    let quantile = ChiSquared::new(q as f64).map_or(2.0 * q as f64, |d| d.inverse_cdf(CONFIDENCE));
+    let z_best = &runs[best].outcome.z;
+    let limit = runs[best].outcome.cost + 0.5 * quantile * u.tau;
+    let equal: Vec<&StartRun> = runs.iter().filter(|r| r.outcome.cost <= limit).collect();
+    let mut sentences = Vec::new();
+    for (i, f) in problem.free().iter().enumerate() {
+        let allowed = u.errors_z[i].map_or(0.0, |e| 2.0 * quantile.sqrt() * e).max(CLOSE);
+        if equal.iter().all(|r| (r.outcome.z[i] - z_best[i]).abs() <= allowed) {
+            continue;
+        }
+        let ends: Vec<f64> = equal.iter().map(|r| problem.charts()[i].value(r.outcome.z[i])).collect();
+        let (low, high) = ends.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+        sentences.push(format!(
+            "{} is not unique: {} of {} starts reach equal costs with values from {low:.4e} to {high:.4e}{}",
+            f.path,
+            equal.len(),
+            runs.len(),
+            unit(&f.unit)
+        ));
+    }
+    sentences
+}
+
+fn unit(unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
+struct Names<'p, 'a> {
+    problem: &'p Problem<'a>,
+}
+
+impl Names<'_, '_> {
+    fn path(&self, i: usize) -> &str {
+        &self.problem.free()[i].path
+    }
+
+    fn undetermined(&self, i: usize, spread: f64, value: f64, z: f64) -> String {
+        let f = &self.problem.free()[i];
+        let range = if f.transform == Transform::Log {
+            format!("a factor of {:.3e} up or down", spread.min(300.0).exp())
+        } else {
+            let chart = &self.problem.charts()[i];
+            let (low, high) = (chart.value(z - spread), chart.value(z + spread));
+            format!("anything from {low:.3e} to {high:.3e}{} around {value:.3e}", unit(&f.unit))
+        };
+        format!("{} is not determined: {range} changes the fit no more than the noise does", f.path)
+    }
+
+    /// Two parameters by their covariance: the combination of least variance is the one that is determined.
+    fn alike(&self, i: usize, j: usize, var_i: f64, var_j: f64, cov: f64) -> String {
+        // Eigenvector of the smaller eigenvalue of [[var_i, cov], [cov, var_j]], free of cancellation.
+        let half = 0.5 * (var_i - var_j);
+        let root = half.hypot(cov);
+        let (mut x, mut y) = if half >= 0.0 { (-cov, half + root) } else { (root - half, -cov) };
+        let norm = x.hypot(y);
+        (x, y) = if norm > 0.0 { (x / norm, y / norm) } else { (1.0, 0.0) };
+        if (if x.abs() >= y.abs() { x } else { y }) < 0.0 {
+            (x, y) = (-x, -y);
+        }
+        let (a, b) = (&self.problem.free()[i], &self.problem.free()[j]);
+        let combination = if a.transform == Transform::Log && b.transform == Transform::Log {
+            format!("{}^{x:.2}·{}^{y:.2}", short(&a.path), short(&b.path))
+        } else {
+            let term = |f: &crate::FreeParameter| match f.transform {
+                Transform::Log => format!("ln {}", short(&f.path)),
+                Transform::Logit => format!("logit {}", short(&f.path)),
+                Transform::Linear => format!("{}/{}", short(&f.path), f.typical),
+            };
+            let sign = if y < 0.0 { '−' } else { '+' };
+            format!("{x:.2}·{} {sign} {:.2}·{}", term(a), y.abs(), term(b))
+        };
+        format!("{} and {} cannot be told apart: only their combination {combination} is determined", a.path, b.path)
+    }
+}
+
+/// Last part of a path that says something: `youngs_modulus`, but `gravity.z` and `plane.0.height` whole.
+fn short(path: &str) -> &str {
+    path.strip_prefix("material.").unwrap_or(path)
+}
