@@ -214,6 +214,21 @@ fn a_joint_fit_shares_some_parameters_and_not_others() {
         assert!((sample.gradient[i] - by_sensitivity.gradient[i]).abs() < 1e-12 * difference.abs(), "{i}");
     }
 
+    // Where all residuals vanish, Gauss–Newton's matrix is the Hessian: differences of the gradient.
+    let truth = [k, c, 1.0, 0.5];
+    let curvature = problem.evaluate_values(&[truth.to_vec()], Want::Curvature).remove(0).curvature;
+    for i in 0..4 {
+        let d = 1e-4 * truth[i];
+        let moved = |x: f64| (0..4).map(|j| if i == j { truth[j] + x } else { truth[j] }).collect::<Vec<f64>>();
+        let g = problem.evaluate_values(&[moved(d), moved(-d)], Want::Gradient);
+        for j in 0..4 {
+            let difference = (g[0].gradient[j] - g[1].gradient[j]) / (2.0 * d);
+            // Relative to what Cauchy and Schwarz allow, as entries off the diagonal may be small.
+            let scale = (curvature[5 * i] * curvature[5 * j]).sqrt();
+            assert!((curvature[4 * i + j] - difference).abs() < 1e-5 * scale, "{i} {j}");
+        }
+    }
+
     let result = solve(&mut problem, &settings(Optimizer::GaussNewton));
     for (found, truth) in values(&result).iter().zip([k, c, 1.0, 0.5]) {
         assert!((found / truth - 1.0).abs() < 1e-6, "{found} instead of {truth}");
