@@ -12,14 +12,14 @@ pub struct Interrupt {
 
 impl Default for Interrupt {
     fn default() -> Interrupt {
-        Interrupt { raised: Arc::default(), remaining: Arc::new(AtomicU64::new(u64::MAX)) }
+        Interrupt::after(u64::MAX)
     }
 }
 
 impl Interrupt {
-    /// An interrupt that raises itself after it has been looked at so many times: a budget of evaluations.
-    pub fn after(evaluations: u64) -> Interrupt {
-        Interrupt { remaining: Arc::new(AtomicU64::new(evaluations)), ..Interrupt::default() }
+    /// An interrupt that raises itself after so many rounds of evaluations: a budget.
+    pub fn after(rounds: u64) -> Interrupt {
+        Interrupt { raised: Arc::new(AtomicBool::new(rounds == 0)), remaining: Arc::new(AtomicU64::new(rounds)) }
     }
 
     /// Asks to stop.
@@ -27,18 +27,23 @@ impl Interrupt {
         self.raised.store(true, Ordering::SeqCst);
     }
 
-    /// True once it has been raised. Does not use up the budget.
+    /// True once it has been raised.
     pub fn is_raised(&self) -> bool {
         self.raised.load(Ordering::SeqCst)
     }
 
-    /// Looks at the request before one more evaluation: true when the computation should stop. Uses up one of the budget.
-    pub fn should_stop(&self) -> bool {
-        let spent = self.remaining.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |n| n.checked_sub(1)).is_err();
-        if spent {
+    /// The flag itself.
+    pub(crate) fn flag(&self) -> &AtomicBool {
+        &self.raised
+    }
+
+    /// Counts a round of evaluations that begins; the last one of the budget raises the flag, and is still finished.
+    pub(crate) fn count(&self) {
+        let left = self.remaining.load(Ordering::SeqCst).saturating_sub(1);
+        self.remaining.store(left, Ordering::SeqCst);
+        if left == 0 {
             self.raise();
         }
-        self.is_raised()
     }
 }
 
@@ -47,13 +52,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_budget_stops_after_so_many_looks_and_clones_share_it() {
+    fn a_budget_is_raised_by_its_last_round_and_shared_by_clones() {
         let a = Interrupt::after(2);
-        let b = a.clone();
-        assert!(!a.should_stop() && !b.should_stop() && a.should_stop() && b.is_raised());
-        let c = Interrupt::default();
-        assert!(!c.should_stop());
-        c.clone().raise();
-        assert!(c.should_stop());
+        a.clone().count();
+        assert!(!a.is_raised());
+        a.count();
+        assert!(a.clone().is_raised());
+        assert!(!Interrupt::default().is_raised() && Interrupt::after(0).is_raised());
     }
 }

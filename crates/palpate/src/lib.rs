@@ -1,7 +1,55 @@
 //! palpate fits the physics of soft bodies to measured motion.
+//!
+//! An [`Experiment`] is a scene file with its recording, cut into cells and ready to be computed:
+//!
+//! ```
+//! use palpate::{Backend, Experiment};
+//!
+//! let scene = r#"
+//!     format = "scene/1"
+//!     [object]
+//!     shape = { ball = { radius = 0.05, center = [0, 0, 0.3] } }
+//!     cell_size = 0.025
+//!     [material]
+//!     density = 1000.0
+//!     youngs_modulus = 2.0e4
+//!     poisson_ratio = 0.4
+//!     [time]
+//!     step = 0.01
+//!     steps = 10
+//! "#;
+//! let experiment = Experiment::from_toml(scene, "ball.toml")?;
+//! let simulation = experiment.simulate(Backend::Auto)?;
+//! let fallen = simulation.snapshots.last().unwrap();
+//! // Free fall: half g t² after a tenth of a second, up to the first-order error of the time step.
+//! let drop = -fallen.displacement.iter().map(|u| u.z).sum::<f64>() / fallen.displacement.len() as f64;
+//! assert!((drop - 0.049).abs() < 0.003, "{drop}");
+//! # Ok::<(), palpate::Error>(())
+//! ```
+//!
+//! With a recording in the scene, [`Experiment::fit`] finds the free parameters of its `[fit]` table, and [`fit`] does so for
+//! several scenes at once. The command line is the same library behind [`cli::run`].
+//!
+//! Invariant: this room reads options, chooses a backend and talks to people. It computes no physics.
 
+pub mod cli;
+mod commands;
 mod embed;
+mod engine;
+mod error;
+mod experiment;
+mod fitting;
 mod interrupt;
+mod options;
 pub mod render;
+pub mod report;
+mod residuals;
+pub mod synthetic;
+
 pub use embed::Embedding;
+pub use engine::Backend;
+pub use error::Error;
+pub use experiment::{Experiment, Simulation};
+pub use fitting::{FitOptions, Fitted, FreeNumber, fit};
 pub use interrupt::Interrupt;
+pub use residuals::{FrameResidual, ResidualSummary};

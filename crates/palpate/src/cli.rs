@@ -1,0 +1,121 @@
+//! The command line as a function: arguments in, exit code out.
+
+use crate::commands::{fit, inspect, observe, simulate};
+use crate::error::Error;
+use crate::interrupt::Interrupt;
+use crate::options::Talk;
+use clap::{Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::ffi::OsString;
+use std::io::Write;
+
+/// Exit code after an interruption (Ctrl-C), by convention 128 + SIGINT. What was found until then has been written.
+pub const INTERRUPTED: i32 = 130;
+
+const AFTER_HELP: &str = "\
+A first session:
+  palpate inspect  scene.toml                  what would be simulated and fitted, and what looks wrong
+  palpate simulate scene.toml --format png     pictures of the motion in out/scene/
+  palpate fit      scene.toml --out found      parameters, errors and a report in found/
+  palpate simulate found/model.toml            the scene with the found values
+
+Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted (Ctrl-C; the best so far is written).";
+
+#[derive(Debug, Parser)]
+#[command(name = "palpate", version, about = "Fits the physics of soft bodies to measured motion", after_help = AFTER_HELP)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    talk: Talk,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Simulate(simulate::Arguments),
+    Observe(observe::Arguments),
+    Fit(fit::Arguments),
+    Inspect(inspect::Arguments),
+}
+
+/// Where a command talks to.
+pub struct Console<'a> {
+    out: &'a mut dyn Write,
+    err: &'a mut dyn Write,
+    talk: Talk,
+    draw: bool,
+    /// Stops a long command in good order.
+    pub interrupt: Interrupt,
+}
+
+impl Console<'_> {
+    /// True when the result is to be JSON.
+    pub fn json(&self) -> bool {
+        self.talk.json
+    }
+
+    /// Prints the result. A reader that has gone away is not an error.
+    pub fn print(&mut self, text: &str) {
+        let _ = writeln!(self.out, "{text}");
+    }
+
+    /// A note that may be silenced.
+    pub fn note(&mut self, text: &str) {
+        if !self.talk.quiet {
+            let _ = writeln!(self.err, "{text}");
+        }
+    }
+
+    /// Warnings, one line each.
+    pub fn warn(&mut self, warnings: &[String]) {
+        for w in warnings {
+            let _ = writeln!(self.err, "warning: {w}");
+        }
+    }
+
+    /// A progress bar on stderr; silent unless stderr is a terminal.
+    pub fn progress(&self, length: u64, what: &str) -> ProgressBar {
+        if self.talk.quiet || !self.draw {
+            return ProgressBar::hidden();
+        }
+        let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3}% {elapsed}/{duration} {msg}");
+        let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+        bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_prefix(what.to_string())
+    }
+}
+
+/// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress bars are drawn
+/// on the process's stderr when `draw` is set and it is a terminal; all else goes to `out` and `err`.
+pub fn run<A: Into<OsString> + Clone>(
+    arguments: impl IntoIterator<Item = A>,
+    out: &mut dyn Write,
+    err: &mut dyn Write,
+    interrupt: Interrupt,
+    draw: bool,
+) -> i32 {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(e) if e.use_stderr() => {
+            let _ = write!(err, "{e}");
+            return 2;
+        }
+        // --help and --version are answers, not errors.
+        Err(e) => {
+            let _ = write!(out, "{e}");
+            return 0;
+        }
+    };
+    let mut console = Console { out, err, talk: cli.talk, draw, interrupt };
+    let done = match &cli.command {
+        Command::Simulate(a) => simulate::run(a, &mut console),
+        Command::Observe(a) => observe::run(a, &mut console),
+        Command::Fit(a) => fit::run(a, &mut console),
+        Command::Inspect(a) => inspect::run(a, &mut console),
+    };
+    let code = done.unwrap_or_else(|e: Error| {
+        let _ = writeln!(console.err, "error: {e}");
+        e.exit_code()
+    });
+    let _ = console.out.flush();
+    code
+}

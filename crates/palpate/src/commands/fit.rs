@@ -1,0 +1,228 @@
+//! `palpate fit`: parameters that explain a recording.
+
+use crate::cli::{Console, INTERRUPTED};
+use crate::engine::Backend;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::fitting::{FitOptions, Fitted, fit};
+use crate::options::{BackendName, out_folder};
+use crate::report::{FramePicture, ReportInput, history_csv, html, pictures, result_json, summary};
+use clap::{Args, ValueEnum};
+use palpate_fit::Progress;
+use palpate_io::output::{make_folder, write_file};
+use palpate_model::scene::Optimizer;
+use std::path::{Path, PathBuf};
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate fit beam.toml                        result in out/beam-fit/
+  palpate fit beam.toml --starts 20 --optimizer rprop --out found
+  palpate fit a.toml b.toml --out joint        the same body recorded twice; parameters with the same path are shared
+  palpate fit beam.toml --out found --resume   go on with an interrupted fit
+
+What is free, and where starts are drawn from, is said by [[fit.parameter]] in the scene. The folder gets result.json
+(format fit/1), model.toml (the scene with the values found), history.csv, report.html and journal.jsonl. Results that are
+already there are moved to previous-1, previous-2, … in the same folder. Ctrl-C stops after the current evaluation, writes the
+best so far (\"status\": \"interrupted\") and exits with 130.";
+
+/// Find the parameters that explain a recording
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene files; several are fitted together
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// Output folder [default: out/SCENE-fit]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What computes
+    #[arg(long, value_enum, default_value = "auto")]
+    backend: BackendName,
+    /// Number of starts [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    starts: Option<u64>,
+    /// Most iterations per start [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1_000_000))]
+    iterations: Option<u64>,
+    /// Optimiser [default: the scene's]
+    #[arg(long, value_enum, value_name = "NAME")]
+    optimizer: Option<OptimizerName>,
+    /// Seed of the starts [default: the scene's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Go on with the journal of an interrupted fit in the output folder
+    #[arg(long)]
+    resume: bool,
+    /// Threads; 0 = one per core [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=4096))]
+    threads: Option<u64>,
+    /// Pictures per scene in the report
+    #[arg(long, value_name = "N", default_value_t = 4, hide_short_help = true)]
+    pictures: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OptimizerName {
+    Rprop,
+    GradientDescent,
+    Lbfgs,
+    GaussNewton,
+    NelderMead,
+}
+
+impl From<OptimizerName> for Optimizer {
+    fn from(name: OptimizerName) -> Optimizer {
+        match name {
+            OptimizerName::Rprop => Optimizer::Rprop,
+            OptimizerName::GradientDescent => Optimizer::GradientDescent,
+            OptimizerName::Lbfgs => Optimizer::Lbfgs,
+            OptimizerName::GaussNewton => Optimizer::GaussNewton,
+            OptimizerName::NelderMead => Optimizer::NelderMead,
+        }
+    }
+}
+
+const JOURNAL: &str = "journal.jsonl";
+
+/// Moves the files of an earlier fit aside; a journal that is to be resumed stays. Returns where they went.
+fn keep_previous(folder: &Path, scenes: usize, resume: bool) -> Result<Option<PathBuf>, Error> {
+    let mut names = vec!["result.json".to_string(), "history.csv".into(), "report.html".into(), "model.toml".into()];
+    names.extend((1..=scenes.max(64)).map(|n| format!("model-{n}.toml")));
+    if !resume {
+        names.push(JOURNAL.into());
+    }
+    let there: Vec<&String> = names.iter().filter(|n| folder.join(n).exists()).collect();
+    if there.is_empty() {
+        return Ok(None);
+    }
+    let number = (1..).find(|n| !folder.join(format!("previous-{n}")).exists()).expect("some number is free");
+    let aside = folder.join(format!("previous-{number}"));
+    make_folder(&aside)?;
+    for n in there {
+        std::fs::rename(folder.join(n), aside.join(n)).map_err(|e| Error::write(&aside.join(n), e))?;
+    }
+    Ok(Some(aside))
+}
+
+/// The command line that gives the same result.
+fn command(a: &Arguments, fitted: &Fitted) -> String {
+    let quote = |p: &Path| {
+        let s = p.display().to_string();
+        if s.contains(|c: char| c.is_whitespace() || "'\"\\$`;&|<>()*?!#".contains(c)) {
+            format!("'{}'", s.replace('\'', "'\\''"))
+        } else {
+            s
+        }
+    };
+    let mut words = vec!["palpate fit".to_string()];
+    words.extend(a.scenes.iter().map(|s| quote(s)));
+    words.push(format!("--backend {}", fitted.backend));
+    let mut option = |name: &str, value: Option<String>| words.extend(value.map(|v| format!("--{name} {v}")));
+    option("starts", a.starts.map(|n| n.to_string()));
+    option("iterations", a.iterations.map(|n| n.to_string()));
+    let name = |o: OptimizerName| o.to_possible_value().map(|v| v.get_name().to_string());
+    option("optimizer", a.optimizer.and_then(name));
+    option("seed", a.seed.map(|n| n.to_string()));
+    words.join(" ")
+}
+
+/// Pictures of one scene before and after; a start that cannot be simulated has none.
+type Pair = (Vec<FramePicture>, Vec<FramePicture>);
+
+fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, count: usize, scale: f64) -> Result<Pair, Error> {
+    let start = &fitted.result.runs[0].start;
+    let mut theta = fitted.result.theta[s].clone();
+    let values: Vec<(String, f64)> = fitted
+        .free
+        .iter()
+        .zip(start)
+        .filter(|(n, _)| n.scene.is_none_or(|o| o == s))
+        .map(|(n, v)| (n.path.clone(), *v))
+        .collect();
+    for (path, value) in values {
+        crate::fitting::set(e, &mut theta, &path, value);
+    }
+    let before = pictures(e, backend, &theta, count, scale).unwrap_or_default();
+    Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale)?))
+}
+
+fn write_all(
+    a: &Arguments,
+    folder: &Path,
+    experiments: &[Experiment],
+    fitted: &Fitted,
+    backend: Backend,
+) -> Result<serde_json::Value, Error> {
+    let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
+    let result = result_json(fitted, experiments);
+    // Results first: a report that fails must not cost them.
+    text("result.json", &(serde_json::to_string_pretty(&result).map_err(|e| Error::write(folder, e))? + "\n"))?;
+    text("history.csv", &history_csv(fitted))?;
+    for (s, e) in experiments.iter().enumerate() {
+        let values = fitted.values_of(s, e);
+        let model = palpate_io::write_scene(e.text(), e.scene(), &values, folder)?;
+        let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
+        text(&name, &model)?;
+    }
+    let (rms, noise, _) = fitted.residual();
+    let scale = if rms.is_finite() { 2.0 * rms.max(noise) } else { noise.max(1e-3) };
+    // Whoever interrupts does not want to wait for pictures.
+    let count = if fitted.interrupted { 0 } else { a.pictures };
+    let pictures = experiments.iter().enumerate().map(|(s, e)| match count {
+        0 => Ok((Vec::new(), Vec::new())),
+        n => scene_pictures(e, fitted, s, backend, n, scale),
+    });
+    let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
+    let page = html(&ReportInput { fitted, experiments, pictures, scale, command: command(a, fitted) });
+    text("report.html", &page)?;
+    Ok(result)
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let (backend, note) = a.backend.choose()?;
+    let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
+    note.iter().for_each(|n| console.note(n));
+    let folder = out_folder(&a.out, &a.scenes[0], "-fit");
+    make_folder(&folder)?;
+    let journal = folder.join(JOURNAL);
+    if a.resume && !journal.exists() {
+        console.note(&format!("{}: there is no journal to go on with; the fit begins anew", journal.display()));
+    }
+    if let Some(aside) = keep_previous(&folder, experiments.len(), a.resume)? {
+        console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));
+    }
+
+    let spec = experiments[0].scene().fit.as_ref();
+    let iterations = a.iterations.unwrap_or(spec.map_or(0, |f| f.iterations as u64));
+    let starts = a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64));
+    let bar = console.progress(iterations * starts, "fitting");
+    let mut best = f64::INFINITY;
+    let mut hear = |p: &Progress| {
+        best = best.min(p.cost);
+        bar.inc(u64::from(p.iteration > 0));
+        bar.set_message(format!("best cost {best:.4}"));
+    };
+    let fitted = fit(
+        &experiments,
+        FitOptions {
+            backend,
+            optimizer: a.optimizer.map(Optimizer::from),
+            iterations: a.iterations.map(|n| n as usize),
+            starts: a.starts.map(|n| n as usize),
+            seed: a.seed,
+            threads: a.threads.map(|n| n as usize),
+            interrupt: console.interrupt.clone(),
+            journal: Some((journal, a.resume)),
+            on_iteration: Some(&mut hear),
+        },
+    )?;
+    bar.finish_and_clear();
+    let result = write_all(a, &folder, &experiments, &fitted, backend)?;
+    console.warn(&fitted.warnings);
+    if console.json() {
+        console.print(&result.to_string());
+    } else {
+        console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
+    }
+    Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
+}

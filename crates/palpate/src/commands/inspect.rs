@@ -1,0 +1,241 @@
+//! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
+
+use crate::cli::Console;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use clap::Args;
+use palpate_io::recording::{Recording, read_recording};
+use palpate_model::plan::Physics;
+use palpate_model::scene::{BodySource, Scene};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate inspect beam.toml
+  palpate inspect my-recording
+  palpate inspect beam.toml --json
+
+A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is simulated.";
+
+/// Show what a scene or recording holds, without computing anything
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene file, or folder (or recording.toml) of a recording
+    #[arg(value_name = "SCENE|RECORDING")]
+    path: PathBuf,
+}
+
+/// One line of the answer: key in JSON, label and text for people.
+struct Line {
+    key: &'static str,
+    label: &'static str,
+    value: Value,
+    text: String,
+}
+
+fn line(key: &'static str, label: &'static str, value: Value, text: impl Into<String>) -> Line {
+    Line { key, label, value, text: text.into() }
+}
+
+fn is_recording(path: &Path) -> bool {
+    let format = |text: String| text.lines().any(|l| l.trim_start().starts_with("format") && l.contains("recording/"));
+    path.is_dir() || std::fs::read_to_string(path).is_ok_and(format)
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let (kind, lines, warnings) = if is_recording(&a.path) {
+        let r = read_recording(&a.path)?;
+        ("recording", recording(&r), r.warnings)
+    } else {
+        let e = Experiment::open(&a.path)?;
+        let mut lines = scene(&e);
+        lines.extend(observed(&e));
+        ("scene", lines, e.warnings().to_vec())
+    };
+    if console.json() {
+        let mut map: Map<String, Value> = lines.into_iter().map(|l| (l.key.to_string(), l.value)).collect();
+        map.insert("format".into(), json!("inspection/1"));
+        map.insert("kind".into(), json!(kind));
+        map.insert("path".into(), json!(a.path.display().to_string()));
+        map.insert("warnings".into(), json!(warnings));
+        console.print(&Value::Object(map).to_string());
+        return Ok(0);
+    }
+    let width = lines.iter().map(|l| l.label.len()).max().unwrap_or(0);
+    let mut text = format!("{kind} {}", a.path.display());
+    for l in lines {
+        text += &format!("\n  {:width$}  {}", l.label, l.text);
+    }
+    for w in &warnings {
+        text += &format!("\n  warning: {w}");
+    }
+    console.print(&text);
+    Ok(0)
+}
+
+/// Edges of a mesh that belong to one triangle only, or to more than two.
+fn open_edges(scene: &Scene) -> Option<usize> {
+    let BodySource::Mesh { mesh, .. } = &scene.object.source else { return None };
+    let mut edges: Vec<[u32; 2]> =
+        mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    Some(edges.chunk_by(|a, b| a == b).filter(|c| c.len() != 2).count())
+}
+
+fn megabytes(bytes: f64) -> String {
+    if bytes < 1e6 { format!("{:.0} kB", bytes / 1e3) } else { format!("{:.1} MB", bytes / 1e6) }
+}
+
+fn scene(e: &Experiment) -> Vec<Line> {
+    let (scene, plan) = (e.scene(), e.plan());
+    let body = &plan.body;
+    let physics = Physics::new(&plan.layout, &plan.theta);
+    let (min, max) = e.shape().bounds();
+    let size = max - min;
+    let full = body.cells.iter().filter(|c| c.is_full()).count();
+    let cut = body.cells.len() - full;
+    let nodes = body.nodes.len();
+    let mass = physics.density * body.volume;
+    let (steps, time) = (plan.clock.steps, &scene.time);
+    // A state is displacement and velocity in double precision; a gradient keeps one per step.
+    let state = 48.0 * nodes as f64;
+    let tape = state * (steps + 1) as f64;
+    let mut lines = vec![
+        line("title", "title", json!(scene.title), scene.title.clone()),
+        line("size", "size", json!(size.to_array()), format!("{:.4} × {:.4} × {:.4} m", size.x, size.y, size.z)),
+        line("volume", "volume", json!(body.volume), format!("{:.6e} m³", body.volume)),
+        line("area", "surface", json!(body.area), format!("{:.6e} m²", body.area)),
+        line("mass", "mass", json!(mass), format!("{mass:.6} kg ({:.1} kg/m³)", physics.density)),
+    ];
+    if let Some(open) = open_edges(scene) {
+        let text = if open == 0 { "0 (closed)".to_string() } else { format!("{open} (not closed)") };
+        lines.push(line("open_edges", "open edges", json!(open), text));
+    }
+    lines.extend([
+        line("cell_size", "cell size", json!(body.grid.h), format!("{:.5} m", body.grid.h)),
+        line(
+            "cells",
+            "cells",
+            json!({ "all": body.cells.len(), "full": full, "cut": cut }),
+            format!("{} ({full} full, {cut} cut)", body.cells.len()),
+        ),
+        line("nodes", "nodes", json!(nodes), format!("{nodes} ({} degrees of freedom)", 3 * nodes)),
+        line("degrees_of_freedom", "degrees of freedom", json!(3 * nodes), format!("{}", 3 * nodes)),
+        line(
+            "band_cells",
+            "band cells",
+            json!(body.band.cells.len()),
+            format!("{} of {:.4} m", body.band.cells.len(), plan.band),
+        ),
+        line(
+            "constraints",
+            "world",
+            json!({ "clamps": plan.clamps.len(), "planes": plan.planes.len(), "masses": plan.masses.len() }),
+            format!("{} clamps, {} planes, {} point masses", plan.clamps.len(), plan.planes.len(), plan.masses.len()),
+        ),
+        line(
+            "time",
+            "time",
+            json!({ "step": time.step, "steps": steps, "start": time.start, "end": e.end_time() }),
+            if steps == 0 {
+                "static".to_string()
+            } else {
+                format!("{steps} steps of {} s, from {} s to {:.4} s", time.step, time.start, e.end_time())
+            },
+        ),
+        line("memory", "tape", json!(tape), format!("{} for one gradient of one start", megabytes(tape))),
+    ]);
+    lines.retain(|l| l.key != "title" || !l.text.is_empty());
+    lines
+}
+
+/// What is compared and what is free.
+fn observed(e: &Experiment) -> Vec<Line> {
+    let mut lines = Vec::new();
+    let o = &e.plan().observation;
+    if let (Some(first), Some(last)) = (o.frames.first(), o.frames.last()) {
+        let points: Vec<usize> = o.frames.iter().map(|f| f.points.len()).collect();
+        let markers: usize = o.frames.iter().map(|f| f.markers.len()).sum();
+        let (low, high) = (points.iter().min().copied().unwrap_or(0), points.iter().max().copied().unwrap_or(0));
+        let total: usize = points.iter().sum();
+        lines.push(line(
+            "observation",
+            "observed",
+            json!({ "frames": o.frames.len(), "from": first.time, "to": last.time, "cameras": o.cameras.len(), "points": total,
+                    "points_per_frame": [low, high], "marker_readings": markers, "markers": o.markers.len(),
+                    "depth_noise": o.depth_noise, "marker_noise": o.marker_noise, "overlap": true }),
+            format!(
+                "{} frames from {:.4} s to {:.4} s, {} cameras, {low} to {high} depth points a frame, {} markers ({markers} readings); \
+                 noise {:.2} mm (depth), {:.2} mm (markers); lies around the object",
+                o.frames.len(),
+                first.time,
+                last.time,
+                o.cameras.len(),
+                o.markers.len(),
+                o.depth_noise * 1e3,
+                o.marker_noise * 1e3
+            ),
+        ));
+    }
+    if let Some(fit) = &e.scene().fit {
+        let paths: Vec<&str> = fit.parameters.iter().map(|p| p.path.as_str()).collect();
+        let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
+        lines.push(line("free", "to be found", json!(paths), text));
+    }
+    lines
+}
+
+fn recording(r: &Recording) -> Vec<Line> {
+    let mut lines = vec![line("title", "title", json!(r.title), r.title.clone())];
+    for c in &r.cameras {
+        let noise = c.noise_sigma.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
+        lines.push(line(
+            "cameras",
+            "camera",
+            json!(
+                r.cameras
+                    .iter()
+                    .map(|c| json!({ "name": c.name, "width": c.width, "height": c.height, "noise": c.noise_sigma,
+                "systematic": c.noise_systematic, "position": c.position().to_array() }))
+                    .collect::<Vec<_>>()
+            ),
+            format!("{} {} × {} pixels, noise {noise}, at {:.3}", c.name, c.width, c.height, c.position()),
+        ));
+    }
+    let readings: Vec<usize> = r.frames.iter().map(|f| f.readings().count()).collect();
+    if let (Some(first), Some(last)) = (r.frames.first(), r.frames.last()) {
+        let (low, high) = (readings.iter().min().copied().unwrap_or(0), readings.iter().max().copied().unwrap_or(0));
+        lines.push(line(
+            "frames",
+            "images",
+            json!({ "count": r.frames.len(), "from": first.time, "to": last.time, "readings": readings.iter().sum::<usize>(),
+                    "readings_per_image": [low, high] }),
+            format!(
+                "{} from {:.4} s to {:.4} s, {low} to {high} readings of the object each",
+                r.frames.len(),
+                first.time,
+                last.time
+            ),
+        ));
+    }
+    if let Some(m) = &r.markers {
+        let (from, to) = (m.samples.first().map_or(f64::NAN, |s| s.time), m.samples.last().map_or(f64::NAN, |s| s.time));
+        let noise = m.noise_sigma.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
+        lines.push(line(
+            "markers",
+            "markers",
+            json!({ "names": m.names, "readings": m.samples.len(), "from": from, "to": to, "noise": m.noise_sigma,
+                    "rest_places": m.rest.len() }),
+            format!(
+                "{} markers, {} readings from {from:.4} s to {to:.4} s, noise {noise}, {} with a rest place",
+                m.names.len(),
+                m.samples.len(),
+                m.rest.len()
+            ),
+        ));
+    }
+    lines.retain(|l| l.key != "title" || !l.text.is_empty());
+    lines
+}

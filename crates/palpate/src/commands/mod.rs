@@ -1,0 +1,6 @@
+//! One file a command.
+
+pub mod fit;
+pub mod inspect;
+pub mod observe;
+pub mod simulate;

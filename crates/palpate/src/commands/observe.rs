@@ -1,0 +1,209 @@
+//! `palpate observe`: a synthetic recording of a scene.
+
+use crate::cli::Console;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::options::BackendName;
+use crate::render::{Pinhole, Sensor};
+use crate::synthetic::{Observers, observe};
+use clap::Args;
+use glam::DVec3;
+use palpate_io::InputError;
+use std::path::{Path, PathBuf};
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate observe ball.toml --camera \"eye=0.5,-0.5,0.4 target=0,0,0.1 size=320x240\" --noise 0.002 --seed 3 --out ball-seen
+  palpate observe beam.toml --markers tips.csv --noise 0.0003 --fps 100 --out beam-seen
+  palpate observe ball.toml --camera \"eye=1,0,1 target=0,0,0\" --refine 2 --out truth
+
+A camera is written as key=value words: eye=x,y,z and target=x,y,z (metres) are needed; up=x,y,z (default 0,0,1),
+fov=DEGREES (vertical, default 45), size=WIDTHxHEIGHT (default 640x480) and name=LABEL may follow.
+A marker file has the header name,x,y,z and one surface point of the rest configuration per line.
+With --refine R the simulation that is recorded has cells and time step divided by R, so that a fit on the scene's own grid
+cannot profit from sharing its errors.";
+
+/// Record a simulation as depth cameras or motion capture would
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene file
+    scene: PathBuf,
+    /// A depth camera, like "eye=1,0,1 target=0,0,0 fov=45 size=640x480"; repeatable
+    #[arg(long, value_name = "CAMERA")]
+    camera: Vec<String>,
+    /// File of tracked surface points (CSV with the header name,x,y,z)
+    #[arg(long, value_name = "FILE")]
+    markers: Option<PathBuf>,
+    /// Folder of the recording
+    #[arg(long, value_name = "RECORDING")]
+    out: PathBuf,
+    /// Standard deviation of a depth reading along the camera's axis, and of a marker coordinate [m]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    noise: f64,
+    /// Share of readings that are missing, 0 to 1
+    #[arg(long, value_name = "F", default_value_t = 0.0)]
+    dropout: f64,
+    /// Metres per count of a depth image
+    #[arg(long, alias = "quantisation", value_name = "S", default_value_t = 0.001)]
+    depth_scale: f64,
+    /// Frames per second [default: one frame per time step of the scene]
+    #[arg(long, value_name = "F", conflicts_with = "times")]
+    fps: Option<f64>,
+    /// Times of the frames on the recording's clock [s], separated by commas
+    #[arg(long, value_name = "T,…", value_delimiter = ',', allow_negative_numbers = true)]
+    times: Option<Vec<f64>>,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Divide cells and time step of the recorded simulation by this
+    #[arg(long, value_name = "R", default_value_t = 1.0)]
+    refine: f64,
+    /// What computes
+    #[arg(long, value_enum, default_value = "auto")]
+    backend: BackendName,
+    /// Overwrite a recording that is already there
+    #[arg(long)]
+    force: bool,
+}
+
+fn check(a: &Arguments) -> Result<(), Error> {
+    let wrong = |option: &str, value: f64, allowed: &str| Err(Error::Input(format!("--{option} {value}: must be {allowed}")));
+    if a.camera.is_empty() && a.markers.is_none() {
+        return Err(Error::Input("nothing observes: give --camera \"eye=x,y,z target=x,y,z\" or --markers FILE".into()));
+    }
+    if !(a.noise >= 0.0 && a.noise.is_finite()) {
+        return wrong("noise", a.noise, "≥ 0 (m)");
+    }
+    if !(0.0..1.0).contains(&a.dropout) {
+        return wrong("dropout", a.dropout, "in [0, 1)");
+    }
+    if !(a.depth_scale > 0.0 && a.depth_scale.is_finite()) {
+        return wrong("depth-scale", a.depth_scale, "> 0 (m per count)");
+    }
+    if !(a.refine > 0.0 && a.refine <= 16.0) {
+        return wrong("refine", a.refine, "> 0 and at most 16");
+    }
+    if let Some(fps) = a.fps
+        && !(fps > 0.0 && fps <= 1e6)
+    {
+        return wrong("fps", fps, "> 0 and at most 1000000 (1/s)");
+    }
+    Ok(())
+}
+
+fn cameras(texts: &[String]) -> Result<Vec<Pinhole>, Error> {
+    let mut cameras: Vec<Pinhole> = Vec::new();
+    for (i, text) in texts.iter().enumerate() {
+        let mut camera: Pinhole = text.parse().map_err(|e| Error::Input(format!("--camera \"{text}\": {e}")))?;
+        if !text.split_whitespace().any(|w| w.starts_with("name=")) {
+            camera.name = format!("cam{i}");
+        }
+        if cameras.iter().any(|c| c.name == camera.name) {
+            return Err(Error::Input(format!("--camera \"{text}\": another camera is already named {}", camera.name)));
+        }
+        cameras.push(camera);
+    }
+    Ok(cameras)
+}
+
+fn times(a: &Arguments, experiment: &Experiment) -> Result<Vec<f64>, Error> {
+    let time = &experiment.scene().time;
+    let count = |step: f64| ((experiment.end_time() - time.start) / step + 1e-9).floor() as usize;
+    let evenly = |step: f64| (0..=count(step)).map(|k| time.start + k as f64 * step).collect();
+    if let Some(times) = &a.times {
+        if times.is_empty() || !times.windows(2).all(|w| w[0] < w[1]) || times.iter().any(|t| !t.is_finite()) {
+            return Err(Error::Input("--times: give increasing times in seconds, separated by commas".into()));
+        }
+        return Ok(times.clone());
+    }
+    let times: Vec<f64> = a.fps.map_or_else(|| evenly(time.step), |fps| evenly(1.0 / fps));
+    if times.len() > 1_000_000 {
+        return Err(Error::Input(format!("{} frames are too many; give --fps or --times", times.len())));
+    }
+    Ok(times)
+}
+
+/// Tracked points of a CSV file, each checked to lie on the surface.
+fn markers(path: &Path, experiment: &Experiment) -> Result<Vec<(String, DVec3)>, Error> {
+    let open = |e: csv::Error| InputError::file(path, format!("cannot be read: {e}"));
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(open)?;
+    if reader.headers().map_err(open)? != vec!["name", "x", "y", "z"] {
+        return Err(InputError::line(path, 1, "the header must be name,x,y,z").into());
+    }
+    let allowed = 2.0 * experiment.plan().body.grid.h;
+    let mut markers: Vec<(String, DVec3)> = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(open)?;
+        let line = row.position().map_or(0, |p| p.line() as usize);
+        let wrong = |message: String| Error::from(InputError::line(path, line, message));
+        let number = |i: usize| row.get(i).and_then(|s| s.parse::<f64>().ok()).filter(|x| x.is_finite());
+        let (Some(x), Some(y), Some(z)) = (number(1), number(2), number(3)) else {
+            return Err(wrong("x, y and z must be numbers (m)".into()));
+        };
+        let (name, p) = (row.get(0).unwrap_or_default().to_string(), DVec3::new(x, y, z));
+        if name.is_empty() || markers.iter().any(|m| m.0 == name) {
+            return Err(wrong(format!("name \"{name}\" must be there and not be used twice")));
+        }
+        let away = experiment.shape().signed_distance(p);
+        if away.abs() > allowed {
+            return Err(wrong(format!(
+                "{name} lies {:.4} m away from the surface; allowed are {allowed:.4} m (two cells)",
+                away.abs()
+            )));
+        }
+        markers.push((name, p));
+    }
+    if markers.is_empty() {
+        return Err(InputError::file(path, "holds no marker").into());
+    }
+    Ok(markers)
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    check(a)?;
+    let (backend, note) = a.backend.choose()?;
+    let cameras = cameras(&a.camera)?;
+    if a.out.join("recording.toml").exists() && !a.force {
+        return Err(Error::Input(format!("--out {}: a recording is already there; add --force to replace it", a.out.display())));
+    }
+    let coarse = Experiment::open_without_recording(&a.scene)?;
+    console.warn(coarse.warnings());
+    note.iter().for_each(|n| console.note(n));
+    let observers = Observers {
+        cameras,
+        markers: a.markers.as_deref().map_or(Ok(Vec::new()), |p| markers(p, &coarse))?,
+        // The scene's own steps: the same frames whatever the refinement.
+        times: times(a, &coarse)?,
+        sensor: Sensor { noise: a.noise, dropout: a.dropout, depth_scale: a.depth_scale, seed: a.seed },
+    };
+    let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
+    let bar = console.progress(1000, "observing");
+    let recording = observe(&experiment, backend, &observers, |share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    palpate_io::write_recording(&a.out, &recording)?;
+
+    let readings: usize = recording.frames.iter().map(|f| f.readings().count()).sum();
+    let samples = recording.markers.as_ref().map_or(0, |m| m.samples.len());
+    if console.json() {
+        let json = serde_json::json!({
+            "format": "observation/1",
+            "recording": a.out.display().to_string(),
+            "backend": backend.resolved(),
+            "cameras": recording.cameras.len(),
+            "frames": observers.times.len(),
+            "images": recording.frames.len(),
+            "depth_readings": readings,
+            "marker_readings": samples,
+        });
+        console.print(&json.to_string());
+    } else {
+        console.print(&format!(
+            "{}: {} times, {} images with {readings} depth readings, {samples} marker readings",
+            a.out.display(),
+            observers.times.len(),
+            recording.frames.len()
+        ));
+    }
+    Ok(0)
+}

@@ -1,0 +1,208 @@
+//! `palpate simulate`: a scene's motion as files.
+
+use crate::cli::{Console, INTERRUPTED};
+use crate::embed::Embedding;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::options::{BackendName, out_folder};
+use crate::render::{Pinhole, shade};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use palpate_engine::Snapshot;
+use palpate_io::output::{make_folder, write_file};
+use palpate_model::shape::TriMesh;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate simulate beam.toml                           a surface mesh (OBJ) per frame in out/beam/
+  palpate simulate beam.toml --format vtu,png --every 5
+  palpate simulate found/model.toml --out frames       what a fit has found, simulated again
+
+obj, ply: the deformed surface; vtu: the cells with displacement and velocity, and a .pvd for the whole series;
+png: shaded pictures. The scene's recording is not read.";
+
+/// Simulate a scene and write its motion
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene file
+    scene: PathBuf,
+    /// Output folder [default: out/SCENE]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What computes
+    #[arg(long, value_enum, default_value = "auto")]
+    backend: BackendName,
+    /// What to write, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "obj")]
+    format: Vec<Format>,
+    /// Write every N-th state
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    every: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Obj,
+    Ply,
+    Vtu,
+    Png,
+}
+
+/// Writes frames of one simulation.
+struct Writer<'a> {
+    experiment: &'a Experiment,
+    folder: PathBuf,
+    formats: Vec<Format>,
+    surface: Embedding,
+    triangles: Vec<[u32; 3]>,
+    hexes: Vec<[u32; 8]>,
+    camera: Pinhole,
+    series: Vec<(f64, String)>,
+    files: usize,
+}
+
+impl Writer<'_> {
+    fn write(&mut self, number: usize, state: &Snapshot) -> Result<(), Error> {
+        let file = |ending: &str| self.folder.join(format!("frame_{number:05}.{ending}"));
+        let vertices = self.surface.deform(&state.displacement);
+        let time = self.experiment.scene().time.start + state.time;
+        for format in self.formats.clone() {
+            match format {
+                Format::Obj | Format::Ply => {
+                    let mesh = TriMesh { vertices: vertices.clone(), triangles: self.triangles.clone() };
+                    match format {
+                        Format::Obj => palpate_io::write_obj(file("obj"), &mesh)?,
+                        _ => palpate_io::write_ply(file("ply"), &mesh)?,
+                    }
+                }
+                Format::Vtu => {
+                    let body = &self.experiment.plan().body;
+                    let points: Vec<DVec3> = body.nodes.iter().zip(&state.displacement).map(|(x, u)| *x + *u).collect();
+                    let fractions: Vec<f64> = body.cells.iter().map(|c| c.fraction).collect();
+                    palpate_io::write_vtu(
+                        file("vtu"),
+                        &points,
+                        &self.hexes,
+                        &[("displacement", &state.displacement), ("velocity", &state.velocity)],
+                        &[("fraction", &fractions)],
+                    )?;
+                    self.series.push((time, format!("frame_{number:05}.vtu")));
+                }
+                Format::Png => {
+                    let blue = |_| DVec3::new(0.45, 0.62, 0.85);
+                    let picture = shade(&self.camera, &vertices, &self.triangles, self.experiment.up(), blue);
+                    write_file(file("png"), |w| w.write_all(&picture.png()))?;
+                }
+            }
+            self.files += 1;
+        }
+        Ok(())
+    }
+}
+
+/// The box that the surface moves in, looked at over a whole simulation, would need two runs: a box twice as large as the body
+/// around where free fall carries it is enough for a picture.
+fn camera(experiment: &Experiment, states: &[(DVec3, DVec3)]) -> Pinhole {
+    let (lo, hi) = states.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
+    Pinhole::framing(lo, hi, experiment.up(), 640, 480)
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let (backend, note) = a.backend.choose()?;
+    let experiment = Experiment::open_without_recording(&a.scene)?;
+    console.warn(experiment.warnings());
+    note.iter().for_each(|n| console.note(n));
+    let folder = out_folder(&a.out, &a.scene, "");
+    make_folder(&folder)?;
+    let clock = Instant::now();
+    let plan = experiment.plan();
+    let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+    let keep = |k: usize| k as u64 % a.every == 0 || k == plan.clock.steps;
+
+    // States first, files afterwards: the pictures' camera frames the whole motion.
+    let bar = console.progress(plan.clock.steps as u64, "simulating");
+    let mut states: Vec<(usize, Snapshot)> = Vec::new();
+    let mut farthest: f64 = 0.0;
+    let mut extent: Vec<(DVec3, DVec3)> = Vec::new();
+    backend.visit(plan, &plan.theta, |k, s, _| {
+        farthest = s.displacement.iter().map(|u| u.length()).fold(farthest, f64::max);
+        if keep(k) {
+            let points = surface.deform(&s.displacement);
+            extent.push(points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p))));
+            states.push((k, s));
+        }
+        bar.set_position(k as u64);
+    })?;
+    bar.finish_and_clear();
+    let seconds = clock.elapsed().as_secs_f64();
+
+    let mut formats = a.format.clone();
+    formats.dedup();
+    let mut writer = Writer {
+        camera: camera(&experiment, &extent),
+        hexes: plan.body.cells.iter().map(|c| c.nodes).collect(),
+        experiment: &experiment,
+        folder: folder.clone(),
+        formats,
+        surface,
+        triangles,
+        series: Vec::new(),
+        files: 0,
+    };
+    let bar = console.progress(states.len() as u64, "writing");
+    let mut written = 0;
+    for (k, state) in &states {
+        if console.interrupt.is_raised() {
+            break;
+        }
+        writer.write(*k, state)?;
+        written += 1;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if !writer.series.is_empty() {
+        palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
+    }
+    report(console, &experiment, &folder, backend.resolved(), seconds, farthest, written, writer.files);
+    Ok(if written < states.len() { INTERRUPTED } else { 0 })
+}
+
+fn report(
+    console: &mut Console,
+    experiment: &Experiment,
+    folder: &Path,
+    backend: &str,
+    seconds: f64,
+    farthest: f64,
+    frames: usize,
+    files: usize,
+) {
+    let plan = experiment.plan();
+    if console.json() {
+        let json = serde_json::json!({
+            "format": "simulation/1",
+            "scene": experiment.scene().path.display().to_string(),
+            "backend": backend,
+            "steps": plan.clock.steps,
+            "nodes": plan.body.nodes.len(),
+            "frames": frames,
+            "files": files,
+            "out": folder.display().to_string(),
+            "largest_displacement": farthest,
+            "seconds": seconds,
+        });
+        console.print(&json.to_string());
+    } else {
+        console.print(&format!(
+            "{}: {} steps of {} nodes in {seconds:.2} s ({backend}), largest displacement {:.4} m; {files} files in {}",
+            experiment.scene().path.display(),
+            plan.clock.steps,
+            plan.body.nodes.len(),
+            farthest,
+            folder.display()
+        ));
+    }
+}

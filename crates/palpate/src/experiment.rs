@@ -1,0 +1,227 @@
+//! A scene and its recording, ready to be simulated, compared and fitted.
+
+use crate::embed::Embedding;
+use crate::engine::Backend;
+use crate::error::Error;
+use crate::fitting::{self, FitOptions, Fitted};
+use crate::residuals::ResidualSummary;
+use glam::DVec3;
+use palpate_engine::Snapshot;
+use palpate_io::recording::Recording;
+use palpate_io::{check_overlap, parse_scene, read_recording, read_scene};
+use palpate_model::observation::Observation;
+use palpate_model::plan::Plan;
+use palpate_model::plan_build::build_plan;
+use palpate_model::scene::Scene;
+use palpate_model::shape::{Shape, TriMesh, shape_of};
+use std::path::Path;
+use std::sync::Arc;
+
+/// One scene, its recording where it names one, and the plan made of both.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    scene: Scene,
+    text: String,
+    recording: Option<Arc<Recording>>,
+    shape: Arc<dyn Shape>,
+    plan: Plan,
+    warnings: Vec<String>,
+}
+
+/// All states of one simulation.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    /// The states, the initial one first; times count from it.
+    pub snapshots: Vec<Snapshot>,
+    /// The rest surface, carried by the nodes.
+    pub surface: Embedding,
+    /// Triangles of the surface.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Simulation {
+    /// The deformed surface of a state.
+    pub fn mesh(&self, state: usize) -> TriMesh {
+        TriMesh { vertices: self.surface.deform(&self.snapshots[state].displacement), triangles: self.triangles.clone() }
+    }
+}
+
+impl Experiment {
+    /// Reads a scene file and, where it has an `[observation]`, its recording.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
+    pub fn open(path: impl AsRef<Path>) -> Result<Experiment, Error> {
+        let loaded = read_scene(&path)?;
+        let text = read_text(path.as_ref())?;
+        Experiment::new(loaded.value, text, loaded.warnings)
+    }
+
+    /// Reads a scene file and leaves its recording alone, which need not exist: enough to simulate.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the first thing that is wrong with a file.
+    pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
+        let loaded = read_scene(&path)?;
+        let text = read_text(path.as_ref())?;
+        let scene = Scene { observation: None, ..loaded.value };
+        Experiment::new(scene, text, loaded.warnings)
+    }
+
+    /// A scene given as text; relative paths in it start from the folder of `path`.
+    ///
+    /// # Errors
+    /// As [`Experiment::open`].
+    pub fn from_toml(text: &str, path: impl AsRef<Path>) -> Result<Experiment, Error> {
+        let loaded = parse_scene(text, path)?;
+        Experiment::new(loaded.value, text.to_string(), loaded.warnings)
+    }
+
+    /// An experiment of a scene built in code; `text` is its file's text, or empty when there is none.
+    ///
+    /// # Errors
+    /// As [`Experiment::open`].
+    pub fn new(scene: Scene, text: String, mut warnings: Vec<String>) -> Result<Experiment, Error> {
+        let input = |e: &dyn std::fmt::Display| Error::Input(format!("{}: {e}", scene.path.display()));
+        let shape = shape_of(&scene.object);
+        let mut recording = None;
+        let (mut observation, mut rest) = (nothing_observed(), Vec::new());
+        if let Some(spec) = &scene.observation {
+            let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
+            let read = read_recording(place)?;
+            warnings.extend(read.warnings.iter().cloned());
+            (observation, rest) = read.observation(spec, &mut warnings)?;
+            let (min, max) = shape.bounds();
+            check_overlap(&observation, min, max).map_err(|e| input(&e))?;
+            recording = Some(Arc::new(read));
+        }
+        let plan = build_plan(&scene, observation, &rest).map_err(|e| input(&e))?;
+        let mut experiment = Experiment { scene, text, recording, shape, plan, warnings };
+        experiment.check_times();
+        Ok(experiment)
+    }
+
+    /// Frames outside the simulated time are compared with a state that is held; that deserves a word.
+    fn check_times(&mut self) {
+        let frames = &self.plan.observation.frames;
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return };
+        if self.plan.clock.steps == 0 {
+            return;
+        }
+        let (from, to) = (self.scene.time.start, self.end_time());
+        // Times in files are rounded to microseconds.
+        let slack = 1e-6 * (1.0 + to.abs());
+        let outside = frames.iter().filter(|f| f.time < from - slack || f.time > to + slack).count();
+        let fits_start = self.scene.fit.iter().flat_map(|f| &f.parameters).any(|p| p.path == "time.start");
+        if outside > 0 && !fits_start {
+            self.warnings.push(format!(
+                "{}: {outside} of {} frames ({:.4} s to {:.4} s) lie outside the simulated time ({from:.4} s to {to:.4} s) and are \
+                 compared with its first or last state; adapt [observation] frames or [time]",
+                self.scene.path.display(),
+                frames.len(),
+                first.time,
+                last.time
+            ));
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene file's text; empty for a scene built in code.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The recording, where the scene names one.
+    pub fn recording(&self) -> Option<&Recording> {
+        self.recording.as_deref()
+    }
+
+    /// The rest shape.
+    pub fn shape(&self) -> &dyn Shape {
+        self.shape.as_ref()
+    }
+
+    /// What a backend gets.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// What looked suspicious without being wrong, one line each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Time of the last state on the recording's clock [s].
+    pub fn end_time(&self) -> f64 {
+        self.scene.time.start + self.scene.time.step * self.scene.time.steps as f64
+    }
+
+    /// The rest surface with edges about `edge` [m], carried by the simulation's nodes, and its triangles. The edge is made
+    /// longer where it would give more than some 150 000 triangles.
+    pub fn surface(&self, edge: f64) -> (Embedding, Vec<[u32; 3]>) {
+        // Triangles of edge e have about 0.4 e² of area.
+        let edge = edge.max((self.plan.body.area / (0.4 * 150_000.0)).sqrt());
+        let mesh = self.shape.surface(edge);
+        (Embedding::new(&self.plan.body, mesh.vertices), mesh.triangles)
+    }
+
+    /// Simulates with the scene's own values and keeps every state.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the simulation fails: what happened, when, and what may help.
+    pub fn simulate(&self, backend: Backend) -> Result<Simulation, Error> {
+        let mut snapshots = Vec::new();
+        backend.visit(&self.plan, &self.plan.theta, |_, s, _| snapshots.push(s))?;
+        let (surface, triangles) = self.surface(0.5 * self.plan.body.grid.h);
+        Ok(Simulation { snapshots, surface, triangles })
+    }
+
+    /// How far the measurement lies from a simulation with parameters θ `[P]`.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when the simulation fails.
+    pub fn residuals(&self, backend: Backend, theta: &[f64]) -> Result<ResidualSummary, Error> {
+        ResidualSummary::new(self, backend, theta)
+    }
+
+    /// Finds the free parameters of the scene's `[fit]` table.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when there is nothing to fit or to compare with, [`Error::Failed`] when no start can be computed.
+    pub fn fit(&self, options: FitOptions) -> Result<Fitted, Error> {
+        fitting::fit(std::slice::from_ref(self), options)
+    }
+
+    /// The same experiment with cells and time step divided by `factor`, and without its recording.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the finer grid cannot be built.
+    pub fn refined(&self, factor: f64) -> Result<Experiment, Error> {
+        let mut scene = Scene { observation: None, ..self.scene.clone() };
+        scene.object.resolution = palpate_model::scene::Resolution::CellSize(self.plan.body.grid.h / factor);
+        let steps = (scene.time.steps as f64 * factor).round() as usize;
+        if steps > 0 {
+            scene.time.step *= scene.time.steps as f64 / steps as f64;
+            scene.time.steps = steps;
+        }
+        Experiment::new(scene, self.text.clone(), Vec::new())
+    }
+
+    /// Up in the world: against gravity, z without it.
+    pub fn up(&self) -> DVec3 {
+        (-self.scene.gravity).try_normalize().unwrap_or(DVec3::Z)
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))
+}
+
+/// An observation without frames; the noises are never used and only keep divisions harmless.
+fn nothing_observed() -> Observation {
+    Observation { depth_noise: 1e-3, marker_noise: 1e-3, displacement_noise: 1e-3, ..Observation::default() }
+}

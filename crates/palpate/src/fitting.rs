@@ -1,0 +1,378 @@
+//! From experiments to a fit: free parameters, shared or not, batches, and the residual before and after.
+
+use crate::engine::{Backend, with_threads};
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::interrupt::Interrupt;
+use crate::residuals::ResidualSummary;
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
+use palpate_fit::{
+    ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot,
+};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::{FitSpec, Optimizer};
+use std::path::PathBuf;
+
+/// Memory that the tapes or tangents of one batch may take together [bytes].
+const BATCH_MEMORY: f64 = 2e9;
+
+/// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
+#[derive(Default)]
+pub struct FitOptions<'a> {
+    /// What computes the physics.
+    pub backend: Backend,
+    /// Optimiser.
+    pub optimizer: Option<Optimizer>,
+    /// Most iterations per start.
+    pub iterations: Option<usize>,
+    /// Number of starts.
+    pub starts: Option<usize>,
+    /// Seed of the starts.
+    pub seed: Option<u64>,
+    /// Threads; 0 = one per core.
+    pub threads: Option<usize>,
+    /// Stops the fit in good order.
+    pub interrupt: Interrupt,
+    /// Journal of evaluations, and whether to go on with what it holds.
+    pub journal: Option<(PathBuf, bool)>,
+    /// Hears of every iteration of every start.
+    pub on_iteration: Option<&'a mut (dyn FnMut(&Progress) + Send)>,
+}
+
+/// One free number of a fit over one or several scenes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeNumber {
+    /// Path in the scene file.
+    pub path: String,
+    /// The scene it belongs to; `None` when all scenes that name it share it.
+    pub scene: Option<usize>,
+}
+
+impl FreeNumber {
+    /// Path, with the number of its scene (from 1) where it is not shared.
+    pub fn label(&self) -> String {
+        self.scene.map_or_else(|| self.path.clone(), |s| format!("{} [scene {}]", self.path, s + 1))
+    }
+}
+
+/// A finished (or interrupted) fit.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Name of the backend used.
+    pub backend: &'static str,
+    /// The free numbers, in the order of `result.parameters`.
+    pub free: Vec<FreeNumber>,
+    /// Optimiser used.
+    pub optimizer: Optimizer,
+    /// What the fit found.
+    pub result: FitResult,
+    /// Every iteration of every start, by start and iteration.
+    pub history: Vec<Progress>,
+    /// Residuals at the first start, scene by scene; `None` where it cannot be computed.
+    pub before: Vec<Option<ResidualSummary>>,
+    /// Residuals at the best point, scene by scene.
+    pub after: Vec<ResidualSummary>,
+    /// True when the fit was stopped before its end.
+    pub interrupted: bool,
+    /// What deserves attention: from the files, from the fit, from the residuals.
+    pub warnings: Vec<String>,
+}
+
+/// Several scenes as one: root mean square over all points.
+pub(crate) fn total(parts: &[ResidualSummary], value: impl Fn(&ResidualSummary) -> f64) -> f64 {
+    let n: usize = parts.iter().map(|r| r.points).sum();
+    let squares: f64 = parts.iter().filter(|r| r.points > 0).map(|r| value(r).powi(2) * r.points as f64).sum();
+    (squares / n as f64).sqrt()
+}
+
+impl Fitted {
+    /// Values of a scene's free numbers by their path in its file.
+    pub fn values_of(&self, scene: usize, experiment: &Experiment) -> Vec<(String, f64)> {
+        let own = |n: &FreeNumber| n.scene.is_none_or(|s| s == scene);
+        let named = |n: &FreeNumber| specs(experiment).is_some_and(|f| f.parameters.iter().any(|p| p.path == n.path));
+        let all = self.free.iter().zip(&self.result.parameters);
+        all.filter(|(n, _)| own(n) && named(n)).map(|(n, p)| (n.path.clone(), p.value)).collect()
+    }
+
+    /// Root mean square distance [m] and what noise alone would leave [m], over all scenes; and the number of points.
+    pub fn residual(&self) -> (f64, f64, usize) {
+        let points = self.after.iter().map(|r| r.points).sum();
+        (total(&self.after, |r| r.rms), total(&self.after, |r| r.noise), points)
+    }
+}
+
+fn specs(experiment: &Experiment) -> Option<&FitSpec> {
+    experiment.scene().fit.as_ref()
+}
+
+/// Fits the free parameters of one or several experiments. A path named free in several scenes is shared by them unless it says
+/// `per_scene = true`; where it is shared, start and bounds must agree.
+///
+/// # Errors
+/// [`Error::Input`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
+/// [`Error::Failed`] when no start can be computed.
+pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
+    let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
+    for e in experiments {
+        let name = e.scene().path.display();
+        if specs(e).is_none_or(|f| f.parameters.is_empty()) {
+            return Err(Error::Input(format!(
+                "{name}: fit.parameter is missing; name at least one number to be found, like [[fit.parameter]] path = \
+                 \"material.youngs_modulus\""
+            )));
+        }
+        if e.plan().observation.residuals() == 0 {
+            return Err(Error::Input(format!("{name}: observation is missing or has no data to fit to; name a recording")));
+        }
+    }
+    let spec = specs(first).expect("every scene was just found to have a [fit]");
+    let settings = Settings {
+        iterations: options.iterations.unwrap_or(spec.iterations),
+        starts: options.starts.unwrap_or(spec.starts),
+        seed: options.seed.unwrap_or(spec.seed),
+        errors: errors(experiments),
+        ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
+    };
+    let (numbers, free, mut warnings) = free_parameters(experiments)?;
+    let mut scenes = Vec::new();
+    for e in experiments {
+        let members = batch(e.plan(), settings.starts, free.len());
+        let inner = options.backend.evaluator(e.plan(), members)?;
+        scenes.push(FitScene {
+            name: e.scene().path.display().to_string(),
+            fingerprint: fingerprint(e.plan()),
+            base: e.plan().theta.clone(),
+            evaluate: Box::new(Counted { inner, interrupt: options.interrupt.clone(), first: scenes.is_empty() }),
+        });
+    }
+    let mut problem = Problem::new(scenes, free).map_err(|e| Error::Input(format!("{}: {e}", first.scene().path.display())))?;
+    let threads = options.threads.unwrap_or(spec.threads);
+    let (backend, interrupt) = (options.backend, options.interrupt.clone());
+    let mut history = Vec::new();
+    let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
+    let mut told = options.on_iteration.take();
+    let settings = &settings;
+    type Done = (FitResult, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>);
+    let done: Result<Done, Error> = with_threads(threads, || {
+        let mut hear = |p: &Progress| {
+            history.push(p.clone());
+            if let Some(f) = &mut told {
+                f(p);
+            }
+        };
+        let hooks = Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal };
+        let result = palpate_fit::fit(&mut problem, settings, hooks).map_err(failed)?;
+        let theta_before: Vec<Vec<f64>> = (0..experiments.len()).map(|s| problem.theta(s, &result.runs[0].start)).collect();
+        let before = experiments.iter().zip(&theta_before).map(|(e, t)| e.residuals(backend, t).ok()).collect();
+        let after = experiments.iter().zip(&result.theta).map(|(e, t)| e.residuals(backend, t)).collect::<Result<_, _>>()?;
+        Ok((result, before, after))
+    })?;
+    let (result, before, after) = done?;
+    history.sort_by_key(|p| (p.start, p.iteration));
+    warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
+    warnings.extend(result.warnings.iter().cloned());
+    let interrupted = result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
+    let fitted = Fitted {
+        backend: backend.resolved(),
+        free: numbers,
+        optimizer: settings.optimizer,
+        result,
+        history,
+        before,
+        after,
+        interrupted,
+        warnings,
+    };
+    Ok(with_residual_warnings(fitted))
+}
+
+fn failed(e: FitError) -> Error {
+    match e {
+        FitError::Journal(palpate_fit::JournalError::Content { .. }) | FitError::Residuals { .. } => Error::Input(e.to_string()),
+        _ => Error::Failed(e.to_string()),
+    }
+}
+
+fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
+    let (rms, noise, points) = fitted.residual();
+    let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
+    if unmatched * 20 > points + unmatched {
+        fitted.warnings.push(format!(
+            "{unmatched} of {} observed points met no part of the simulated body; is something else in the images, or is the band too narrow?",
+            points + unmatched
+        ));
+    }
+    if rms > 2.0 * noise {
+        fitted.warnings.push(format!(
+            "the remaining residual of {:.3} mm is {:.1} times what noise and grid explain ({:.3} mm): something in the model is \
+             missing or wrong",
+            rms * 1e3,
+            rms / noise,
+            noise * 1e3
+        ));
+    }
+    fitted
+}
+
+/// A number that reaches θ: its place, θ per unit, and what is typical of it.
+fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot)> {
+    let plan = experiment.plan();
+    // The mass of the body is its density times its volume on the grid.
+    let (path, factor) = if path == "material.mass" { ("material.density", 1.0 / plan.body.volume) } else { (path, 1.0) };
+    let place = (0..plan.layout.len()).find(|p| plan.layout.keys[*p].spec().path == path)?;
+    Some((plan.layout.keys[place], Slot { scene, place, factor }))
+}
+
+/// Sets one free number in a scene's θ.
+pub(crate) fn set(experiment: &Experiment, theta: &mut [f64], path: &str, value: f64) {
+    if let Some((_, s)) = slot(experiment, 0, path) {
+        theta[s.place] = value * s.factor;
+    }
+}
+
+type Free = (Vec<FreeNumber>, Vec<FreeParameter>, Vec<String>);
+
+fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error> {
+    let (mut numbers, mut free): (Vec<FreeNumber>, Vec<FreeParameter>) = (Vec::new(), Vec::new());
+    let mut warnings = Vec::new();
+    for (scene, e) in experiments.iter().enumerate() {
+        let name = |s: usize| experiments[s].scene().path.display();
+        for p in specs(e).iter().flat_map(|f| &f.parameters) {
+            let (key, slot) = slot(e, scene, &p.path).ok_or_else(|| {
+                Error::Input(format!("{}: fit.parameter \"{}\" is not a number of this scene", name(scene), p.path))
+            })?;
+            let own = p.per_scene && experiments.len() > 1;
+            let known = numbers.iter().position(|n| n.path == p.path && n.scene.is_none());
+            if let (false, Some(k)) = (own, known) {
+                let f = &mut free[k];
+                if f.bounds != p.bounds || f.start != p.start {
+                    return Err(Error::Input(format!(
+                        "{}: {} has start [{}, {}] and bounds [{}, {}], {} has [{}, {}] and [{}, {}]; a shared parameter has the same \
+                         in both, or say per_scene = true",
+                        name(scene),
+                        p.path,
+                        p.start.0,
+                        p.start.1,
+                        p.bounds.0,
+                        p.bounds.1,
+                        name(f.slots[0].scene),
+                        f.start.0,
+                        f.start.1,
+                        f.bounds.0,
+                        f.bounds.1
+                    )));
+                }
+                f.slots.push(slot);
+                continue;
+            }
+            let spec = key.spec();
+            let is_mass = p.path == "material.mass";
+            let number = FreeNumber { path: p.path.clone(), scene: own.then_some(scene) };
+            free.push(FreeParameter {
+                path: number.label(),
+                unit: if is_mass { "kg".into() } else { spec.unit.into() },
+                transform: spec.transform,
+                typical: spec.typical / slot.factor,
+                bounds: p.bounds,
+                start: p.start,
+                slots: vec![slot],
+            });
+            numbers.push(number);
+        }
+    }
+    for (n, f) in numbers.iter().zip(&free).filter(|(n, _)| n.scene.is_none() && n.path.starts_with("material.")) {
+        for (s, e) in experiments.iter().enumerate() {
+            if !f.slots.iter().any(|slot| slot.scene == s) {
+                warnings.push(format!(
+                    "{} is free in another scene but keeps its own value in {}; name it in its [fit] to share it",
+                    n.path,
+                    e.scene().path.display()
+                ));
+            }
+        }
+    }
+    Ok((numbers, free, warnings))
+}
+
+/// What the recordings say of errors that do not average out. Every camera, and every marker, has its own.
+fn errors(experiments: &[Experiment]) -> ErrorModel {
+    let mut model = ErrorModel { systematic: 0.0, groups: 0 };
+    for e in experiments {
+        let o = &e.plan().observation;
+        let points: usize = o.frames.iter().map(|f| f.points.len()).sum();
+        let coordinates: usize = o.frames.iter().map(|f| 3 * f.markers.len()).sum();
+        let (depth, marker) = (o.depth_systematic / o.depth_noise, o.marker_systematic / o.marker_noise);
+        // The part of the data with more residuals decides how many independent errors there are.
+        if points >= coordinates {
+            model.systematic = model.systematic.max(depth);
+            let used = |c: usize| o.frames.iter().flat_map(|f| &f.points).any(|p| p.camera as usize == c);
+            model.groups += (0..o.cameras.len()).filter(|c| used(*c)).count();
+        } else {
+            model.systematic = model.systematic.max(marker);
+            model.groups += o.markers.len();
+        }
+    }
+    ErrorModel { groups: model.groups.max(1), ..model }
+}
+
+/// Simulations at once: as many as starts, as long as their tapes or tangents fit into memory.
+fn batch(plan: &Plan, starts: usize, free: usize) -> usize {
+    let state = plan.body.nodes.len() as f64 * 48.0;
+    // A tape holds every state; tangents hold two states per free parameter. The optimiser may ask for either.
+    let member = state * (plan.clock.steps + 1).max(2 * free + 2) as f64;
+    ((BATCH_MEMORY / member) as usize).clamp(1, starts.max(1))
+}
+
+/// Identifies what a plan compares with what, up to the values of θ: FNV-1a over everything that enters the cost.
+pub(crate) fn fingerprint(plan: &Plan) -> String {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut eat = |x: u64| {
+        for b in x.to_le_bytes() {
+            hash = (hash ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    };
+    let o = &plan.observation;
+    let numbers =
+        [o.depth_noise, o.marker_noise, plan.band, plan.clock.step, plan.clock.theta, plan.body.grid.h, plan.body.volume];
+    numbers.iter().for_each(|x| eat(x.to_bits()));
+    [plan.clock.steps, plan.body.nodes.len(), plan.clamps.len(), plan.masses.len()].iter().for_each(|n| eat(*n as u64));
+    plan.body.nodes.iter().for_each(|p| p.to_array().iter().for_each(|x| eat(x.to_bits())));
+    plan.body.node_volume.iter().for_each(|x| eat(x.to_bits()));
+    plan.pivot.to_array().iter().for_each(|x| eat(x.to_bits()));
+    format!("{:?} {:?} {:?} {:?}", plan.solver, plan.initial, plan.planes, plan.clamps).bytes().for_each(|b| eat(u64::from(b)));
+    format!("{:?} {:?}", plan.masses, o.markers).bytes().for_each(|b| eat(u64::from(b)));
+    for f in &o.frames {
+        eat(f.time.to_bits());
+        for p in &f.points {
+            p.position.to_array().iter().for_each(|x| eat(x.to_bits()));
+            eat(u64::from(p.camera));
+        }
+        for m in &f.markers {
+            m.position.to_array().iter().for_each(|x| eat(x.to_bits()));
+            eat(u64::from(m.site));
+        }
+    }
+    format!("{hash:016x}")
+}
+
+/// Counts evaluations against an interrupt's budget.
+struct Counted {
+    inner: Box<dyn Evaluate>,
+    interrupt: Interrupt,
+    /// Only the first scene counts, so that a joint evaluation counts once.
+    first: bool,
+}
+
+impl Evaluate for Counted {
+    fn parameters(&self) -> usize {
+        self.inner.parameters()
+    }
+
+    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        if self.first {
+            self.interrupt.count();
+        }
+        self.inner.evaluate(theta, request)
+    }
+}

@@ -1,0 +1,10 @@
+//! What a fit leaves behind: `result.json`, `history.csv`, `model.toml`, `report.html`.
+
+mod html;
+mod pictures;
+mod plots;
+mod result;
+
+pub use html::{ReportInput, html};
+pub use pictures::{FramePicture, pictures};
+pub use result::{history_csv, number, result_json, summary};

@@ -1,0 +1,147 @@
+//! The numbers of a fit as JSON (`fit/1`), CSV and a short table.
+
+use crate::experiment::Experiment;
+use crate::fitting::{Fitted, total};
+use crate::residuals::ResidualSummary;
+use palpate_fit::Progress;
+use serde_json::{Map, Value, json};
+
+/// A number for JSON; infinite and undefined ones become null.
+fn finite(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
+}
+
+fn residual(r: &ResidualSummary) -> Value {
+    json!({ "rms": finite(r.rms), "noise": finite(r.noise), "points": r.points, "unmatched": r.unmatched })
+}
+
+/// `result.json`. Beyond the format's keys it holds `status`, `warnings`, per-scene residuals, `residual_before` and the
+/// reduced χ²; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
+pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
+    let r = &fitted.result;
+    let named = |values: &[f64]| -> Value {
+        let map: Map<String, Value> = fitted.free.iter().zip(values).map(|(n, v)| (n.label(), finite(*v))).collect();
+        Value::Object(map)
+    };
+    let parameters: Vec<Value> = fitted
+        .free
+        .iter()
+        .zip(&r.parameters)
+        .map(|(n, p)| {
+            let mut v = json!({
+                "path": n.path,
+                "value": finite(p.value),
+                "standard_error": p.standard_error.map_or(Value::Null, finite),
+                "unit": p.unit,
+            });
+            if let Some(s) = n.scene {
+                v["scene"] = json!(s);
+            }
+            if let Some(side) = p.at_bound {
+                v["at_bound"] = json!(format!("{side:?}").to_lowercase());
+            }
+            v
+        })
+        .collect();
+    let runs: Vec<Value> = r
+        .runs
+        .iter()
+        .map(|run| {
+            json!({
+                "start": named(&run.start),
+                "end": named(&run.end),
+                "start_cost": finite(run.start_cost),
+                "cost": finite(run.cost),
+                "iterations": run.iterations,
+                "evaluations": run.evaluations,
+                "status": run.status.name(),
+            })
+        })
+        .collect();
+    let (rms, noise, points) = fitted.residual();
+    let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
+    let scenes: Vec<String> = experiments.iter().map(|e| e.scene().path.display().to_string()).collect();
+    json!({
+        "format": "fit/1",
+        "version": env!("CARGO_PKG_VERSION"),
+        "backend": fitted.backend,
+        "scene": scenes.first(),
+        "scenes": scenes,
+        "status": if fitted.interrupted { "interrupted" } else { "complete" },
+        "parameters": parameters,
+        "correlation": r.correlation,
+        "cost": { "initial": finite(r.initial_cost), "final": finite(r.cost) },
+        "reduced_chi_square": finite(r.reduced_chi_square),
+        "residual": { "rms": finite(rms), "noise": finite(noise), "points": points,
+                      "scenes": fitted.after.iter().map(residual).collect::<Vec<_>>() },
+        "residual_before": before.map_or(Value::Null, |b| json!({ "rms": finite(total(&b, |r| r.rms)) })),
+        "best": r.best,
+        "runs": runs,
+        "warnings": fitted.warnings,
+        "evaluations": r.evaluations,
+        "seconds": r.seconds,
+    })
+}
+
+/// One row per run and iteration: `run,iteration,cost,<one column per parameter>`; full precision.
+pub fn history_csv(fitted: &Fitted) -> String {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let mut rows = vec![["run", "iteration", "cost"].map(str::to_string).to_vec()];
+    rows[0].extend(fitted.free.iter().map(|n| n.label()));
+    let row = |p: &Progress| {
+        let mut row = vec![p.start.to_string(), p.iteration.to_string(), format!("{:?}", p.cost)];
+        row.extend(p.values.iter().map(|v| format!("{v:?}")));
+        row
+    };
+    rows.extend(fitted.history.iter().map(row));
+    for r in rows {
+        csv.write_record(&r).expect("writing to memory cannot fail");
+    }
+    String::from_utf8(csv.into_inner().expect("writing to memory cannot fail")).expect("numbers and paths are UTF-8")
+}
+
+/// A number with as many digits as people read: four, without exponent where that is short.
+pub fn number(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e5).contains(&x.abs()) {
+        let digits = if x == 0.0 { 0 } else { (3 - x.abs().log10().floor() as i32).max(0) as usize };
+        format!("{x:.digits$}")
+    } else {
+        format!("{x:.3e}")
+    }
+}
+
+/// Short table for the terminal.
+pub fn summary(fitted: &Fitted) -> String {
+    let unit = |u: &str| if u == "1" { String::new() } else { format!(" {u}") };
+    let rows: Vec<[String; 3]> = fitted
+        .free
+        .iter()
+        .zip(&fitted.result.parameters)
+        .map(|(n, p)| {
+            let error = p.standard_error.map_or("no standard error".to_string(), |e| format!("± {}", number(e)));
+            [n.label(), number(p.value), format!("{error}{}", unit(&p.unit))]
+        })
+        .collect();
+    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
+    let (a, b) = (width(0), width(1));
+    let mut text: String = rows.iter().map(|[n, v, e]| format!("  {n:a$}  {v:>b$} {e}\n")).collect();
+    let (rms, noise, points) = fitted.residual();
+    let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
+    let before = before.map_or(String::new(), |b| format!("{:.3} mm before, ", total(&b, |r| r.rms) * 1e3));
+    text += &format!("  residual: {before}{:.3} mm now ({:.3} mm from noise and grid), {points} points", rms * 1e3, noise * 1e3);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (x, text) in
+            [(0.45, "0.4500"), (-9.81, "-9.810"), (12345.6, "12346"), (1.2e5, "1.200e5"), (0.0, "0"), (3.2e-7, "3.200e-7")]
+        {
+            assert_eq!(number(x), text);
+        }
+    }
+}

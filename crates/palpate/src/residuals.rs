@@ -1,0 +1,247 @@
+//! How far a measurement lies from a simulation, and how far noise alone would put it.
+//!
+//! - `rms` is the root mean square *distance*: of every matched depth point to the simulated surface, and of every marker
+//!   to the simulated one (3-vector); points that met nothing are counted apart.
+//! - `noise` is what would remain with the right model, `sqrt(measurement² + grid²)`, mean squares over the same points:
+//!   - a depth reading's error runs along the camera's axis, so its distance to a surface seen at an angle is shortened by the cosine
+//!     between axis and normal: `(σ² + systematic²) · mean cos²`, the mean taken from the simulated surface in the cameras;
+//!   - a marker coordinate's σ counts three times, and its systematic error (a length) once: `3 σ² + systematic²`;
+//!   - grid: root mean square of the band's interpolated distance at points of the true rest surface, where it should be 0.
+
+use crate::embed::Embedding;
+use crate::engine::{Backend, between};
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::render::{DepthImage, Pinhole, rasterise};
+use glam::DVec3;
+use palpate_engine::{FrameResiduals, Snapshot};
+use palpate_io::recording::RecordedCamera;
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use std::collections::BTreeMap;
+
+/// Frames that the mean incidence angle is taken from; it varies slowly.
+const INCIDENCE_FRAMES: usize = 12;
+
+/// Residuals of a whole recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResidualSummary {
+    /// Root mean square distance [m] over `points`; NaN without any.
+    pub rms: f64,
+    /// What measurement noise and grid alone would leave [m].
+    pub noise: f64,
+    /// Matched depth points and markers.
+    pub points: usize,
+    /// Depth points that met no cell around the body.
+    pub unmatched: usize,
+    /// Cost J of the simulation.
+    pub cost: f64,
+    /// Frame by frame, ordered by time.
+    pub frames: Vec<FrameResidual>,
+}
+
+/// Residuals of one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameResidual {
+    /// Time on the recording's clock [s].
+    pub time: f64,
+    /// Root mean square distance [m]; NaN without matched points.
+    pub rms: f64,
+    /// Mean signed distance of matched depth points [m], positive outside the model; NaN without any.
+    pub bias: f64,
+    /// Matched depth points and markers.
+    pub points: usize,
+    /// Depth points that met nothing.
+    pub unmatched: usize,
+}
+
+impl FrameResidual {
+    fn new(time: f64, r: &FrameResiduals) -> FrameResidual {
+        let matched: Vec<f64> = r.points.iter().flatten().copied().collect();
+        let squares = matched.iter().map(|d| d * d).sum::<f64>() + r.markers.iter().map(|m| m.length_squared()).sum::<f64>();
+        let points = matched.len() + r.markers.len();
+        FrameResidual {
+            time,
+            rms: (squares / points as f64).sqrt(),
+            bias: matched.iter().sum::<f64>() / matched.len() as f64,
+            points,
+            unmatched: r.points.len() - matched.len(),
+        }
+    }
+}
+
+impl ResidualSummary {
+    pub(crate) fn new(experiment: &Experiment, backend: Backend, theta: &[f64]) -> Result<ResidualSummary, Error> {
+        let plan = experiment.plan();
+        let observation = &plan.observation;
+        let with_points: Vec<usize> =
+            (0..observation.frames.len()).filter(|f| !observation.frames[*f].points.is_empty()).collect();
+        let wanted = spread(&with_points, INCIDENCE_FRAMES);
+        let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+        let mut frames = BTreeMap::new();
+        let (mut cos2, mut seen) = (0.0, 0usize);
+        let cost = visit_frames(plan, backend, theta, |frame, displacement, r| {
+            frames.insert(frame, FrameResidual::new(observation.frames[frame].time, r));
+            if wanted.contains(&frame) {
+                let (sum, n) = incidence(experiment, frame, &surface.deform(&displacement()), &triangles);
+                cos2 += sum;
+                seen += n;
+            }
+        })?;
+        let frames: Vec<FrameResidual> = frames.into_values().collect();
+        let points = frames.iter().map(|f| f.points).sum::<usize>();
+        let unmatched = frames.iter().map(|f| f.unmatched).sum();
+        let squares: f64 = frames.iter().filter(|f| f.points > 0).map(|f| f.rms * f.rms * f.points as f64).sum();
+        let markers = observation.frames.iter().map(|f| f.markers.len()).sum::<usize>();
+        let shortened = if seen > 0 { cos2 / seen as f64 } else { 1.0 };
+        let depth2 = (observation.depth_noise.powi(2) + observation.depth_systematic.powi(2)) * shortened;
+        let grid2 = grid_error(plan, &surface).powi(2);
+        let marker2 = 3.0 * observation.marker_noise.powi(2) + observation.marker_systematic.powi(2);
+        let of_points = (points - markers) as f64 * (depth2 + grid2);
+        Ok(ResidualSummary {
+            rms: (squares / points as f64).sqrt(),
+            noise: ((of_points + markers as f64 * marker2) / points as f64).sqrt(),
+            points,
+            unmatched,
+            cost,
+            frames,
+        })
+    }
+}
+
+/// Up to `count` of some numbers, evenly spread, first and last among them.
+pub(crate) fn spread(numbers: &[usize], count: usize) -> Vec<usize> {
+    if numbers.len() <= count {
+        return numbers.to_vec();
+    }
+    if count <= 1 {
+        return numbers.first().copied().into_iter().take(count).collect();
+    }
+    (0..count).map(|k| numbers[k * (numbers.len() - 1) / (count - 1)]).collect()
+}
+
+/// Simulates and hands every frame to `visit`: its number, the displacement at its time (computed when asked for) and its
+/// residuals. Returns the cost.
+pub(crate) fn visit_frames(
+    plan: &Plan,
+    backend: Backend,
+    theta: &[f64],
+    mut visit: impl FnMut(usize, &dyn Fn() -> Vec<DVec3>, &FrameResiduals),
+) -> Result<f64, Error> {
+    let start = theta[plan.layout.index(ParamKey::TimeStart)];
+    let mut last: Option<Snapshot> = None;
+    let evaluation = backend.visit(plan, theta, |_, state, residuals| {
+        for r in &residuals {
+            let time = plan.observation.frames[r.frame].time - start;
+            let displacement = || last.as_ref().map_or_else(|| state.displacement.clone(), |a| between(a, &state, time));
+            visit(r.frame, &displacement, r);
+        }
+        last = Some(state);
+    })?;
+    Ok(evaluation.cost)
+}
+
+/// The camera of a recording as one that can be rendered. Lens distortion is left out: it moves a pixel, hardly its normal.
+pub(crate) fn pinhole(c: &RecordedCamera) -> Pinhole {
+    Pinhole {
+        name: c.name.clone(),
+        width: c.width,
+        height: c.height,
+        fx: c.focal[0],
+        fy: c.focal[1],
+        cx: c.center[0],
+        cy: c.center[1],
+        world_from_camera: c.world_from_camera,
+    }
+}
+
+/// Sum and number of cos² between the camera's axis and the surface's normal, over the observed points of a frame that fall on
+/// the simulated surface.
+fn incidence(experiment: &Experiment, frame: usize, vertices: &[DVec3], triangles: &[[u32; 3]]) -> (f64, usize) {
+    let Some(recording) = experiment.recording() else { return (0.0, 0) };
+    let points = &experiment.plan().observation.frames[frame].points;
+    let (mut sum, mut n) = (0.0, 0);
+    for (number, camera) in recording.cameras.iter().enumerate() {
+        let mine: Vec<DVec3> = points.iter().filter(|p| p.camera as usize == number).map(|p| p.position).collect();
+        if mine.is_empty() {
+            continue;
+        }
+        let camera = pinhole(camera);
+        let axis = camera.world_from_camera.matrix3.z_axis;
+        let image = rasterise(&camera, vertices, triangles);
+        for p in mine {
+            let q = camera.project(p);
+            let (u, v) = (q.x.round(), q.y.round());
+            if !(0.0..camera.width as f64).contains(&u) || !(0.0..camera.height as f64).contains(&v) {
+                continue;
+            }
+            let t = image.triangle[v as usize * camera.width + u as usize];
+            if t == DepthImage::NONE {
+                continue;
+            }
+            let [a, b, c] = triangles[t as usize].map(|k| vertices[k as usize]);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            sum += normal.dot(axis).powi(2);
+            n += 1;
+        }
+    }
+    (sum, n)
+}
+
+/// Root mean square of the interpolated signed distance at the rest surface [m].
+fn grid_error(plan: &Plan, surface: &Embedding) -> f64 {
+    let grid = &plan.body.grid;
+    let mut cell_at = vec![u32::MAX; grid.len()];
+    for (n, c) in plan.body.band.cells.iter().enumerate() {
+        cell_at[grid.index(c.lattice)] = n as u32;
+    }
+    let (mut sum, mut n) = (0.0, 0usize);
+    for p in &surface.rest {
+        let Some((ijk, xi)) = grid.locate(*p) else { continue };
+        let number = cell_at[grid.index(ijk)];
+        if number != u32::MAX {
+            sum += triquadratic(&plan.body.band.cells[number as usize].sdf, xi).powi(2);
+            n += 1;
+        }
+    }
+    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
+}
+
+/// Value at `xi` ∈ [0, 1]³ of the polynomial of degree 2 in each variable through 27 values at 0, ½, 1 (x fastest).
+fn triquadratic(values: &[f64; 27], xi: DVec3) -> f64 {
+    let basis = |t: f64| [(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)];
+    let [x, y, z] = xi.to_array().map(basis);
+    (0..27).map(|q| values[q] * x[q % 3] * y[q / 3 % 3] * z[q / 9]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triquadratic_interpolation_reproduces_products_of_squares() {
+        let f = |p: DVec3| 1.0 + p.x * p.x * p.y - 2.0 * p.z * p.z * p.y * p.y * p.x + p.z;
+        let values = std::array::from_fn(|q| f(DVec3::new((q % 3) as f64, (q / 3 % 3) as f64, (q / 9) as f64) * 0.5));
+        let p = DVec3::new(0.3, 0.8, 0.55);
+        assert!((triquadratic(&values, p) - f(p)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_spread_has_both_ends() {
+        let all: Vec<usize> = (10..30).collect();
+        assert_eq!(spread(&all, 3), [10, 19, 29]);
+        assert_eq!((spread(&all[..2], 3), spread(&all, 1), spread(&all, 0)), (vec![10, 11], vec![10], vec![]));
+    }
+
+    #[test]
+    fn a_frame_counts_distances_of_points_and_markers() {
+        let r = FrameResiduals {
+            frame: 0,
+            points: vec![Some(0.003), None, Some(-0.001)],
+            markers: vec![DVec3::new(0.0, 0.002, 0.001)],
+        };
+        let f = FrameResidual::new(0.5, &r);
+        assert_eq!((f.points, f.unmatched), (3, 1));
+        assert!((f.rms - (15e-6f64 / 3.0).sqrt()).abs() < 1e-15 && (f.bias - 0.001).abs() < 1e-15);
+    }
+}
