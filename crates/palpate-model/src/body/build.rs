@@ -8,8 +8,8 @@ use crate::shape::Shape;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Sub-cubes per axis that a cut cell is divided into unless told otherwise. With 4 a curved surface of radius r is off by about
-/// h²/(128 r) on average, 3 % of h² / (8 r), the error of plain trilinear elements' geometry.
+/// Sub-cubes per axis that a cut cell is divided into unless told otherwise. With 4 a surface of radius r lies up to h²/(128 r) inside
+/// the true one, a sixteenth of what cells without subdivision would leave.
 pub const SUBDIVISIONS: usize = 4;
 
 /// Most cells of a lattice.

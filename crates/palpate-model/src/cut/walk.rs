@@ -54,43 +54,97 @@ pub fn kuhn(lo: DVec3, hi: DVec3) -> [[DVec3; 4]; 6] {
     })
 }
 
+/// Sub-cubes with a sharp edge in them are divided once more by this along each axis.
+const REFINE: usize = 4;
+
+/// A sub-cube holds a sharp edge if the mean gradient of the distance in it is shorter than this. A smooth surface of radius r has
+/// 1 − (step/r)²/8 or more: it takes a radius below two sub-steps to be mistaken for an edge, at no harm but time.
+const SHARP: f64 = 0.97;
+
 /// Hands every piece of the cell whose lowest node is `cell` (world lattice coordinates) to the sink.
 pub fn walk(lattice: &Lattice, cell: [i64; 3], sink: &mut impl Sink) {
     let s = lattice.subdivisions;
-    let n = s + 1;
-    let origin = cell.map(|c| c * s as i64);
-    let global = |l: [i64; 3]| [origin[0] + l[0], origin[1] + l[1], origin[2] + l[2]];
-    let values: Vec<f64> =
-        (0..n * n * n).map(|i| lattice.value(global([(i % n) as i64, (i / n % n) as i64, (i / (n * n)) as i64]))).collect();
+    let block = Block { lattice, cell, low: [0; 3], count: s };
+    let values = block.values();
     if values.iter().all(|&v| v < 0.0) {
         return sink.cube(DVec3::ZERO, DVec3::ONE);
     }
-    if values.iter().all(|&v| v > 0.0) {
+    // A corner of the body may poke in between the points.
+    let step = lattice.h / s as f64;
+    if values.iter().all(|&v| v > step) {
         return;
     }
-    // Points of neighbouring cells are asked for only where a face lies on the surface.
-    let at = |l: [i64; 3]| {
-        if l.iter().all(|&c| c >= 0 && c < n as i64) {
-            values[l[0] as usize + n * (l[1] as usize + n * l[2] as usize)]
-        } else {
-            lattice.value(global(l))
+    block.walk(&values, true, sink);
+}
+
+/// Some sub-cubes of a cell: `count`³ from sub-lattice place `low`, counted from the cell's lowest corner.
+struct Block<'a> {
+    lattice: &'a Lattice<'a>,
+    cell: [i64; 3],
+    low: [i64; 3],
+    count: usize,
+}
+
+impl Block<'_> {
+    /// Place on the world's sub-lattice of a place in the block.
+    fn global(&self, l: [i64; 3]) -> [i64; 3] {
+        std::array::from_fn(|a| self.cell[a] * self.lattice.subdivisions as i64 + self.low[a] + l[a])
+    }
+
+    /// Local coordinates in the cell of a place in the block.
+    fn local(&self, l: [i64; 3]) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|a| (self.low[a] + l[a]) as f64 / self.lattice.subdivisions as f64))
+    }
+
+    fn values(&self) -> Vec<f64> {
+        let n = self.count + 1;
+        let place = |i: usize| [(i % n) as i64, (i / n % n) as i64, (i / (n * n)) as i64];
+        (0..n * n * n).map(|i| self.lattice.value(self.global(place(i)))).collect()
+    }
+
+    fn walk(&self, values: &[f64], refine: bool, sink: &mut impl Sink) {
+        let (s, n) = (self.count, self.count + 1);
+        let step = self.lattice.h / self.lattice.subdivisions as f64;
+        // Points beyond the block are asked for only where a face lies on the surface.
+        let at = |l: [i64; 3]| {
+            if l.iter().all(|&c| c >= 0 && c < n as i64) {
+                values[l[0] as usize + n * (l[1] as usize + n * l[2] as usize)]
+            } else {
+                self.lattice.value(self.global(l))
+            }
+        };
+        for c in 0..s * s * s {
+            let lo = [(c % s) as i64, (c / s % s) as i64, (c / (s * s)) as i64];
+            let hi = lo.map(|x| x + 1);
+            let corner: [f64; 8] =
+                std::array::from_fn(|i| at([lo[0] + (i & 1) as i64, lo[1] + (i >> 1 & 1) as i64, lo[2] + (i >> 2) as i64]));
+            if corner.iter().all(|&v| v < 0.0) && (!refine || corner.iter().all(|&v| v < -step)) {
+                sink.cube(self.local(lo), self.local(hi));
+                continue;
+            }
+            if refine && corner.iter().any(|v| v.abs() < step) && mean_slope(&corner) < SHARP * step {
+                let lattice = Lattice { subdivisions: self.lattice.subdivisions * REFINE, ..*self.lattice };
+                let low = std::array::from_fn(|a| (self.low[a] + lo[a]) * REFINE as i64);
+                let block = Block { lattice: &lattice, cell: self.cell, low, count: REFINE };
+                block.walk(&block.values(), false, sink);
+                continue;
+            }
+            if corner.iter().all(|&v| v < 0.0) {
+                sink.cube(self.local(lo), self.local(hi));
+                continue;
+            }
+            if corner.iter().all(|&v| v >= 0.0) && corner.iter().filter(|&&v| v > 0.0).count() > 4 {
+                continue;
+            }
+            let middle = 0.5 * (self.local(lo) + self.local(hi));
+            let octant = (0..3).map(|a| if middle[a] > 0.5 { 1 << a } else { 0 }).sum();
+            self.sub_cube(lo, &at, octant, sink);
         }
-    };
-    let local = |l: [i64; 3]| DVec3::new(l[0] as f64, l[1] as f64, l[2] as f64) / s as f64;
-    for c in 0..s * s * s {
-        let lo = [(c % s) as i64, (c / s % s) as i64, (c / (s * s)) as i64];
-        let corner: [f64; 8] =
-            std::array::from_fn(|i| at([lo[0] + (i & 1) as i64, lo[1] + (i >> 1 & 1) as i64, lo[2] + (i >> 2) as i64]));
-        let positive = corner.iter().filter(|&&v| v > 0.0).count();
-        let negative = corner.iter().filter(|&&v| v < 0.0).count();
-        if negative == 8 {
-            sink.cube(local(lo), local([lo[0] + 1, lo[1] + 1, lo[2] + 1]));
-            continue;
-        }
-        if negative == 0 && positive > 4 {
-            continue;
-        }
-        let octant = (0..3).map(|a| if 2 * lo[a] as usize + 1 > s { 1 << a } else { 0 }).sum();
+    }
+
+    /// The six tetrahedra of one sub-cube.
+    fn sub_cube(&self, lo: [i64; 3], at: &impl Fn([i64; 3]) -> f64, octant: usize, sink: &mut impl Sink) {
+        let global = |l| self.global(l);
         for path in PATHS {
             let mut v = [lo; 4];
             for k in 0..3 {
@@ -98,24 +152,31 @@ pub fn walk(lattice: &Lattice, cell: [i64; 3], sink: &mut impl Sink) {
                 v[k + 1][path[k]] += 1;
             }
             let phi = v.map(at);
+            let x = v.map(|l| self.local(l));
             if phi.iter().any(|&f| f > 0.0) {
                 if phi.iter().any(|&f| f < 0.0) {
-                    cut_tetra(v.map(local), phi, sink, octant);
+                    cut_tetra(x, phi, sink, octant);
                 }
                 continue;
             }
-            if phi.iter().all(|&f| f == 0.0) && !lattice.flat_inside(v.map(global)) {
+            if phi.iter().all(|&f| f == 0.0) && !self.lattice.flat_inside(v.map(global)) {
                 continue;
             }
-            sink.tetra(v.map(local));
+            sink.tetra(x);
             for k in 0..4 {
-                if (0..4).all(|m| m == k || phi[m] == 0.0) && !neighbour_inside(lattice, &at, &global, v, k) {
-                    let f: [DVec3; 3] = std::array::from_fn(|m| local(v[(k + 1 + m) % 4]));
-                    outward(f, (f[0] + f[1] + f[2]) / 3.0 - local(v[k]), sink, octant);
+                if (0..4).all(|m| m == k || phi[m] == 0.0) && !neighbour_inside(self.lattice, at, &global, v, k) {
+                    let f: [DVec3; 3] = std::array::from_fn(|m| x[(k + 1 + m) % 4]);
+                    outward(f, (f[0] + f[1] + f[2]) / 3.0 - x[k], sink, octant);
                 }
             }
         }
     }
+}
+
+/// Length of the mean gradient over a cube, times its edge.
+fn mean_slope(corner: &[f64; 8]) -> f64 {
+    let slope = |bit: usize| (0..8).map(|i| if i & bit == 0 { -corner[i] } else { corner[i] }).sum::<f64>() / 4.0;
+    DVec3::new(slope(1), slope(2), slope(4)).length()
 }
 
 /// True if the tetrahedron across the face opposite to corner `k` is inside; the face's corners all lie on the surface.

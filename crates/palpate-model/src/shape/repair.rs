@@ -241,7 +241,7 @@ fn orient(mesh: &mut TriMesh) -> usize {
             for &(s, agree) in &neighbours[t] {
                 if flip[s].is_none() {
                     // A neighbour that agrees needs the same treatment, one that disagrees the other.
-                    let g = f != !agree;
+                    let g = f == agree;
                     flip[s] = Some(g);
                     part.push((s, g));
                 }

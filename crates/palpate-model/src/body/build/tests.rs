@@ -70,7 +70,8 @@ fn slivers_are_merged_without_loss() {
     // The sliver's own edge is chamfered by a sub-cube, 1e-7 cells thick: 2e-8 of its cell at most.
     assert!((body.volume / (0.64 * top) - 1.0).abs() < 1e-8, "{}", body.volume / (0.64 * top) - 1.0);
     let up: f64 = body.patches.iter().filter(|p| p.normal.z > 0.7).map(|p| p.area).sum();
-    assert!((up / 0.64 - 1.0).abs() < 1e-6, "{up}");
+    // At two corners the finer lattice below and the coarser one above miss a triangle of half a sub-cube's face: 15/16 · h²/32 each.
+    assert!((up / 0.64 - 1.0).abs() < 1e-3, "{up}");
     let cells: std::collections::BTreeSet<_> = parts.merged.iter().map(|m| m.1).collect();
     assert!(cells.iter().all(|&c| !body.cells[c as usize].is_full() && body.cells[c as usize].fraction < 1.0 + 2e-6));
 }
@@ -151,4 +152,24 @@ fn impossible_resolutions_are_refused_with_numbers() {
     assert!(matches!(Body::build(&empty, 0.1, 0.0, 4), Err(BodyError::Empty { .. })));
     let far = placed(Analytic::Ball { radius: 0.05, center: DVec3::splat(1e9) });
     assert!(Body::build(&far, 0.01, 0.0, 4).is_err());
+}
+
+#[test]
+fn sharp_edges_are_kept() {
+    let pose = DAffine3::from_rotation_translation(
+        glam::DQuat::from_axis_angle(DVec3::new(1.0, -0.5, 0.3).normalize(), 0.7),
+        DVec3::new(0.0313, 0.0177, -0.0021),
+    );
+    let size = DVec3::new(1.0, 0.3, 0.3);
+    let exact = Placed::new(Analytic::Box { min: DVec3::ZERO, max: size }, pose);
+    let mesh = crate::shape::MeshShape::new(exact.surface(1.0));
+    for shape in [&exact as &dyn Shape, &mesh] {
+        let body = Body::build(shape, 0.1, 0.0, 4).unwrap();
+        check(&body);
+        let (volume, area) = (body.volume / size.element_product() - 1.0, body.area / 1.38 - 1.0);
+        // Chamfers of h/16 at the edges: measured 6e-4 of volume (7e-3 if edges were not refined) and 8e-3 of area.
+        assert!(volume.abs() < 1e-3, "{volume}");
+        assert!(area.abs() < 0.012, "{area}");
+        assert!((body.center - pose.transform_point3(0.5 * size)).length() < 1e-4);
+    }
 }
