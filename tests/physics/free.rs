@@ -52,15 +52,15 @@ fn spinning_body_keeps_its_angular_momentum() {
 
 #[test]
 fn undamped_vibration_keeps_its_energy() {
-    // A block without weight strikes a plane edge first and flies off, spinning and vibrating.
+    // A block without weight strikes a plane edge first, slaps it with the other end, and flies off spinning and vibrating.
     let mut s = block();
     s.object.pose = DAffine3::from_mat3(DMat3::from_rotation_y(0.4));
     s.material.youngs_modulus = 5.0e4;
-    s.planes = vec![scenes::plane(DVec3::new(0.0, 0.0, -0.035), DVec3::Z)];
-    s.initial.velocity = DVec3::new(0.0, 0.0, -0.15);
+    s.planes = vec![scenes::plane(DVec3::new(0.0, 0.0, -0.028), DVec3::Z)];
+    s.initial.velocity = DVec3::new(0.0, 0.0, -0.05);
     // The first stretching mode along the longest side; 24 steps a period, 50 periods after the contact.
     let period = 2.0 * 0.064 / (5.0e4f64 / 1000.0).sqrt();
-    let contact = 120;
+    let contact = 400;
     s.time = Time { step: period / 24.0, steps: contact + 1200, start: 0.0, theta: 0.5 };
     s.solver.tolerance = 1e-10;
     let plan = scenes::plan(&s);
@@ -76,6 +76,8 @@ fn undamped_vibration_keeps_its_energy() {
     let strained = (contact..contact + 1200).map(elastic).fold(0.0, f64::max);
     let worst = (contact..=contact + 1200).step_by(20).map(|k| (energy(k) - energy(contact)).abs() / inner).fold(0.0, f64::max);
     println!("inner energy {inner:.2e} J, strained at most {strained:.2e} J, at worst {worst:.1e} of it off in 50 periods");
+    let height = |k: usize| plan.body.nodes.iter().zip(&states[k].displacement).map(|(x, u)| (*x + *u).z).fold(f64::INFINITY, f64::min);
+    assert!((contact..=contact + 1200).all(|k| height(k) > -0.028), "it has left the plane");
     assert!(strained > 0.05 * inner, "it vibrates");
     assert!(worst < 0.01);
 }
@@ -89,19 +91,21 @@ fn turned_scene_gives_the_turned_result() {
         s.initial.angular_velocity = turn * DVec3::new(3.0, 1.0, 5.0);
         s.planes = vec![scenes::plane(turn * DVec3::new(0.0, 0.0, -0.02), turn * DVec3::new(0.1, 0.0, 1.0))];
         s.time = Time { step: 0.005, steps: 20, start: 0.0, theta: 0.6 };
+        s.solver.tolerance = 1e-12;
         let plan = scenes::plan(&s);
         let end = run::states(&plan).pop().unwrap();
         (plan, end)
     };
     let (plan, end) = make(DMat3::IDENTITY);
-    // A quarter turn maps the lattice onto itself: equal up to the solver's tolerance.
-    let quarter = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
-    let (turned, turned_end) = make(quarter);
+    // A third of a turn about (1, 1, 1) maps the lattice onto itself. What is left comes from the edges of the box, where the
+    // signed distance is not linear and the tetrahedra that cells are divided into see it from another side.
+    let third = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
+    let (turned, turned_end) = make(third);
     assert_eq!(plan.body.nodes.len(), turned.body.nodes.len());
     for i in 0..plan.body.nodes.len() {
-        let j = run::nearest(&turned, quarter * plan.body.nodes[i]);
-        let off = (quarter * end.displacement[i] - turned_end.displacement[j]).length();
-        assert!(off < 1e-6 * end.displacement[i].length().max(0.01), "node {i}: {off:.1e}");
+        let j = run::nearest(&turned, third * plan.body.nodes[i]);
+        let off = (third * end.displacement[i] - turned_end.displacement[j]).length();
+        assert!(off < 1e-4 * end.displacement[i].length().max(0.01), "node {i}: {off:.1e}");
     }
     // Any other turn cuts the cells differently: the motion of the centre of mass agrees within the discretisation.
     let skew = DMat3::from_rotation_x(0.5) * DMat3::from_rotation_z(0.3);

@@ -1,10 +1,9 @@
 //! Element matrices of one Poisson ratio, shared by every member and cell that can share them.
 
 use palpate_model::body::Body;
-use palpate_model::element::{self, CellMatrices};
+use palpate_model::element::CellMatrices;
 use palpate_model::material::{lame, lame_by_nu};
 use palpate_model::plan::{ClampCell, ClampSite, Plan};
-use palpate_model::scene::Element;
 use std::collections::BTreeMap;
 
 /// Nitsche's surface penalty, in units of (λ + 2μ)/h. The mean-strain traction of a full cell needs 2; a cell that is cut down
@@ -38,11 +37,6 @@ impl Classes {
             .collect();
         Classes { of_cell, weights }
     }
-
-    /// Number of different element matrices.
-    pub fn len(&self) -> usize {
-        self.weights.len()
-    }
 }
 
 /// Matrices for Young's modulus 1 Pa and one Poisson ratio; all scale linearly with Young's modulus.
@@ -66,11 +60,7 @@ impl Elements {
         let matrices = classes
             .weights
             .par_iter()
-            .map(|(weights, fraction)| {
-                let mut m = zero();
-                element::stiffness(plan.solver.element, h, weights, *fraction, nu, &mut m.k, &mut m.k_nu);
-                m
-            })
+            .map(|(weights, fraction)| CellMatrices::new(plan.solver.element, h, weights, *fraction, nu))
             .collect();
         let clamps = plan.clamps.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect();
         Elements { nu, matrices, of_cell: classes.of_cell.clone(), clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
@@ -80,10 +70,6 @@ impl Elements {
     pub fn cell(&self, e: usize) -> &CellMatrices {
         &self.matrices[self.of_cell[e] as usize]
     }
-}
-
-fn zero() -> CellMatrices {
-    CellMatrices { k: Box::new([0.0; 576]), k_nu: Box::new([0.0; 576]) }
 }
 
 fn clamp_matrices(body: &Body, clamp: &ClampSite, nu: f64) -> Vec<CellMatrices> {
@@ -127,9 +113,4 @@ fn clamp_matrix(c: &ClampCell, h: f64, fraction: f64, lambda: f64, mu: f64) -> [
         }
     }
     k
-}
-
-/// Doubles that the matrices of a plan take, for memory forecasts.
-pub fn matrix_doubles(classes: &Classes, _element: Element) -> usize {
-    classes.len() * 2 * 576
 }
