@@ -1,14 +1,12 @@
 //! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh.
 
-mod check;
-mod crossing;
 mod parse;
 #[cfg(test)]
 mod tests;
 
 use crate::error::{InputError, Loaded};
 use glam::DVec3;
-use palpate_model::shape::TriMesh;
+use palpate_model::shape::{MeshReport, TriMesh, diagnose, repair};
 use std::path::Path;
 
 /// Longest side of an object [m]; anything larger was written in another unit.
@@ -41,7 +39,7 @@ pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
     points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)))
 }
 
-/// Equal vertices become one, unused ones, repeated triangles and those without area go; the order of the rest is kept.
+/// Equal vertices become one, unused ones and collapsed triangles go; the order of the rest is kept.
 fn merge(mesh: TriMesh) -> TriMesh {
     let mut number = std::collections::BTreeMap::new();
     let mut out = TriMesh::default();
@@ -58,18 +56,6 @@ fn merge(mesh: TriMesh) -> TriMesh {
             out.triangles.push(corners);
         }
     }
-    // The same triangle twice would count its solid angle twice.
-    let mut seen = std::collections::BTreeSet::new();
-    out.triangles.retain(|&[a, b, c]| {
-        let first = a.min(b).min(c);
-        seen.insert(if first == a {
-            [a, b, c]
-        } else if first == b {
-            [b, c, a]
-        } else {
-            [c, a, b]
-        })
-    });
     out
 }
 
@@ -86,12 +72,41 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
     if side < SMALLEST_SIDE {
         return refuse(format!("its longest side is {side:e} m; lengths are in metres: convert the file"));
     }
-    let mut warnings = Vec::new();
-    let mesh = check::solid(mesh, &mut warnings).map_err(|e| InputError::file(path, e))?;
-    let crossings = crossing::crossings(&mesh);
-    if crossings > 0 {
-        warnings.push(format!("passes through itself in {crossings} triangles; overlaps are counted once"));
+    // Coordinates of files carry six or more digits; a millionth of the length is flat.
+    if (max - min).min_element() < 1e-6 * side {
+        return refuse("encloses no volume: it is flat; a closed surface of a solid is needed".to_string());
+    }
+    let (mesh, repairs) = repair(&mesh);
+    let mut warnings: Vec<String> = repairs.into_iter().map(|r| format!("repaired: {r}")).collect();
+    let report = diagnose(&mesh);
+    if let Some(fault) = fault(&report, side) {
+        return refuse(fault);
+    }
+    if report.non_manifold_edges > 0 {
+        warnings.push(format!("touches itself along {} edges", report.non_manifold_edges));
+    }
+    if report.intersecting_pairs > 0 {
+        warnings.push(format!("passes through itself: {} pairs of triangles", report.intersecting_pairs));
     }
     let warnings = warnings.into_iter().map(|w| InputError::file(path, w).to_string()).collect();
     Ok(Loaded { value: mesh, warnings })
+}
+
+/// What keeps a repaired mesh from enclosing a solid.
+fn fault(report: &MeshReport, side: f64) -> Option<String> {
+    if report.open_edges > 0 {
+        let largest = match report.holes.first() {
+            Some((edges, rim)) => format!(", the largest hole has {edges} of them and a rim of {rim:.4} m"),
+            None => String::new(),
+        };
+        let edges = report.open_edges;
+        return Some(format!("is open: {edges} border edges{largest}; a closed surface is needed: fill it in a mesh editor"));
+    }
+    if report.inconsistent_edges > 0 {
+        let edges = report.inconsistent_edges;
+        return Some(format!("has no inside: its surface is one-sided (like a Möbius strip), seen along {edges} edges"));
+    }
+    // A flattened surface's volume is rounding noise; a fibre a thousandth as thick as long is far above this.
+    (report.signed_volume < 1e-9 * side.powi(3))
+        .then(|| format!("encloses no volume ({:e} m³, its longest side is {side} m)", report.signed_volume))
 }

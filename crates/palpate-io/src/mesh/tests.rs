@@ -109,14 +109,18 @@ fn inward_and_mixed_faces_are_turned_with_a_warning() {
     m.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let r = read_back(&m).unwrap();
     assert!((r.value.volume() - 0.006).abs() < 1e-15);
-    assert!(r.warnings.len() == 1 && r.warnings[0].contains("faced inward"), "{:?}", r.warnings);
+    assert!(
+        r.warnings.len() == 1 && r.warnings[0].contains("turned inside-out parts outward, triangles: 300"),
+        "{:?}",
+        r.warnings
+    );
     let mut m = unit();
     for t in [7, 20, 21] {
         m.triangles[t].swap(0, 1);
     }
     let r = read_back(&m).unwrap();
     assert!((r.value.volume() - 0.006).abs() < 1e-15);
-    assert!(r.warnings[0].contains("3 of 300 triangles were turned"), "{:?}", r.warnings);
+    assert!(r.warnings[0].contains("turned triangles to agree with their neighbours: 3"), "{:?}", r.warnings);
 }
 
 #[test]
@@ -125,19 +129,19 @@ fn small_holes_and_cracks_are_closed_and_large_holes_refused() {
     m.triangles.remove(0);
     let r = read_back(&m).unwrap();
     assert!((r.value.volume() - 1e-3).abs() < 1e-15, "a missing piece of a flat side changes nothing once filled");
-    assert!(r.warnings[0].contains("1 small holes were closed (3 border edges)"), "{:?}", r.warnings);
+    assert!(r.warnings[0].contains("closed small holes: 1"), "{:?}", r.warnings);
     let mut m = cuboid(DVec3::splat(0.1), 4);
     m.triangles.drain(..32);
     let e = read_back(&m).unwrap_err();
-    assert!(e.contains("is open: 16 border edges, a hole 0.1414 m across (up to 0.0100 m would be closed)"), "{e}");
+    assert!(e.contains("is open: 16 border edges, the largest hole has 16 of them and a rim of 0.4000 m"), "{e}");
     let mut m = cuboid(DVec3::splat(0.1), 4);
     m.vertices.iter_mut().take(25).for_each(|v| v.z += 1e-8);
     let r = read_back(&m).unwrap();
-    assert!((r.value.volume() - 1e-3).abs() < 1e-9 && r.warnings.is_empty(), "{:?}", r.warnings);
+    assert!((r.value.volume() - 1e-3).abs() < 1e-9 && r.warnings[0].contains("joined vertices"), "{:?}", r.warnings);
 }
 
 #[test]
-fn cavities_stay_and_solids_inside_solids_are_told() {
+fn cavities_stay_and_overlaps_are_told() {
     let join = |mut inner: TriMesh, inward: bool| {
         let mut m = cuboid(DVec3::splat(0.1), 2);
         inner.vertices.iter_mut().for_each(|v| *v += 0.03);
@@ -151,8 +155,6 @@ fn cavities_stay_and_solids_inside_solids_are_told() {
     };
     let r = join(cuboid(DVec3::splat(0.04), 2), true);
     assert!((r.value.volume() - (1e-3 - 6.4e-5)).abs() < 1e-12 && r.warnings.is_empty(), "{:?}", r.warnings);
-    let r = join(cuboid(DVec3::splat(0.04), 2), false);
-    assert!(r.warnings[0].contains("taken as solid"), "{:?}", r.warnings);
     // Twice as far out as the inner box reached: it sticks out of the outer one.
     let r = join(cuboid(DVec3::splat(0.09), 2), false);
     assert!(r.warnings.iter().any(|w| w.contains("passes through itself")), "{:?}", r.warnings);
@@ -166,14 +168,6 @@ fn what_is_no_solid_is_refused() {
     assert!(e.contains("longest side is 100 m; in millimetres? convert the file to metres (scale by 0.001)"), "{e}");
     assert!(read_back(&cuboid(DVec3::splat(1e-5), 1)).unwrap_err().contains("lengths are in metres"));
     assert!(read_back(&TriMesh::default()).unwrap_err().contains("no triangle"));
-    let mut double = unit();
-    let reversed: Vec<[u32; 3]> = double.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect();
-    double.triangles.extend(reversed);
-    assert!(read_back(&double).unwrap_err().contains("encloses no volume"), "a surface and its reverse cancel");
-    double.triangles.drain(300..);
-    double.triangles.extend(double.triangles.clone());
-    let twice = read_back(&double).unwrap();
-    assert!((twice.value.volume() - 0.006).abs() < 1e-15 && twice.value.triangles.len() == 300, "the same surface twice is one");
 }
 
 #[test]
@@ -195,6 +189,4 @@ fn solids_that_share_an_edge_are_kept_as_they_are() {
     let r = read_back(&m).unwrap();
     assert!((r.value.volume() - 2e-3).abs() < 1e-12);
     assert!(r.warnings.len() == 1 && r.warnings[0].contains("touches itself along 1 edges"), "{:?}", r.warnings);
-    m.triangles[0].swap(0, 1);
-    assert!(read_back(&m).unwrap_err().contains("contradict each other"));
 }

@@ -14,8 +14,8 @@ pub(super) fn read_c3d(
 ) -> Result<(Vec<String>, Vec<MarkerSample>), InputError> {
     let refuse = |text: String| InputError::file(path, text);
     // The parser indexes into damaged files without looking; a panic there is a fault of the file.
-    let parsed =
-        std::panic::catch_unwind(|| C3d::from_bytes(bytes)).map_err(|_| refuse("not a readable C3D file: damaged".into()))?;
+    let parsed = std::panic::catch_unwind(|| C3d::from_bytes(bytes).map_err(|e| e.to_string()))
+        .map_err(|_| refuse("not a readable C3D file: damaged".into()))?;
     let c3d = parsed.map_err(|e| refuse(format!("not a readable C3D file: {e}")))?;
     let p = &c3d.points;
     let unit: String = p.units.iter().filter(|c| !c.is_whitespace() && **c != '\0').collect();

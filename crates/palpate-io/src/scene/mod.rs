@@ -57,7 +57,7 @@ pub fn scene_error(scene: &Scene, key: &str, message: impl Into<String>) -> Inpu
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
     let root = source.root();
     check_format(&root, FORMAT)?;
-    for effect in root.tables("effect")? {
+    if let Some(effect) = root.tables("effect")?.first() {
         let known = if EFFECTS.is_empty() { "none".to_string() } else { EFFECTS.join(", ") };
         let kind = effect.optional_str("kind")?.ok_or_else(|| effect.missing("kind", "the name of an effect"))?;
         return Err(effect.error("kind", format!("\"{kind}\" is not known to this version; effects it knows: {known}")));

@@ -1,0 +1,3 @@
+//! Measured data: read, placed, fitted.
+
+mod reading;
