@@ -2,6 +2,7 @@
 
 mod analytic;
 mod mesh;
+mod pseudonormal;
 mod repair;
 mod trimesh;
 

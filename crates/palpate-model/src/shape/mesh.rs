@@ -1,9 +1,11 @@
-//! Triangle meshes as shapes: distance by a bounding volume hierarchy, sign by generalized winding numbers.
+//! Triangle meshes as shapes: distance by a bounding volume hierarchy, sign by generalized winding numbers, or, on clean meshes,
+//! by the normal at the nearest point ([`super::pseudonormal`]).
 //!
 //! Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", 2013; hierarchical far
 //! field after Barill, Dickson, Schmidt, Levin, Jacobson, "Fast winding numbers for soups and clouds", 2018 (its first term). Holes,
 //! overlaps and touching parts, as scans have them, leave the sign defined everywhere.
 
+use super::pseudonormal::{Feature, Pseudonormals};
 use super::{Shape, TriMesh};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -22,6 +24,7 @@ pub struct MeshShape {
     corners: Vec<[DVec3; 3]>,
     numbers: Vec<u32>,
     tree: Vec<Node>,
+    normals: Option<Pseudonormals>,
 }
 
 #[derive(Clone, Debug)]
@@ -41,13 +44,20 @@ struct Node {
 impl MeshShape {
     /// Prepares a mesh; an empty mesh has infinite distance everywhere.
     pub fn new(mesh: TriMesh) -> MeshShape {
+        let mut shape = MeshShape::unsigned(mesh);
+        shape.normals = Pseudonormals::of(&shape.mesh, &shape);
+        shape
+    }
+
+    /// A mesh whose signs always come from winding numbers.
+    pub(super) fn unsigned(mesh: TriMesh) -> MeshShape {
         let mut items: Vec<(u32, [DVec3; 3])> = (0..mesh.triangles.len()).map(|t| (t as u32, mesh.corners(t))).collect();
         let mut tree = Vec::new();
         if !items.is_empty() {
             build(&mut items, 0, &mut tree);
         }
         let (numbers, corners) = items.into_iter().unzip();
-        MeshShape { mesh, corners, numbers, tree }
+        MeshShape { mesh, corners, numbers, tree, normals: None }
     }
 
     /// The mesh.
@@ -57,7 +67,11 @@ impl MeshShape {
 
     /// Nearest point of the mesh [m] and its triangle; `None` only for an empty mesh.
     pub fn closest(&self, p: DVec3) -> Option<(DVec3, usize)> {
-        let mut best = (f64::INFINITY, DVec3::ZERO, u32::MAX);
+        self.nearest(p).map(|(q, t, _)| (q, t))
+    }
+
+    fn nearest(&self, p: DVec3) -> Option<(DVec3, usize, Feature)> {
+        let mut best = (f64::INFINITY, DVec3::ZERO, u32::MAX, Feature::Face);
         let mut stack = vec![(0.0, 0u32)];
         if self.tree.is_empty() {
             return None;
@@ -69,11 +83,11 @@ impl MeshShape {
             let node = &self.tree[n as usize];
             if node.second == 0 {
                 for t in node.range.0..node.range.1 {
-                    let q = closest_on_triangle(p, self.corners[t as usize]);
+                    let (q, feature) = closest_on_triangle(p, self.corners[t as usize]);
                     let d = q.distance_squared(p);
                     let number = self.numbers[t as usize];
                     if d < best.0 || d == best.0 && number < best.2 {
-                        best = (d, q, number);
+                        best = (d, q, number, feature);
                     }
                 }
             } else {
@@ -87,7 +101,7 @@ impl MeshShape {
                 stack.extend([far, near]);
             }
         }
-        Some((best.1, best.2 as usize))
+        Some((best.1, best.2 as usize, best.3))
     }
 
     /// Visits the triangles whose bounding boxes' leaf touches the box `lo..hi`.
@@ -171,48 +185,47 @@ fn solid_angle(p: DVec3, t: [DVec3; 3]) -> f64 {
     if det == 0.0 { 0.0 } else { 2.0 * det.atan2(div) }
 }
 
-/// Nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5: regions of corners, edges, face).
-fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+/// Nearest point of a triangle and the feature it lies on (Ericson, Real-Time Collision Detection, 5.1.5: regions of corners, edges, face).
+pub(super) fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return a;
+        return (a, Feature::Corner(0));
     }
     let bp = p - b;
     let (d3, d4) = (ab.dot(bp), ac.dot(bp));
     if d3 >= 0.0 && d4 <= d3 {
-        return b;
+        return (b, Feature::Corner(1));
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return a + ab * (d1 / (d1 - d3));
+        return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
     }
     let cp = p - c;
     let (d5, d6) = (ab.dot(cp), ac.dot(cp));
     if d6 >= 0.0 && d5 <= d6 {
-        return c;
+        return (c, Feature::Corner(2));
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return a + ac * (d2 / (d2 - d6));
+        return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(1));
     }
     let sum = va + vb + vc;
-    a + ab * (vb / sum) + ac * (vc / sum)
+    (a + ab * (vb / sum) + ac * (vc / sum), Feature::Face)
 }
 
 impl Shape for MeshShape {
     fn signed_distance(&self, p: DVec3) -> f64 {
-        match self.closest(p) {
-            None => f64::INFINITY,
-            Some((q, _)) => {
-                let d = q.distance(p);
-                if self.winding_number(p) > 0.5 { -d } else { d }
-            }
-        }
+        let Some((q, t, feature)) = self.nearest(p) else { return f64::INFINITY };
+        let inside = match &self.normals {
+            Some(n) => n.at(t, self.mesh.triangles[t], feature).dot(p - q) < 0.0,
+            None => self.winding_number(p) > 0.5,
+        };
+        if inside { -q.distance(p) } else { q.distance(p) }
     }
 
     fn bounds(&self) -> (DVec3, DVec3) {

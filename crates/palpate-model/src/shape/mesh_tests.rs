@@ -22,14 +22,15 @@ fn distance_agrees_with_brute_force_and_the_exact_shape() {
     let (exact, mesh) = torus();
     let shape = MeshShape::new(mesh.clone());
     for p in points(300, 1.6) {
-        let brute =
-            (0..mesh.triangles.len()).map(|t| closest_on_triangle(p, mesh.corners(t)).distance(p)).fold(f64::INFINITY, f64::min);
+        let brute = (0..mesh.triangles.len())
+            .map(|t| closest_on_triangle(p, mesh.corners(t)).0.distance(p))
+            .fold(f64::INFINITY, f64::min);
         let d = shape.signed_distance(p);
         assert_eq!(d.abs(), brute);
         // Chords of 0.03 on a radius of 0.2 lie up to 0.0009 inside.
         assert!((d - exact.signed_distance(p)).abs() < 1e-3, "{p}: {d}");
         let (q, t) = shape.closest(p).unwrap();
-        assert!((closest_on_triangle(p, mesh.corners(t)) - q).length() < 1e-15);
+        assert!((closest_on_triangle(p, mesh.corners(t)).0 - q).length() < 1e-15);
     }
 }
 
@@ -81,4 +82,28 @@ fn mesh_measures_follow_the_exact_shape() {
     // Rounding of sums over 10⁵ triangles.
     assert!(volume.abs() < 1e-10 && area.abs() < 1e-10, "{volume} {area}");
     assert!(fine.edges().iter().all(|&[a, b]| fine.vertices[a as usize].distance(fine.vertices[b as usize]) <= 0.011));
+}
+
+#[test]
+fn clean_meshes_take_their_sign_from_normals_and_others_do_not() {
+    let (_, mesh) = torus();
+    // Sharp edges and corners, where a face normal alone would err.
+    let sharp = Placed::new(Analytic::Box { min: DVec3::splat(-0.3), max: DVec3::new(0.4, 0.3, 0.1) }, DAffine3::IDENTITY);
+    for mesh in [mesh.clone(), sharp.surface(0.2)] {
+        let (clean, winding) = (MeshShape::new(mesh.clone()), MeshShape::unsigned(mesh));
+        assert!(clean.normals.is_some() && winding.normals.is_none());
+        for p in points(2000, 1.2) {
+            assert_eq!(clean.signed_distance(p), winding.signed_distance(p), "{p}");
+        }
+    }
+    // Two boxes back to back, sharing a wall, edges or vertices of it doubled: only winding numbers see the inside.
+    let (left, right) = (sharp.surface(0.2), sharp.surface(0.2).transformed(&DAffine3::from_translation(DVec3::X * 0.7)));
+    let n = left.vertices.len() as u32;
+    let both = TriMesh {
+        vertices: [left.vertices, right.vertices].concat(),
+        triangles: left.triangles.iter().copied().chain(right.triangles.iter().map(|t| t.map(|v| v + n))).collect(),
+    };
+    let shape = MeshShape::new(both);
+    assert!(shape.normals.is_none());
+    assert!([0.39, 0.41].into_iter().all(|x| shape.signed_distance(DVec3::new(x, 0.01, 0.02)) < 0.0));
 }

@@ -105,7 +105,7 @@ fn is_degenerate(mesh: &TriMesh, t: usize) -> bool {
 
 /// Pairs of triangles of which an edge of one passes through the inside of the other.
 fn intersecting_pairs(mesh: &TriMesh) -> usize {
-    let tree = MeshShape::new(mesh.clone());
+    let tree = MeshShape::unsigned(mesh.clone());
     let mut pairs = Vec::new();
     for (t, &v) in mesh.triangles.iter().enumerate() {
         let [a, b, c] = mesh.corners(t);
@@ -285,7 +285,7 @@ fn turn_outward(mesh: &mut TriMesh) -> usize {
             continue;
         }
         let enclosed = count > 1 && {
-            let others = MeshShape::new(part(mesh, &|n| n != c));
+            let others = MeshShape::unsigned(part(mesh, &|n| n != c));
             let first = of.iter().position(|&n| n == c).map(|t| mesh.corners(t)[0]);
             first.is_some_and(|p| others.winding_number(p).abs() > 0.5)
         };
