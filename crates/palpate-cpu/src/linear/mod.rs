@@ -23,8 +23,9 @@ use std::sync::OnceLock;
 const MOST_ITERATIONS: usize = 4000;
 /// Largest body (nodes) whose Cholesky factor is worth its cost in a static problem: 3D fill grows like N^(4/3).
 const DIRECT_STATIC: usize = 9000;
-/// Largest body (nodes) and fewest right-hand sides for which a factor pays in a time step.
-const DIRECT_STEP: (usize, usize) = (1500, 4);
+/// Largest body (nodes) whose factor is cheaper than the iterations of one solve of a time step, and with several right-hand
+/// sides: clamps and ν near ½ cost block-Jacobi hundreds of iterations, a factor of 1000 nodes about 20 ms.
+const DIRECT_STEP: [usize; 2] = [900, 1800];
 /// Smallest body (nodes) for which the second level of the preconditioner pays.
 const COARSE_FROM: usize = 600;
 /// Edge of a group of nodes on the second level.
@@ -75,7 +76,7 @@ impl Solvers {
             (LinearSolver::Cholesky, _) => true,
             (LinearSolver::ConjugateGradient, _) => false,
             (LinearSolver::Auto, Purpose::Static) => nodes <= DIRECT_STATIC,
-            (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP.0 && columns >= DIRECT_STEP.1,
+            (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP[usize::from(columns > 2)],
         }
     }
 
