@@ -1,6 +1,7 @@
 //! The ladder of tests: each rung trusts only the rungs above it in this list.
 
 mod bad_input;
+mod cli;
 mod physics;
 mod real_data;
 mod rollouts;

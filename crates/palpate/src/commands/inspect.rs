@@ -121,8 +121,8 @@ fn scene(e: &Experiment) -> Vec<Line> {
             json!({ "all": body.cells.len(), "full": full, "cut": cut }),
             format!("{} ({full} full, {cut} cut)", body.cells.len()),
         ),
-        line("nodes", "nodes", json!(nodes), format!("{nodes} ({} degrees of freedom)", 3 * nodes)),
-        line("degrees_of_freedom", "degrees of freedom", json!(3 * nodes), format!("{}", 3 * nodes)),
+        line("nodes", "nodes", json!(nodes), nodes.to_string()),
+        line("degrees_of_freedom", "degrees of freedom", json!(3 * nodes), (3 * nodes).to_string()),
         line(
             "band_cells",
             "band cells",

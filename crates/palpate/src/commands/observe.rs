@@ -39,16 +39,16 @@ pub struct Arguments {
     #[arg(long, value_name = "RECORDING")]
     out: PathBuf,
     /// Standard deviation of a depth reading along the camera's axis, and of a marker coordinate [m]
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     noise: f64,
     /// Share of readings that are missing, 0 to 1
-    #[arg(long, value_name = "F", default_value_t = 0.0)]
+    #[arg(long, value_name = "F", default_value_t = 0.0, allow_negative_numbers = true)]
     dropout: f64,
     /// Metres per count of a depth image
-    #[arg(long, alias = "quantisation", value_name = "S", default_value_t = 0.001)]
+    #[arg(long, alias = "quantisation", value_name = "S", default_value_t = 0.001, allow_negative_numbers = true)]
     depth_scale: f64,
     /// Frames per second [default: one frame per time step of the scene]
-    #[arg(long, value_name = "F", conflicts_with = "times")]
+    #[arg(long, value_name = "F", conflicts_with = "times", allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Times of the frames on the recording's clock [s], separated by commas
     #[arg(long, value_name = "T,…", value_delimiter = ',', allow_negative_numbers = true)]
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Divide cells and time step of the recorded simulation by this
-    #[arg(long, value_name = "R", default_value_t = 1.0)]
+    #[arg(long, value_name = "R", default_value_t = 1.0, allow_negative_numbers = true)]
     refine: f64,
     /// What computes
     #[arg(long, value_enum, default_value = "auto")]

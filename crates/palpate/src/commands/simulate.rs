@@ -103,10 +103,9 @@ impl Writer<'_> {
     }
 }
 
-/// The box that the surface moves in, looked at over a whole simulation, would need two runs: a box twice as large as the body
-/// around where free fall carries it is enough for a picture.
-fn camera(experiment: &Experiment, states: &[(DVec3, DVec3)]) -> Pinhole {
-    let (lo, hi) = states.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
+/// A camera that sees the surface in all states, given by their bounding boxes.
+fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
+    let (lo, hi) = boxes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
     Pinhole::framing(lo, hi, experiment.up(), 640, 480)
 }
 

@@ -44,6 +44,11 @@ pub fn curves(curves: &[Curve], x_label: &str, y_label: &str, logarithmic: bool)
     Some(svg)
 }
 
+/// A tick's number, without the zeros that rounding leaves.
+fn tick(v: f64) -> String {
+    if v == 0.0 || (1e-3..1e6).contains(&v.abs()) { format!("{}", (v * 1e6).round() / 1e6) } else { format!("{v:.1e}") }
+}
+
 fn draw<'a, Y>(
     area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
     curves: &[Curve],
@@ -68,7 +73,9 @@ where
         .x_desc(x_label)
         .y_desc(y_label)
         .light_line_style(TRANSPARENT)
-        .y_label_formatter(&|v| super::number(*v))
+        .label_style(("sans-serif", 14))
+        .x_label_formatter(&|v| tick(*v))
+        .y_label_formatter(&|v| tick(*v))
         .draw()
         .map_err(|e| e.to_string())?;
     for (i, c) in curves.iter().enumerate() {

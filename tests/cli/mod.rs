@@ -1,0 +1,130 @@
+//! The command line as its users meet it: arguments in, exit code, text and files out.
+
+mod fitting;
+mod usage;
+
+use palpate::Interrupt;
+use std::path::Path;
+
+/// Exit code, stdout and stderr of one command line.
+pub struct Answer {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+/// Runs `palpate` with these arguments.
+pub fn palpate(arguments: &[&str]) -> Answer {
+    stopped(arguments, Interrupt::default())
+}
+
+/// Runs `palpate` until `interrupt`.
+pub fn stopped(arguments: &[&str], interrupt: Interrupt) -> Answer {
+    let (mut out, mut err) = (Vec::new(), Vec::new());
+    let all = std::iter::once("palpate").chain(arguments.iter().copied());
+    let code = palpate::cli::run(all, &mut out, &mut err, interrupt, false);
+    let text = |b: Vec<u8>| String::from_utf8(b).expect("the command line speaks UTF-8");
+    Answer { code, out: text(out), err: text(err) }
+}
+
+/// A command that must succeed.
+pub fn succeed(arguments: &[&str]) -> Answer {
+    let a = palpate(arguments);
+    assert_eq!(a.code, 0, "{arguments:?}\n{}", a.err);
+    a
+}
+
+/// A JSON file.
+pub fn json(path: impl AsRef<Path>) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// A path as an argument.
+pub fn arg(path: &Path) -> &str {
+    path.to_str().expect("temporary folders have UTF-8 names")
+}
+
+/// A soft ball held at its bottom that is pushed sideways at the start. It has no edge, at which a noisy reading could belong to
+/// a hidden side.
+pub const BALL: &str = r#"
+format = "scene/1"
+title = "Pushed ball"
+
+[object]
+shape = { ball = { radius = 0.04, center = [0.02, 0.02, 0.04] } }
+cell_size = 0.02
+
+[material]
+density = 1000.0
+youngs_modulus = 2.0e4
+poisson_ratio = 0.4
+mass_damping = 1.0
+
+[[clamp]]
+box = { min = [-0.1, -0.1, -0.01], max = [0.1, 0.1, 0.015] }
+
+[initial]
+velocity = [0.6, 0.0, 0.0]
+
+[time]
+step = 0.01
+steps = 16
+"#;
+
+/// A soft block standing on a clamp that is pushed sideways at the start; small enough for a fit in a second.
+pub const BLOCK: &str = r#"
+format = "scene/1"
+title = "Pushed block"
+
+[object]
+shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
+cell_size = 0.02
+
+[material]
+density = 1000.0
+youngs_modulus = 2.0e4
+poisson_ratio = 0.4
+mass_damping = 1.0
+
+[[clamp]]
+box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
+
+[initial]
+velocity = [0.6, 0.0, 0.0]
+
+[time]
+step = 0.01
+steps = 16
+"#;
+
+/// What turns [`BALL`] or [`BLOCK`] into a fit of its stiffness to a recording beside it.
+pub const STIFFNESS: &str = r#"
+[observation]
+recording = "seen"
+cost = "sparse-surface"
+
+[fit]
+optimizer = "gauss-newton"
+iterations = 12
+starts = 3
+seed = 4
+
+[[fit.parameter]]
+path = "material.youngs_modulus"
+start = [8.0e3, 6.0e4]
+bounds = [1.0e2, 1.0e7]
+"#;
+
+/// Watches either from the front.
+pub const CAMERA: &str = "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=80x60";
+
+/// A folder with `scene.toml`, its recording `seen`, and `fit.toml` with another stiffness.
+pub fn observed(scene: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    std::fs::write(file("scene.toml"), scene).unwrap();
+    std::fs::write(file("fit.toml"), scene.replace("2.0e4", "1.0e4") + STIFFNESS).unwrap();
+    let (scene, seen) = (file("scene.toml"), file("seen"));
+    succeed(&["observe", arg(&scene), "--camera", CAMERA, "--noise", "0.0005", "--depth-scale", "0.0001", "--out", arg(&seen)]);
+    folder
+}

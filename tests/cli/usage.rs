@@ -1,0 +1,137 @@
+//! Answers to right and wrong questions.
+
+use super::{BLOCK, CAMERA, STIFFNESS, arg, observed, palpate, succeed};
+use std::fs;
+
+#[test]
+fn help_teaches_and_versions_are_told() {
+    for command in ["simulate", "observe", "fit", "inspect"] {
+        let a = succeed(&[command, "--help"]);
+        assert!(a.out.contains("Examples:") && a.out.contains(&format!("palpate {command}")), "{}", a.out);
+    }
+    assert!(succeed(&["--help"]).out.contains("Exit codes"));
+    assert!(succeed(&["--version"]).out.starts_with("palpate "));
+}
+
+#[test]
+fn wrong_usage_exits_2_and_names_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("block.toml"), BLOCK).unwrap();
+    fs::write(file("typo.toml"), BLOCK.replace("youngs_modulus", "young_modulus")).unwrap();
+    fs::write(file("markers.csv"), "name,x,y,z\ntip,0,0,0.08\nfar,1,1,1\n").unwrap();
+    let (scene, typo, out, markers) = (file("block.toml"), file("typo.toml"), file("out"), file("markers.csv"));
+    let (s, o) = (arg(&scene), arg(&out));
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["simulate"], &["SCENE"]),
+        (&["simulte", s], &["simulate"]),
+        (&["simulate", "no-such.toml"], &["no-such.toml", "no such file"]),
+        (&["simulate", arg(&typo)], &["typo.toml:11", "young_modulus", "youngs_modulus"]),
+        (&["simulate", s, "--backend", "gpu"], &["gpu", "only the cpu backend"]),
+        (&["simulate", s, "--format", "stl"], &["stl", "obj"]),
+        (&["simulate", s, "--every", "0"], &["--every"]),
+        (&["observe", s, "--out", o], &["--camera", "--markers"]),
+        (&["observe", s, "--out", o, "--camera", "eye=1,0,0"], &["eye=1,0,0", "target"]),
+        (&["observe", s, "--out", o, "--camera", "eye=1,0,0 target=2,0,0"], &["never sees"]),
+        (&["observe", s, "--out", o, "--camera", CAMERA, "--noise", "-1"], &["noise"]),
+        (&["observe", s, "--out", o, "--camera", CAMERA, "--dropout", "1.5"], &["--dropout 1.5", "[0, 1)"]),
+        (&["observe", s, "--out", o, "--camera", CAMERA, "--times", "0.1,9"], &["9 s", "not simulated"]),
+        (&["observe", s, "--out", o, "--markers", arg(&markers)], &["markers.csv:3", "far", "surface"]),
+        (&["fit", s, "--out", o], &["block.toml", "fit.parameter"]),
+        (&["fit", s, "--optimizer", "magic"], &["magic", "gauss-newton"]),
+        (&["inspect", "no-such"], &["no-such"]),
+    ];
+    for (arguments, words) in cases {
+        let a = palpate(arguments);
+        assert_eq!(a.code, 2, "{arguments:?}: {}{}", a.out, a.err);
+        assert_eq!(a.out, "", "{arguments:?}");
+        for w in *words {
+            assert!(a.err.contains(w), "{arguments:?}: \"{w}\" is not in: {}", a.err);
+        }
+    }
+    assert!(!out.join("recording.toml").exists(), "nothing is written when something is wrong");
+}
+
+#[test]
+fn a_simulation_that_cannot_go_on_exits_1_with_a_hint() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("free.toml");
+    // Nothing holds the body, so there is no equilibrium to start from.
+    let text = BLOCK.replace("[initial]", "[initial]\nstate = \"static-equilibrium\"");
+    let (head, rest) = text.split_once("[[clamp]]").unwrap();
+    fs::write(&path, head.to_string() + rest.split_once("}\n").unwrap().1).unwrap();
+    let a = palpate(&["simulate", arg(&path), "--out", arg(&folder.path().join("out"))]);
+    assert_eq!(a.code, 1, "{}{}", a.out, a.err);
+    assert!(a.err.contains("hint:"), "{}", a.err);
+}
+
+#[test]
+fn inspect_tells_sizes_and_problems_of_scenes_and_recordings() {
+    let folder = observed(BLOCK);
+    let file = |name: &str| folder.path().join(name);
+    let (scene, seen) = (file("fit.toml"), file("seen"));
+    let text = succeed(&["inspect", arg(&scene)]).out;
+    for word in ["0.0400 × 0.0400 × 0.0800 m", "0.128000 kg", "16 full, 0 cut", "45", "135", "17 frames", "youngs_modulus"] {
+        assert!(text.contains(word), "\"{word}\" is not in:\n{text}");
+    }
+    let v: serde_json::Value = serde_json::from_str(&succeed(&["inspect", arg(&scene), "--json"]).out).unwrap();
+    assert_eq!((v["cells"]["all"].as_u64(), v["degrees_of_freedom"].as_u64()), (Some(16), Some(135)));
+    assert!((v["volume"].as_f64().unwrap() - 1.28e-4).abs() < 1e-12);
+    // Two states of 24 bytes per node, and one more than there are steps.
+    assert_eq!(v["memory"].as_f64(), Some(48.0 * 45.0 * 17.0));
+    let v: serde_json::Value = serde_json::from_str(&succeed(&["inspect", arg(&seen), "--json"]).out).unwrap();
+    assert_eq!((&v["kind"], v["frames"]["count"].as_u64()), (&"recording".into(), Some(17)));
+
+    // The same recording around a body a metre away.
+    let far = (BLOCK.to_string() + STIFFNESS).replace("[object]", "[object]\npose = [[1,0,0,1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
+    fs::write(
+        file("far.toml"),
+        far.replace("min = [-0.01,", "min = [0.99,").replace("max = [0.05, 0.05, 0.001]", "max = [1.05, 0.05, 0.001]"),
+    )
+    .unwrap();
+    let a = palpate(&["inspect", arg(&file("far.toml"))]);
+    assert_eq!(a.code, 2, "{}", a.out);
+    assert!(a.err.contains("far.toml") && a.err.contains("nowhere near"), "{}", a.err);
+}
+
+#[test]
+fn a_recording_depends_on_the_seed_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("block.toml"), BLOCK).unwrap();
+    let scene = file("block.toml");
+    let record = |name: &str, seed: &str| {
+        let out = file(name);
+        let (a, b) = (["observe", arg(&scene), "--camera", CAMERA, "--noise", "0.001", "--dropout", "0.05"], ["--seed", seed]);
+        succeed(&[&a[..], &b[..], &["--fps", "50", "--out", arg(&out)]].concat());
+        let bytes = |f: &str| fs::read(out.join(f)).unwrap();
+        (bytes("depth/cam0/000003.png"), bytes("mask/cam0/000003.png"), bytes("recording.toml"))
+    };
+    let (a, b, c) = (record("a", "1"), record("b", "1"), record("c", "2"));
+    assert!(a == b, "same seed, same bytes");
+    assert!(a.0 != c.0, "another seed, other noise");
+    assert!(a.1 == c.1 && a.2 == c.2, "noise does not touch masks and cameras");
+    let again = palpate(&["observe", arg(&scene), "--camera", CAMERA, "--out", arg(&file("a"))]);
+    assert_eq!(again.code, 2);
+    assert!(again.err.contains("--force"), "{}", again.err);
+}
+
+#[test]
+fn simulate_writes_what_was_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("block.toml"), BLOCK).unwrap();
+    let (scene, out) = (file("block.toml"), file("frames"));
+    let a =
+        succeed(&["simulate", arg(&scene), "--out", arg(&out), "--format", "obj,vtu,png", "--every", "10", "--json", "--quiet"]);
+    assert_eq!(a.err, "", "--quiet");
+    let v: serde_json::Value = serde_json::from_str(&a.out).unwrap();
+    // States 0 and 10, and always the last.
+    assert_eq!((v["frames"].as_u64(), v["files"].as_u64()), (Some(3), Some(9)));
+    for name in ["frame_00000.obj", "frame_00010.vtu", "frame_00016.png", "series.pvd"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    let picture = image::open(out.join("frame_00010.png")).unwrap().to_rgb8();
+    let body = picture.pixels().filter(|p| p.0[2] > p.0[0].saturating_add(20)).count();
+    assert!(body > 5000, "the body is to be seen: {body} blue pixels of {}", picture.len() / 3);
+}
