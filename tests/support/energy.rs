@@ -6,13 +6,22 @@ use palpate_model::element;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Scene;
 
-/// Elastic energy of the cells at displacement u [J]; ghost penalty and clamps are left out.
+/// Elastic energy of cells and ghost penalty at displacement u [J]; clamps are left out.
 pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
     let body = &plan.body;
     let h = body.grid.h;
     let (mut k, mut k_nu) = (Box::new([0.0; 576]), Box::new([0.0; 576]));
     let mut last: Option<[f64; 27]> = None;
-    body.cells
+    let shear = scene.material.youngs_modulus / (2.0 * (1.0 + scene.material.poisson_ratio));
+    let ghost: f64 = body
+        .ghosts
+        .iter()
+        .map(|g| {
+            let [a, b, c] = g.nodes.map(|n| u[n as usize]);
+            0.5 * scene.solver.ghost * shear * h * g.weight * (a - 2.0 * b + c).length_squared()
+        })
+        .sum();
+    let cells: f64 = body.cells
         .iter()
         .map(|cell| {
             if last != Some(cell.weights) {
@@ -23,5 +32,6 @@ pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
             let x = cell.nodes.map(|n| body.nodes[n as usize] + u[n as usize]);
             CellPose::new(&x, h).energy(&k, scene.material.youngs_modulus)
         })
-        .sum()
+        .sum();
+    cells + ghost
 }
