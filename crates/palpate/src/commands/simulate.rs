@@ -119,7 +119,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let clock = Instant::now();
     let plan = experiment.plan();
     let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
-    let keep = |k: usize| k as u64 % a.every == 0 || k == plan.clock.steps;
+    let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
 
     // States first, files afterwards: the pictures' camera frames the whole motion.
     let bar = console.progress(plan.clock.steps as u64, "simulating");
