@@ -2,4 +2,5 @@
 
 mod beam;
 mod contact;
+mod cut;
 mod free;

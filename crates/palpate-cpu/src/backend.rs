@@ -5,7 +5,7 @@ use crate::passes::cells::zeros;
 use crate::passes::frames::{self, Instant};
 use crate::simulate;
 use crate::world::{Adjoint, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -14,6 +14,17 @@ use rayon::prelude::*;
 /// The reference backend.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CpuBackend;
+
+impl CpuBackend {
+    /// Stiffness of one member at a state without inertia (clamps, contact and ghost penalty included): blocks (row node, column
+    /// node, 3 × 3) [N/m], for studies of conditioning and vibration.
+    pub fn stiffness(&self, world: &mut World, state: &State, member: usize) -> Vec<(usize, usize, DMat3)> {
+        let matrix = simulate::stiffness(&world.shared, &mut world.members[member], &state.members[member]);
+        let rows = &world.shared.pattern.blocks;
+        let of_row = |a: usize| (rows.rows[a]..rows.rows[a + 1]).map(move |k| (a, k));
+        (0..rows.len()).flat_map(of_row).map(|(a, k)| (a, rows.columns[k] as usize, matrix.values[k])).collect()
+    }
+}
 
 fn blank(world: &World) -> Vec<MemberState> {
     let n = world.shared.plan.body.nodes.len();

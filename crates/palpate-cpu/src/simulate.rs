@@ -42,6 +42,14 @@ fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Bala
     }
 }
 
+/// The static stiffness at a state.
+pub fn stiffness(shared: &Shared, member: &mut Member, s: &MemberState) -> crate::linear::matrix::Matrix {
+    let zero = zeros(s.u.len());
+    let mut matrix = crate::linear::matrix::Matrix::default();
+    balance(shared, member, None).tangent(States { u1: &s.u, u0: &zero, v0: &zero }, false, &mut matrix);
+    matrix
+}
+
 /// Takes the scratch matrix out of a member, so that a balance can borrow the rest.
 fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut crate::linear::matrix::Matrix) -> T) -> T {
     let mut matrix = std::mem::take(&mut member.matrix);
