@@ -12,8 +12,11 @@ use palpate_model::pullback::{Pullback, pull_back};
 use rayon::prelude::*;
 
 /// A surface that is turned away from the camera by more than this (cosine between its outward normal and the line of sight)
-/// cannot have been seen. Not zero: normals at the silhouette are uncertain by some degrees.
+/// cannot have been seen. Not zero: normals at the silhouette and along edges are uncertain.
 const TURNED_AWAY: f64 = 0.3;
+/// Nearer than this to a hidden side [cells] a point may still belong to it: next to a sharp edge noise puts points closest to
+/// the side that the camera does not see, and calling them unmatched would make the cost jump by a whole band.
+const HIDDEN_REACH: f64 = 1.0;
 
 /// Points sorted by the hash of the cube they lie in.
 #[derive(Clone, Debug, Default)]
@@ -119,12 +122,14 @@ pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
     out
 }
 
-/// Matches a frame's points with the deformed band (extended displacements `u`): among all cells that hold a point and whose
-/// surface faces its camera the one with the smallest |φ| wins, then the lowest cell number. Ordered by point.
+/// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
+/// surface faces its camera come first (a hidden side counts within a cell only); then the smallest |φ| wins, then the lowest
+/// cell number. Ordered by point.
 pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[ObservedPoint], cameras: &[Camera]) -> Vec<Match> {
     let n = body.nodes.len();
     let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
-    let candidates: Vec<Vec<Match>> = body
+    let reach = HIDDEN_REACH * body.grid.h;
+    let candidates: Vec<Vec<(bool, Match)>> = body
         .band
         .cells
         .par_iter()
@@ -142,20 +147,21 @@ pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[Observ
                 }
                 if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
                     let sight = (seen.position - cameras[seen.camera as usize].center).normalize_or_zero();
-                    if place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length() {
-                        found.push(Match { point: p, cell: c as u32, place });
+                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
+                    if faces || place.phi.abs() <= reach {
+                        found.push((faces, Match { point: p, cell: c as u32, place }));
                     }
                 }
             });
             found
         })
         .collect();
-    let mut best: Vec<Option<Match>> = vec![None; points.len()];
-    for m in candidates.into_iter().flatten() {
+    let mut best: Vec<Option<(bool, Match)>> = vec![None; points.len()];
+    for (faces, m) in candidates.into_iter().flatten() {
         let slot = &mut best[m.point as usize];
-        if slot.is_none_or(|b| m.place.phi.abs() < b.place.phi.abs()) {
-            *slot = Some(m);
+        if slot.is_none_or(|(f, b)| (faces && !f) || (faces == f && m.place.phi.abs() < b.place.phi.abs())) {
+            *slot = Some((faces, m));
         }
     }
-    best.into_iter().flatten().collect()
+    best.into_iter().flatten().map(|(_, m)| m).collect()
 }
