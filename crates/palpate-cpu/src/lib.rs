@@ -5,6 +5,8 @@
 mod backend;
 mod elements;
 pub mod linear;
+#[cfg(test)]
+mod local_tests;
 mod newton;
 pub mod passes;
 mod simulate;

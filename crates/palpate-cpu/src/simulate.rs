@@ -17,7 +17,7 @@ const WORLD_SIZE: f64 = 1000.0;
 const STATIC_ITERATIONS: usize = 200;
 
 /// The balance of step k, or of the static problem (`None`).
-fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Balance<'a> {
+pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Balance<'a> {
     let clock = &shared.plan.clock;
     let (dt, theta) = (clock.step, clock.theta);
     let p = &member.physics;
