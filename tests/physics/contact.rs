@@ -47,10 +47,8 @@ fn stiff_contact_limits_no_time_step() {
         p.point + (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum::<DVec3>()
     };
     let states = run::states(&plan);
-    let lowest = states
-        .iter()
-        .flat_map(|s| body.patches.iter().map(|p| point(p, &s.displacement).z))
-        .fold(f64::INFINITY, f64::min);
+    let lowest =
+        states.iter().flat_map(|s| body.patches.iter().map(|p| point(p, &s.displacement).z)).fold(f64::INFINITY, f64::min);
     println!("deepest point of a patch: {lowest:.2e} m");
     // A patch may dip in by the smoothing width (a twentieth of a cell), no more.
     assert!(lowest > -0.05 * 0.012, "nothing falls through: {lowest}");

@@ -75,7 +75,8 @@ fn undamped_vibration_keeps_its_energy() {
     let strained = (contact..contact + 1200).map(elastic).fold(0.0, f64::max);
     let worst = (contact..=contact + 1200).step_by(20).map(|k| (energy(k) - energy(contact)).abs() / inner).fold(0.0, f64::max);
     println!("inner energy {inner:.2e} J, strained at most {strained:.2e} J, at worst {worst:.1e} of it off in 50 periods");
-    let height = |k: usize| plan.body.nodes.iter().zip(&states[k].displacement).map(|(x, u)| (*x + *u).z).fold(f64::INFINITY, f64::min);
+    let height =
+        |k: usize| plan.body.nodes.iter().zip(&states[k].displacement).map(|(x, u)| (*x + *u).z).fold(f64::INFINITY, f64::min);
     assert!((contact..=contact + 1200).all(|k| height(k) > -0.0207 + 0.001), "it has left the plane");
     assert!(strained > 0.05 * inner, "it vibrates");
     assert!(worst < 0.01);

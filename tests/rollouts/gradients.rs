@@ -31,12 +31,19 @@ fn ball() -> Scene {
 
 /// Points on the surface of the body as it is after some steps of other parameters, so that no residual is zero.
 fn observed(scene: &Scene, times: &[f64]) -> Plan {
-    let marker = MarkerRest { name: "m".into(), position: DVec3::new(0.0, 0.01, 0.118), surface: Some(DVec3::new(0.0, 0.005, 0.11)) };
+    let marker =
+        MarkerRest { name: "m".into(), position: DVec3::new(0.0, 0.01, 0.118), surface: Some(DVec3::new(0.0, 0.005, 0.11)) };
     let plain = build_plan(scene, Observation { depth_noise: 1e-3, marker_noise: 1e-3, ..Observation::default() }, &[]).unwrap();
     let mut theta = plain.theta.clone();
     theta[0] *= 1.15;
     let mut states = Vec::new();
-    Rollout::new(CpuBackend, &plain, 1).unwrap().visit(&theta, |_, s, _| states.push(s)).unwrap();
+    Rollout::new(CpuBackend, &plain, 1)
+        .unwrap()
+        .visit(&theta, |_, s, _| {
+            states.push(s);
+            std::ops::ControlFlow::Continue(())
+        })
+        .unwrap();
     let body = &plain.body;
     let frames = times
         .iter()
@@ -113,14 +120,16 @@ fn check(plan: &Plan, name: &str) {
             })
         })
         .collect();
-    let costs: Vec<f64> =
-        rollout.evaluate(&ParamBatch::from_rows(&rows), &Request::default()).iter().map(|e| e.cost).collect();
+    let costs: Vec<f64> = rollout.evaluate(&ParamBatch::from_rows(&rows), &Request::default()).iter().map(|e| e.cost).collect();
     let mut worst = (0.0f64, 0.0f64);
     for i in 0..p {
         let c = &costs[4 * i..4 * i + 4];
         let difference = (c[0] - 8.0 * c[1] + 8.0 * c[2] - c[3]) / (12.0 * 1e-4);
         let (a, f) = (adjoint.gradient[i] * size(i), forward[i] * size(i));
-        println!("{name} {:32} adjoint {a:+.10e} forward {f:+.10e} differences {difference:+.10e}", plan.layout.keys[i].spec().path);
+        println!(
+            "{name} {:32} adjoint {a:+.10e} forward {f:+.10e} differences {difference:+.10e}",
+            plan.layout.keys[i].spec().path
+        );
         // Relative to the parameter's own derivative, or to a thousandth of the largest for those that hardly matter.
         let scale = a.abs().max(1e-3 * largest);
         worst = (worst.0.max((a - f).abs() / scale), worst.1.max((a - difference).abs() / scale));
@@ -152,15 +161,15 @@ fn static_equilibrium_then_motion() {
         translations: vec![DVec3::ZERO, DVec3::new(0.004, 0.0, 0.002), DVec3::new(0.003, -0.004, 0.0), DVec3::ZERO],
         rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_x(0.1), DQuat::from_rotation_x(0.15), DQuat::from_rotation_y(0.1)],
     };
-    s.clamps =
-        vec![Clamp { motion: Some(motion), ..scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2)) }];
+    s.clamps = vec![Clamp { motion: Some(motion), ..scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2)) }];
     check(&observed(&s, &[0.0, 0.03, 0.055]), "static start");
 }
 
 #[test]
 fn static_problem() {
     let mut s = ball();
-    s.initial = Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::StaticEquilibrium };
+    s.initial =
+        Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::StaticEquilibrium };
     s.time.steps = 0;
     s.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
     check(&observed(&s, &[0.0]), "static");

@@ -1,3 +1,4 @@
-//! Whole simulations: adjoint, sensitivities and differences agree.
+//! Whole simulations: derivatives agree, and so do solvers, threads and batches.
 
+mod agreement;
 mod gradients;

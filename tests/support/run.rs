@@ -4,11 +4,16 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Rollout, Snapshot};
 use palpate_model::plan::Plan;
+use std::ops::ControlFlow;
 
 /// All states of a simulation at the plan's own parameters, the initial one first.
 pub fn states(plan: &Plan) -> Vec<Snapshot> {
     let mut all = Vec::new();
-    Rollout::new(CpuBackend, plan, 1).unwrap().visit(&plan.theta, |_, s, _| all.push(s)).unwrap_or_else(|e| panic!("{e}"));
+    Rollout::new(CpuBackend, plan, 1).unwrap().visit(&plan.theta, |_, s, _| {
+        all.push(s);
+        ControlFlow::Continue(())
+    })
+    .unwrap_or_else(|e| panic!("{e}"));
     all
 }
 

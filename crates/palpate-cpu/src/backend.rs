@@ -199,13 +199,15 @@ impl Backend for CpuBackend {
     fn start_tangent(&self, world: &mut World, first: &State, tangent: &mut Tangent, tally: &mut Tally) {
         let shared = &world.shared;
         let directions = &tangent.directions;
-        (&mut world.members, &first.members, &mut tangent.members, &mut tally.members).into_par_iter().for_each(|(m, s, d, t)| {
-            if !t.failed()
-                && let Err(reason) = simulate::start_tangent(shared, m, s, directions, d)
-            {
-                t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
-            }
-        });
+        (&mut world.members, &first.members, &mut tangent.members, &mut tally.members).into_par_iter().for_each(
+            |(m, s, d, t)| {
+                if !t.failed()
+                    && let Err(reason) = simulate::start_tangent(shared, m, s, directions, d)
+                {
+                    t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+                }
+            },
+        );
     }
 
     fn step_tangent(
@@ -221,14 +223,7 @@ impl Backend for CpuBackend {
         let shared = &world.shared;
         let directions = &tangent.directions;
         let time = (k + 1) as f64 * shared.plan.clock.step;
-        (
-            &mut world.members,
-            &now.members,
-            &next.members,
-            &tangent.members,
-            &mut tangent_next.members,
-            &mut tally.members,
-        )
+        (&mut world.members, &now.members, &next.members, &tangent.members, &mut tangent_next.members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, d, d_next, t)| {
                 if !t.failed()

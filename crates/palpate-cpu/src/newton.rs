@@ -24,7 +24,9 @@ pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
 fn trouble(t: Trouble) -> Reason {
     match t {
         Trouble::Indefinite(what) => (FailureKind::LinearSolve, format!("the matrix is not positive definite ({what})")),
-        Trouble::Unconverged(left) => (FailureKind::LinearSolve, format!("conjugate gradients stopped at a relative residual of {left:.1e}")),
+        Trouble::Unconverged(left) => {
+            (FailureKind::LinearSolve, format!("conjugate gradients stopped at a relative residual of {left:.1e}"))
+        }
     }
 }
 
@@ -65,7 +67,11 @@ pub fn solve(
     let (first, last) = (history.first().copied().unwrap_or(0.0), history.last().copied().unwrap_or(0.0));
     Err((
         FailureKind::NewtonStalled,
-        format!("{most} iterations took the scaled residual from {:.1e} to {:.1e} of the forces", first / reference, last / reference),
+        format!(
+            "{most} iterations took the scaled residual from {:.1e} to {:.1e} of the forces",
+            first / reference,
+            last / reference
+        ),
     ))
 }
 

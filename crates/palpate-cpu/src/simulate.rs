@@ -105,13 +105,20 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
 }
 
 /// dJ/dθ of the start: adds to `gradient` `[P]`.
-pub fn start_adjoint(shared: &Shared, member: &mut Member, s: &MemberState, adj: &MemberState, gradient: &mut [f64]) -> Result<(), Reason> {
+pub fn start_adjoint(
+    shared: &Shared,
+    member: &mut Member,
+    s: &MemberState,
+    adj: &MemberState,
+    gradient: &mut [f64],
+) -> Result<(), Reason> {
     let plan = &shared.plan;
     for (p, key) in plan.layout.keys.iter().enumerate() {
         match key {
             ParamKey::Velocity(a) => gradient[p] += adj.v.iter().map(|v| v[*a as usize]).sum::<f64>(),
             ParamKey::AngularVelocity(a) => {
-                gradient[p] += adj.v.iter().zip(&plan.body.nodes).map(|(v, x)| (*x - plan.pivot).cross(*v)[*a as usize]).sum::<f64>();
+                gradient[p] +=
+                    adj.v.iter().zip(&plan.body.nodes).map(|(v, x)| (*x - plan.pivot).cross(*v)[*a as usize]).sum::<f64>();
             }
             _ => {}
         }

@@ -69,7 +69,13 @@ impl World {
                 e
             });
             let planes = supports::planes(&shared.plan, &physics);
-            self.members.push(Member { theta: row.to_vec(), physics, planes, elements, matrix: scratch.pop().unwrap_or_default() });
+            self.members.push(Member {
+                theta: row.to_vec(),
+                physics,
+                planes,
+                elements,
+                matrix: scratch.pop().unwrap_or_default(),
+            });
         }
     }
 }

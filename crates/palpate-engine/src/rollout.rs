@@ -4,6 +4,7 @@ use crate::backend::{Backend, BuildError, FrameResiduals};
 use crate::evaluate::{Evaluate, Evaluation, ParamBatch, Request};
 use glam::DVec3;
 use palpate_model::plan::Plan;
+use std::ops::ControlFlow;
 
 /// A plan on a backend, ready to be evaluated for batches of θ.
 pub struct Rollout<B: Backend> {
@@ -104,11 +105,11 @@ impl<B: Backend> Rollout<B> {
     }
 
     /// Simulates one member and hands every state (the initial one first) to `visit` together with the residuals of the
-    /// frames of its step; stops early with the member's failure.
+    /// frames of its step; stops early when `visit` breaks, or with the member's failure.
     pub fn visit(
         &mut self,
         theta: &[f64],
-        mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>),
+        mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, crate::Failure> {
         let b = &self.backend;
         let w = &mut self.world;
@@ -121,6 +122,7 @@ impl<B: Backend> Rollout<B> {
             let (displacement, velocity) = b.read_state(w, s, 0);
             Snapshot { time: k as f64 * self.plan.clock.step, displacement, velocity }
         };
+        let mut flow = ControlFlow::Continue(());
         if !b.all_failed(&tally) {
             let residuals = if steps == 0 {
                 b.observe(w, 0, &now, &now, &mut tally);
@@ -128,10 +130,10 @@ impl<B: Backend> Rollout<B> {
             } else {
                 Vec::new()
             };
-            visit(0, snapshot(w, 0, &now), residuals);
+            flow = visit(0, snapshot(w, 0, &now), residuals);
         }
         for k in 0..steps {
-            if b.all_failed(&tally) {
+            if b.all_failed(&tally) || flow.is_break() {
                 break;
             }
             let mut next = b.new_state(w);
@@ -141,7 +143,7 @@ impl<B: Backend> Rollout<B> {
             }
             b.observe(w, k, &now, &next, &mut tally);
             let residuals = b.residuals(w, k, &now, &next, 0);
-            visit(k + 1, snapshot(w, k + 1, &next), residuals);
+            flow = visit(k + 1, snapshot(w, k + 1, &next), residuals);
             now = next;
         }
         let evaluation = b.read(w, &tally).remove(0);

@@ -5,6 +5,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Rollout, Snapshot};
 use palpate_model::plan::Plan;
+use std::ops::ControlFlow;
 
 /// What computes the physics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +36,8 @@ impl Backend {
         }
     }
 
-    /// Simulates one member; `visit` gets every state (the initial one first) with the residuals of the frames of its step.
+    /// Simulates one member; `visit` gets every state (the initial one first) with the residuals of the frames of its step, and may
+    /// end the simulation.
     ///
     /// # Errors
     /// The backend refuses the plan, or the simulation fails.
@@ -43,7 +45,7 @@ impl Backend {
         self,
         plan: &Plan,
         theta: &[f64],
-        visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>),
+        visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
         match self {
             Backend::Cpu | Backend::Auto => Ok(Rollout::new(CpuBackend, plan, 1)?.visit(theta, visit)?),

@@ -12,14 +12,18 @@ pub enum Error {
     /// The input is fine, but the computation or the writing of its result failed.
     #[error("{0}")]
     Failed(String),
+    /// The user asked to stop before there was anything worth keeping.
+    #[error("interrupted: nothing was written")]
+    Interrupted,
 }
 
 impl Error {
-    /// Exit code of the command line: 2 for bad input, 1 for a failed computation.
+    /// Exit code of the command line: 2 for bad input, 1 for a failed computation, 130 when interrupted.
     pub fn exit_code(&self) -> i32 {
         match self {
             Error::Input(_) => 2,
             Error::Failed(_) => 1,
+            Error::Interrupted => crate::cli::INTERRUPTED,
         }
     }
 

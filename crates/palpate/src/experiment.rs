@@ -175,7 +175,10 @@ impl Experiment {
     /// [`Error::Failed`] when the simulation fails: what happened, when, and what may help.
     pub fn simulate(&self, backend: Backend) -> Result<Simulation, Error> {
         let mut snapshots = Vec::new();
-        backend.visit(&self.plan, &self.plan.theta, |_, s, _| snapshots.push(s))?;
+        backend.visit(&self.plan, &self.plan.theta, |_, s, _| {
+            snapshots.push(s);
+            std::ops::ControlFlow::Continue(())
+        })?;
         let (surface, triangles) = self.surface(0.5 * self.plan.body.grid.h);
         Ok(Simulation { snapshots, surface, triangles })
     }

@@ -137,6 +137,7 @@ pub(crate) fn visit_frames(
             visit(r.frame, &displacement, r);
         }
         last = Some(state);
+        std::ops::ControlFlow::Continue(())
     })?;
     Ok(evaluation.cost)
 }

@@ -41,7 +41,7 @@ pub fn observe(
     experiment: &Experiment,
     backend: Backend,
     observers: &Observers,
-    mut progress: impl FnMut(f64),
+    mut progress: impl FnMut(f64) -> std::ops::ControlFlow<()>,
 ) -> Result<Recording, Error> {
     let plan = experiment.plan();
     let (start, end) = (experiment.scene().time.start, experiment.end_time());
@@ -57,6 +57,7 @@ pub fn observe(
     let mut last: Option<Snapshot> = None;
     let (mut frames, mut samples) = (Vec::new(), Vec::new());
     let steps = plan.clock.steps.max(1) as f64;
+    let mut stopped = false;
     backend.visit(plan, &plan.theta, |k, state, _| {
         while let Some((number, time)) = waiting.next_if(|(_, t)| is_static || t - start <= state.time + slack) {
             let u = last.as_ref().map_or_else(|| state.displacement.clone(), |a| between(a, &state, time - start));
@@ -64,8 +65,13 @@ pub fn observe(
             samples.extend(marker_samples(observers, number, time, &tracked.deform(&u)));
         }
         last = Some(state);
-        progress(k as f64 / steps);
+        let flow = progress(k as f64 / steps);
+        stopped = flow.is_break();
+        flow
     })?;
+    if stopped {
+        return Err(Error::Interrupted);
+    }
     for (i, c) in observers.cameras.iter().enumerate() {
         if !frames.iter().any(|f| f.camera == i) {
             return Err(Error::Input(format!("camera \"{}\" never sees the body; check eye, target and fov", c.name)));

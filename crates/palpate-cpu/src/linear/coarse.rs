@@ -122,7 +122,8 @@ impl Coarsening {
                         let j = rows.columns[k];
                         let a = matrix.values[k];
                         let b = a * -cross(arms[j as usize]);
-                        let at = columns.binary_search(&(2 * self.group_of[j as usize])).expect("groups of neighbours are neighbours");
+                        let at =
+                            columns.binary_search(&(2 * self.group_of[j as usize])).expect("groups of neighbours are neighbours");
                         strip[at] += a;
                         strip[at + 1] += b;
                         strip[length + at] += left * a;
@@ -136,7 +137,14 @@ impl Coarsening {
     }
 
     /// A preconditioner for a matrix at displacement u.
-    pub fn prepare(&self, body: &Body, rows: &BlockRows, matrix: &Matrix, jacobi: BlockJacobi, u: &[DVec3]) -> Result<TwoLevel<'_>, String> {
+    pub fn prepare(
+        &self,
+        body: &Body,
+        rows: &BlockRows,
+        matrix: &Matrix,
+        jacobi: BlockJacobi,
+        u: &[DVec3],
+    ) -> Result<TwoLevel<'_>, String> {
         let arms = self.arms(body, u);
         let factor = self.analysis.factor(&self.project(rows, matrix, &arms))?;
         Ok(TwoLevel { coarsening: self, jacobi, arms, factor })

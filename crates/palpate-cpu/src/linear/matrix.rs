@@ -31,8 +31,7 @@ impl Matrix {
 
     /// Inverses of the diagonal blocks `[N]`; `None` at the first block that is not positive definite.
     pub fn diagonal_inverses(&self, rows: &BlockRows) -> Result<Vec<DMat3>, usize> {
-        rows
-            .diagonal
+        rows.diagonal
             .iter()
             .enumerate()
             .map(|(a, &k)| {

@@ -192,7 +192,9 @@ impl<'a> Balance<'a> {
         }
         let width = contact::WIDTH * self.plan.body.grid.h;
         for plane in self.planes {
-            w += supports::touches(&self.plan.body, plane, s.u1).map(|t| t.area * contact::energy(t.gap, plane.stiffness, width)).sum::<f64>();
+            w += supports::touches(&self.plan.body, plane, s.u1)
+                .map(|t| t.area * contact::energy(t.gap, plane.stiffness, width))
+                .sum::<f64>();
         }
         // Inertia and weight are quadratic and linear: ½ (r(u₁) + r(0))·u₁.
         let mut at_new = zeros(s.u1.len());
@@ -264,7 +266,8 @@ impl<'a> Balance<'a> {
                 let k = &self.elements.clamps[c][m].k;
                 let places = &self.places.cells[cell.cell as usize];
                 for b in 0..64 {
-                    values[places[b] as usize] += a * block(k, b / 8, b % 8) * a.transpose() * (self.mix.new * physics.youngs_modulus);
+                    values[places[b] as usize] +=
+                        a * block(k, b / 8, b % 8) * a.transpose() * (self.mix.new * physics.youngs_modulus);
                 }
             }
         }
@@ -312,7 +315,15 @@ impl<'a> Balance<'a> {
             let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
             for (i, clamp) in self.plan.clamps.iter().enumerate() {
                 let turn = supports::pose_at(clamp, self.time - dt).0;
-                supports::clamp_product(self.plan, i, self.elements, turn, self.mix.old * self.physics.youngs_modulus, du0, &mut out);
+                supports::clamp_product(
+                    self.plan,
+                    i,
+                    self.elements,
+                    turn,
+                    self.mix.old * self.physics.youngs_modulus,
+                    du0,
+                    &mut out,
+                );
             }
         }
         out

@@ -52,12 +52,7 @@ pub fn instants(plan: &Plan, start: f64, k: usize) -> Vec<Instant> {
             Instant {
                 frame,
                 value: [2.0 * s3 - 3.0 * s2 + 1.0, (s3 - 2.0 * s2 + s) * dt, -2.0 * s3 + 3.0 * s2, (s3 - s2) * dt],
-                rate: [
-                    (6.0 * s2 - 6.0 * s) / dt,
-                    3.0 * s2 - 4.0 * s + 1.0,
-                    (-6.0 * s2 + 6.0 * s) / dt,
-                    3.0 * s2 - 2.0 * s,
-                ],
+                rate: [(6.0 * s2 - 6.0 * s) / dt, 3.0 * s2 - 4.0 * s + 1.0, (-6.0 * s2 + 6.0 * s) / dt, 3.0 * s2 - 2.0 * s],
             }
         })
         .collect()
@@ -87,7 +82,8 @@ pub struct Compared {
 pub fn compare(plan: &Plan, hash: &PointHash, frame: usize, u: &[DVec3]) -> Compared {
     let (body, obs) = (&*plan.body, &*plan.observation);
     let f = &obs.frames[frame];
-    let matches = if f.points.is_empty() { Vec::new() } else { match_points(body, &extend(body, u), hash, &f.points, &obs.cameras) };
+    let matches =
+        if f.points.is_empty() { Vec::new() } else { match_points(body, &extend(body, u), hash, &f.points, &obs.cameras) };
     let per_point = 1.0 / (obs.depth_noise * obs.depth_noise);
     // A point without a match costs what one at the edge of the band costs.
     let mut cost = (f.points.len() - matches.len()) as f64 * kernel::unmatched(plan.band) * per_point;

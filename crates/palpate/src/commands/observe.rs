@@ -9,6 +9,7 @@ use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
 use palpate_io::InputError;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 const AFTER_HELP: &str = "\
@@ -179,7 +180,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     };
     let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
     let bar = console.progress(1000, "observing");
-    let recording = observe(&experiment, backend, &observers, |share| bar.set_position((share * 1000.0) as u64))?;
+    let interrupt = console.interrupt.clone();
+    let recording = observe(&experiment, backend, &observers, |share| {
+        bar.set_position((share * 1000.0) as u64);
+        if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
     bar.finish_and_clear();
     palpate_io::write_recording(&a.out, &recording)?;
 

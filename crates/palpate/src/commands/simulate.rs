@@ -11,6 +11,7 @@ use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::output::{make_folder, write_file};
 use palpate_model::shape::TriMesh;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -121,11 +122,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
     let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
 
-    // States first, files afterwards: the pictures' camera frames the whole motion.
+    // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
+    // writing of what it has.
     let bar = console.progress(plan.clock.steps as u64, "simulating");
     let mut states: Vec<(usize, Snapshot)> = Vec::new();
     let mut farthest: f64 = 0.0;
     let mut extent: Vec<(DVec3, DVec3)> = Vec::new();
+    let interrupt = console.interrupt.clone();
     backend.visit(plan, &plan.theta, |k, s, _| {
         farthest = s.displacement.iter().map(|u| u.length()).fold(farthest, f64::max);
         if keep(k) {
@@ -134,7 +137,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             states.push((k, s));
         }
         bar.set_position(k as u64);
+        if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
+    let interrupted = interrupt.is_raised();
     bar.finish_and_clear();
     let seconds = clock.elapsed().as_secs_f64();
 
@@ -154,9 +159,6 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let bar = console.progress(states.len() as u64, "writing");
     let mut written = 0;
     for (k, state) in &states {
-        if console.interrupt.is_raised() {
-            break;
-        }
         writer.write(*k, state)?;
         written += 1;
         bar.inc(1);
@@ -166,7 +168,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
     }
     report(console, &experiment, &folder, backend.resolved(), seconds, farthest, written, writer.files);
-    Ok(if written < states.len() { INTERRUPTED } else { 0 })
+    Ok(if interrupted { INTERRUPTED } else { 0 })
 }
 
 fn report(
