@@ -1,0 +1,130 @@
+//! `cargo xtask tidy`: what the house promises and the compiler does not check.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Longest source file, in lines: what one reads in a few minutes.
+const LONGEST: usize = 450;
+/// Largest asset, in bytes.
+const LARGEST: u64 = 300_000;
+
+/// Which rooms a room may import (`palpate-` left out); nobody but tests and xtask imports `palpate`.
+const ARROWS: [(&str, &[&str]); 6] = [
+    ("palpate-model", &[]),
+    ("palpate-io", &["model"]),
+    ("palpate-engine", &["model"]),
+    ("palpate-cpu", &["model", "engine"]),
+    ("palpate-fit", &["model", "engine"]),
+    ("palpate", &["model", "io", "engine", "cpu", "fit"]),
+];
+
+/// Checks the workspace at `root`; one line per finding.
+pub fn check(root: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    rooms(root, &mut found);
+    for file in files(root) {
+        let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
+        let size = fs::metadata(&file).map_or(0, |m| m.len());
+        if name.starts_with("assets/") && size > LARGEST {
+            found.push(format!("{name}: {size} bytes; assets may have {LARGEST}"));
+        }
+        if matches!(file.extension().and_then(|e| e.to_str()), Some("rs" | "wgsl")) {
+            let text = fs::read_to_string(&file).unwrap_or_default();
+            source(&name, &text, &mut found);
+        }
+    }
+    found
+}
+
+/// Folders under `crates/` against the arrows and the room lists of README and ARCHITECTURE.
+fn rooms(root: &Path, found: &mut Vec<String>) {
+    let mut names: Vec<String> = fs::read_dir(root.join("crates"))
+        .into_iter()
+        .flatten()
+        .filter_map(|e| Some(e.ok()?.file_name().to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    for name in &names {
+        let Some((_, allowed)) = ARROWS.iter().find(|a| a.0 == name) else {
+            found.push(format!("crates/{name}: no arrow in xtask/src/tidy.rs says what it may import"));
+            continue;
+        };
+        let manifest = fs::read_to_string(root.join("crates").join(name).join("Cargo.toml")).unwrap_or_default();
+        for line in manifest.lines().filter_map(|l| l.strip_prefix("palpate")) {
+            let other = line.split(['.', ' ', '=']).next().unwrap_or("").trim_start_matches('-');
+            if !allowed.contains(&other) {
+                found.push(format!("crates/{name}/Cargo.toml: may not import palpate-{other}"));
+            }
+        }
+    }
+    for page in ["README.md", "ARCHITECTURE.md"] {
+        let text = fs::read_to_string(root.join(page)).unwrap_or_default();
+        for name in names.iter().filter(|n| !text.contains(n.as_str())) {
+            found.push(format!("{page}: does not name the room {name}"));
+        }
+    }
+}
+
+/// Rules for one source file.
+fn source(name: &str, text: &str, found: &mut Vec<String>) {
+    let lines = text.lines().count();
+    if lines > LONGEST {
+        found.push(format!("{name}: {lines} lines; split it by ideas (at most {LONGEST})"));
+    }
+    if !text.starts_with("//!") && name.ends_with(".rs") {
+        found.push(format!("{name}: begins without a //! that says what it is for"));
+    }
+    let lines: Vec<&str> = text.lines().collect();
+    for (i, line) in lines.iter().enumerate() {
+        let ignored = line.trim_start().starts_with("#[ignore");
+        if ignored && !(i > 0 && lines[i - 1].trim_start().starts_with("//")) {
+            found.push(format!("{name}:{}: an ignored test needs its reason in the line above", i + 1));
+        }
+        let unfinished = ["todo!(", "unimplemented!("].iter().any(|w| line.contains(w));
+        if unfinished && !name.ends_with("tidy.rs") {
+            found.push(format!("{name}:{}: unfinished", i + 1));
+        }
+    }
+}
+
+/// All files of the workspace but builds, outputs and git's own, sorted.
+fn files(root: &Path) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    let mut waiting = vec![root.to_path_buf()];
+    while let Some(folder) = waiting.pop() {
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if path.is_dir() {
+                if !(name.starts_with("target") || name == ".git" || name == "out") {
+                    waiting.push(path);
+                }
+            } else {
+                all.push(path);
+            }
+        }
+    }
+    all.sort();
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_what_is_wrong() {
+        let folder = tempfile::tempdir().unwrap();
+        let room = folder.path().join("crates/palpate-fit");
+        fs::create_dir_all(room.join("src")).unwrap();
+        fs::write(room.join("Cargo.toml"), "[dependencies]\npalpate-model.workspace = true\npalpate-cpu.workspace = true\n").unwrap();
+        fs::write(room.join("src/lib.rs"), format!("fn f() {{}}\n#[ignore]\n{}", "\n".repeat(LONGEST))).unwrap();
+        fs::create_dir_all(folder.path().join("assets")).unwrap();
+        fs::write(folder.path().join("assets/big.bin"), vec![0; LARGEST as usize + 1]).unwrap();
+        let found = check(folder.path()).join("\n");
+        for part in ["may not import palpate-cpu", "lines; split", "begins without", "needs its reason", "assets may have", "README.md"] {
+            assert!(found.contains(part), "{part} in\n{found}");
+        }
+        assert!(!found.contains("may not import palpate-model"));
+    }
+}
