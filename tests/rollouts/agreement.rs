@@ -88,3 +88,14 @@ fn a_member_that_fails_keeps_its_slot_and_harms_nobody() {
     assert!(all[1].cost.is_infinite() && failure.contains("poisson_ratio = 0.7"), "{failure}");
     assert_eq!(all[2], alone[0]);
 }
+
+#[test]
+fn a_body_that_leaves_the_world_says_when_and_with_what() {
+    let mut s = scenes::body(Analytic::Ball { radius: 0.03, center: DVec3::ZERO }, 0.015);
+    s.initial.velocity = DVec3::new(0.0, 0.0, 1e5);
+    let plan = scenes::plan(&s);
+    let failure = evaluate(&plan, &[plan.theta.clone()], 1).remove(0).failure.unwrap();
+    assert_eq!(failure.kind, palpate_engine::FailureKind::FellOut);
+    let text = failure.to_string();
+    assert!(text.contains("t = 0.005") && text.contains("initial.velocity.z = 100000") && text.contains("hint"), "{text}");
+}

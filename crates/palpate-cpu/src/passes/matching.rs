@@ -17,6 +17,9 @@ const TURNED_AWAY: f64 = 0.3;
 /// Nearer than this to a hidden side [cells] a point may still belong to it: next to a sharp edge noise puts points closest to
 /// the side that the camera does not see, and calling them unmatched would make the cost jump by a whole band.
 const HIDDEN_REACH: f64 = 1.0;
+/// That holds for sides next to one that is seen; a side turned away by more than this (cosine) is a back, whose points can only
+/// come from the front of a thin part.
+const BACK: f64 = 0.8;
 
 /// Points sorted by the hash of the cube they lie in.
 #[derive(Clone, Debug, Default)]
@@ -123,7 +126,7 @@ pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
-/// surface faces its camera come first (a hidden side counts within a cell only); then the smallest |φ| wins, then the lowest
+/// surface faces its camera come first (a hidden side next to it counts within a cell, a back never); then the smallest |φ| wins, then the lowest
 /// cell number. Ordered by point.
 pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[ObservedPoint], cameras: &[Camera]) -> Vec<Match> {
     let n = body.nodes.len();
@@ -147,8 +150,9 @@ pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[Observ
                 }
                 if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
                     let sight = (seen.position - cameras[seen.camera as usize].center).normalize_or_zero();
-                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
-                    if faces || place.phi.abs() <= reach {
+                    let away = place.gradient.dot(sight) / place.gradient.length().max(f64::MIN_POSITIVE);
+                    let faces = away <= TURNED_AWAY;
+                    if faces || (away <= BACK && place.phi.abs() <= reach) {
                         found.push((faces, Match { point: p, cell: c as u32, place }));
                     }
                 }
