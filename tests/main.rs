@@ -4,4 +4,5 @@ mod bad_input;
 mod cli;
 mod physics;
 mod real_data;
+mod recovery;
 mod rollouts;

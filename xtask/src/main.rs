@@ -1,2 +1,71 @@
 //! Developer verbs.
-fn main() {}
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use studies::{bench, paper, table, tidy};
+
+/// Developer verbs of palpate.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Repeat the published recovery experiments
+    Paper {
+        /// Coarser cells, fewer starts and cases
+        #[arg(long)]
+        quick: bool,
+    },
+    /// Time and memory of a step, forward and back
+    Bench {
+        /// Also a body of 100 000 nodes
+        #[arg(long)]
+        large: bool,
+        /// Only compare two results of earlier runs
+        #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
+        compare: Option<Vec<PathBuf>>,
+    },
+    /// Check rooms, imports, sizes of files
+    Tidy,
+}
+
+fn run(verb: Verb) -> Result<(), String> {
+    match verb {
+        Verb::Paper { quick } => {
+            let report = paper::tables::all(quick).map_err(|e| e.to_string())?;
+            report.print();
+            let name = if quick { "paper-quick" } else { "paper" };
+            println!("\nwritten to {}", table::save(name, &report)?.display());
+        }
+        Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
+        Verb::Bench { large, compare: None } => {
+            let report = bench::all(large)?;
+            report.print();
+            println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
+        }
+        Verb::Tidy => {
+            let found = tidy::check(&table::root());
+            found.iter().for_each(|f| println!("{f}"));
+            if !found.is_empty() {
+                return Err(format!("tidy: {} findings", found.len()));
+            }
+            println!("tidy: nothing to report");
+        }
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse().verb) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("{e}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Time and memory of one step, forward and back, of the CPU backend: the paper's dragon, and balls and blocks of growing size.
+
+pub mod report;
+
+use crate::table;
+use glam::{DAffine3, DVec3};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Backend, ParamBatch};
+use palpate_model::body::{Body, SUBDIVISIONS};
+use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
+use palpate_model::params::{Layout, ParamKey};
+use palpate_model::plan::{Clock, Plan, PlaneSite};
+use palpate_model::scene::{Analytic, InitialShape, RotationUpdate, Solver};
+use palpate_model::shape::{Placed, Shape};
+use report::{Line, Report, Times};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Steps that are timed.
+const STEPS: usize = 10;
+/// Points of a frame, about what a 50 × 50 camera sees of a body.
+const POINTS: usize = 1000;
+/// Width of the band in cells, as for the paper's dragon.
+const BAND: f64 = 4.0;
+/// The paper's table 2 for the dragon: forward, cost, adjoint of one step [ms].
+const PAPER_DRAGON: [f64; 3] = [318.0, 172.0, 462.0];
+
+/// Runs everything; `large` adds a body of 100 000 nodes.
+///
+/// # Errors
+/// A body cannot be built.
+pub fn all(large: bool) -> Result<Report, String> {
+    let mut report = Report { date: table::today(), threads: rayon::current_num_threads(), lines: Vec::new() };
+    let mut add = |line: Line| {
+        println!("{}: {} nodes, forward {:.1} ms", line.name, line.nodes, 1e3 * line.forward.median);
+        report.lines.push(line);
+    };
+    match data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
+        Some(file) => {
+            // Longest side 0.3 m: the file's unit is a fifth of it, with 6 cells to a unit.
+            let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
+            for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
+                let line = one(&format!("dragon, {rotation:?}").to_lowercase(), &sdf, 0.3 / 5.0 / 6.0, rotation, 5e4)?;
+                add(Line { paper: Some(PAPER_DRAGON.map(|ms| 1e-3 * ms)), ..line });
+            }
+        }
+        None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
+    }
+    // Cells over the diameter or the edge that give about 1, 3, 10, 30 (100) thousand nodes.
+    let balls = [10.0, 15.5, 24.0, 36.0, 55.0];
+    let blocks = [9.0, 13.0, 20.5, 30.0, 45.5];
+    for k in 0..if large { 5 } else { 4 } {
+        let ball = Analytic::Ball { radius: 0.1, center: DVec3::new(0.001, 0.002, 0.103) };
+        add(one(&format!("ball {}", SIZES[k]), &placed(ball), 0.2 / balls[k], RotationUpdate::Converged, 5e4)?);
+        let block = Analytic::Box { min: DVec3::new(-0.1, -0.1, 0.003), max: DVec3::new(0.1, 0.1, 0.203) };
+        add(one(&format!("block {}", SIZES[k]), &placed(block), 0.2 / blocks[k], RotationUpdate::Converged, 5e4)?);
+    }
+    Ok(report)
+}
+
+/// Names of the sizes.
+const SIZES: [&str; 5] = ["1k", "3k", "10k", "30k", "100k"];
+
+fn placed(body: Analytic) -> Placed {
+    Placed::new(body, DAffine3::IDENTITY)
+}
+
+/// Folder of the recordings: `PALPATE_DATA`, or `shared/data` beside the workspace.
+fn data() -> Option<std::path::PathBuf> {
+    let folder = std::env::var_os("PALPATE_DATA").map_or_else(|| table::root().join("../shared/data"), Into::into);
+    folder.is_dir().then_some(folder)
+}
+
+/// Resident memory of this process [bytes], where the system tells.
+fn resident() -> usize {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"));
+    line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<usize>().ok()).unwrap_or(0) * 1024
+}
+
+/// A body that is dropped from just above the ground and watched in every step.
+fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
+    let layout = Layout::new(1, 0);
+    let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let value = |k: &ParamKey| match k {
+        ParamKey::YoungsModulus => youngs_modulus,
+        ParamKey::PoissonRatio => 0.45,
+        ParamKey::Density => 1000.0,
+        ParamKey::MassDamping => 0.1,
+        ParamKey::StiffnessDamping => 0.01,
+        ParamKey::Gravity(2) => -9.81,
+        ParamKey::PlaneTheta(_) | ParamKey::PlanePhi(_) => std::f64::consts::FRAC_PI_2,
+        ParamKey::PlaneHeight(_) => lowest,
+        _ => 0.0,
+    };
+    let theta = layout.keys.iter().map(value).collect();
+    // Seen from the front: patches that face the camera.
+    let camera = DVec3::new(0.0, -2.0, 0.2);
+    let facing: Vec<_> = body.patches.iter().filter(|p| p.normal.dot(camera - p.point) > 0.0).collect();
+    let stride = facing.len().div_ceil(POINTS).max(1);
+    let points: Vec<ObservedPoint> =
+        facing.iter().step_by(stride).map(|p| ObservedPoint { position: p.point, camera: 0 }).collect();
+    let frame = |k: usize| Frame { time: 0.01 * k as f64, points: points.clone(), ..Frame::default() };
+    let observation = Observation {
+        cameras: vec![Camera { center: camera }],
+        frames: (1..=STEPS).map(frame).collect(),
+        depth_noise: 1e-3,
+        marker_noise: 1e-3,
+        displacement_noise: 1e-3,
+        ..Observation::default()
+    };
+    Plan {
+        theta,
+        layout,
+        planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
+        clamps: Vec::new(),
+        masses: Vec::new(),
+        clock: Clock { step: 0.01, steps: STEPS, theta: 0.6 },
+        initial: InitialShape::Rest,
+        pivot: DVec3::ZERO,
+        observation: Arc::new(observation),
+        band: BAND * body.grid.h,
+        solver: Solver { rotation, ..Solver::default() },
+        body: Arc::new(body),
+    }
+}
+
+/// Blocks of the stiffness matrix: pairs of nodes that share a cell or a ghost line.
+fn blocks(body: &Body) -> usize {
+    let mut pairs = BTreeSet::new();
+    let mut add = |nodes: &[u32]| nodes.iter().for_each(|a| pairs.extend(nodes.iter().map(|b| (*a, *b))));
+    body.cells.iter().for_each(|c| add(&c.nodes));
+    body.ghosts.iter().for_each(|g| add(&g.nodes));
+    pairs.len()
+}
+
+fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
+    let before = resident();
+    let clock = Instant::now();
+    let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
+    let build = clock.elapsed().as_secs_f64();
+    let plan = plan(body, rotation, youngs_modulus);
+    let body = &plan.body;
+    let backend = CpuBackend;
+    let mut world = backend.build(&plan, 1).map_err(|e| e.to_string())?;
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    let mut tally = backend.new_tally(&world, &[]);
+    let mut now = backend.new_state(&world);
+    backend.start(&mut world, &mut now, &mut tally);
+    let (mut tape, mut forward, mut cost, mut adjoint) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for k in 0..STEPS {
+        let mut next = backend.new_state(&world);
+        let clock = Instant::now();
+        backend.step(&mut world, k, &now, &mut next, &mut tally);
+        forward.push(clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        backend.observe(&world, k, &now, &next, &mut tally);
+        cost.push(clock.elapsed().as_secs_f64());
+        tape.push(std::mem::replace(&mut now, next));
+    }
+    let (mut adj, mut adj_now) = (backend.new_adjoint(&world), backend.new_adjoint(&world));
+    let mut next = now;
+    for k in (0..STEPS).rev() {
+        let Some(now) = tape.pop() else { break };
+        let clock = Instant::now();
+        backend.observe_adjoint(&world, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(&mut world, k, &now, &next, &adj, &mut adj_now, &mut tally);
+        adjoint.push(clock.elapsed().as_secs_f64());
+        std::mem::swap(&mut adj, &mut adj_now);
+        backend.clear_adjoint(&mut adj_now);
+        next = now;
+    }
+    let resident = resident().saturating_sub(before);
+    let failure = backend.read(&world, &tally).remove(0).failure.map(|f| f.to_string());
+    Ok(Line {
+        name: name.into(),
+        nodes: body.nodes.len(),
+        cells: body.cells.len(),
+        band_nodes: body.band.nodes.len(),
+        build,
+        forward: Times::of(forward),
+        cost: Times::of(cost),
+        adjoint: Times::of(adjoint),
+        paper: None,
+        tape: 48 * body.nodes.len(),
+        matrix: 72 * blocks(body),
+        resident,
+        failure,
+    })
+}

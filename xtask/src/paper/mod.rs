@@ -1,0 +1,6 @@
+//! The published experiments of Weiss et al., Sparse Surface Constraints (CVPR 2020), repeated: synthetic recordings give
+//! their parameters back.
+
+pub mod scenes;
+pub mod study;
+pub mod tables;

@@ -1,0 +1,258 @@
+//! The tables: the paper's figures beside ours.
+
+use super::scenes;
+use super::study::{self, Recovery, Search, Unknown, Watch};
+use crate::table;
+use glam::DVec3;
+use palpate::render::Pinhole;
+use palpate::{Backend, Error};
+use palpate_engine::{ParamBatch, Request};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::{Optimizer, Scene};
+use serde::Serialize;
+use std::time::Instant;
+
+/// One line of a study.
+#[derive(Clone, Debug, Serialize)]
+pub struct Line {
+    /// Which table.
+    pub table: &'static str,
+    /// What is varied, and its value.
+    pub case: String,
+    /// What the paper says, or nothing.
+    pub paper: String,
+    /// Simulation nodes.
+    pub nodes: usize,
+    /// Starts within 5 % of the truth.
+    pub converged: usize,
+    /// Starts.
+    pub starts: usize,
+    /// Mean relative error of those [%].
+    pub mean_error_percent: f64,
+    /// Signed relative error of the best start [%].
+    pub best_error_percent: f64,
+    /// Spread of the converged ends [%].
+    pub spread_percent: f64,
+    /// Median evaluations of a start.
+    pub evaluations: usize,
+    /// Wall-clock time [s].
+    pub seconds: f64,
+}
+
+/// Where tables are gathered and shown.
+#[derive(Debug, Default, Serialize)]
+pub struct Report {
+    /// Day of the run.
+    pub date: String,
+    /// All recoveries.
+    pub lines: Vec<Line>,
+    /// Gradient checks.
+    pub gradients: Vec<Gradient>,
+}
+
+/// Adjoint against central differences at one E.
+#[derive(Clone, Debug, Serialize)]
+pub struct Gradient {
+    /// E over the truth.
+    pub at: f64,
+    /// dJ/d ln E by the adjoint.
+    pub adjoint: f64,
+    /// Relative deviation of central differences of relative step 1e-4 [%].
+    pub central_percent: f64,
+    /// Of forward differences over 5 Pa, the paper's smaller step [%].
+    pub forward_5_percent: f64,
+    /// Of forward differences over 100 Pa, the paper's larger step [%].
+    pub forward_100_percent: f64,
+    /// Time of cost and adjoint gradient over that of the cost.
+    pub adjoint_cost: f64,
+}
+
+fn torus_cameras(count: usize, pixels: usize) -> Vec<Pinhole> {
+    scenes::cameras(DVec3::new(0.0, 0.0, 0.1), 1.0, 26.0, count, pixels)
+}
+
+fn ball_cameras() -> Vec<Pinhole> {
+    scenes::cameras(DVec3::new(0.0, 0.0, 0.07), 0.6, 30.0, 1, 50)
+}
+
+/// One experiment with E unknown.
+struct Case<'a> {
+    table: &'static str,
+    name: String,
+    paper: &'a str,
+    scene: Scene,
+    watch: Watch,
+    band: f64,
+    search: Search,
+}
+
+fn run(report: &mut Report, case: Case) -> Result<(), Error> {
+    let clock = Instant::now();
+    let plan = study::plan(&case.scene, &study::record(&case.scene, &case.watch)?, case.band)?;
+    let unknown = Unknown::within(&plan, ParamKey::YoungsModulus, 10.0);
+    let result = study::search(&plan, &[unknown], &case.search)?;
+    let r = Recovery::of(&result, 0, case.scene.material.youngs_modulus);
+    let line = Line {
+        table: case.table,
+        case: case.name,
+        paper: case.paper.into(),
+        nodes: plan.body.nodes.len(),
+        converged: r.converged,
+        starts: r.starts,
+        mean_error_percent: 100.0 * r.mean_error,
+        best_error_percent: 100.0 * r.best_error,
+        spread_percent: 100.0 * r.spread,
+        evaluations: r.evaluations,
+        seconds: clock.elapsed().as_secs_f64(),
+    };
+    println!(
+        "{}, {}: {}/{} converged, mean error {:.2} %, {} evaluations, {:.0} s",
+        line.table, line.case, line.converged, line.starts, line.mean_error_percent, line.evaluations, line.seconds
+    );
+    report.lines.push(line);
+    Ok(())
+}
+
+/// Runs everything; `quick` takes coarser cells and fewer starts and cases.
+///
+/// # Errors
+/// A scene cannot be simulated, or no start of a fit can be evaluated.
+pub fn all(quick: bool) -> Result<Report, Error> {
+    let mut report = Report { date: table::today(), ..Report::default() };
+    let cell = if quick { 0.028 } else { 0.02 };
+    let starts = if quick { 3 } else { 20 };
+    let few = if quick { 2 } else { 4 };
+    let gauss_newton = |starts| Search { optimizer: Optimizer::GaussNewton, iterations: 30, starts, seed: 5 };
+    let torus = |table, name: String, paper, cell: f64, cameras, refine, band, search| Case {
+        table,
+        name,
+        paper,
+        scene: scenes::torus(cell),
+        watch: Watch { cameras, noise: 0.1 * cell, every: 1, refine, seed: 3 },
+        band,
+        search,
+    };
+    let paper_torus = "about 19/20, 2.39 %";
+    run(
+        &mut report,
+        torus("torus", "same grid".into(), paper_torus, cell, torus_cameras(1, 50), 1.0, 5.0, gauss_newton(starts)),
+    )?;
+    for h in if quick { vec![0.028] } else { vec![0.03, 0.024, 0.02] } {
+        let name = format!("data twice as fine, cell {h} m");
+        run(&mut report, torus("torus", name, "-", h, torus_cameras(1, 50), 2.0, 5.0, gauss_newton(few)))?;
+    }
+    for seed in 1..=(if quick { 2 } else { 6 }) {
+        let case = Case {
+            table: "ball",
+            name: format!("tilted plane {seed}"),
+            paper: "18 to 20 of 20",
+            scene: scenes::ball(if quick { 0.0167 } else { 0.0125 }, seed),
+            watch: Watch { cameras: ball_cameras(), noise: 0.07 * 0.0125, every: 1, refine: 1.0, seed: 4 },
+            band: 4.0,
+            search: gauss_newton(starts),
+        };
+        run(&mut report, case)?;
+    }
+    // Figures 21 to 23; the paper's text swaps some labels between figures, the order here is that of the figures.
+    for (count, paper) in [(1, "2.39 %"), (2, "8.94 %"), (4, "5.08 %"), (8, "4.46 %")] {
+        run(
+            &mut report,
+            torus("cameras", count.to_string(), paper, cell, torus_cameras(count, 50), 1.0, 5.0, gauss_newton(few)),
+        )?;
+    }
+    for (pixels, paper) in [(20, "2.71 %"), (50, "4.62 %"), (100, "3.05 %"), (200, "2.56 %")] {
+        let name = format!("{pixels}²");
+        run(&mut report, torus("image", name, paper, cell, torus_cameras(1, pixels), 1.0, 5.0, gauss_newton(few)))?;
+    }
+    for (band, paper) in [(1.0, "10/14"), (2.0, "-"), (5.0, "13/14")] {
+        let name = format!("{band} cells");
+        run(&mut report, torus("band", name, paper, cell, torus_cameras(1, 50), 1.0, band, gauss_newton(few)))?;
+    }
+    use Optimizer::{GaussNewton, GradientDescent, Lbfgs, NelderMead, Rprop};
+    for (optimizer, paper) in
+        [(GaussNewton, "-"), (Lbfgs, "-"), (GradientDescent, "-"), (Rprop, "100 iterations"), (NelderMead, "-")]
+    {
+        let search = Search { optimizer, iterations: 100, starts: few.min(3), seed: 5 };
+        run(&mut report, torus("optimiser", format!("{optimizer:?}"), paper, cell, torus_cameras(1, 50), 1.0, 5.0, search))?;
+    }
+    let watch = Watch { cameras: torus_cameras(1, 50), noise: 0.1 * cell, every: 1, refine: 1.0, seed: 3 };
+    let truth = scenes::torus(cell);
+    let plan = study::plan(&truth, &study::record(&truth, &watch)?, 5.0)?;
+    report.gradients = gradients(&plan, if quick { &[0.4, 2.5] } else { &[0.2, 0.4, 0.7, 0.9, 1.2, 2.5, 5.0] })?;
+    Ok(report)
+}
+
+fn gradients(plan: &Plan, at: &[f64]) -> Result<Vec<Gradient>, Error> {
+    let mut evaluator = Backend::Auto.evaluator(plan, 1)?;
+    let place = plan.layout.index(ParamKey::YoungsModulus);
+    let truth = plan.theta[place];
+    let mut evaluate = |e: f64, gradient: bool| {
+        let mut theta = plan.theta.clone();
+        theta[place] = e;
+        let request = Request { gradient, sensitivities: Vec::new() };
+        let clock = Instant::now();
+        let r = evaluator.evaluate(&ParamBatch::from_rows(&[theta]), &request).remove(0);
+        let seconds = clock.elapsed().as_secs_f64();
+        r.failure.map_or(Ok(()), |f| Err(Error::Failed(f.to_string())))?;
+        Ok::<_, Error>((r.cost, r.gradient.get(place).copied().unwrap_or(0.0), seconds))
+    };
+    let one = |&at: &f64| {
+        let e = at * truth;
+        let d = 1e-4 * e;
+        let (cost, _, forward) = evaluate(e, false)?;
+        let (_, adjoint, both) = evaluate(e, true)?;
+        let central = (evaluate(e + d, false)?.0 - evaluate(e - d, false)?.0) / (2.0 * d);
+        let (small, large) = ((evaluate(e + 5.0, false)?.0 - cost) / 5.0, (evaluate(e + 100.0, false)?.0 - cost) / 100.0);
+        let off = |g: f64| 100.0 * (g / adjoint - 1.0).abs();
+        Ok(Gradient {
+            at,
+            adjoint: adjoint * e,
+            central_percent: off(central),
+            forward_5_percent: off(small),
+            forward_100_percent: off(large),
+            adjoint_cost: both / forward,
+        })
+    };
+    at.iter().map(one).collect()
+}
+
+impl Report {
+    /// Prints all tables.
+    pub fn print(&self) {
+        let mut tables: Vec<&str> = self.lines.iter().map(|l| l.table).collect();
+        tables.dedup();
+        for name in tables {
+            let head = ["case", "nodes", "paper", "converged", "mean error", "best", "spread", "evaluations", "time"];
+            let mut rows = vec![head.map(String::from).to_vec()];
+            rows.extend(self.lines.iter().filter(|l| l.table == name).map(|l| {
+                vec![
+                    l.case.clone(),
+                    l.nodes.to_string(),
+                    l.paper.clone(),
+                    format!("{}/{}", l.converged, l.starts),
+                    format!("{:.2} %", l.mean_error_percent),
+                    format!("{:+.2} %", l.best_error_percent),
+                    format!("{:.3} %", l.spread_percent),
+                    l.evaluations.to_string(),
+                    format!("{:.0} s", l.seconds),
+                ]
+            }));
+            table::print(name, &rows);
+        }
+        let head = ["E / truth", "dJ/d ln E", "central 1e-4", "forward 5 Pa", "forward 100 Pa", "gradient / cost"];
+        let mut rows = vec![head.map(String::from).to_vec()];
+        rows.extend(self.gradients.iter().map(|g| {
+            let percent = |p: f64| format!("{p:.4} %");
+            vec![
+                g.at.to_string(),
+                format!("{:+.5}", g.adjoint),
+                percent(g.central_percent),
+                percent(g.forward_5_percent),
+                percent(g.forward_100_percent),
+                format!("{:.2}", g.adjoint_cost),
+            ]
+        }));
+        table::print("deviation of differences from the adjoint (time ratio: cost and gradient over cost alone)", &rows);
+    }
+}
