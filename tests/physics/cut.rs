@@ -23,7 +23,7 @@ fn block(cut: f64, ghost: f64) -> (f64, f64) {
     let plan = scenes::plan(&s);
     let backend = CpuBackend;
     let mut world = backend.build(&plan, 1).unwrap();
-    backend.set_params(&mut world, &ParamBatch::from_rows(&[plan.theta.clone()]));
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     let mut state = backend.new_state(&world);
     let mut tally = backend.new_tally(&world, &[]);
     backend.start(&mut world, &mut state, &mut tally);

@@ -51,7 +51,7 @@ fn direct_and_iterative_solvers_agree() {
     let [a, b] = [LinearSolver::Cholesky, LinearSolver::ConjugateGradient].map(|l| {
         let plan = plan(l, 0.06);
         assert!(plan.body.nodes.len() > 600);
-        evaluate(&plan, &[plan.theta.clone()], 1).remove(0)
+        evaluate(&plan, std::slice::from_ref(&plan.theta), 1).remove(0)
     });
     assert!(a.failure.is_none() && b.failure.is_none());
     assert!((a.cost / b.cost - 1.0).abs() < 1e-8, "{} {}", a.cost, b.cost);
@@ -94,7 +94,7 @@ fn a_body_that_leaves_the_world_says_when_and_with_what() {
     let mut s = scenes::body(Analytic::Ball { radius: 0.03, center: DVec3::ZERO }, 0.015);
     s.initial.velocity = DVec3::new(0.0, 0.0, 1e5);
     let plan = scenes::plan(&s);
-    let failure = evaluate(&plan, &[plan.theta.clone()], 1).remove(0).failure.unwrap();
+    let failure = evaluate(&plan, std::slice::from_ref(&plan.theta), 1).remove(0).failure.unwrap();
     assert_eq!(failure.kind, palpate_engine::FailureKind::FellOut);
     let text = failure.to_string();
     assert!(text.contains("t = 0.005") && text.contains("initial.velocity.z = 100000") && text.contains("hint"), "{text}");

@@ -21,7 +21,7 @@ impl ParamBatch {
 
     /// Number of members B.
     pub fn members(&self) -> usize {
-        if self.parameters == 0 { 0 } else { self.values.len() / self.parameters }
+        self.values.len().checked_div(self.parameters).unwrap_or(0)
     }
 
     /// Parameters of member b.
