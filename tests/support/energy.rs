@@ -21,7 +21,8 @@ pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
             0.5 * scene.solver.ghost * shear * h * g.weight * (a - 2.0 * b + c).length_squared()
         })
         .sum();
-    let cells: f64 = body.cells
+    let cells: f64 = body
+        .cells
         .iter()
         .map(|cell| {
             if last != Some(cell.weights) {

@@ -9,11 +9,13 @@ use std::ops::ControlFlow;
 /// All states of a simulation at the plan's own parameters, the initial one first.
 pub fn states(plan: &Plan) -> Vec<Snapshot> {
     let mut all = Vec::new();
-    Rollout::new(CpuBackend, plan, 1).unwrap().visit(&plan.theta, |_, s, _| {
-        all.push(s);
-        ControlFlow::Continue(())
-    })
-    .unwrap_or_else(|e| panic!("{e}"));
+    Rollout::new(CpuBackend, plan, 1)
+        .unwrap()
+        .visit(&plan.theta, |_, s, _| {
+            all.push(s);
+            ControlFlow::Continue(())
+        })
+        .unwrap_or_else(|e| panic!("{e}"));
     all
 }
 

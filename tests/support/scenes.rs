@@ -1,17 +1,21 @@
 //! Small scenes built in code.
 
 use glam::{DAffine3, DVec3};
+use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
 use palpate_model::scene::*;
-use palpate_model::observation::Observation;
 
 /// A body in free space at rest, E = 5 kPa, ν = 0.4, 1000 kg/m³, no damping, no gravity, 10 steps of 5 ms at θ = ½.
 pub fn body(shape: Analytic, cell_size: f64) -> Scene {
     Scene {
         path: "in-code.toml".into(),
         title: String::new(),
-        object: Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell_size) },
+        object: Object {
+            source: BodySource::Analytic(shape),
+            pose: DAffine3::IDENTITY,
+            resolution: Resolution::CellSize(cell_size),
+        },
         material: Material {
             inertia: Inertia::Density(1000.0),
             youngs_modulus: 5000.0,
@@ -43,6 +47,10 @@ pub fn plane(point: DVec3, normal: DVec3) -> Plane {
 
 /// A plan without observations.
 pub fn plan(scene: &Scene) -> Plan {
-    build_plan(scene, Observation { depth_noise: 1e-3, marker_noise: 1e-3, displacement_noise: 1e-3, ..Observation::default() }, &[])
-        .unwrap_or_else(|e| panic!("{e}"))
+    build_plan(
+        scene,
+        Observation { depth_noise: 1e-3, marker_noise: 1e-3, displacement_noise: 1e-3, ..Observation::default() },
+        &[],
+    )
+    .unwrap_or_else(|e| panic!("{e}"))
 }

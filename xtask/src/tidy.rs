@@ -117,12 +117,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let room = folder.path().join("crates/palpate-fit");
         fs::create_dir_all(room.join("src")).unwrap();
-        fs::write(room.join("Cargo.toml"), "[dependencies]\npalpate-model.workspace = true\npalpate-cpu.workspace = true\n").unwrap();
+        fs::write(room.join("Cargo.toml"), "[dependencies]\npalpate-model.workspace = true\npalpate-cpu.workspace = true\n")
+            .unwrap();
         fs::write(room.join("src/lib.rs"), format!("fn f() {{}}\n#[ignore]\n{}", "\n".repeat(LONGEST))).unwrap();
         fs::create_dir_all(folder.path().join("assets")).unwrap();
         fs::write(folder.path().join("assets/big.bin"), vec![0; LARGEST as usize + 1]).unwrap();
         let found = check(folder.path()).join("\n");
-        for part in ["may not import palpate-cpu", "lines; split", "begins without", "needs its reason", "assets may have", "README.md"] {
+        for part in
+            ["may not import palpate-cpu", "lines; split", "begins without", "needs its reason", "assets may have", "README.md"]
+        {
             assert!(found.contains(part), "{part} in\n{found}");
         }
         assert!(!found.contains("may not import palpate-model"));
