@@ -20,6 +20,9 @@ enum Verb {
         /// Coarser cells, fewer starts and cases
         #[arg(long)]
         quick: bool,
+        /// One table alone: torus, ball, cameras, image, band, optimiser or gradient
+        #[arg(long, value_name = "TABLE")]
+        only: Option<String>,
     },
     /// Time and memory of a step, forward and back
     Bench {
@@ -36,11 +39,12 @@ enum Verb {
 
 fn run(verb: Verb) -> Result<(), String> {
     match verb {
-        Verb::Paper { quick } => {
-            let report = paper::tables::all(quick).map_err(|e| e.to_string())?;
+        Verb::Paper { quick, only } => {
+            let suffix = only.as_ref().map_or_else(String::new, |t| format!("-{t}"));
+            let report = paper::tables::all(quick, only).map_err(|e| e.to_string())?;
             report.print();
-            let name = if quick { "paper-quick" } else { "paper" };
-            println!("\nwritten to {}", table::save(name, &report)?.display());
+            let name = format!("paper{}{suffix}", if quick { "-quick" } else { "" });
+            println!("\nwritten to {}", table::save(&name, &report)?.display());
         }
         Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
         Verb::Bench { large, compare: None } => {

@@ -17,8 +17,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Steps that are timed.
-const STEPS: usize = 10;
+/// Steps that are timed; fewer of bodies beyond [`BIG`] nodes.
+const STEPS: [usize; 2] = [10, 4];
+/// See [`STEPS`].
+const BIG: usize = 20_000;
 /// Points of a frame, about what a 50 × 50 camera sees of a body.
 const POINTS: usize = 1000;
 /// Width of the band in cells, as for the paper's dragon.
@@ -82,6 +84,7 @@ fn resident() -> usize {
 /// A body that is dropped from just above the ground and watched in every step.
 fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
     let layout = Layout::new(1, 0);
+    let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let value = |k: &ParamKey| match k {
         ParamKey::YoungsModulus => youngs_modulus,
@@ -104,7 +107,7 @@ fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
     let frame = |k: usize| Frame { time: 0.01 * k as f64, points: points.clone(), ..Frame::default() };
     let observation = Observation {
         cameras: vec![Camera { center: camera }],
-        frames: (1..=STEPS).map(frame).collect(),
+        frames: (1..=steps).map(frame).collect(),
         depth_noise: 1e-3,
         marker_noise: 1e-3,
         displacement_noise: 1e-3,
@@ -116,7 +119,7 @@ fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
         clamps: Vec::new(),
         masses: Vec::new(),
-        clock: Clock { step: 0.01, steps: STEPS, theta: 0.6 },
+        clock: Clock { step: 0.01, steps, theta: 0.6 },
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),
@@ -149,7 +152,7 @@ fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_m
     let mut now = backend.new_state(&world);
     backend.start(&mut world, &mut now, &mut tally);
     let (mut tape, mut forward, mut cost, mut adjoint) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for k in 0..STEPS {
+    for k in 0..plan.clock.steps {
         let mut next = backend.new_state(&world);
         let clock = Instant::now();
         backend.step(&mut world, k, &now, &mut next, &mut tally);
@@ -161,7 +164,7 @@ fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_m
     }
     let (mut adj, mut adj_now) = (backend.new_adjoint(&world), backend.new_adjoint(&world));
     let mut next = now;
-    for k in (0..STEPS).rev() {
+    for k in (0..plan.clock.steps).rev() {
         let Some(now) = tape.pop() else { break };
         let clock = Instant::now();
         backend.observe_adjoint(&world, k, &now, &next, &mut adj, &mut adj_now, &mut tally);

@@ -45,6 +45,8 @@ pub struct Line {
 pub struct Report {
     /// Day of the run.
     pub date: String,
+    /// The one table that was asked for; `None` = all.
+    pub only: Option<String>,
     /// All recoveries.
     pub lines: Vec<Line>,
     /// Gradient checks.
@@ -88,6 +90,9 @@ struct Case<'a> {
 }
 
 fn run(report: &mut Report, case: Case) -> Result<(), Error> {
+    if !report.wants(case.table) {
+        return Ok(());
+    }
     let clock = Instant::now();
     let plan = study::plan(&case.scene, &study::record(&case.scene, &case.watch)?, case.band)?;
     let unknown = Unknown::within(&plan, ParamKey::YoungsModulus, 10.0);
@@ -114,12 +119,17 @@ fn run(report: &mut Report, case: Case) -> Result<(), Error> {
     Ok(())
 }
 
-/// Runs everything; `quick` takes coarser cells and fewer starts and cases.
+/// Runs everything, or the table `only` (torus, ball, cameras, image, band, optimiser, gradient); `quick` takes coarser cells and
+/// fewer starts and cases.
 ///
 /// # Errors
 /// A scene cannot be simulated, or no start of a fit can be evaluated.
-pub fn all(quick: bool) -> Result<Report, Error> {
-    let mut report = Report { date: table::today(), ..Report::default() };
+pub fn all(quick: bool, only: Option<String>) -> Result<Report, Error> {
+    const TABLES: [&str; 7] = ["torus", "ball", "cameras", "image", "band", "optimiser", "gradient"];
+    if let Some(t) = only.as_ref().filter(|t| !TABLES.contains(&t.as_str())) {
+        return Err(Error::Input(format!("--only {t}: no such table; allowed are {}", TABLES.join(", "))));
+    }
+    let mut report = Report { date: table::today(), only, ..Report::default() };
     let cell = if quick { 0.028 } else { 0.02 };
     let starts = if quick { 3 } else { 20 };
     let few = if quick { 2 } else { 4 };
@@ -176,6 +186,9 @@ pub fn all(quick: bool) -> Result<Report, Error> {
         let search = Search { optimizer, iterations: 100, starts: few.min(3), seed: 5 };
         run(&mut report, torus("optimiser", format!("{optimizer:?}"), paper, cell, torus_cameras(1, 50), 1.0, 5.0, search))?;
     }
+    if !report.wants("gradient") {
+        return Ok(report);
+    }
     let watch = Watch { cameras: torus_cameras(1, 50), noise: 0.1 * cell, every: 1, refine: 1.0, seed: 3 };
     let truth = scenes::torus(cell);
     let plan = study::plan(&truth, &study::record(&truth, &watch)?, 5.0)?;
@@ -218,6 +231,10 @@ fn gradients(plan: &Plan, at: &[f64]) -> Result<Vec<Gradient>, Error> {
 }
 
 impl Report {
+    fn wants(&self, table: &str) -> bool {
+        self.only.as_ref().is_none_or(|only| only == table)
+    }
+
     /// Prints all tables.
     pub fn print(&self) {
         let mut tables: Vec<&str> = self.lines.iter().map(|l| l.table).collect();
@@ -239,6 +256,9 @@ impl Report {
                 ]
             }));
             table::print(name, &rows);
+        }
+        if self.gradients.is_empty() {
+            return;
         }
         let head = ["E / truth", "dJ/d ln E", "central 1e-4", "forward 5 Pa", "forward 100 Pa", "gradient / cost"];
         let mut rows = vec![head.map(String::from).to_vec()];
