@@ -4,3 +4,5 @@ pub mod data;
 pub mod energy;
 pub mod run;
 pub mod scenes;
+pub mod swing;
+pub mod tracks;
