@@ -5,5 +5,5 @@
 
 pub mod bench;
 pub mod paper;
-pub mod tidy;
 pub mod table;
+pub mod tidy;

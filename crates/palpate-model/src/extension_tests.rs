@@ -1,3 +1,5 @@
+//! Affine fields continued exactly, and the weights' properties.
+
 use super::*;
 use crate::scene::Analytic;
 use crate::shape::Placed;

@@ -1,3 +1,5 @@
+//! Plans made from scenes: places of clamps, masses and markers.
+
 use super::*;
 use crate::motion::RigidMotion;
 use crate::scene::*;

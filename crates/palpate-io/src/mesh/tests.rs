@@ -1,3 +1,5 @@
+//! Mesh files read, and refused with what is wrong.
+
 use super::*;
 use crate::surface::{write_obj, write_ply};
 use tempfile::TempDir;

@@ -1,3 +1,5 @@
+//! Recordings read and written, and refused with what is wrong.
+
 use super::*;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::observation::Observation;

@@ -1,3 +1,5 @@
+//! Scenes read and written, and refused with what is wrong.
+
 use super::*;
 use palpate_model::scene::FitParameter;
 

@@ -1,3 +1,5 @@
+//! Integrals over cut cells against closed forms.
+
 use super::*;
 use glam::DAffine3;
 

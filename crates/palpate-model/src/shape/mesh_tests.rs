@@ -1,3 +1,5 @@
+//! Signed distance to meshes.
+
 use super::*;
 use crate::scene::Analytic;
 use crate::shape::Placed;

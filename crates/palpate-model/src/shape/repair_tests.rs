@@ -1,3 +1,5 @@
+//! Meshes reported on and repaired.
+
 use super::*;
 use crate::scene::Analytic;
 use crate::shape::{Placed, Shape};

@@ -1,3 +1,5 @@
+//! Bodies against the volume, area and centre of shapes that are known in closed form.
+
 use super::*;
 use crate::scene::Analytic;
 use crate::shape::{Placed, TriMesh};
