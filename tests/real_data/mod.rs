@@ -1,3 +1,4 @@
 //! Measured data: read, placed, fitted.
 
+mod fits;
 mod reading;
