@@ -44,8 +44,7 @@ pub fn arg(path: &Path) -> &str {
     path.to_str().expect("temporary folders have UTF-8 names")
 }
 
-/// A soft ball held at its bottom that is pushed sideways at the start. It has no edge, at which a noisy reading could belong to
-/// a hidden side.
+/// A soft ball held at its bottom that is pushed sideways at the start.
 pub const BALL: &str = r#"
 format = "scene/1"
 title = "Pushed ball"

@@ -29,7 +29,7 @@ fn distances(points: &[DVec3]) -> Vec<Option<f64>> {
     let observation = Observation {
         cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 5.0) }],
         frames: vec![Frame { time: 0.005, points: seen, ..Frame::default() }],
-        depth_noise: 1e-3,
+        depth_noise: 2e-4,
         marker_noise: 1e-3,
         displacement_noise: 1e-3,
         ..Observation::default()

@@ -110,7 +110,7 @@ impl Backend for CpuBackend {
             }
             for at in frames::instants(&shared.plan, m.physics.start, k) {
                 let u = displacement(&at, a, b);
-                let compared = frames::compare(&shared.plan, &shared.hashes[at.frame], at.frame, &u);
+                let compared = frames::compare(&shared.plan, &shared.lookup, &shared.hashes[at.frame], at.frame, &u);
                 let e = &mut t.evaluation;
                 e.cost += shared.scale * compared.cost;
                 e.matched += compared.matched;
@@ -309,7 +309,7 @@ impl Backend for CpuBackend {
             .iter()
             .map(|at| {
                 let u = displacement(at, a, b);
-                let compared = frames::compare(&shared.plan, &shared.hashes[at.frame], at.frame, &u);
+                let compared = frames::compare(&shared.plan, &shared.lookup, &shared.hashes[at.frame], at.frame, &u);
                 frames::residuals(&shared.plan, at.frame, &compared, &u)
             })
             .collect()

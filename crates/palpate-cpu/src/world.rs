@@ -6,7 +6,7 @@ use crate::linear::matrix::Matrix;
 use crate::linear::pattern::{Pattern, Places};
 use crate::linear::vector::Nodes;
 use crate::passes::frames::Compared;
-use crate::passes::matching::PointHash;
+use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::supports::{self, PlaneNow};
 use palpate_engine::{Evaluation, Failure, ParamBatch};
 use palpate_model::plan::{Physics, Plan};
@@ -28,6 +28,7 @@ pub struct Shared {
     pub(crate) classes: Classes,
     pub(crate) solvers: Solvers,
     pub(crate) hashes: Vec<PointHash>,
+    pub(crate) lookup: BandLookup,
     /// 1/n: one over the number of scalar residuals of the whole recording.
     pub(crate) scale: f64,
 }
@@ -52,7 +53,8 @@ impl World {
         let residuals = plan.observation.residuals();
         let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
         let solvers = Solvers::new(plan.solver.linear);
-        World { shared: Shared { plan, pattern, places, classes, solvers, hashes, scale }, members: Vec::new() }
+        let lookup = BandLookup::new(&plan.body);
+        World { shared: Shared { plan, pattern, places, classes, solvers, hashes, lookup, scale }, members: Vec::new() }
     }
 
     pub(crate) fn set_params(&mut self, theta: &ParamBatch) {

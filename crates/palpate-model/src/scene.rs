@@ -240,7 +240,7 @@ impl Default for Solver {
             linear: LinearSolver::Auto,
             tolerance: 1e-8,
             newton_iterations: 30,
-            ghost: 0.002,
+            ghost: 0.02,
         }
     }
 }

@@ -12,7 +12,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_scene};
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
-use palpate_model::scene::Scene;
+use palpate_model::scene::{ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
 use std::sync::Arc;
@@ -204,7 +204,20 @@ impl Experiment {
     /// # Errors
     /// [`Error::Input`] when the finer grid cannot be built.
     pub fn refined(&self, factor: f64) -> Result<Experiment, Error> {
-        let mut scene = Scene { observation: None, ..self.scene.clone() };
+        self.with_finer_grid(factor, None)
+    }
+
+    /// The same experiment with cells and time step divided by `factor`, compared with its recording in the same band.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when the finer grid cannot be built or the recording is gone.
+    pub fn finer(&self, factor: f64) -> Result<Experiment, Error> {
+        let observation = self.scene.observation.clone().map(|o| ObservationSpec { band: o.band * factor, ..o });
+        self.with_finer_grid(factor, observation)
+    }
+
+    fn with_finer_grid(&self, factor: f64, observation: Option<ObservationSpec>) -> Result<Experiment, Error> {
+        let mut scene = Scene { observation, ..self.scene.clone() };
         scene.object.resolution = palpate_model::scene::Resolution::CellSize(self.plan.body.grid.h / factor);
         let steps = (scene.time.steps as f64 * factor).round() as usize;
         if steps > 0 {

@@ -75,6 +75,10 @@ pub struct Fitted {
     pub after: Vec<ResidualSummary>,
     /// True when the fit was stopped before its end.
     pub interrupted: bool,
+    /// How far a finer grid and time step would move each parameter, where that was asked for ([`grid_shift`]).
+    ///
+    /// [`grid_shift`]: crate::grid_shift
+    pub grid_shift: Option<Vec<f64>>,
     /// What deserves attention: from the files, from the fit, from the residuals.
     pub warnings: Vec<String>,
 }
@@ -182,6 +186,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         before,
         after,
         interrupted,
+        grid_shift: None,
         warnings,
     };
     Ok(with_residual_warnings(fitted))
@@ -233,7 +238,7 @@ pub(crate) fn set(experiment: &Experiment, theta: &mut [f64], path: &str, value:
 
 type Free = (Vec<FreeNumber>, Vec<FreeParameter>, Vec<String>);
 
-fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error> {
+pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error> {
     let (mut numbers, mut free): (Vec<FreeNumber>, Vec<FreeParameter>) = (Vec::new(), Vec::new());
     let mut warnings = Vec::new();
     for (scene, e) in experiments.iter().enumerate() {

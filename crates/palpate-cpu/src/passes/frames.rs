@@ -5,7 +5,7 @@
 
 use crate::linear::vector::Nodes;
 use crate::passes::markers::Carried;
-use crate::passes::matching::{Match, PointHash, extend, extend_transposed, match_points};
+use crate::passes::matching::{BandLookup, Match, PointHash, extend, extend_transposed, match_points};
 use glam::DVec3;
 use palpate_engine::FrameResiduals;
 use palpate_model::kernel;
@@ -79,11 +79,14 @@ pub struct Compared {
 }
 
 /// Compares a frame with displacement `u`.
-pub fn compare(plan: &Plan, hash: &PointHash, frame: usize, u: &[DVec3]) -> Compared {
+pub fn compare(plan: &Plan, lookup: &BandLookup, hash: &PointHash, frame: usize, u: &[DVec3]) -> Compared {
     let (body, obs) = (&*plan.body, &*plan.observation);
     let f = &obs.frames[frame];
-    let matches =
-        if f.points.is_empty() { Vec::new() } else { match_points(body, &extend(body, u), hash, &f.points, &obs.cameras) };
+    let matches = if f.points.is_empty() {
+        Vec::new()
+    } else {
+        match_points(body, &extend(body, u), hash, &f.points, &obs.cameras, lookup, obs.depth_noise)
+    };
     let per_point = 1.0 / (obs.depth_noise * obs.depth_noise);
     // A point without a match costs what one at the edge of the band costs.
     let mut cost = (f.points.len() - matches.len()) as f64 * kernel::unmatched(plan.band) * per_point;

@@ -8,18 +8,37 @@ use glam::DVec3;
 use palpate_model::body::Body;
 use palpate_model::grid::shape_functions;
 use palpate_model::observation::{Camera, ObservedPoint};
-use palpate_model::pullback::{Pullback, pull_back};
+use palpate_model::pullback::{Pullback, jacobian, pull_back, triquadratic};
 use rayon::prelude::*;
 
 /// A surface that is turned away from the camera by more than this (cosine between its outward normal and the line of sight)
 /// cannot have been seen. Not zero: normals at the silhouette and along edges are uncertain.
 const TURNED_AWAY: f64 = 0.3;
-/// Nearer than this to a hidden side [cells] a point may still belong to it: next to a sharp edge noise puts points closest to
-/// the side that the camera does not see, and calling them unmatched would make the cost jump by a whole band.
-const HIDDEN_REACH: f64 = 1.0;
-/// That holds for sides next to one that is seen; a side turned away by more than this (cosine) is a back, whose points can only
-/// come from the front of a thin part.
-const BACK: f64 = 0.8;
+/// Next to a sharp edge noise puts points closest to the side that the camera does not see; calling them unmatched would make the
+/// cost jump by a whole band. Such a point lies near a visible side as well: going towards the camera by `1.5 |φ|` and so many
+/// standard deviations of the noise leaves the body. Inside a thin part, near its back, it does not.
+const NOISE_REACH: f64 = 4.0;
+
+/// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
+#[derive(Clone, Debug)]
+pub struct BandLookup(Vec<u32>);
+
+impl BandLookup {
+    /// Looks every band cell up once.
+    pub fn new(body: &Body) -> BandLookup {
+        let mut cells = vec![u32::MAX; body.grid.len()];
+        for (c, cell) in body.band.cells.iter().enumerate() {
+            cells[body.grid.index(cell.lattice)] = c as u32;
+        }
+        BandLookup(cells)
+    }
+
+    /// True when a place of the rest configuration lies in the body.
+    fn inside(&self, body: &Body, place: DVec3) -> bool {
+        let cell = body.grid.locate(place).map(|(ijk, xi)| (self.0[body.grid.index(ijk)], xi));
+        cell.is_some_and(|(c, xi)| c != u32::MAX && triquadratic(&body.band.cells[c as usize].sdf, xi).0 < 0.0)
+    }
+}
 
 /// Points sorted by the hash of the cube they lie in.
 #[derive(Clone, Debug, Default)]
@@ -126,12 +145,19 @@ pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
-/// surface faces its camera come first (a hidden side next to it counts within a cell, a back never); then the smallest |φ| wins, then the lowest
+/// surface faces its camera come first (a hidden side counts where a visible one is near; `noise` [m] of a reading); then the smallest |φ| wins, then the lowest
 /// cell number. Ordered by point.
-pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[ObservedPoint], cameras: &[Camera]) -> Vec<Match> {
+pub fn match_points(
+    body: &Body,
+    u: &[DVec3],
+    hash: &PointHash,
+    points: &[ObservedPoint],
+    cameras: &[Camera],
+    lookup: &BandLookup,
+    noise: f64,
+) -> Vec<Match> {
     let n = body.nodes.len();
     let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
-    let reach = HIDDEN_REACH * body.grid.h;
     let candidates: Vec<Vec<(bool, Match)>> = body
         .band
         .cells
@@ -150,9 +176,13 @@ pub fn match_points(body: &Body, u: &[DVec3], hash: &PointHash, points: &[Observ
                 }
                 if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
                     let sight = (seen.position - cameras[seen.camera as usize].center).normalize_or_zero();
-                    let away = place.gradient.dot(sight) / place.gradient.length().max(f64::MIN_POSITIVE);
-                    let faces = away <= TURNED_AWAY;
-                    if faces || (away <= BACK && place.phi.abs() <= reach) {
+                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
+                    let towards_camera = || {
+                        let way = 1.5 * place.phi.abs() + NOISE_REACH * noise;
+                        let lowest = body.grid.position(cell.lattice);
+                        lowest + body.grid.h * (place.xi - way * (jacobian(&x, place.xi).inverse() * sight))
+                    };
+                    if faces || !lookup.inside(body, towards_camera()) {
                         found.push((faces, Match { point: p, cell: c as u32, place }));
                     }
                 }

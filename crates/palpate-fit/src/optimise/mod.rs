@@ -33,6 +33,20 @@ impl Sample {
         Sample { cost: f64::INFINITY, failure: Some(why), ..Sample::default() }
     }
 
+    /// The undamped Gauss–Newton step −H⁻¹g `[q]`: where the model of the cost at this point has its minimum. `None` without
+    /// curvature, or where it does not determine every parameter.
+    pub fn gauss_newton_step(&self) -> Option<Vec<f64>> {
+        let q = self.gradient.len();
+        if self.curvature.len() != q * q || q == 0 {
+            return None;
+        }
+        // Parameters may differ by many orders of magnitude: scaled to a unit diagonal.
+        let scale: Vec<f64> = (0..q).map(|i| self.curvature[i * q + i].sqrt()).collect();
+        let h: Vec<f64> = (0..q * q).map(|k| self.curvature[k] / (scale[k / q] * scale[k % q])).collect();
+        let g: Vec<f64> = (0..q).map(|i| -self.gradient[i] / scale[i]).collect();
+        Some(crate::dense::solve(&h, &g)?.iter().zip(&scale).map(|(d, s)| d / s).collect())
+    }
+
     /// Multiplies cost and derivatives by one number.
     pub fn scale(&mut self, by: f64) {
         self.cost *= by;

@@ -117,7 +117,22 @@ fn parameters(p: &mut String, fitted: &Fitted) -> std::fmt::Result {
             if f.unit == "1" { "" } else { &f.unit }
         )?;
     }
-    writeln!(p, "</table>")
+    writeln!(p, "</table>")?;
+    if let Some(shift) = &fitted.grid_shift {
+        let each: Vec<String> = fitted
+            .free
+            .iter()
+            .zip(&fitted.result.parameters)
+            .zip(shift)
+            .map(|((n, f), s)| format!("<code>{}</code> by {:+.1} %", escape(&n.label()), 100.0 * s / f.value.abs()))
+            .collect();
+        writeln!(
+            p,
+            "<p>The standard errors hold noise only. Cells and time step half as large would move {}.</p>",
+            each.join(", ")
+        )?;
+    }
+    Ok(())
 }
 
 fn correlation(p: &mut String, fitted: &Fitted) -> std::fmt::Result {

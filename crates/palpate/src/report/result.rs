@@ -27,13 +27,17 @@ pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
         .free
         .iter()
         .zip(&r.parameters)
-        .map(|(n, p)| {
+        .enumerate()
+        .map(|(i, (n, p))| {
             let mut v = json!({
                 "path": n.path,
                 "value": finite(p.value),
                 "standard_error": p.standard_error.map_or(Value::Null, finite),
                 "unit": p.unit,
             });
+            if let Some(shift) = &fitted.grid_shift {
+                v["finer_grid_shift"] = finite(shift[i]);
+            }
             if let Some(s) = n.scene {
                 v["scene"] = json!(s);
             }
@@ -117,9 +121,14 @@ pub fn summary(fitted: &Fitted) -> String {
         .free
         .iter()
         .zip(&fitted.result.parameters)
-        .map(|(n, p)| {
+        .enumerate()
+        .map(|(i, (n, p))| {
             let error = p.standard_error.map_or("no standard error".to_string(), |e| format!("± {}", number(e)));
-            [n.label(), number(p.value), format!("{error}{}", unit(&p.unit))]
+            let shift = fitted
+                .grid_shift
+                .as_ref()
+                .map_or(String::new(), |s| format!("; cells and step half as large: {:+.1} %", 100.0 * s[i] / p.value.abs()));
+            [n.label(), number(p.value), format!("{error}{}{shift}", unit(&p.unit))]
         })
         .collect();
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
