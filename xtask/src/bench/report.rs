@@ -96,7 +96,7 @@ impl Report {
             if let Some(p) = l.paper {
                 let ratio = |a: f64, t: &Times| format!("{:.1}", a / t.median);
                 println!(
-                    "  {}: times faster than the paper's (RTX 2070; {} / {} / {} s): forward {}, cost {}, adjoint {}",
+                    "  {}: times faster than the paper's (RTX 2070; {:.3} / {:.3} / {:.3} s): forward {}, cost {}, adjoint {}",
                     l.name,
                     p[0],
                     p[1],
