@@ -52,11 +52,12 @@ pub fn solve(
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
         }
         let s = States { u1, u0, v0 };
-        let (direction, norm) = direction(balance, solvers, matrix, purpose, s, &residual, forcing, tolerance, &mut scale)?;
+        let (direction, norm, diagonal) =
+            direction(balance, solvers, matrix, purpose, s, &residual, forcing, tolerance, &mut scale)?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
         let after;
-        (residual, after) = line_search(balance, matrix, u1, u0, v0, &residual, norm, &direction);
+        (residual, after) = line_search(balance, &diagonal, u1, u0, v0, &residual, norm, &direction);
         if after <= tolerance * scale.unwrap_or(0.0) {
             return Ok(());
         }
@@ -86,11 +87,7 @@ fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
     9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
 }
 
-fn current_norm(balance: &Balance, matrix: &Matrix, residual: &[DVec3]) -> f64 {
-    BlockJacobi::new(&balance.pattern.blocks, matrix).map_or(f64::INFINITY, |d| d.norm(residual))
-}
-
-/// Newton direction −A⁻¹ r, or `None` when the residual is small already; and the residual's norm. Where the exact tangent is
+/// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and what it is measured with. Where the exact tangent is
 /// not positive definite its convex part gives a descent direction instead.
 fn direction(
     balance: &Balance,
@@ -102,29 +99,27 @@ fn direction(
     forcing: f64,
     tolerance: f64,
     scale: &mut Option<f64>,
-) -> Result<(Option<Nodes>, f64), Reason> {
+) -> Result<(Option<Nodes>, f64, BlockJacobi), Reason> {
     for convex in [false, true] {
         balance.tangent(s, convex, matrix);
-        let norm = match BlockJacobi::new(&balance.pattern.blocks, matrix) {
-            Ok(diagonal) => {
-                let reference = *scale.get_or_insert_with(|| balance.scale(s, |f| diagonal.norm(f)));
-                let norm = diagonal.norm(residual);
-                if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
-                    return Ok((None, norm));
-                }
-                norm
-            }
+        let diagonal = match BlockJacobi::new(&balance.pattern.blocks, matrix) {
+            Ok(diagonal) => diagonal,
             Err(_) if !convex => continue,
             Err(a) => return Err((FailureKind::LinearSolve, format!("the stiffness of node {a} is not positive"))),
         };
-        let absolute = 0.1 * tolerance * scale.unwrap_or(0.0);
+        let reference = *scale.get_or_insert_with(|| balance.scale(s, |f| diagonal.norm(f)));
+        let norm = diagonal.norm(residual);
+        if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
+            return Ok((None, norm, diagonal));
+        }
+        let absolute = 0.1 * tolerance * reference;
         let solved = solvers.prepare(&balance.plan.body, balance.pattern, matrix, purpose, s.u1).and_then(|prepared| {
             let mut d = vec![DVec3::ZERO; residual.len()];
             let minus: Nodes = residual.iter().map(|r| -*r).collect();
             prepared.solve(&minus, &mut d, forcing, absolute).map(|()| d)
         });
         match solved {
-            Ok(d) if is_finite(&d) => return Ok((Some(d), norm)),
+            Ok(d) if is_finite(&d) => return Ok((Some(d), norm, diagonal)),
             Ok(_) => return Err((FailureKind::NotFinite, "displacement of a Newton step".into())),
             Err(Trouble::Indefinite(_)) if !convex => {}
             Err(t) => return Err(trouble(t)),
@@ -137,7 +132,7 @@ fn direction(
 /// (Armijo 1966). Returns the residual there and its norm.
 fn line_search(
     balance: &Balance,
-    matrix: &Matrix,
+    diagonal: &BlockJacobi,
     u1: &mut Nodes,
     u0: &[DVec3],
     v0: &[DVec3],
@@ -148,7 +143,7 @@ fn line_search(
     let start = u1.clone();
     add_scaled(u1, 1.0, d);
     let full = balance.residual(States { u1, u0, v0 });
-    let full_norm = current_norm(balance, matrix, &full);
+    let full_norm = diagonal.norm(&full);
     if full_norm <= 0.5 * norm {
         return (full, full_norm);
     }
@@ -167,7 +162,7 @@ fn line_search(
         add_scaled(u1, step, d);
     }
     let residual = if step == 1.0 { full } else { balance.residual(States { u1, u0, v0 }) };
-    let norm = current_norm(balance, matrix, &residual);
+    let norm = diagonal.norm(&residual);
     (residual, norm)
 }
 

@@ -29,7 +29,7 @@ impl Matrix {
         }
     }
 
-    /// Inverses of the diagonal blocks `[N]`; `None` at the first block that is not positive definite.
+    /// Inverses of the diagonal blocks `[N]`; the error is the number of the first block that is not positive definite.
     pub fn diagonal_inverses(&self, rows: &BlockRows) -> Result<Vec<DMat3>, usize> {
         rows.diagonal
             .iter()

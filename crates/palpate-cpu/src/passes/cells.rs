@@ -200,6 +200,20 @@ impl<'a> Elasticity<'a> {
         }
     }
 
+    /// Derivative by the old state with converged rotation, for one cell: `b` Pᵀ_to E K P_from d, and the symmetric share of the
+    /// old state's own force. `[from, to]` is [old, new]; the other way round it is the transpose.
+    fn converged_by_old(&self, mix: &Mix, k: &M24, old: &CellPose, [from, to]: [&CellPose; 2], b: f64, d: &Corners) -> Corners {
+        let mut f = to.force(&times(k, &from.strain_rate(d), self.young * b));
+        if mix.old != 0.0 {
+            let y0 = times(k, &old.q, self.young * mix.old);
+            let g = old.hessian_product(k, self.young * mix.old, &y0, d);
+            for i in 0..8 {
+                f[i] += g[i];
+            }
+        }
+        f
+    }
+
     /// Adds (∂force/∂u₀) du₀.
     pub fn by_old(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], du0: &[DVec3], out: &mut [DVec3]) {
         self.gather(
@@ -221,16 +235,7 @@ impl<'a> Elasticity<'a> {
                     let turned: V24 = std::array::from_fn(|i| ky[i] + w.cross(vector(&y, i / 3))[i % 3]);
                     poses.new.force(&turned)
                 } else if let Some(old) = &poses.old {
-                    let dq = old.strain_rate(&d);
-                    let mut f = poses.new.force(&times(k, &dq, self.young * b));
-                    if mix.old != 0.0 {
-                        let y0 = times(k, &old.q, self.young * mix.old);
-                        let g = old.hessian_product(k, self.young * mix.old, &y0, &d);
-                        for i in 0..8 {
-                            f[i] += g[i];
-                        }
-                    }
-                    f
+                    self.converged_by_old(mix, k, old, [old, &poses.new], b, &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
@@ -264,16 +269,7 @@ impl<'a> Elasticity<'a> {
                     }
                     f
                 } else if let Some(old) = &poses.old {
-                    let s = poses.new.strain_rate(&d);
-                    let mut f = old.force(&times(k, &s, self.young * b));
-                    if mix.old != 0.0 {
-                        let y0 = times(k, &old.q, self.young * mix.old);
-                        let g = old.hessian_product(k, self.young * mix.old, &y0, &d);
-                        for i in 0..8 {
-                            f[i] += g[i];
-                        }
-                    }
-                    f
+                    self.converged_by_old(mix, k, old, [&poses.new, old], b, &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
