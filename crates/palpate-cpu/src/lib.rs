@@ -3,7 +3,6 @@
 //! Invariant: this room does not know where a plan comes from nor what gradients are for.
 
 mod backend;
-mod elements;
 pub mod linear;
 #[cfg(test)]
 mod local_tests;

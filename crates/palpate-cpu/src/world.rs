@@ -1,14 +1,14 @@
 //! What the backend holds: a world of members, their states, adjoints, tangents and tallies.
 
-use crate::elements::{Classes, Elements};
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
-use crate::linear::pattern::{Pattern, Places};
 use crate::linear::vector::Nodes;
 use crate::passes::frames::Compared;
 use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::supports::{self, PlaneNow};
 use palpate_engine::{Evaluation, Failure, ParamBatch};
+use palpate_model::elements::{Classes, Elements};
+use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
 use std::sync::Arc;
 

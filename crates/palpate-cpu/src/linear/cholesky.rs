@@ -1,11 +1,11 @@
 //! Direct solver: faer's sparse Cholesky factorisation over a pattern that is analysed once.
 
 use super::matrix::Matrix;
-use super::pattern::BlockRows;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
+use palpate_model::pattern::BlockRows;
 
 /// Fill-reducing order and structure of the factor, shared by all members and steps.
 #[derive(Debug)]

@@ -8,9 +8,9 @@ use super::cholesky::{Analysis, Factor};
 use super::conjugate_gradient::Precondition;
 use super::jacobi::BlockJacobi;
 use super::matrix::Matrix;
-use super::pattern::{BlockRows, Pattern};
 use glam::{DMat3, DVec3};
 use palpate_model::body::Body;
+use palpate_model::pattern::{BlockRows, Pattern};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 

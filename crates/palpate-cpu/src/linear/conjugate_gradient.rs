@@ -1,9 +1,9 @@
 //! Preconditioned conjugate gradients with a residual norm that small cells cannot hide from.
 
 use super::matrix::Matrix;
-use super::pattern::BlockRows;
 use super::vector::{add_scaled, dot};
 use glam::DVec3;
+use palpate_model::pattern::BlockRows;
 
 /// Something that approximates A⁻¹ and is symmetric positive definite.
 pub trait Precondition {

@@ -2,9 +2,9 @@
 
 use super::conjugate_gradient::Precondition;
 use super::matrix::Matrix;
-use super::pattern::BlockRows;
 use super::vector::{Nodes, dot};
 use glam::{DMat3, DVec3};
+use palpate_model::pattern::BlockRows;
 
 /// Inverted diagonal blocks; also the norm in which residuals are measured.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! The system matrix: symmetric block-compressed rows of 3 × 3 blocks.
 
-use super::pattern::BlockRows;
 use glam::{DMat3, DVec3};
+use palpate_model::pattern::BlockRows;
 use rayon::prelude::*;
 
 /// Values of a [`BlockRows`]; row-major blocks: entry (r, c) of a block is the effect of component c on component r.

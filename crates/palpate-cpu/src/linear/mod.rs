@@ -5,7 +5,6 @@ pub mod coarse;
 pub mod conjugate_gradient;
 pub mod jacobi;
 pub mod matrix;
-pub mod pattern;
 pub mod vector;
 
 use cholesky::{Analysis, Factor};
@@ -15,8 +14,8 @@ use glam::DVec3;
 use jacobi::BlockJacobi;
 use matrix::Matrix;
 use palpate_model::body::Body;
+use palpate_model::pattern::{BlockRows, Pattern};
 use palpate_model::scene::LinearSolver;
-use pattern::{BlockRows, Pattern};
 use std::sync::OnceLock;
 
 /// Most CG iterations; a solve that needs more is a symptom.

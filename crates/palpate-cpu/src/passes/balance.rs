@@ -5,15 +5,15 @@
 //! Contact acts at the new state only: its work is never less than its energy's change, so it limits no time step. Clamps are
 //! weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
-use crate::elements::Elements;
 use crate::linear::matrix::Matrix;
-use crate::linear::pattern::{Pattern, Places};
 use crate::linear::vector::{Nodes, dot};
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
 use palpate_model::contact;
+use palpate_model::elements::Elements;
 use palpate_model::params::ParamKey;
+use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
 use rayon::prelude::*;
 

@@ -6,12 +6,12 @@
 //! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
 //! With lagged rotation both q use R(x₀) and R is not differentiated by x₁, as in the paper.
 
-use crate::elements::Elements;
-use crate::linear::pattern::Pattern;
 use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_model::body::Body;
 use palpate_model::corotation::{CellPose, M24, V24, multiply};
+use palpate_model::elements::Elements;
+use palpate_model::pattern::Pattern;
 use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 

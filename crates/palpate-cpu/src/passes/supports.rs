@@ -1,12 +1,13 @@
 //! Clamps (Nitsche), ghost penalty and contact planes: everything that pushes besides the cells and inertia.
 
-use crate::elements::Elements;
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
 use palpate_model::body::{Body, Patch};
 use palpate_model::contact;
 use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
-use palpate_model::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
+use palpate_model::elements::Elements;
+use palpate_model::plan::{ClampCell, ClampSite, Plan, clamp_pose};
+pub use palpate_model::plane::{PlaneNow, planes};
 
 /// Rest position of corner i of a clamp cell.
 fn rest(body: &Body, c: &ClampCell, i: usize) -> DVec3 {
@@ -91,33 +92,6 @@ pub fn ghost_product(body: &Body, scale: f64, u: &[DVec3], out: &mut [DVec3]) {
         out[b] -= 2.0 * s;
         out[c] += s;
     }
-}
-
-/// A contact plane of one member.
-#[derive(Clone, Copy, Debug)]
-pub struct PlaneNow {
-    /// Unit normal, and its derivatives by θ and φ.
-    pub normal: [DVec3; 3],
-    /// Distance along the normal [m].
-    pub height: f64,
-    /// Penalty stiffness [Pa/m].
-    pub stiffness: f64,
-    /// True when the stiffness is proportional to Young's modulus.
-    pub scales: bool,
-}
-
-/// The planes of a member.
-pub fn planes(plan: &Plan, physics: &Physics) -> Vec<PlaneNow> {
-    plan.planes
-        .iter()
-        .zip(&physics.planes)
-        .map(|(site, [height, theta, phi])| PlaneNow {
-            normal: site.normal(*theta, *phi),
-            height: *height,
-            stiffness: site.stiffness.unwrap_or(contact::DEFAULT_STIFFNESS * physics.youngs_modulus / plan.body.grid.h),
-            scales: site.stiffness.is_none(),
-        })
-        .collect()
 }
 
 /// A surface patch that touches a plane.

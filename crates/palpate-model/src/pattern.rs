@@ -1,7 +1,7 @@
 //! Which nodes touch which: the block pattern of the system matrix and the way into it.
 
-use palpate_model::body::Body;
-use palpate_model::plan::Plan;
+use crate::body::Body;
+use crate::plan::Plan;
 
 /// Block-compressed rows over the simulation nodes (3 × 3 blocks), with the places where cells, ghost lines and point
 /// masses add. The pattern is symmetric and every row's columns increase.

@@ -1,9 +1,9 @@
-//! Element matrices of one Poisson ratio, shared by every member and cell that can share them.
+//! Element and clamp matrices of a plan at one Poisson ratio: the one truth that every backend reads.
 
-use palpate_model::body::Body;
-use palpate_model::element::CellMatrices;
-use palpate_model::material::{lame, lame_by_nu};
-use palpate_model::plan::{ClampCell, ClampSite, Plan};
+use crate::body::Body;
+use crate::element::CellMatrices;
+use crate::material::{lame, lame_by_nu};
+use crate::plan::{ClampCell, ClampSite, Plan};
 use std::collections::BTreeMap;
 
 /// Nitsche's surface penalty, in units of (λ + 2μ)/h. The mean-strain traction of a full cell needs 2; a cell that is cut down
@@ -15,7 +15,8 @@ const CLAMP_VOLUME: f64 = 10.0;
 /// Which elements of a body need a matrix of their own; depends on the geometry only.
 #[derive(Debug)]
 pub struct Classes {
-    of_cell: Vec<u32>,
+    /// Class of each cell.
+    pub of_cell: Vec<u32>,
     weights: Vec<([f64; 27], f64)>,
 }
 
