@@ -1,5 +1,6 @@
 //! Whole simulations: derivatives agree, and so do solvers, threads and batches.
 
 mod agreement;
+mod effects;
 mod gradients;
 mod visibility;

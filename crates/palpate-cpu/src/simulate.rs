@@ -36,6 +36,7 @@ pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usiz
         elements: &member.elements,
         physics: p,
         planes: &member.planes,
+        effects: &member.effects,
         inertia,
         mix,
         time,

@@ -5,6 +5,7 @@ use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::passes::frames::Compared;
 use crate::passes::matching::{BandLookup, PointHash};
+use crate::passes::points::{self, Acting};
 use crate::passes::supports::{self, PlaneNow};
 use palpate_engine::{Evaluation, Failure, ParamBatch};
 use palpate_model::elements::{Classes, Elements};
@@ -39,6 +40,7 @@ pub struct Member {
     pub(crate) theta: Vec<f64>,
     pub(crate) physics: Physics,
     pub(crate) planes: Vec<PlaneNow>,
+    pub(crate) effects: Vec<Acting>,
     pub(crate) elements: Arc<Elements>,
     pub(crate) matrix: Matrix,
 }
@@ -71,10 +73,12 @@ impl World {
                 e
             });
             let planes = supports::planes(&shared.plan, &physics);
+            let effects = points::acting(&shared.plan, &physics);
             self.members.push(Member {
                 theta: row.to_vec(),
                 physics,
                 planes,
+                effects,
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),
             });

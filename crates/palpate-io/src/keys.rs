@@ -38,7 +38,8 @@ pub(crate) fn suggest(name: &str, known: &[&str]) -> String {
 
 /// Format `scene/1`.
 pub(crate) const SCENE: Schema = Schema {
-    keys: &["format", "title"],
+    // The keys of an effect depend on its kind: its own reader checks them.
+    keys: &["format", "title", "effect"],
     tables: &[
         (
             "object",

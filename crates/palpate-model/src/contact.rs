@@ -3,6 +3,8 @@
 //! p = stiffness · g(gap) with g = 0 for gap ≥ w, g = −gap for gap ≤ −w and a C² blend between. Unlike a softplus
 //! layer it acts at no distance beyond w, and unlike max(−gap, 0) Newton's method sees no kink.
 
+use crate::effects::law::Number;
+
 /// Default penalty stiffness in units of E / h, i.e. stiffness = `DEFAULT_STIFFNESS` · E / h [Pa/m].
 ///
 /// A body that rests on a plane carries a pressure p; it yields g = p h / (10 E), a tenth of a cell times the strain p / E
@@ -42,9 +44,42 @@ pub fn energy(gap: f64, stiffness: f64, width: f64) -> f64 {
     }
 }
 
+/// [`pressure`] without its slope, for numbers that carry derivatives.
+pub fn pressure_of<D: Number>(gap: D, stiffness: D, width: f64) -> D {
+    if gap.re() >= width {
+        D::from(0.0)
+    } else if gap.re() <= -width {
+        -stiffness * gap
+    } else {
+        let s = (-gap + width) * (0.5 / width);
+        stiffness * s.powi(3) * (-s * 0.5 + 1.0) * (2.0 * width)
+    }
+}
+
+/// [`energy`] for numbers that carry derivatives.
+pub fn energy_of<D: Number>(gap: D, stiffness: D, width: f64) -> D {
+    if gap.re() >= width {
+        D::from(0.0)
+    } else if gap.re() <= -width {
+        stiffness * (gap * gap * 0.5 + 0.1 * width * width)
+    } else {
+        let s = (-gap + width) * (0.5 / width);
+        stiffness * s.powi(4) * (-s * 0.1 + 0.25) * (4.0 * width * width)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_forms_agree() {
+        for i in -200..=200 {
+            let gap = 0.0101 * f64::from(i) * W;
+            assert!((pressure_of(gap, K, W) - pressure(gap, K, W).0).abs() <= 1e-15 * K * W);
+            assert!((energy_of(gap, K, W) - energy(gap, K, W)).abs() <= 1e-15 * K * W * W);
+        }
+    }
 
     const K: f64 = 3.0e5;
     const W: f64 = 2.0e-4;

@@ -8,6 +8,7 @@ pub mod body;
 pub mod contact;
 pub mod corotation;
 pub mod cut;
+pub mod effects;
 pub mod element;
 pub mod elements;
 pub mod extension;

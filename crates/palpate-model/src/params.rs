@@ -3,6 +3,8 @@
 //! A parameter is the dotted path of a number in the scene file. [`Layout`] lists those of one scene in a fixed
 //! order; a parameter vector θ has one entry per key, in SI units and in the declared (not the optimiser's) variable.
 
+use crate::effects;
+
 /// How an optimiser sees a parameter; the transforms themselves live in `palpate-fit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transform {
@@ -43,6 +45,15 @@ pub enum ParamKey {
     PlanePhi(u16),
     /// Mass of point mass i.
     PointMass(u16),
+    /// Number `slot` of effect `effect` of the scene, which follows law `law` of [`effects::ALL`].
+    Effect {
+        /// Number of the effect in the scene.
+        effect: u16,
+        /// Place of its law in the table.
+        law: u16,
+        /// Place in the law's parameters.
+        slot: u16,
+    },
 }
 
 /// What is known about a parameter before any scene is read.
@@ -99,6 +110,11 @@ impl ParamKey {
             PlaneTheta(i) => (format!("plane.{i}.theta"), "rad", Linear, -inf, inf, 0.1, "polar angle of the plane's normal"),
             PlanePhi(i) => (format!("plane.{i}.phi"), "rad", Linear, -inf, inf, 0.1, "azimuth of the plane's normal"),
             PointMass(i) => (format!("mass.{i}.mass"), "kg", Log, 1e-9, 1e6, 1e-2, "point mass fixed to the body"),
+            Effect { effect, law, slot } => {
+                let p = &effects::ALL[usize::from(law)].params[usize::from(slot)];
+                let axis = p.axis.map_or_else(String::new, |a| format!(".{}", AXES[usize::from(a)]));
+                (format!("effect.{effect}.{}{axis}", p.key), p.unit, p.transform, p.lower, p.upper, p.typical, p.doc)
+            }
         };
         ParamSpec { key: self, path, unit, transform, lower, upper, typical, doc }
     }
@@ -112,8 +128,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of a scene with so many planes and point masses.
-    pub fn new(planes: usize, masses: usize) -> Layout {
+    /// The layout of a scene with so many planes, point masses, and effects of these laws.
+    pub fn new(planes: usize, masses: usize, laws: &[usize]) -> Layout {
         use ParamKey::*;
         let mut keys = vec![YoungsModulus, PoissonRatio, Density, MassDamping, StiffnessDamping];
         keys.extend((0..3).map(Gravity));
@@ -124,7 +140,22 @@ impl Layout {
             keys.extend([PlaneHeight(i), PlaneTheta(i), PlanePhi(i)]);
         }
         keys.extend((0..masses as u16).map(PointMass));
+        for (i, &law) in laws.iter().enumerate() {
+            let key = |slot: usize| Effect { effect: i as u16, law: law as u16, slot: slot as u16 };
+            keys.extend((0..effects::ALL[law].params.len()).map(key));
+        }
         Layout { keys }
+    }
+
+    /// The effects in their order: law, and the places of its numbers in θ.
+    pub fn effects(&self) -> impl Iterator<Item = (&'static effects::Law, std::ops::Range<usize>)> + '_ {
+        self.keys.iter().enumerate().filter_map(|(p, key)| match *key {
+            ParamKey::Effect { law, slot: 0, .. } => {
+                let law = &effects::ALL[usize::from(law)];
+                Some((law, p..p + law.params.len()))
+            }
+            _ => None,
+        })
     }
 
     /// Number of parameters P.

@@ -115,6 +115,8 @@ pub struct Physics {
     pub planes: Vec<[f64; 3]>,
     /// Point masses [kg].
     pub masses: Vec<f64>,
+    /// Parameters of every effect.
+    pub effects: Vec<Vec<f64>>,
 }
 
 impl Physics {
@@ -137,6 +139,7 @@ impl Physics {
                 .map(|i| [get(ParamKey::PlaneHeight(i)), get(ParamKey::PlaneTheta(i)), get(ParamKey::PlanePhi(i))])
                 .collect(),
             masses: (0..count(|k| matches!(k, ParamKey::PointMass(_)))).map(|i| get(ParamKey::PointMass(i))).collect(),
+            effects: layout.effects().map(|(_, range)| theta[range].to_vec()).collect(),
         }
     }
 }

@@ -116,6 +116,7 @@ fn theta(scene: &Scene, planes: &[PlaneSite], body: &Body) -> Vec<f64> {
         ParamKey::PlaneTheta(i) => plane(i).1.angles(plane(i).0.normal).0,
         ParamKey::PlanePhi(i) => plane(i).1.angles(plane(i).0.normal).1,
         ParamKey::PointMass(i) => scene.masses[i as usize].mass,
+        ParamKey::Effect { effect, slot, .. } => scene.effects[effect as usize].value(slot as usize, body.center),
     };
     scene.layout().keys.iter().map(value).collect()
 }

@@ -27,6 +27,7 @@ fn scene() -> Scene {
         clamps: vec![],
         planes: vec![],
         masses: vec![],
+        effects: Vec::new(),
         initial: Initial { velocity: DVec3::X, angular_velocity: DVec3::Y, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 10, start: 0.5, theta: 0.6 },
         solver: Solver::default(),

@@ -1,6 +1,7 @@
 //! A scene as plain checked data (format `scene/1`): everything known about an experiment, and what is to be found out.
 //! Reading and writing the TOML is `palpate-io`'s business.
 
+use crate::effects::Effect;
 use crate::motion::RigidMotion;
 use crate::observation::MarkerRest;
 use crate::params::Layout;
@@ -27,6 +28,8 @@ pub struct Scene {
     pub planes: Vec<Plane>,
     /// Point masses fixed to the body.
     pub masses: Vec<PointMass>,
+    /// Laws beyond the material, in the order of the file.
+    pub effects: Vec<Effect>,
     /// State at the start.
     pub initial: Initial,
     /// Time steps.
@@ -42,7 +45,8 @@ pub struct Scene {
 impl Scene {
     /// The parameters of this scene.
     pub fn layout(&self) -> Layout {
-        Layout::new(self.planes.len(), self.masses.len())
+        let laws: Vec<usize> = self.effects.iter().map(|e| e.law).collect();
+        Layout::new(self.planes.len(), self.masses.len(), &laws)
     }
 }
 

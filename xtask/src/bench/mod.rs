@@ -83,7 +83,7 @@ fn resident() -> usize {
 
 /// A body that is dropped from just above the ground and watched in every step.
 fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
-    let layout = Layout::new(1, 0);
+    let layout = Layout::new(1, 0, &[]);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let value = |k: &ParamKey| match k {

@@ -8,6 +8,7 @@
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, dot};
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
+use crate::passes::points::Acting;
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
 use palpate_model::contact;
@@ -43,6 +44,8 @@ pub struct Balance<'a> {
     pub physics: &'a Physics,
     /// The member's planes.
     pub planes: &'a [PlaneNow],
+    /// The member's effects.
+    pub effects: &'a [Acting],
     /// Inertia; `None` = static.
     pub inertia: Option<Inertia>,
     /// How the two states enter the elastic force.
@@ -121,6 +124,7 @@ impl<'a> Balance<'a> {
         self.ghost(self.physics.youngs_modulus * self.elements.shear[0], &self.mix, s, &mut r);
         self.supports(s, &mut r);
         self.bodily(s, &mut r);
+        self.add_effects(s, &mut r);
         r
     }
 
@@ -166,6 +170,7 @@ impl<'a> Balance<'a> {
         self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut elastic);
         let mut support = zeros(n);
         self.supports(s, &mut support);
+        self.add_effects(s, &mut support);
         norm(&weight) + norm(&momentum) + norm(&elastic) + norm(&support)
     }
 
@@ -201,7 +206,7 @@ impl<'a> Balance<'a> {
         self.bodily(s, &mut at_new);
         let zero = zeros(s.u1.len());
         self.bodily(States { u1: &zero, ..s }, &mut at_new);
-        w + 0.5 * dot(s.u1, &at_new)
+        w + 0.5 * dot(s.u1, &at_new) + self.effects_potential(s)
     }
 
     /// ∂r/∂u₁, symmetric. With `convex` the indefinite part of the elastic tangent is left out.
@@ -234,6 +239,7 @@ impl<'a> Balance<'a> {
             }
         });
         self.add_sparse(s.u1, matrix);
+        self.add_effects_tangent(s, convex, matrix);
     }
 
     /// Adds everything but the cells to the matrix.
@@ -287,6 +293,7 @@ impl<'a> Balance<'a> {
     pub fn by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
         let mut out = self.by_old_linear(du0, dv0);
         self.elasticity().by_old(&self.mix, s.u1, s.u0, du0, &mut out);
+        self.add_effects_by_old(s, du0, dv0, &mut out);
         out
     }
 
@@ -295,7 +302,9 @@ impl<'a> Balance<'a> {
         let zero = zeros(z.len());
         let mut to_u = self.by_old_linear(z, &zero);
         self.elasticity().by_old_transposed(&self.mix, s.u1, s.u0, z, &mut to_u);
-        (to_u, self.by_old_linear(&zero, z))
+        let mut to_v = self.by_old_linear(&zero, z);
+        self.add_effects_transposed(s, z, &mut to_u, &mut to_v);
+        (to_u, to_v)
     }
 
     /// The symmetric parts (inertia, ghost, clamps) of the derivative by the old state.
@@ -404,8 +413,11 @@ impl<'a> Balance<'a> {
                     self.clamps(Matrices::Stiffness, sign * young / (2.0 * d), sign * d, s, &mut out);
                 }
             }
+            // What effects depend on is added below.
+            ParamKey::Effect { .. } => {}
             ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => return None,
         }
+        self.add_effects_column(key, s, &mut out);
         Some(out)
     }
 

@@ -5,4 +5,5 @@ pub mod cells;
 pub mod frames;
 pub mod markers;
 pub mod matching;
+pub mod points;
 pub mod supports;

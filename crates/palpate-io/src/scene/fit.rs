@@ -53,6 +53,8 @@ fn value(scene: &Scene, key: ParamKey) -> f64 {
         ParamKey::PlaneTheta(i) => plane(i).1.0,
         ParamKey::PlanePhi(i) => plane(i).1.1,
         ParamKey::PointMass(i) => scene.masses[usize::from(i)].mass,
+        // Not stated and not known before the body is cut: the fit must say where to start.
+        ParamKey::Effect { effect, slot, .. } => scene.effects[usize::from(effect)].values[usize::from(slot)].unwrap_or(f64::NAN),
     }
 }
 
@@ -101,6 +103,9 @@ fn parameter(t: &Table, known: &[Target]) -> Result<Vec<FitParameter>, InputErro
         let start = starts.as_ref().map_or((k.value, k.value), |s| s[i]);
         let bounds = bounds.as_ref().map_or((k.lower, k.upper), |b| b[i]);
         let path = &k.path;
+        if start.0.is_nan() {
+            return Err(t.error("start", format!("{path}: the scene states no value; give a start, or state it in the effect")));
+        }
         if bounds.0 >= bounds.1 {
             return Err(t.error("bounds", format!("{path}: [{}, {}] leaves no room; low must be below high", bounds.0, bounds.1)));
         }

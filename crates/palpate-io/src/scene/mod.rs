@@ -1,5 +1,6 @@
 //! Format `scene/1`: one TOML file ↔ [`Scene`].
 
+mod effects;
 mod fit;
 mod motion;
 mod object;
@@ -19,9 +20,6 @@ use std::path::{Path, PathBuf};
 
 /// The scene format this version reads and writes.
 pub const FORMAT: &str = "scene/1";
-
-/// Kinds of `[[effect]]` known to this version.
-pub const EFFECTS: &[&str] = &[];
 
 /// More steps than this are a slip of units, not a simulation.
 const MOST_STEPS: f64 = 1e7;
@@ -57,11 +55,6 @@ pub fn scene_error(scene: &Scene, key: &str, message: impl Into<String>) -> Inpu
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
     let root = source.root();
     check_format(&root, FORMAT)?;
-    if let Some(effect) = root.tables("effect")?.first() {
-        let known = if EFFECTS.is_empty() { "none".to_string() } else { EFFECTS.join(", ") };
-        let kind = effect.optional_str("kind")?.ok_or_else(|| effect.missing("kind", "the name of an effect"))?;
-        return Err(effect.error("kind", format!("\"{kind}\" is not known to this version; effects it knows: {known}")));
-    }
     root.check_keys(&SCENE)?;
 
     let mut warnings = Vec::new();
@@ -81,6 +74,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         clamps: clamps(source, &root)?,
         planes: planes(&root)?,
         masses: masses(&root)?,
+        effects: effects::effects(&root)?,
         time: time(&root, initial.state)?,
         initial,
         solver: solver(&root)?,

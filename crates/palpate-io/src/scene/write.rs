@@ -37,6 +37,27 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 let i: usize = i.parse().map_err(|_| unknown())?;
                 set(row(&mut doc, "mass", i).ok_or_else(unknown)?, "mass", Value::from(*value));
             }
+            ["effect", i, key] => {
+                let i: usize = i.parse().map_err(|_| unknown())?;
+                set(row(&mut doc, "effect", i).ok_or_else(unknown)?, key, Value::from(*value));
+            }
+            ["effect", i, key, a] => {
+                let (i, a) = (i.parse::<usize>().map_err(|_| unknown())?, axis(a).ok_or_else(unknown)?);
+                let effect = scene.effects.get(i).ok_or_else(unknown)?;
+                let slot = effect.law().params.iter().position(|p| p.key == key && p.axis == Some(0)).ok_or_else(unknown)?;
+                let table = row(&mut doc, "effect", i).ok_or_else(unknown)?;
+                if !table.contains_key(key) {
+                    // Components that are not written keep what the scene means by leaving them out.
+                    let known = |k: usize| values.iter().find(|(p, _)| *p == format!("effect.{i}.{key}.{}", ["x", "y", "z"][k]));
+                    let before = |k: usize| effect.values[slot + k].or_else(|| known(k).map(|v| v.1));
+                    let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(before) else {
+                        return Err(wrong("needs all three components".to_string()));
+                    };
+                    set(table, key, vector(DVec3::new(x, y, z)));
+                }
+                let array = table.get_mut(key).and_then(Item::as_array_mut).ok_or_else(unknown)?;
+                replace(array.get_mut(a).ok_or_else(unknown)?, Value::from(*value));
+            }
             [group @ ("world" | "initial"), name, a] => {
                 let a = axis(a).ok_or_else(unknown)?;
                 let before = match name {

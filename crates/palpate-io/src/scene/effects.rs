@@ -1,0 +1,44 @@
+//! `[[effect]]`: laws beyond the material. The keys of each kind come from the table of laws.
+
+use crate::document::Table;
+use crate::error::InputError;
+use crate::keys::suggest;
+use palpate_model::effects::{self, Effect, EffectParam};
+
+/// Every effect of a scene, in the order of the file.
+pub(super) fn effects(root: &Table) -> Result<Vec<Effect>, InputError> {
+    root.tables("effect")?.iter().map(effect).collect()
+}
+
+fn effect(t: &Table) -> Result<Effect, InputError> {
+    let kind = t.optional_str("kind")?.ok_or_else(|| t.missing("kind", "the name of an effect"))?;
+    let kinds: Vec<&str> = effects::ALL.iter().map(|l| l.kind).collect();
+    let law =
+        effects::find(kind).ok_or_else(|| t.error("kind", format!("\"{kind}\" is not an effect; {}", suggest(kind, &kinds))))?;
+    let mut known = vec!["kind"];
+    known.extend(effects::ALL[law].params.iter().filter(|p| p.axis.unwrap_or(0) == 0).map(|p| p.key));
+    if let Some(unknown) = t.names().into_iter().find(|k| !known.contains(k)) {
+        return Err(t.error(unknown, format!("unknown key of \"{kind}\"; {}", suggest(unknown, &known))));
+    }
+    let mut out = Effect::absent(law);
+    for (value, p) in out.values.iter_mut().zip(effects::ALL[law].params) {
+        if let Some(stated) = stated(t, p)? {
+            *value = Some(stated);
+        }
+    }
+    Ok(out)
+}
+
+/// A parameter's value where the file states it, checked against its bounds.
+fn stated(t: &Table, p: &EffectParam) -> Result<Option<f64>, InputError> {
+    let value = match p.axis {
+        None => t.optional_f64(p.key)?,
+        Some(a) => t.optional_vec3(p.key)?.map(|v| v[usize::from(a)]),
+    };
+    match value {
+        Some(v) if !(p.lower..=p.upper).contains(&v) => {
+            Err(t.error(p.key, format!("{v} is not allowed: {} must lie in [{}, {}] {}", p.doc, p.lower, p.upper, p.unit)))
+        }
+        v => Ok(v),
+    }
+}

@@ -1,0 +1,266 @@
+//! What a local law is: an incremental potential of one point, written once for any number type.
+//!
+//! A point of the body (a node, or the middle of a surface patch) moves from `old` to `x` in a step. A law gives the potential
+//! Π(x; old, velocity, parameters) whose gradient by x is minus the force on the point at the new state; what is not
+//! conservative (friction, drag) is written as a dissipation potential with everything else taken at the old state. Second
+//! derivatives are therefore symmetric, Newton's line search has something to descend, and the adjoint needs no transposed
+//! matrix. Derivatives come from hyper-dual numbers (Fike & Alonso, AIAA 2011-886), exact to rounding.
+
+use glam::DVec3;
+use num_dual::{DualNum, HyperDual64};
+
+/// A number that a law is written for: f64 or a dual number.
+pub trait Number: DualNum<Primitive = f64> + Copy {}
+impl<T: DualNum<Primitive = f64> + Copy> Number for T {}
+
+/// Entries of a point's input before the law's own parameters; see [`Input`].
+pub const COMMON: usize = 18;
+/// Place of x in the input [m].
+pub const X: usize = 0;
+/// Place of the old position [m].
+pub const OLD: usize = 3;
+/// Place of the old velocity [m/s].
+pub const VELOCITY: usize = 6;
+/// Place of gravity [m/s²].
+pub const GRAVITY: usize = 9;
+/// Place of the default contact stiffness, 10 E/h [Pa/m].
+pub const STIFFNESS: usize = 12;
+/// Place of the plane's unit normal (3), height [m] and penalty stiffness [Pa/m]; zero where there is no plane.
+pub const PLANE: usize = 13;
+
+/// Most parameters of a point law.
+pub const MOST: usize = 22;
+
+/// What a point is, the same at every step: no derivative is taken by it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Rest position [m].
+    pub rest: DVec3,
+    /// Outward unit normal at rest; zero inside the body.
+    pub normal: DVec3,
+    /// Volume [m³] of a node, area [m²] of a patch, share of the whole of a node that shares one load.
+    pub measure: f64,
+    /// Half width of the contact law's blend [m].
+    pub width: f64,
+    /// Time of the new state on the recording's clock [s].
+    pub time: f64,
+    /// 1/Δt [1/s]; 0 in a static problem.
+    pub rate: f64,
+    /// Factor 1/(θΔt²) of (x − old) in the acceleration of the θ-scheme; 0 in a static problem.
+    pub inertia: f64,
+    /// Factor 1/(θΔt) of −velocity in the acceleration; 0 in a static problem.
+    pub momentum: f64,
+}
+
+/// The numbers of a point that derivatives are taken by.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a, D> {
+    z: &'a [D],
+}
+
+impl<'a, D: Number> Input<'a, D> {
+    /// Wraps an input of [`COMMON`] numbers and the law's parameters.
+    pub fn new(z: &'a [D]) -> Self {
+        Input { z }
+    }
+
+    fn three(&self, at: usize) -> [D; 3] {
+        [self.z[at], self.z[at + 1], self.z[at + 2]]
+    }
+
+    /// New position [m].
+    pub fn x(&self) -> [D; 3] {
+        self.three(X)
+    }
+
+    /// Way of this step, x − old [m].
+    pub fn way(&self) -> [D; 3] {
+        sub(self.x(), self.old())
+    }
+
+    /// Old position [m].
+    pub fn old(&self) -> [D; 3] {
+        self.three(OLD)
+    }
+
+    /// Old velocity [m/s].
+    pub fn velocity(&self) -> [D; 3] {
+        self.three(VELOCITY)
+    }
+
+    /// Gravity [m/s²].
+    pub fn gravity(&self) -> [D; 3] {
+        self.three(GRAVITY)
+    }
+
+    /// Contact stiffness of a plane that states none [Pa/m].
+    pub fn default_stiffness(&self) -> D {
+        self.z[STIFFNESS]
+    }
+
+    /// The plane's unit normal.
+    pub fn normal(&self) -> [D; 3] {
+        self.three(PLANE)
+    }
+
+    /// The plane's height along its normal [m].
+    pub fn height(&self) -> D {
+        self.z[PLANE + 3]
+    }
+
+    /// The plane's penalty stiffness [Pa/m].
+    pub fn plane_stiffness(&self) -> D {
+        self.z[PLANE + 4]
+    }
+
+    /// The law's parameter `i`.
+    pub fn p(&self, i: usize) -> D {
+        self.z[COMMON + i]
+    }
+
+    /// Three parameters from `i` on, as a vector.
+    pub fn vector(&self, i: usize) -> [D; 3] {
+        self.three(COMMON + i)
+    }
+}
+
+/// a − b.
+pub fn sub<D: Number>(a: [D; 3], b: [D; 3]) -> [D; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// a · b.
+pub fn dot<D: Number>(a: [D; 3], b: [D; 3]) -> D {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A constant vector.
+pub fn constant<D: Number>(v: DVec3) -> [D; 3] {
+    [D::from(v.x), D::from(v.y), D::from(v.z)]
+}
+
+/// A law of points. Implement this; everything else follows.
+pub trait PointLaw: Sync {
+    /// Potential of the point [J], up to anything that does not depend on x; proportional to `place.measure`.
+    fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D;
+
+    /// True when the potential of this input is constant around it, so that the point can be skipped.
+    fn idle(&self, _place: &Place, _z: &[f64]) -> bool {
+        false
+    }
+
+    /// Weight of a node at rest position `rest` [m] in a load that all nodes share (times the node's volume, then divided by the sum
+    /// over the body); `None` for laws whose nodes do not share. Parameters only.
+    fn share<D: Number>(&self, _rest: DVec3, _p: &[D]) -> Option<D> {
+        None
+    }
+}
+
+/// A [`PointLaw`] with its derivatives, without its type. `z` is the input: [`COMMON`] numbers, then the law's parameters.
+pub trait Point: Sync {
+    /// Π [J].
+    fn value(&self, place: &Place, z: &[f64]) -> f64;
+    /// ∂Π/∂x [N].
+    fn gradient(&self, place: &Place, z: &[f64]) -> [f64; 3];
+    /// ∂²Π/∂x² [N/m].
+    fn hessian(&self, place: &Place, z: &[f64]) -> [[f64; 3]; 3];
+    /// ∂²Π/∂x∂z · d for a change `d` of the whole input.
+    fn along(&self, place: &Place, z: &[f64], d: &[f64]) -> [f64; 3];
+    /// wᵀ ∂²Π/∂x∂z for the entries `range` of the input, written to `out`.
+    fn transposed(&self, place: &Place, z: &[f64], w: [f64; 3], range: std::ops::Range<usize>, out: &mut [f64]);
+    /// As [`PointLaw::idle`].
+    fn skips(&self, place: &Place, z: &[f64]) -> bool;
+    /// Share of a node, with its derivatives by the parameters.
+    fn shared(&self, rest: DVec3, p: &[f64]) -> Option<(f64, Vec<f64>)>;
+}
+
+/// An input as numbers that carry two first derivatives and the mixed second one.
+struct Lifted {
+    z: [HyperDual64; COMMON + MOST],
+    len: usize,
+}
+
+impl Lifted {
+    fn new(z: &[f64]) -> Lifted {
+        let mut lifted = Lifted { z: [HyperDual64::from(0.0); COMMON + MOST], len: z.len() };
+        for (h, v) in lifted.z.iter_mut().zip(z) {
+            h.re = *v;
+        }
+        lifted
+    }
+
+    fn evaluate(&self, law: &impl PointLaw, place: &Place) -> HyperDual64 {
+        law.potential(place, Input { z: &self.z[..self.len] })
+    }
+}
+
+impl<L: PointLaw> Point for L {
+    fn value(&self, place: &Place, z: &[f64]) -> f64 {
+        self.potential(place, Input { z })
+    }
+
+    fn gradient(&self, place: &Place, z: &[f64]) -> [f64; 3] {
+        let mut h = Lifted::new(z);
+        (h.z[X].eps1, h.z[X + 1].eps2) = (1.0, 1.0);
+        let first = h.evaluate(self, place);
+        (h.z[X].eps1, h.z[X + 1].eps2, h.z[X + 2].eps1) = (0.0, 0.0, 1.0);
+        [first.eps1, first.eps2, h.evaluate(self, place).eps1]
+    }
+
+    fn hessian(&self, place: &Place, z: &[f64]) -> [[f64; 3]; 3] {
+        let mut h = Lifted::new(z);
+        let mut out = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..=i {
+                h.z[X + i].eps1 = 1.0;
+                h.z[X + j].eps2 = 1.0;
+                let v = h.evaluate(self, place).eps1eps2;
+                h.z[X + i].eps1 = 0.0;
+                h.z[X + j].eps2 = 0.0;
+                (out[i][j], out[j][i]) = (v, v);
+            }
+        }
+        out
+    }
+
+    fn along(&self, place: &Place, z: &[f64], d: &[f64]) -> [f64; 3] {
+        let mut h = Lifted::new(z);
+        for (h, d) in h.z.iter_mut().zip(d) {
+            h.eps2 = *d;
+        }
+        std::array::from_fn(|i| {
+            h.z[X + i].eps1 = 1.0;
+            let v = h.evaluate(self, place).eps1eps2;
+            h.z[X + i].eps1 = 0.0;
+            v
+        })
+    }
+
+    fn transposed(&self, place: &Place, z: &[f64], w: [f64; 3], range: std::ops::Range<usize>, out: &mut [f64]) {
+        let mut h = Lifted::new(z);
+        for i in 0..3 {
+            h.z[X + i].eps1 = w[i];
+        }
+        for (j, o) in range.zip(out) {
+            h.z[j].eps2 = 1.0;
+            *o = h.evaluate(self, place).eps1eps2;
+            h.z[j].eps2 = 0.0;
+        }
+    }
+
+    fn skips(&self, place: &Place, z: &[f64]) -> bool {
+        self.idle(place, z)
+    }
+
+    fn shared(&self, rest: DVec3, p: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let mut h = Lifted::new(p);
+        let value = self.share(rest, &h.z[..p.len()])?.re;
+        let slopes = (0..p.len()).map(|i| {
+            h.z[i].eps1 = 1.0;
+            let v = self.share(rest, &h.z[..p.len()]).map_or(0.0, |v| v.eps1);
+            h.z[i].eps1 = 0.0;
+            v
+        });
+        Some((value, slopes.collect()))
+    }
+}

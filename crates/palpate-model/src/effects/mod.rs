@@ -1,0 +1,176 @@
+//! The library of effects: every law that a scene's `[[effect]]` can name, one file and one line of [`ALL`] each.
+//!
+//! An effect has named parameters with unit, bounds and the value at which it is absent. Where it acts is its [`Site`]; backends
+//! loop over sites and know no effect by name. From the table follow the scene's keys, the fit parameters, the tests of
+//! derivatives and the hypotheses of `diagnose`.
+
+pub mod law;
+
+mod coulomb_friction;
+mod uniform_force;
+
+use crate::params::Transform;
+use law::Point;
+
+/// An effect: what it is called, what it needs, where it acts.
+pub struct Law {
+    /// Name in scene files, `kind = "…"`.
+    pub kind: &'static str,
+    /// What it competes with.
+    pub family: Family,
+    /// One plain sentence for reports, without full stop: "the ground holds the body back by friction".
+    pub sentence: &'static str,
+    /// Parameters, in the order of the law's input.
+    pub params: &'static [EffectParam],
+    /// How a diagnosis tries it.
+    pub trial: Trial,
+    /// Where it acts.
+    pub site: Site,
+}
+
+/// Families of effects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Between the body and planes.
+    Contact,
+    /// Forces on the body.
+    Load,
+    /// What the body is made of.
+    Material,
+    /// Rest shape, state at the start, supports.
+    Shape,
+    /// How it was measured.
+    Measurement,
+    /// A free force field: a bound, never an explanation.
+    Slack,
+}
+
+/// One number of an effect; the components of a vector are three entries with `axis` 0 to 2.
+#[derive(Clone, Copy, Debug)]
+pub struct EffectParam {
+    /// Key in the scene file.
+    pub key: &'static str,
+    /// Component of a vector, `None` for a number.
+    pub axis: Option<u8>,
+    /// SI unit, `1` for none.
+    pub unit: &'static str,
+    /// How optimisers see it.
+    pub transform: Transform,
+    /// Smallest allowed value.
+    pub lower: f64,
+    /// Largest allowed value.
+    pub upper: f64,
+    /// A size at which the effect matters.
+    pub typical: f64,
+    /// Value when the scene does not say it; for amplitudes the value at which the effect is absent.
+    pub default: Unstated,
+    /// One sentence for `--help` and reports.
+    pub doc: &'static str,
+}
+
+/// Value of a parameter that the scene does not state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unstated {
+    /// An amplitude: the effect is absent at this value.
+    Absent(f64),
+    /// A number of minor importance that a diagnosis leaves alone.
+    Fixed(f64),
+    /// This component of the body's centre of mass [m].
+    Center,
+    /// Must be stated (a diagnosis starts it at this value).
+    Stated(f64),
+}
+
+/// How a diagnosis tries an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trial {
+    /// Its amplitudes have a derivative at "absent" that tells whether it helps.
+    Score,
+    /// Flat or not smooth at "absent", or it acts at an unknown place: short fits from spread starts.
+    Starts,
+    /// Not tried by itself.
+    Never,
+}
+
+/// Where a law acts.
+pub enum Site {
+    /// Every node of the body; `measure` is its volume.
+    Nodes(&'static dyn Point),
+    /// Every surface patch.
+    Surface(&'static dyn Point),
+    /// Every surface patch and every plane of the scene.
+    Contact(&'static dyn Point),
+}
+
+/// All effects, in the order in which reports list them.
+pub static ALL: &[Law] = &[coulomb_friction::LAW, uniform_force::LAW];
+
+/// Place in [`ALL`] of a kind.
+pub fn find(kind: &str) -> Option<usize> {
+    ALL.iter().position(|l| l.kind == kind)
+}
+
+/// A number that is not a component of a vector.
+const fn number(
+    key: &'static str,
+    unit: &'static str,
+    [lower, upper, typical]: [f64; 3],
+    default: Unstated,
+    doc: &'static str,
+) -> EffectParam {
+    EffectParam { key, axis: None, unit, transform: Transform::Linear, lower, upper, typical, default, doc }
+}
+
+/// One component of a vector of any sign that is zero when absent.
+const fn component(key: &'static str, axis: u8, unit: &'static str, typical: f64, doc: &'static str) -> EffectParam {
+    EffectParam {
+        key,
+        axis: Some(axis),
+        unit,
+        transform: Transform::Linear,
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        typical,
+        default: Unstated::Absent(0.0),
+        doc,
+    }
+}
+
+/// An effect of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// Place of its law in [`ALL`].
+    pub law: usize,
+    /// Values of its parameters in the order of [`Law::params`]; `None` = the body's centre of mass, known once the body is.
+    pub values: Vec<Option<f64>>,
+}
+
+impl Effect {
+    /// An effect with every parameter at its default.
+    pub fn absent(law: usize) -> Effect {
+        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect() }
+    }
+
+    /// Its law.
+    pub fn law(&self) -> &'static Law {
+        &ALL[self.law]
+    }
+
+    /// Value of parameter `slot`, for a body with this centre of mass [m].
+    pub fn value(&self, slot: usize, center: glam::DVec3) -> f64 {
+        self.values[slot].unwrap_or_else(|| center[usize::from(self.law().params[slot].axis.unwrap_or(0))])
+    }
+}
+
+impl Unstated {
+    /// The value, unless it is the body's centre.
+    pub fn value(self) -> Option<f64> {
+        match self {
+            Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Stated(v) => Some(v),
+            Unstated::Center => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
