@@ -6,7 +6,7 @@ mod shapes;
 
 use palpate_io::{InputError, read_scene, scene_error};
 use palpate_model::plan_build::build_plan;
-use palpate_model::scene::{CostKind, ObservationSpec, Scene};
+use palpate_model::scene::Scene;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -69,20 +69,6 @@ fn plan_fault(from: &str, to: &str, line: usize) -> String {
     let e = scene_error(&scene, &fault.key, fault.message);
     assert_eq!(e.line, Some(line), "{e}");
     one_line(e)
-}
-
-fn spec(costs: &[CostKind]) -> ObservationSpec {
-    ObservationSpec {
-        recording: PathBuf::new(),
-        file: "recording.toml".into(),
-        costs: costs.to_vec(),
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    }
 }
 
 #[test]

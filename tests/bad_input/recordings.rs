@@ -1,11 +1,12 @@
 //! Recordings with faults.
 
-use super::{one_line, spec};
+use super::one_line;
 use glam::{DAffine3, DVec3};
 use palpate_io::recording::{DepthImage, RecordedCamera, RecordedFrame};
 use palpate_io::{Recording, check_overlap, read_recording, write_recording};
 use palpate_model::scene::CostKind;
 use std::path::PathBuf;
+use support::measured::compared;
 use tempfile::TempDir;
 
 /// Two frames of a wall half a metre in front of a camera.
@@ -109,7 +110,7 @@ fn zero_cameras() {
 fn points_nowhere_near_the_object() {
     let folder = written(&wall());
     let r = read_recording(folder.path()).unwrap();
-    let (o, _) = r.observation(&spec(&[CostKind::SparseSurface]), &mut Vec::new()).unwrap();
+    let (o, _) = r.observation(&compared(CostKind::SparseSurface), &mut Vec::new()).unwrap();
     let body = |z: f64| (DVec3::new(-0.05, -0.05, z), DVec3::new(0.05, 0.05, z + 0.1));
     let (min, max) = body(0.5);
     check_overlap(&o, min, max).unwrap();

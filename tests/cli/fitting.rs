@@ -1,8 +1,9 @@
 //! Observe, fit, interrupt, resume, look at what was written.
 
-use super::{BALL, BLOCK, CAMERA, STIFFNESS, arg, json, observed, palpate, stopped, succeed};
+use super::{BALL, BLOCK, CAMERA, STIFFNESS, observed};
 use palpate::{Interrupt, cli::INTERRUPTED};
 use std::fs;
+use support::command::{arg, json, palpate, stopped, succeed};
 
 #[test]
 fn a_recorded_simulation_gives_its_stiffness_back() {

@@ -1,7 +1,8 @@
 //! Answers to right and wrong questions.
 
-use super::{BLOCK, CAMERA, STIFFNESS, arg, observed, palpate, succeed};
+use super::{BLOCK, CAMERA, STIFFNESS, observed};
 use std::fs;
+use support::command::{arg, palpate, succeed};
 
 #[test]
 fn help_teaches_and_versions_are_told() {
@@ -24,6 +25,8 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
     let (s, o) = (arg(&scene), arg(&out));
     let cases: &[(&[&str], &[&str])] = &[
         (&["simulate"], &["SCENE"]),
+        (&["simulate", s, "--evry", "2"], &["--evry", "--every"]),
+        (&["simulate", s, "--every", "two"], &["--every", "two"]),
         (&["simulte", s], &["simulate"]),
         (&["simulate", "no-such.toml"], &["no-such.toml", "no such file"]),
         (&["simulate", arg(&typo)], &["typo.toml:11", "young_modulus", "youngs_modulus"]),
@@ -45,6 +48,8 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         let a = palpate(arguments);
         assert_eq!(a.code, 2, "{arguments:?}: {}{}", a.out, a.err);
         assert_eq!(a.out, "", "{arguments:?}");
+        let errors = a.err.lines().filter(|l| !l.starts_with("warning: ") && !l.starts_with("backend: "));
+        assert_eq!(errors.count(), 1, "{arguments:?}: {}", a.err);
         for w in *words {
             assert!(a.err.contains(w), "{arguments:?}: \"{w}\" is not in: {}", a.err);
         }

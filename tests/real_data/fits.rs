@@ -1,41 +1,8 @@
 //! Recordings are fitted from their scene files, and what is found agrees with what was measured without a simulation.
 
-use palpate::{Experiment, FitOptions, Fitted};
-use std::path::Path;
 use support::data::data_dir;
-use support::swing::Swing;
+use support::measured::{fit, found, open, swings};
 use support::tracks::{rms, track};
-
-/// A scene of `assets/scenes` whose recordings are those of `data`, with lines of the file replaced.
-fn open(data: &Path, name: &str, changes: &[(&str, &str)]) -> Experiment {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/scenes").join(format!("{name}.toml"));
-    let mut text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    text = text.replace("../../../shared/data", &data.canonicalize().expect("the folder exists").display().to_string());
-    for (old, new) in changes {
-        assert!(text.contains(old), "{name} has no \"{old}\"");
-        text = text.replace(old, new);
-    }
-    Experiment::from_toml(&text, &path).unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn fit(experiment: &Experiment) -> Fitted {
-    experiment.fit(FitOptions::default()).unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn found(fitted: &Fitted, path: &str) -> f64 {
-    fitted.result.parameters.iter().find(|p| p.path == path).unwrap_or_else(|| panic!("{path} was not fitted")).value
-}
-
-/// Vertical swing of a marker, measured and simulated, at the parameters found.
-fn swings(experiment: &Experiment, fitted: &Fitted, marker: &str, guess: f64) -> (Swing, Swing) {
-    let all = track(experiment, &fitted.result.theta[0], marker);
-    let up = experiment.up();
-    let of = |y: &dyn Fn(usize) -> f64| {
-        let samples: Vec<(f64, f64)> = (0..all.len()).map(|i| (all[i].time, y(i))).collect();
-        Swing::fit(&samples, guess)
-    };
-    (of(&|i| all[i].seen.dot(up)), of(&|i| all[i].simulated.dot(up)))
-}
 
 #[test]
 fn swinging_beam() {
@@ -46,7 +13,7 @@ fn swinging_beam() {
     let e = found(&fitted, "material.youngs_modulus");
     // The source's own fits lie between 264 and 294 kPa.
     assert!((255e3..310e3).contains(&e), "E = {e}");
-    let (seen, simulated) = swings(&experiment, &fitted, "tip1", 7.5);
+    let (seen, simulated) = swings(&experiment, &fitted.result.theta[0], "tip1", 7.5);
     // Frequency follows from E, which the sag wants a little smaller (docs/real-data.md).
     assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.01, "{seen:?} {simulated:?}");
     // Decay of three periods is less certain than their frequency.

@@ -2,24 +2,11 @@
 
 use palpate_io::{Recording, check_overlap, read_mesh, read_recording, read_sdf};
 use palpate_model::observation::MarkerRest;
-use palpate_model::scene::{CostKind, ObservationSpec};
+use palpate_model::scene::CostKind;
 use palpate_model::shape::Shape;
 use std::path::Path;
 use support::data::data_dir;
-
-fn spec(cost: CostKind) -> ObservationSpec {
-    ObservationSpec {
-        recording: Default::default(),
-        file: "recording.toml".into(),
-        costs: vec![cost],
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    }
-}
+use support::measured::compared;
 
 fn read(data: &Path, name: &str) -> Recording {
     let r = read_recording(data.join(name)).unwrap_or_else(|e| panic!("{e}"));
@@ -42,7 +29,7 @@ fn motion_capture_of_a_beam() {
     for (name, times) in [("beam-mocap-gravity-a", 429), ("beam-mocap-load52-a", 556)] {
         let r = read(&data, name);
         let mut warnings = Vec::new();
-        let (o, rest) = r.observation(&spec(CostKind::Markers), &mut warnings).unwrap();
+        let (o, rest) = r.observation(&compared(CostKind::Markers), &mut warnings).unwrap();
         assert_eq!((o.frames.len(), rest.len(), warnings.len()), (times, 3, 0), "{name}");
         assert_eq!((o.marker_noise, o.marker_systematic), (0.0003, 0.0008));
         let (min, max) = check_mesh(&data, name, 9e-5, 1e-9);
@@ -56,7 +43,7 @@ fn depth_of_hanging_cantilevers() {
     for name in ["cantilever-ecoflex-hanging", "cantilever-two-materials-hanging"] {
         for file in ["recording.toml", "recording-corrected.toml"] {
             let r = read(&data, &format!("{name}/{file}"));
-            let (o, _) = r.observation(&spec(CostKind::SparseSurface), &mut Vec::new()).unwrap();
+            let (o, _) = r.observation(&compared(CostKind::SparseSurface), &mut Vec::new()).unwrap();
             assert_eq!((o.frames.len(), o.depth_noise), (1, 0.001));
             assert!(o.frames[0].points.len() > 5000, "{name}: {} points", o.frames[0].points.len());
             // The stated 234 cm³.
@@ -73,10 +60,10 @@ fn silhouettes_and_derived_points_of_an_oscillating_cantilever() {
     let silhouettes = read(&data, &format!("{name}/silhouettes.toml"));
     assert_eq!(silhouettes.frames.len(), 18);
     assert!(silhouettes.frames.iter().all(|f| f.depth.is_none() && f.mask.is_some()));
-    assert!(silhouettes.observation(&spec(CostKind::SparseSurface), &mut Vec::new()).is_err(), "a silhouette has no points");
+    assert!(silhouettes.observation(&compared(CostKind::SparseSurface), &mut Vec::new()).is_err(), "a silhouette has no points");
 
     let r = read(&data, name);
-    let mut spec = spec(CostKind::Markers);
+    let mut spec = compared(CostKind::Markers);
     let e = r.observation(&spec, &mut Vec::new()).unwrap_err().to_string();
     assert!(e.contains("no rest position for head_outer_top") && e.contains("[[observation.marker]]"), "{e}");
     // The recording's description places them on the front face z = 15 mm.

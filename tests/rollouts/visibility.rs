@@ -7,6 +7,7 @@ use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::plan_build::build_plan;
 use palpate_model::scene::*;
 use std::ops::ControlFlow;
+use support::measured::compared;
 use support::scenes;
 
 /// Distances that points get from a plate of 8 × 8 × 1.5 cells whose top is at z = 0, seen from straight above.
@@ -14,17 +15,7 @@ fn distances(points: &[DVec3]) -> Vec<Option<f64>> {
     let h = 0.01;
     let mut s = scenes::body(Analytic::Box { min: DVec3::new(-0.04, -0.04, -0.015), max: DVec3::new(0.04, 0.04, 0.0) }, h);
     s.time.steps = 1;
-    s.observation = Some(ObservationSpec {
-        recording: "none".into(),
-        file: String::new(),
-        costs: vec![CostKind::SparseSurface],
-        band: 4.0,
-        from: 0.0,
-        to: 1.0,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    });
+    s.observation = Some(compared(CostKind::SparseSurface));
     let seen = points.iter().map(|&position| ObservedPoint { position, camera: 0 }).collect();
     let observation = Observation {
         cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 5.0) }],

@@ -1,7 +1,9 @@
-//! What the tests share: small scenes built in code, runs, energies.
+//! What the tests share: small scenes built in code, runs, energies, command lines, measured recordings and their swings.
 
+pub mod command;
 pub mod data;
 pub mod energy;
+pub mod measured;
 pub mod run;
 pub mod scenes;
 pub mod swing;

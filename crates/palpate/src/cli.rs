@@ -4,6 +4,7 @@ use crate::commands::{fit, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ffi::OsString;
@@ -96,7 +97,7 @@ pub fn run<A: Into<OsString> + Clone>(
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(e) if e.use_stderr() => {
-            let _ = write!(err, "{e}");
+            let _ = writeln!(err, "{}", usage_error(&e));
             return 2;
         }
         // --help and --version are answers, not errors.
@@ -118,4 +119,19 @@ pub fn run<A: Into<OsString> + Clone>(
     });
     let _ = console.out.flush();
     code
+}
+
+/// What is wrong with a command line in one line, like every other error: the key, the reason, what is allowed or meant. No
+/// command at all is a question, and is answered with the help.
+fn usage_error(e: &clap::Error) -> String {
+    let text = e.to_string();
+    if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return text.trim_end().to_string();
+    }
+    // Clap writes the error with indented details, tips, the usage and a pointer to the help, in this order.
+    let told = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"));
+    told.filter(|l| !l.is_empty())
+        .map(|l| l.strip_prefix("tip: ").map_or(l.to_string(), |tip| format!("({tip})")))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
