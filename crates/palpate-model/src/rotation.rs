@@ -8,10 +8,10 @@ use glam::{DMat3, DQuat, DVec3};
 
 /// Determinant, relative to that of an isotropic matrix of the same norm, above which Newton's iteration is used:
 /// rounding of det F (1e-16 relative to the norm cubed) is then harmless and R is far from the non-unique set.
-const NEWTON_DETERMINANT: f64 = 1e-3;
+pub const NEWTON_DETERMINANT: f64 = 1e-3;
 
 /// Smallest eigenvalue of G [dimensionless, like a stretch] that [`Polar::new`] leaves as it is.
-const SMALLEST_PAIR: f64 = 1e-3;
+pub const SMALLEST_PAIR: f64 = 1e-3;
 
 /// Rotation R ∈ SO(3) that maximises tr(RᵀF), orthonormal to rounding; also for singular and inverted `f`.
 ///

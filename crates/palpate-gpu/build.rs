@@ -1,0 +1,160 @@
+//! Links the WGSL of `shaders/` into one source per pass and variant, validates each with naga, and writes down what Rust must
+//! know of it: bindings by name, workgroup size, overrides, and assertions that `#[repr(C)]` twins have the same layout.
+//!
+//! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
+//! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{AddressSpace, StorageAccess, TypeInner};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+const VARIANTS: [&str; 2] = ["subgroup", "memory"];
+
+fn main() {
+    let shaders = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("../../shaders");
+    println!("cargo::rerun-if-changed={}", shaders.display());
+    let mut names: Vec<String> = fs::read_dir(shaders.join("passes"))
+        .expect("shaders/passes exists")
+        .filter_map(|e| Some(e.ok()?.path().file_stem()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    let mut out = String::new();
+    let mut structs = BTreeMap::new();
+    let mut indices = String::new();
+    writeln!(out, "/// Every kernel, by name.\npub static PASSES: [PassSource; {}] = [", names.len())
+        .expect("a String takes all");
+    for (index, name) in names.iter().enumerate() {
+        let variants: Vec<Linked> = VARIANTS.iter().map(|v| link(&shaders, name, v)).collect();
+        let facts: Vec<Facts> = variants.iter().map(|v| Facts::of(name, v, &mut structs)).collect();
+        let same = variants[0].text == variants[1].text;
+        assert!(same || facts[0].bindings == facts[1].bindings, "variants of {name} bind different buffers");
+        let sources: Vec<&str> = variants.iter().map(|v| v.text.as_str()).collect();
+        writeln!(
+            out,
+            "    PassSource {{ name: {name:?}, sources: {sources:?}, lanes: {}, width: {}, memory: {}, bindings: &{:?}, overrides: &{:?} }},",
+            !same, facts[0].width, facts.iter().map(|f| f.memory).max().unwrap_or(0), facts[0].bindings, facts[0].overrides,
+        )
+        .expect("a String takes all");
+        writeln!(indices, "    /// `shaders/passes/{name}.wgsl`.\n    pub const {}: usize = {index};", name.to_uppercase())
+            .expect("a String takes all");
+    }
+    writeln!(out, "];\n/// Numbers of the passes in [`PASSES`].\npub mod pass {{\n{indices}}}").expect("a String takes all");
+    for (name, (span, members)) in structs {
+        writeln!(out, "const _: () = {{\n    assert!(size_of::<crate::layout::{name}>() == {span}, \"size of {name}\");")
+            .expect("text");
+        for (member, offset) in members {
+            writeln!(
+                out,
+                "    assert!(core::mem::offset_of!(crate::layout::{name}, {member}) == {offset}, \"{name}.{member}\");"
+            )
+            .expect("a String takes all");
+        }
+        out.push_str("};\n");
+    }
+    let path = Path::new(&env::var("OUT_DIR").expect("cargo sets it")).join("shaders.rs");
+    fs::write(path, out).expect("OUT_DIR is writable");
+}
+
+/// A pass with everything it uses.
+struct Linked {
+    text: String,
+}
+
+fn link(shaders: &Path, name: &str, variant: &str) -> Linked {
+    let mut text = String::new();
+    include(shaders, &format!("passes/{name}"), variant, &mut BTreeSet::new(), &mut text);
+    let mut number = 0;
+    let lines: Vec<String> = text
+        .lines()
+        .map(|line| {
+            if line.starts_with("var<storage") || line.starts_with("var<uniform") {
+                number += 1;
+                format!("@group(0) @binding({}) {line}", number - 1)
+            } else {
+                line.to_string()
+            }
+        })
+        .collect();
+    Linked { text: lines.join("\n") }
+}
+
+fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    if !done.insert(file.to_string()) {
+        return;
+    }
+    let path = shaders.join(format!("{file}.wgsl"));
+    let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    for line in text.lines() {
+        if let Some(other) = line.strip_prefix("// use ") {
+            let other = if other == "shared/lanes" { format!("shared/lanes_{variant}") } else { other.to_string() };
+            include(shaders, &other, variant, done, out);
+        }
+    }
+    for line in text.lines().filter(|l| !l.starts_with("//") && !l.is_empty()) {
+        out.push_str(line);
+        out.push('\n');
+    }
+}
+
+/// What Rust must know of a linked pass.
+struct Facts {
+    width: u32,
+    memory: u32,
+    /// Name, number, whether it is written, whether it is a uniform.
+    bindings: Vec<(String, u32, bool, bool)>,
+    overrides: Vec<String>,
+}
+
+type Structs = BTreeMap<String, (u32, Vec<(String, u32)>)>;
+
+impl Facts {
+    fn of(pass: &str, linked: &Linked, structs: &mut Structs) -> Facts {
+        let module = naga::front::wgsl::parse_str(&linked.text)
+            .unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {}", e.emit_to_string(&linked.text)));
+        let capabilities = Capabilities::SUBGROUP | Capabilities::IMMEDIATES;
+        let mut validator = Validator::new(ValidationFlags::all(), capabilities);
+        validator
+            .subgroup_stages(naga::valid::ShaderStages::COMPUTE)
+            .subgroup_operations(naga::valid::SubgroupOperationSet::all());
+        let info = validator
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {}", e.emit_to_string(&linked.text)));
+        assert!(module.entry_points.len() == 1, "{pass} has one entry point");
+        let entry = &module.entry_points[0];
+        assert!(entry.name == pass, "the entry point of {pass}.wgsl is called {pass}, not {}", entry.name);
+        assert!(entry.workgroup_size[1..] == [1, 1], "{pass} is one-dimensional");
+        let used = info.get_entry_point(0);
+        let layouter = {
+            let mut l = naga::proc::Layouter::default();
+            l.update(module.to_ctx()).expect("layouts of a validated module");
+            l
+        };
+        let mut bindings = Vec::new();
+        let mut memory = 0;
+        for (handle, variable) in module.global_variables.iter() {
+            if used[handle].is_empty() {
+                continue;
+            }
+            if variable.space == AddressSpace::WorkGroup {
+                memory += layouter[variable.ty].size;
+            }
+            let Some(binding) = &variable.binding else { continue };
+            let writes = matches!(variable.space, AddressSpace::Storage { access } if access.contains(StorageAccess::STORE));
+            let uniform = variable.space == AddressSpace::Uniform;
+            bindings.push((variable.name.clone().expect("buffers have names"), binding.binding, writes, uniform));
+        }
+        for (_, ty) in module.types.iter() {
+            if let (Some(name), TypeInner::Struct { members, span }) = (&ty.name, &ty.inner)
+                && linked.text.contains(&format!("struct {name} {{ // mirrored"))
+            {
+                let members = members.iter().map(|m| (m.name.clone().expect("fields have names"), m.offset)).collect();
+                structs.insert(name.clone(), (*span, members));
+            }
+        }
+        let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+        Facts { width: entry.workgroup_size[0], memory, bindings, overrides }
+    }
+}

@@ -1,0 +1,221 @@
+//! Structs that host and kernels share. The build script asserts that every field lies where WGSL has it.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Arguments of one dispatch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Call {
+    /// Time step.
+    pub step: u32,
+    /// 0 = static balance, 1 = step.
+    pub mode: u32,
+    /// Section of the roster.
+    pub roster: u32,
+    /// Whatever the pass says.
+    pub extra: u32,
+}
+
+/// Sizes and constants of a plan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Shape {
+    /// Members B of the current batch.
+    pub members: u32,
+    /// Simulation nodes N.
+    pub nodes: u32,
+    /// Cells.
+    pub cells: u32,
+    /// 3 × 3 blocks of the matrix.
+    pub blocks: u32,
+    /// Surface patches.
+    pub patches: u32,
+    /// Clamp cells of all clamps.
+    pub holds: u32,
+    /// Clamps.
+    pub clamps: u32,
+    /// Contact planes.
+    pub planes: u32,
+    /// Point masses.
+    pub masses: u32,
+    /// Parameters P.
+    pub parameters: u32,
+    /// Classes of cells that share element matrices.
+    pub classes: u32,
+    /// 1 with lagged rotation.
+    pub lagged: u32,
+    /// Edge of a cell [m].
+    pub h: f32,
+    /// Time step [s].
+    pub dt: f32,
+    /// Weight of the new state.
+    pub theta: f32,
+    /// Largest displacement before a body counts as lost [m].
+    pub world: f32,
+    /// Centre of the initial spin [m].
+    pub pivot: [f32; 3],
+    /// Relative accuracy of a Newton solve.
+    pub tolerance: f32,
+    /// Steps of the clock.
+    pub steps: u32,
+    /// Most Newton iterations of a step.
+    pub iterations: u32,
+    /// CG iterations of one dispatch.
+    pub chunk: u32,
+    /// Most CG iterations of one solve.
+    pub most: u32,
+}
+
+/// Parameters of one member.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Member {
+    /// Young's modulus [Pa].
+    pub young: f32,
+    /// Density [kg/m³].
+    pub density: f32,
+    /// Rayleigh damping [1/s].
+    pub mass_damping: f32,
+    /// Rayleigh damping [s].
+    pub stiffness_damping: f32,
+    /// Ghost penalty γ h μ at Young's modulus 1, and its derivative by ν.
+    pub ghost: [f32; 2],
+    /// Which element matrices.
+    pub slot: u32,
+    /// Fills up.
+    pub pad: u32,
+    /// Gravity [m/s²].
+    pub gravity: [f32; 4],
+    /// Initial velocity [m/s].
+    pub velocity: [f32; 4],
+    /// Initial angular velocity [rad/s].
+    pub spin: [f32; 4],
+}
+
+/// A contact plane of one member.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Plane {
+    /// Unit normal and height [m].
+    pub normal: [f32; 4],
+    /// Derivative of the normal by θ.
+    pub by_theta: [f32; 4],
+    /// Derivative of the normal by φ.
+    pub by_phi: [f32; 4],
+    /// Penalty stiffness [Pa/m].
+    pub stiffness: f32,
+    /// 1 when it is proportional to Young's modulus.
+    pub scales: f32,
+    /// Fills up.
+    pub pad: [f32; 2],
+}
+
+/// A cell.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Cell {
+    /// Nodes of the corners.
+    pub nodes: [u32; 8],
+    /// Class of its element matrices.
+    pub kind: u32,
+    /// First patch on it.
+    pub patch_start: u32,
+    /// One past the last patch.
+    pub patch_end: u32,
+    /// First clamp cell on it, in the order of `hold_list`.
+    pub hold_start: u32,
+    /// One past the last.
+    pub hold_end: u32,
+    /// Fills up.
+    pub pad: [u32; 3],
+}
+
+/// A surface patch.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Patch {
+    /// Rest position [m] and area [m²].
+    pub point: [f32; 4],
+    /// Means of the shape functions.
+    pub weights: [f32; 8],
+    /// Cell that it lies in.
+    pub cell: u32,
+    /// Fills up.
+    pub pad: [u32; 3],
+}
+
+/// A point mass.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Mass {
+    /// Nodes that carry it.
+    pub nodes: [u32; 8],
+    /// Shape functions at the point.
+    pub weights: [f32; 8],
+}
+
+/// Pose of a clamp at one time: x ↦ A x + b and its rate.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ClampPose {
+    /// Columns of A.
+    pub turn: [[f32; 4]; 3],
+    /// Columns of A − I.
+    pub excess: [[f32; 4]; 3],
+    /// b [m].
+    pub shift: [f32; 4],
+    /// Columns of dA/dt.
+    pub turn_rate: [[f32; 4]; 3],
+    /// db/dt [m/s].
+    pub shift_rate: [f32; 4],
+}
+
+/// Where the nonlinear solve of one member stands.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Newton {
+    /// 0 idle, 1 wants a matrix, 2 wants conjugate gradients, 3 wants a trial.
+    pub stage: u32,
+    /// 1: use the convex part of the tangent.
+    pub convex: u32,
+    /// Newton iterations so far.
+    pub iteration: u32,
+    /// Trials of the line search so far.
+    pub trial: u32,
+    /// Norm of the residual.
+    pub norm: f32,
+    /// Sizes of the forces, in the same norm.
+    pub scale: f32,
+    /// Relative accuracy of the next direction.
+    pub forcing: f32,
+    /// Norm at which conjugate gradients stop.
+    pub goal: f32,
+    /// Length of the step being tried.
+    pub length: f32,
+    /// Potential [J] at the last accepted point.
+    pub potential: f32,
+    /// Sum of the absolute shares of the potential [J].
+    pub shares: f32,
+    /// Residual times direction [J].
+    pub slope: f32,
+    /// rᵀ M⁻¹ r of the linear solve.
+    pub rz: f32,
+    /// CG iterations of this solve.
+    pub cg: u32,
+    /// CG iterations of all solves.
+    pub total: u32,
+    /// Norm that rounding alone leaves.
+    pub floor: f32,
+}
+
+/// Whether a member is well.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Health {
+    /// 0 = well, else a code of `shared/structs.wgsl`.
+    pub code: u32,
+    /// Time step in which it failed; 0 = start, k + 1 = step k.
+    pub step: u32,
+    /// Two numbers that explain.
+    pub detail: [f32; 2],
+}

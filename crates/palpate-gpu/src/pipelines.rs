@@ -1,0 +1,122 @@
+//! Kernels as the build script found them, compiled when they are first used.
+
+use crate::device::{Gpu, Lanes, translate};
+use crate::error::GpuError;
+use std::sync::OnceLock;
+
+/// A buffer of a kernel: name, number, whether it is written, whether it is a uniform.
+pub type Binding = (&'static str, u32, bool, bool);
+
+/// One kernel, linked and validated by `build.rs`.
+#[derive(Debug)]
+pub struct PassSource {
+    /// Name of the file and of the entry point.
+    pub name: &'static str,
+    /// WGSL with subgroups, and with workgroup memory.
+    pub sources: [&'static str; 2],
+    /// True when the two differ.
+    pub lanes: bool,
+    /// Invocations of a workgroup.
+    pub width: u32,
+    /// Workgroup memory of the hungrier variant [B].
+    pub memory: u32,
+    /// Its buffers.
+    pub bindings: &'static [Binding],
+    /// Constants that the host supplies.
+    pub overrides: &'static [&'static str],
+}
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// A compiled kernel.
+#[derive(Debug)]
+pub struct Kernel {
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    pub(crate) layout: wgpu::BindGroupLayout,
+}
+
+/// All kernels of a device.
+#[derive(Debug)]
+pub struct Pipelines {
+    /// How lanes talk.
+    pub lanes: Lanes,
+    kernels: Vec<OnceLock<Result<Kernel, GpuError>>>,
+}
+
+/// Bytes of a dispatch's own arguments (`Call` in `shared/structs.wgsl`).
+pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
+
+/// Value of an override: every constant that host and kernels share has its one source in `palpate-model`.
+fn constant(name: &str) -> Option<f64> {
+    Some(match name {
+        "contact_width" => palpate_model::contact::WIDTH,
+        "smallest_pair" => palpate_model::rotation::SMALLEST_PAIR,
+        "newton_determinant" => palpate_model::rotation::NEWTON_DETERMINANT,
+        _ => return None,
+    })
+}
+
+impl Pipelines {
+    pub(crate) fn new(lanes: Lanes) -> Pipelines {
+        Pipelines { lanes, kernels: PASSES.iter().map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The kernel of a pass.
+    pub(crate) fn get(&self, gpu: &Gpu, pass: usize) -> Result<&Kernel, &GpuError> {
+        self.kernels[pass].get_or_init(|| compile(gpu, &PASSES[pass], self.lanes)).as_ref()
+    }
+}
+
+fn compile(gpu: &Gpu, source: &PassSource, lanes: Lanes) -> Result<Kernel, GpuError> {
+    let device = &gpu.device;
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = source
+        .bindings
+        .iter()
+        .map(|&(_, binding, writes, uniform)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: if uniform {
+                    wgpu::BufferBindingType::Uniform
+                } else {
+                    wgpu::BufferBindingType::Storage { read_only: !writes }
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    let label = Some(source.name);
+    let guards = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory]
+        .map(|filter| device.push_error_scope(filter));
+    let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+    let whole = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label,
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: CALL_BYTES,
+    });
+    let text = source.sources[usize::from(lanes == Lanes::Memory)];
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label,
+        source: wgpu::ShaderSource::Wgsl(std::borrow::Cow::Borrowed(text)),
+    });
+    let constants: Vec<(&str, f64)> = source.overrides.iter().filter_map(|n| Some((*n, constant(n)?))).collect();
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label,
+        layout: Some(&whole),
+        module: &module,
+        entry_point: Some(source.name),
+        compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
+        cache: None,
+    });
+    let mut problem = None;
+    for guard in guards.into_iter().rev() {
+        problem = problem.or(pollster::block_on(guard.pop()));
+    }
+    match problem.map(translate) {
+        None => Ok(Kernel { pipeline, layout }),
+        Some(GpuError::Refused { message }) => Err(GpuError::Shader { pass: source.name.into(), message }),
+        Some(e) => Err(e),
+    }
+}

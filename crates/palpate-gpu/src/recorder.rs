@@ -1,0 +1,201 @@
+//! Records dispatches: a pass by its number, buffers by their names, sizes in members and items.
+
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::layout::Call;
+use crate::pipelines::PASSES;
+use std::collections::HashMap;
+
+/// Named buffers: what a pass finds under the names in its WGSL.
+pub type Named<'a> = [(&'static str, &'a wgpu::Buffer)];
+
+/// Most workgroups along one axis of a dispatch (the WebGPU limit; every device has at least this).
+pub const MOST_GROUPS: u64 = 65_535;
+
+/// How many workgroups a dispatch has.
+#[derive(Clone, Copy, Debug)]
+pub enum Size {
+    /// Members × items, all of them.
+    All {
+        /// Members B.
+        members: usize,
+        /// Workgroups per member.
+        groups: usize,
+    },
+    /// As the device wrote it at this byte of the buffer `arguments`.
+    Indirect(u64),
+}
+
+/// Timed passes need this many queries at most per submission.
+const QUERIES: u32 = 2048;
+
+/// Time spent in one pass.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PassTime {
+    /// Dispatches.
+    pub count: u64,
+    /// Nanoseconds on the device.
+    pub nanoseconds: f64,
+}
+
+/// A command buffer in the making, over a set of buffers that all its passes can name.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    world: &'a HashMap<&'static str, wgpu::Buffer>,
+    encoder: wgpu::CommandEncoder,
+    groups: &'a mut Groups,
+    timer: Option<Timer>,
+    // Dispatches share a compute pass unless they are timed one by one: opening one costs as much as ten dispatches.
+    open: Option<wgpu::ComputePass<'static>>,
+}
+
+/// Bind groups that were made before, by pass and buffers.
+pub type Groups = HashMap<(usize, Vec<wgpu::Buffer>), wgpu::BindGroup>;
+
+struct Timer {
+    set: wgpu::QuerySet,
+    passes: Vec<usize>,
+}
+
+/// Arguments of a pass beside its buffers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Args {
+    /// Time step.
+    pub step: u32,
+    /// 0 = static balance, 1 = step.
+    pub mode: u32,
+    /// Section of the roster: which members take part.
+    pub roster: u32,
+    /// Whatever the pass says.
+    pub extra: u32,
+}
+
+impl<'a> Recorder<'a> {
+    /// Starts recording.
+    pub fn new(
+        gpu: &'a Gpu,
+        world: &'a HashMap<&'static str, wgpu::Buffer>,
+        groups: &'a mut Groups,
+        timed: bool,
+    ) -> Recorder<'a> {
+        let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("palpate") });
+        let timer = (timed && gpu.tick().is_some()).then(|| Timer {
+            set: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("pass times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: QUERIES,
+            }),
+            passes: Vec::new(),
+        });
+        Recorder { gpu, world, encoder, groups, timer, open: None }
+    }
+
+    /// Records one dispatch of `pass`. Buffers are looked up in `own` first, then in the world.
+    pub fn run(&mut self, pass: usize, own: &Named, size: Size, args: Args) {
+        if let Err(e) = self.try_run(pass, own, size, args) {
+            self.gpu.keep(e);
+        }
+    }
+
+    fn try_run(&mut self, pass: usize, own: &Named, size: Size, args: Args) -> Result<(), GpuError> {
+        let source = &PASSES[pass];
+        let kernel = self.gpu.pipelines.get(self.gpu, pass).map_err(Clone::clone)?;
+        let mut buffers = Vec::with_capacity(source.bindings.len());
+        for (name, ..) in source.bindings {
+            let found = own.iter().find(|b| b.0 == *name).map(|b| b.1).or_else(|| self.world.get(name));
+            buffers.push(found.cloned().ok_or_else(|| GpuError::Refused {
+                message: format!("the pass {} was given no buffer called {name}", source.name),
+            })?);
+        }
+        let device = &self.gpu.device;
+        let group = self.groups.entry((pass, buffers)).or_insert_with_key(|(_, buffers)| {
+            let entries: Vec<wgpu::BindGroupEntry> = source
+                .bindings
+                .iter()
+                .zip(buffers)
+                .map(|(b, buffer)| wgpu::BindGroupEntry { binding: b.1, resource: buffer.as_entire_binding() })
+                .collect();
+            let label = Some(source.name);
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &kernel.layout, entries: &entries })
+        });
+        let timestamp_writes = self.timer.as_mut().filter(|t| 2 * t.passes.len() as u32 + 2 <= QUERIES).map(|t| {
+            let first = 2 * t.passes.len() as u32;
+            t.passes.push(pass);
+            wgpu::ComputePassTimestampWrites {
+                query_set: &t.set,
+                beginning_of_pass_write_index: Some(first),
+                end_of_pass_write_index: Some(first + 1),
+            }
+        });
+        if timestamp_writes.is_some() {
+            self.open = None;
+        }
+        let compute = self.open.get_or_insert_with(|| {
+            let label = if timestamp_writes.is_some() { source.name } else { "passes" };
+            self.encoder
+                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes })
+                .forget_lifetime()
+        });
+        compute.set_pipeline(&kernel.pipeline);
+        compute.set_bind_group(0, &*group, &[]);
+        let call = Call { step: args.step, mode: args.mode, roster: args.roster, extra: args.extra };
+        compute.set_immediates(0, bytemuck::bytes_of(&call));
+        match size {
+            Size::All { members, groups } => {
+                let total = (members * groups) as u64;
+                // Beyond the limit of one axis the grid becomes two-dimensional; kernels flatten it again.
+                let (x, y) = (total.min(MOST_GROUPS), total.div_ceil(MOST_GROUPS));
+                compute.dispatch_workgroups(x as u32, y as u32, 1);
+            }
+            Size::Indirect(offset) => {
+                let Some(arguments) = self.world.get("arguments") else {
+                    return Err(GpuError::Refused { message: "no buffer called arguments".into() });
+                };
+                compute.dispatch_workgroups_indirect(arguments, offset);
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies a whole buffer.
+    pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.open = None;
+        self.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size()));
+    }
+
+    /// Sets a buffer to zero.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+        self.open = None;
+        self.encoder.clear_buffer(buffer, 0, None);
+    }
+
+    /// Hands the work to the device; does not wait, unless passes are timed: then adds their times.
+    pub fn submit(mut self, times: &mut HashMap<&'static str, PassTime>) {
+        self.open = None;
+        let Some(timer) = self.timer.take().filter(|t| !t.passes.is_empty()) else {
+            self.gpu.queue.submit([self.encoder.finish()]);
+            return;
+        };
+        let count = 2 * timer.passes.len() as u32;
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        let resolved = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("pass times"),
+            size: u64::from(count) * 8,
+            usage,
+            mapped_at_creation: false,
+        });
+        self.encoder.resolve_query_set(&timer.set, 0..count, &resolved, 0);
+        self.gpu.queue.submit([self.encoder.finish()]);
+        match self.gpu.download::<u64>(&resolved, count as usize) {
+            Ok(ticks) => {
+                let tick = f64::from(self.gpu.tick().unwrap_or(1.0));
+                for (pair, pass) in ticks.chunks_exact(2).zip(&timer.passes) {
+                    let t = times.entry(PASSES[*pass].name).or_default();
+                    t.count += 1;
+                    t.nanoseconds += pair[1].saturating_sub(pair[0]) as f64 * tick;
+                }
+            }
+            Err(e) => self.gpu.keep(e),
+        }
+    }
+}

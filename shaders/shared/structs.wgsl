@@ -1,0 +1,125 @@
+//! Structs that host and kernels share (twins in crates/palpate-gpu/src/layout.rs), and the numbers of stages and failures.
+
+struct Call { // mirrored
+    step: u32,
+    mode: u32,
+    roster: u32,
+    extra: u32,
+}
+var<immediate> call: Call;
+
+struct Shape { // mirrored
+    members: u32,
+    nodes: u32,
+    cells: u32,
+    blocks: u32,
+    patches: u32,
+    holds: u32,
+    clamps: u32,
+    planes: u32,
+    masses: u32,
+    parameters: u32,
+    classes: u32,
+    lagged: u32,
+    h: f32,
+    dt: f32,
+    theta: f32,
+    world: f32,
+    pivot: vec3<f32>,
+    tolerance: f32,
+    steps: u32,
+    iterations: u32,
+    chunk: u32,
+    most: u32,
+}
+
+struct Member { // mirrored
+    young: f32,
+    density: f32,
+    mass_damping: f32,
+    stiffness_damping: f32,
+    ghost: vec2<f32>,
+    slot: u32,
+    pad: u32,
+    gravity: vec4<f32>,
+    velocity: vec4<f32>,
+    spin: vec4<f32>,
+}
+
+struct Plane { // mirrored
+    normal: vec4<f32>,
+    by_theta: vec4<f32>,
+    by_phi: vec4<f32>,
+    stiffness: f32,
+    scales: f32,
+    pad: vec2<f32>,
+}
+
+struct Cell { // mirrored
+    nodes: array<u32, 8>,
+    kind: u32,
+    patch_start: u32,
+    patch_end: u32,
+    hold_start: u32,
+    hold_end: u32,
+    pad: array<u32, 3>,
+}
+
+struct Patch { // mirrored
+    point: vec4<f32>,
+    weights: array<f32, 8>,
+    cell: u32,
+    pad: array<u32, 3>,
+}
+
+struct Mass { // mirrored
+    nodes: array<u32, 8>,
+    weights: array<f32, 8>,
+}
+
+struct ClampPose { // mirrored
+    turn: mat3x3<f32>,
+    excess: mat3x3<f32>,
+    shift: vec4<f32>,
+    turn_rate: mat3x3<f32>,
+    shift_rate: vec4<f32>,
+}
+
+const IDLE = 0u;
+const WANTS_MATRIX = 1u;
+const WANTS_SOLVE = 2u;
+const WANTS_TRIAL = 3u;
+
+struct Newton { // mirrored
+    stage: u32,
+    convex: u32,
+    iteration: u32,
+    trial: u32,
+    norm: f32,
+    scale: f32,
+    forcing: f32,
+    goal: f32,
+    length: f32,
+    potential: f32,
+    shares: f32,
+    slope: f32,
+    rz: f32,
+    cg: u32,
+    total: u32,
+    floor: f32,
+}
+
+const WELL = 0u;
+const NOT_FINITE = 1u;
+const STALLED = 2u;
+const UNSOLVED = 3u;
+const INDEFINITE = 4u;
+const FELL_OUT = 5u;
+const BAD_PARAMETER = 6u;
+const NO_CLAMP = 7u;
+
+struct Health { // mirrored
+    code: u32,
+    step: u32,
+    detail: vec2<f32>,
+}
