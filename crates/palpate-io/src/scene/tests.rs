@@ -224,7 +224,7 @@ fn found_values_are_written_in_place_and_read_again() {
     .map(|(p, v)| (p.to_string(), v))
     .to_vec();
     let text = write_scene(BASE, &scene, &values, Path::new("some/out")).unwrap();
-    assert!(text.contains("# a ball") && text.contains("youngs_modulus = 123456.789   # soft"), "{text}");
+    assert!(text.contains("# a ball") && text.contains("youngs_modulus = 123456.789   # fitted, was 1e5: soft"), "{text}");
     let again = parse_scene(&text, "some/out/model.toml").unwrap().value;
     assert_eq!(again.material.youngs_modulus, 123456.789);
     assert_eq!(again.material.mass_damping, 0.25);

@@ -1,4 +1,5 @@
-//! A scene written back with found values in place; comments and layout of the user's file are kept.
+//! A scene written back with found values in place; comments and layout of the user's file are kept, and every changed value
+//! says what it was, so that no comment speaks of a number that is gone.
 
 use crate::error::InputError;
 use glam::DVec3;
@@ -93,6 +94,8 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
         set(table, "point", vector(point));
         set(table, "normal", vector(normal));
     }
+    let before: DocumentMut = template.parse().expect("it was parsed above");
+    note_changes(doc.as_table_mut(), before.as_table());
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
     Ok(doc.to_string())
 }
@@ -139,6 +142,40 @@ fn set(table: &mut dyn TableLike, key: &str, new: Value) {
         Some(old) => replace(old, new),
         None => drop(table.insert(key, Item::Value(new))),
     }
+}
+
+/// Begins the note of a changed value.
+const NOTE: &str = "fitted, was ";
+
+/// Writes beside every value that differs from `before` what it was, in front of the comment that was written for the old one.
+fn note_changes(table: &mut dyn TableLike, before: &dyn TableLike) {
+    for (key, old) in before.iter() {
+        match (table.get_mut(key), old) {
+            (Some(Item::Value(new)), Item::Value(old)) => note_change(new, old),
+            (Some(Item::Table(new)), Item::Table(old)) => note_changes(new, old),
+            (Some(Item::ArrayOfTables(new)), Item::ArrayOfTables(old)) => {
+                new.iter_mut().zip(old.iter()).for_each(|(new, old)| note_changes(new, old));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn note_change(new: &mut Value, old: &Value) {
+    let bare = |v: &Value| v.clone().decorated("", "").to_string();
+    let was = bare(old);
+    // An array over several lines has no room for a note.
+    if bare(new) == was || was.contains('\n') {
+        return;
+    }
+    let suffix = old.decor().suffix().and_then(|s| s.as_str()).unwrap_or("").trim().trim_start_matches('#').trim_start();
+    // A value that is fitted again does not pile up notes.
+    let comment = match suffix.strip_prefix(NOTE) {
+        Some(note) => note.split_once(": ").map_or("", |(_, comment)| comment),
+        None => suffix,
+    };
+    let colon = if comment.is_empty() { "" } else { ": " };
+    new.decor_mut().set_suffix(format!("   # {NOTE}{was}{colon}{comment}"));
 }
 
 /// Rewrites the paths in a scene that lies in `from` so that they hold from `to`.
