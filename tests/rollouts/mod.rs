@@ -3,4 +3,5 @@
 mod agreement;
 mod effects;
 mod gradients;
+mod rows;
 mod visibility;

@@ -1,12 +1,13 @@
 //! [`Backend`] on the CPU: every pass over all members of the batch, side by side.
 
+use crate::linear::vector::Nodes;
 use crate::newton;
 use crate::passes::cells::zeros;
 use crate::passes::frames::{self, Instant};
 use crate::simulate;
 use crate::world::{Adjoint, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
-use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch};
+use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch, Rows};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use rayon::prelude::*;
@@ -33,6 +34,27 @@ fn blank(world: &World) -> Vec<MemberState> {
 
 fn displacement(at: &Instant, now: &MemberState, next: &MemberState) -> Vec<DVec3> {
     frames::blend(&at.value, [&now.u, &now.v, &next.u, &next.v])
+}
+
+/// Derivatives of a frame's displacement along the tangent directions, `[Q][N]`.
+fn derivatives(
+    at: &Instant,
+    keys: &[ParamKey],
+    directions: &[usize],
+    s: [&MemberState; 2],
+    d: [&MemberTangent; 2],
+) -> Vec<Nodes> {
+    (0..directions.len())
+        .map(|q| {
+            let mut du = frames::blend(&at.value, [&d[0].du[q], &d[0].dv[q], &d[1].du[q], &d[1].dv[q]]);
+            if keys[directions[q]] == ParamKey::TimeStart {
+                // A later start means an earlier place on the curve.
+                let rate = frames::blend(&at.rate, [&s[0].u, &s[0].v, &s[1].u, &s[1].v]);
+                crate::linear::vector::add_scaled(&mut du, -1.0, &rate);
+            }
+            du
+        })
+        .collect()
 }
 
 impl Backend for CpuBackend {
@@ -253,16 +275,7 @@ impl Backend for CpuBackend {
                     return;
                 }
                 for at in frames::instants(&shared.plan, m.physics.start, k) {
-                    let du: Vec<_> = (0..tangent.directions.len())
-                        .map(|q| {
-                            let mut du = frames::blend(&at.value, [&d0.du[q], &d0.dv[q], &d1.du[q], &d1.dv[q]]);
-                            if keys[tangent.directions[q]] == ParamKey::TimeStart {
-                                let rate = frames::blend(&at.rate, [&a.u, &a.v, &b.u, &b.v]);
-                                crate::linear::vector::add_scaled(&mut du, -1.0, &rate);
-                            }
-                            du
-                        })
-                        .collect();
+                    let du = derivatives(&at, keys, &tangent.directions, [a, b], [d0, d1]);
                     let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
                     let c = t.evaluation.curvature.as_mut().expect("tangents go with a curvature");
                     frames::gauss_newton(
@@ -277,6 +290,30 @@ impl Backend for CpuBackend {
                     );
                 }
             });
+    }
+
+    fn rows(
+        &self,
+        world: &World,
+        k: usize,
+        states: [&State; 2],
+        tangents: [&Tangent; 2],
+        tally: &Tally,
+        member: usize,
+    ) -> Option<Rows> {
+        let shared = &world.shared;
+        let t = &tally.members[member];
+        let mut out = Rows::default();
+        for at in frames::instants(&shared.plan, world.members[member].physics.start, k) {
+            let keys = &shared.plan.layout.keys;
+            let s = states.map(|s| &s.members[member]);
+            let du = derivatives(&at, keys, &tangents[0].directions, s, tangents.map(|t| &t.members[member]));
+            let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
+            let rows = frames::all_rows(&shared.plan, at.frame, &found.2, &found.1, &du);
+            out.residuals.extend(rows.residuals);
+            out.sensitivity.extend(rows.sensitivity);
+        }
+        Some(out)
     }
 
     fn all_failed(&self, tally: &Tally) -> bool {

@@ -1,6 +1,7 @@
 //! What a backend does: whole time steps, observations, and the adjoint and tangent of each, for a batch.
 
 use crate::evaluate::{Evaluation, ParamBatch};
+use crate::rows::Rows;
 use glam::DVec3;
 use palpate_model::plan::Plan;
 
@@ -105,6 +106,20 @@ pub trait Backend: Send {
         tangent_next: &Self::Tangent,
         tally: &mut Self::Tally,
     );
+
+    /// Every residual of the frames in step k of one member with its sensitivities, from what [`Backend::observe`] found; `None`
+    /// from a backend that only sums.
+    fn rows(
+        &self,
+        _world: &Self::World,
+        _k: usize,
+        _states: [&Self::State; 2],
+        _tangents: [&Self::Tangent; 2],
+        _tally: &Self::Tally,
+        _member: usize,
+    ) -> Option<Rows> {
+        None
+    }
 
     /// True when every member has failed, so that the rest of the rollout can be skipped. A backend that would have to
     /// wait for the answer returns `false`.

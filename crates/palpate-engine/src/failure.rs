@@ -28,6 +28,8 @@ pub enum FailureKind {
     NoEquilibrium,
     /// A parameter lies outside the range the model is defined for.
     BadParameter,
+    /// The backend cannot compute what was asked for.
+    Unsupported,
 }
 
 impl FailureKind {
@@ -42,6 +44,7 @@ impl FailureKind {
             FailureKind::FellOut => "check gravity, planes and initial velocity, or shorten [time] duration",
             FailureKind::NoEquilibrium => "add a [[clamp]], or start from initial.state = \"rest\"",
             FailureKind::BadParameter => "set bounds for the parameter in [[fit.parameter]]",
+            FailureKind::Unsupported => "use --backend cpu",
         }
     }
 }
@@ -55,6 +58,7 @@ impl fmt::Display for Failure {
             FailureKind::FellOut => "the body left the world",
             FailureKind::NoEquilibrium => "no static equilibrium was found",
             FailureKind::BadParameter => "a parameter is out of range",
+            FailureKind::Unsupported => "the backend cannot do this",
         };
         write!(f, "{what} at t = {:.6} s: {} (hint: {})", self.time, self.detail, self.kind.hint())
     }

@@ -8,8 +8,10 @@ mod backend;
 mod evaluate;
 mod failure;
 mod rollout;
+mod rows;
 
 pub use backend::{Backend, BuildError, FrameResiduals};
 pub use evaluate::{Curvature, Evaluate, Evaluation, ParamBatch, Request};
 pub use failure::{Failure, FailureKind};
 pub use rollout::{Rollout, Snapshot};
+pub use rows::{Linearised, ResidualRow, Rows, Source};

@@ -2,6 +2,8 @@
 
 use crate::backend::{Backend, BuildError, FrameResiduals};
 use crate::evaluate::{Evaluate, Evaluation, ParamBatch, Request};
+use crate::failure::{Failure, FailureKind};
+use crate::rows::{Linearised, Rows};
 use glam::DVec3;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
@@ -110,7 +112,7 @@ impl<B: Backend> Rollout<B> {
         &mut self,
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
-    ) -> Result<Evaluation, crate::Failure> {
+    ) -> Result<Evaluation, Failure> {
         let b = &self.backend;
         let w = &mut self.world;
         b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
@@ -150,6 +152,61 @@ impl<B: Backend> Rollout<B> {
         match &evaluation.failure {
             Some(f) => Err(f.clone()),
             None => Ok(evaluation),
+        }
+    }
+}
+
+impl<B: Backend> Rollout<B> {
+    /// Simulates one member with tangents along `directions` (places in θ) and collects every residual with its sensitivities.
+    ///
+    /// # Errors
+    /// The simulation fails, or the backend has no rows ([`FailureKind::Unsupported`]).
+    pub fn linearise(&mut self, theta: &[f64], directions: &[usize]) -> Result<Linearised, Failure> {
+        let b = &self.backend;
+        let w = &mut self.world;
+        b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+        let mut tally = b.new_tally(w, directions);
+        let mut now = b.new_state(w);
+        let (mut t, mut t_next) = (b.new_tangent(w, directions), b.new_tangent(w, directions));
+        let mut rows = Rows::default();
+        let mut add = |more: Option<Rows>| {
+            let more = more.ok_or_else(|| Failure {
+                kind: FailureKind::Unsupported,
+                time: 0.0,
+                detail: format!("backend {} has no single residuals", b.name()),
+            })?;
+            rows.residuals.extend(more.residuals);
+            rows.sensitivity.extend(more.sensitivity);
+            Ok(())
+        };
+        b.start(w, &mut now, &mut tally);
+        b.start_tangent(w, &now, &mut t, &mut tally);
+        let steps = self.plan.clock.steps;
+        if steps == 0 && !b.all_failed(&tally) {
+            b.observe(w, 0, &now, &now, &mut tally);
+            add(b.rows(w, 0, [&now, &now], [&t, &t], &tally, 0))?;
+        }
+        for k in 0..steps {
+            if b.all_failed(&tally) {
+                break;
+            }
+            let mut next = b.new_state(w);
+            b.step(w, k, &now, &mut next, &mut tally);
+            b.observe(w, k, &now, &next, &mut tally);
+            b.step_tangent(w, k, &now, &next, &t, &mut t_next, &mut tally);
+            if b.all_failed(&tally) {
+                break;
+            }
+            add(b.rows(w, k, [&now, &next], [&t, &t_next], &tally, 0))?;
+            std::mem::swap(&mut t, &mut t_next);
+            now = next;
+        }
+        let evaluation = b.read(w, &tally).remove(0);
+        match evaluation.failure {
+            Some(f) => Err(f),
+            None => {
+                Ok(Linearised { evaluation: Evaluation { curvature: None, ..evaluation }, directions: directions.to_vec(), rows })
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::linear::vector::Nodes;
 use crate::passes::markers::Carried;
 use crate::passes::matching::{BandLookup, Match, PointHash, extend, extend_transposed, match_points};
 use glam::DVec3;
-use palpate_engine::FrameResiduals;
+use palpate_engine::{FrameResiduals, ResidualRow, Rows, Source};
 use palpate_model::kernel;
 use palpate_model::plan::Plan;
 
@@ -142,6 +142,93 @@ pub fn gradient(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], sca
     out
 }
 
+/// Hands every scalar residual of a frame to `visit`, with its derivatives along the displacement derivatives `du[q]` `[Q]`.
+/// Matched points come in their order; points that met nothing are left out.
+pub fn rows(
+    plan: &Plan,
+    frame: usize,
+    compared: &Compared,
+    u: &[DVec3],
+    du: &[Nodes],
+    mut visit: impl FnMut(ResidualRow, &[f64]),
+) {
+    let (body, obs) = (&*plan.body, &*plan.observation);
+    let f = &obs.frames[frame];
+    let mut d = vec![0.0; du.len()];
+    if !compared.matches.is_empty() {
+        let extended: Vec<Nodes> = du.iter().map(|d| extend(body, d)).collect();
+        for m in &compared.matches {
+            let (nodes, weights) = m.stencil(body);
+            for (r, d) in d.iter_mut().zip(&extended) {
+                *r = -m.place.gradient.dot((0..8).map(|i| weights[i] * d[nodes[i] as usize]).sum());
+            }
+            let seen = &f.points[m.point as usize];
+            let sight = (seen.position - obs.cameras[seen.camera as usize].center).normalize_or_zero();
+            let row = ResidualRow {
+                frame,
+                source: Source::Point { point: m.point, camera: seen.camera },
+                value: Some(m.place.phi),
+                noise: obs.depth_noise,
+                weight: kernel::weight(m.place.phi, plan.band),
+                rest: body.grid.position(body.band.cells[m.cell as usize].lattice) + body.grid.h * m.place.xi,
+                along_sight: m.place.gradient.dot(sight),
+            };
+            visit(row, &d);
+        }
+    }
+    let mut vector = |noise: f64, rest: DVec3, r: DVec3, source: &dyn Fn(u8) -> Source, change: &dyn Fn(&Nodes) -> DVec3| {
+        let changes: Vec<DVec3> = du.iter().map(change).collect();
+        for a in 0..3u8 {
+            for (d, c) in d.iter_mut().zip(&changes) {
+                *d = c[usize::from(a)];
+            }
+            let value = Some(r[usize::from(a)]);
+            visit(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0 }, &d);
+        }
+    };
+    for m in &f.markers {
+        let site = &obs.markers[m.site as usize];
+        let carried = Carried::new(body, site, u);
+        let rest = site.carry(|i| body.nodes[i]).0;
+        let source = |axis| Source::Marker { site: m.site, axis };
+        vector(obs.marker_noise, rest, carried.position - m.position, &source, &|d| carried.tangent(site, d));
+    }
+    for (i, d) in f.displacements.iter().enumerate() {
+        let source = |axis| Source::Node { node: i as u32, axis };
+        vector(obs.displacement_noise, body.nodes[i], u[i] - *d, &source, &|d| d[i]);
+    }
+}
+
+/// As [`rows`], all together: points that met nothing stand in their place, without value and with derivatives of zero.
+pub fn all_rows(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], du: &[Nodes]) -> Rows {
+    let obs = &*plan.observation;
+    let points = &obs.frames[frame].points;
+    let mut out = Rows::default();
+    let zero = vec![0.0; du.len()];
+    let mut seen = 0;
+    let unmatched = |n: usize| ResidualRow {
+        frame,
+        source: Source::Point { point: n as u32, camera: points[n].camera },
+        value: None,
+        noise: obs.depth_noise,
+        weight: 0.0,
+        rest: points[n].position,
+        along_sight: 0.0,
+    };
+    let mut add = |row: ResidualRow, d: &[f64]| {
+        out.residuals.push(row);
+        out.sensitivity.extend_from_slice(d);
+    };
+    rows(plan, frame, compared, u, du, |row, d| {
+        let upto = if let Source::Point { point, .. } = row.source { point as usize } else { points.len() };
+        (seen..upto).for_each(|n| add(unmatched(n), &zero));
+        seen = if matches!(row.source, Source::Point { .. }) { upto + 1 } else { upto };
+        add(row, d);
+    });
+    (seen..points.len()).for_each(|n| add(unmatched(n), &zero));
+    out
+}
+
 /// Adds a frame's Gauss–Newton gradient `[Q]` and matrix `[Q, Q]` for the displacement derivatives `du[q]`.
 pub fn gauss_newton(
     plan: &Plan,
@@ -153,43 +240,17 @@ pub fn gauss_newton(
     gradient: &mut [f64],
     matrix: &mut [f64],
 ) {
-    let (body, obs) = (&*plan.body, &*plan.observation);
-    let f = &obs.frames[frame];
     let q = du.len();
-    let mut add = |weight: f64, residual: f64, d: &[f64]| {
+    rows(plan, frame, compared, u, du, |row, d| {
+        let weight = scale * row.weight / (row.noise * row.noise);
+        let residual = row.value.unwrap_or(0.0);
         for a in 0..q {
             gradient[a] += weight * residual * d[a];
             for b in 0..q {
                 matrix[a * q + b] += weight * d[a] * d[b];
             }
         }
-    };
-    if !compared.matches.is_empty() {
-        let extended: Vec<Nodes> = du.iter().map(|d| extend(body, d)).collect();
-        let factor = scale / (obs.depth_noise * obs.depth_noise);
-        let mut row = vec![0.0; q];
-        for m in &compared.matches {
-            let (nodes, weights) = m.stencil(body);
-            for (r, d) in row.iter_mut().zip(&extended) {
-                *r = -m.place.gradient.dot((0..8).map(|i| weights[i] * d[nodes[i] as usize]).sum());
-            }
-            add(factor * kernel::weight(m.place.phi, plan.band), m.place.phi, &row);
-        }
-    }
-    let mut vector = |noise: f64, r: DVec3, d: &[DVec3]| {
-        for a in 0..3 {
-            add(scale / (noise * noise), r[a], &d.iter().map(|d| d[a]).collect::<Vec<_>>());
-        }
-    };
-    for m in &f.markers {
-        let site = &obs.markers[m.site as usize];
-        let carried = Carried::new(body, site, u);
-        let d: Vec<DVec3> = du.iter().map(|d| carried.tangent(site, d)).collect();
-        vector(obs.marker_noise, carried.position - m.position, &d);
-    }
-    for (i, d) in f.displacements.iter().enumerate() {
-        vector(obs.displacement_noise, u[i] - *d, &du.iter().map(|d| d[i]).collect::<Vec<_>>());
-    }
+    });
 }
 
 /// Every residual of a frame, for reports.
