@@ -1,5 +1,6 @@
 //! The command line as its users meet it: arguments in, exit code, text and files out.
 
+mod batch;
 mod fitting;
 mod usage;
 

@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{fit, inspect, observe, simulate};
+use crate::commands::{batch, fit, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -36,6 +36,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Observe(observe::Arguments),
     Fit(fit::Arguments),
+    Batch(batch::Arguments),
     Inspect(inspect::Arguments),
 }
 
@@ -50,6 +51,11 @@ pub struct Console<'a> {
 }
 
 impl Console<'_> {
+    /// The same talk to another place (a log), without progress bars.
+    pub fn aside<'b>(&self, out: &'b mut dyn Write, err: &'b mut dyn Write) -> Console<'b> {
+        Console { out, err, talk: Talk { json: false, quiet: false }, draw: false, interrupt: self.interrupt.clone() }
+    }
+
     /// True when the result is to be JSON.
     pub fn json(&self) -> bool {
         self.talk.json
@@ -111,6 +117,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Simulate(a) => simulate::run(a, &mut console),
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),
+        Command::Batch(a) => batch::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {

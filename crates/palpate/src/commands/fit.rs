@@ -9,6 +9,7 @@ use crate::grid::grid_shift;
 use crate::options::{BackendName, out_folder};
 use crate::report::{FramePicture, ReportInput, history_csv, html, pictures, result_json, summary};
 use clap::{Args, ValueEnum};
+use indicatif::ProgressBar;
 use palpate_fit::Progress;
 use palpate_io::output::{make_folder, write_file};
 use palpate_model::scene::Optimizer;
@@ -36,9 +37,19 @@ pub struct Arguments {
     /// Output folder [default: out/SCENE-fit]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Go on with the journal of an interrupted fit in the output folder
+    #[arg(long)]
+    resume: bool,
+    #[command(flatten)]
+    choices: Choices,
+}
+
+/// How to fit; shared by `fit` and `batch`.
+#[derive(Clone, Debug, Args)]
+pub struct Choices {
     /// What computes
     #[arg(long, value_enum, default_value = "auto")]
-    backend: BackendName,
+    pub backend: BackendName,
     /// Number of starts [default: the scene's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     starts: Option<u64>,
@@ -51,9 +62,6 @@ pub struct Arguments {
     /// Seed of the starts [default: the scene's]
     #[arg(long)]
     seed: Option<u64>,
-    /// Go on with the journal of an interrupted fit in the output folder
-    #[arg(long)]
-    resume: bool,
     /// Threads; 0 = one per core [default: the scene's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=4096))]
     threads: Option<u64>,
@@ -109,7 +117,7 @@ fn keep_previous(folder: &Path, scenes: usize, resume: bool) -> Result<Option<Pa
 }
 
 /// The command line that gives the same result.
-fn command(a: &Arguments, fitted: &Fitted) -> String {
+fn command(scenes: &[PathBuf], a: &Choices, fitted: &Fitted) -> String {
     let quote = |p: &Path| {
         let s = p.display().to_string();
         if s.contains(|c: char| c.is_whitespace() || "'\"\\$`;&|<>()*?!#".contains(c)) {
@@ -119,7 +127,7 @@ fn command(a: &Arguments, fitted: &Fitted) -> String {
         }
     };
     let mut words = vec!["palpate fit".to_string()];
-    words.extend(a.scenes.iter().map(|s| quote(s)));
+    words.extend(scenes.iter().map(|s| quote(s)));
     words.push(format!("--backend {}", fitted.backend));
     let mut option = |name: &str, value: Option<String>| words.extend(value.map(|v| format!("--{name} {v}")));
     option("starts", a.starts.map(|n| n.to_string()));
@@ -151,7 +159,8 @@ fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, c
 }
 
 fn write_all(
-    a: &Arguments,
+    scenes: &[PathBuf],
+    a: &Choices,
     folder: &Path,
     experiments: &[Experiment],
     fitted: &Fitted,
@@ -177,29 +186,54 @@ fn write_all(
         n => scene_pictures(e, fitted, s, backend, n, scale),
     });
     let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
-    let page = html(&ReportInput { fitted, experiments, pictures, scale, command: command(a, fitted) });
+    let page = html(&ReportInput { fitted, experiments, pictures, scale, command: command(scenes, a, fitted) });
     text("report.html", &page)?;
     Ok(result)
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let (backend, note) = a.backend.choose()?;
+    let (backend, note) = a.choices.backend.choose()?;
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    make_folder(&folder)?;
+    let bar = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
+    let (fitted, result) = run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &bar, console)?;
+    bar.finish_and_clear();
+    console.warn(&fitted.warnings);
+    if console.json() {
+        console.print(&result.to_string());
+    } else {
+        console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
+    }
+    Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
+}
+
+/// Iterations that a fit may take in all.
+pub fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
+    let spec = experiment.scene().fit.as_ref();
+    let iterations = a.iterations.unwrap_or(spec.map_or(0, |f| f.iterations as u64));
+    iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
+}
+
+/// Fits and writes everything into a folder; the progress goes to `bar`. Returns the fit and its `result.json`.
+pub fn run_in(
+    scenes: &[PathBuf],
+    a: &Choices,
+    backend: Backend,
+    experiments: &[Experiment],
+    folder: &Path,
+    resume: bool,
+    bar: &ProgressBar,
+    console: &mut Console,
+) -> Result<(Fitted, serde_json::Value), Error> {
+    make_folder(folder)?;
     let journal = folder.join(JOURNAL);
-    if a.resume && !journal.exists() {
+    if resume && !journal.exists() {
         console.note(&format!("{}: there is no journal to go on with; the fit begins anew", journal.display()));
     }
-    if let Some(aside) = keep_previous(&folder, experiments.len(), a.resume)? {
+    if let Some(aside) = keep_previous(folder, experiments.len(), resume)? {
         console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));
     }
-
-    let spec = experiments[0].scene().fit.as_ref();
-    let iterations = a.iterations.unwrap_or(spec.map_or(0, |f| f.iterations as u64));
-    let starts = a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64));
-    let bar = console.progress(iterations * starts, "fitting");
     let mut best = f64::INFINITY;
     let mut hear = |p: &Progress| {
         best = best.min(p.cost);
@@ -207,7 +241,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         bar.set_message(format!("best cost {best:.4}"));
     };
     let mut fitted = fit(
-        &experiments,
+        experiments,
         FitOptions {
             backend,
             optimizer: a.optimizer.map(Optimizer::from),
@@ -216,24 +250,17 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             seed: a.seed,
             threads: a.threads.map(|n| n as usize),
             interrupt: console.interrupt.clone(),
-            journal: Some((journal, a.resume)),
+            journal: Some((journal, resume)),
             on_iteration: Some(&mut hear),
         },
     )?;
-    bar.finish_and_clear();
     if a.grid_check && !fitted.interrupted {
-        match grid_shift(&experiments, &fitted, 2.0, backend) {
+        match grid_shift(experiments, &fitted, 2.0, backend) {
             Ok(shift) => fitted.grid_shift = Some(shift),
             // The fit stands without it.
             Err(e) => fitted.warnings.push(format!("no grid check: {e}")),
         }
     }
-    let result = write_all(a, &folder, &experiments, &fitted, backend)?;
-    console.warn(&fitted.warnings);
-    if console.json() {
-        console.print(&result.to_string());
-    } else {
-        console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
-    }
-    Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
+    let result = write_all(scenes, a, folder, experiments, &fitted, backend)?;
+    Ok((fitted, result))
 }

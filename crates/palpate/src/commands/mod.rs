@@ -1,5 +1,6 @@
 //! One file a command.
 
+pub mod batch;
 pub mod fit;
 pub mod inspect;
 pub mod observe;

@@ -1,0 +1,89 @@
+//! Many recordings in one command: one that fails harms no other, and what is done is not done again.
+
+use super::{BLOCK, observed};
+use palpate::{Interrupt, cli::INTERRUPTED};
+use std::fs;
+use support::command::{Answer, arg, json, palpate, stopped};
+
+/// Three scenes in a folder: two that fit and, between them, one without a recording; and a file that is no scene.
+fn folder() -> tempfile::TempDir {
+    let folder = observed(BLOCK);
+    let file = |name: &str| folder.path().join(name);
+    let scene = fs::read_to_string(file("fit.toml")).unwrap();
+    let scenes = file("scenes");
+    fs::create_dir(&scenes).unwrap();
+    let seen = scene.replace("\"seen\"", "\"../seen\"").replace("starts = 3", "starts = 1");
+    fs::write(scenes.join("a.toml"), &seen).unwrap();
+    fs::write(scenes.join("b.toml"), seen.replace("../seen", "../lost")).unwrap();
+    fs::write(scenes.join("c.toml"), seen.replace("[8.0e3, 6.0e4]", "3.0e4")).unwrap();
+    fs::write(scenes.join("notes.toml"), "colour = \"green\"\n").unwrap();
+    folder
+}
+
+fn statuses(out: &std::path::Path) -> Vec<String> {
+    let rows = json(out.join("summary.json"));
+    rows["scenes"].as_array().unwrap().iter().map(|r| r["status"].as_str().unwrap().to_string()).collect()
+}
+
+#[test]
+fn one_bad_scene_harms_no_other_and_finished_ones_are_taken_over() {
+    let folder = folder();
+    let (scenes, out) = (folder.path().join("scenes"), folder.path().join("out"));
+    let run = |more: &[&str]| -> Answer { palpate(&[&["batch", arg(&scenes), "--out", arg(&out)], more].concat()) };
+    let first = run(&[]);
+    assert_eq!(first.code, 1, "{}", first.err);
+    assert_eq!(statuses(&out), ["complete", "bad-input", "complete"]);
+    assert!(first.err.contains("lost") && first.out.contains("2 of 3 scenes complete"), "{}{}", first.err, first.out);
+    let csv = fs::read_to_string(out.join("summary.csv")).unwrap();
+    let head = csv.lines().next().unwrap();
+    assert!(head.contains("material.youngs_modulus,material.youngs_modulus standard error"), "{head}");
+    assert_eq!(csv.lines().count(), 4);
+    for name in ["a", "c"] {
+        let value = json(out.join(name).join("result.json"))["parameters"][0]["value"].as_f64().unwrap();
+        // The recording was made with 20 kPa on the same grid; noise leaves some per mille.
+        assert!((value / 2e4 - 1.0).abs() < 0.02, "{value}");
+        assert!(out.join(name).join("fit.log").exists() && out.join(name).join("report.html").exists());
+    }
+
+    // The missing recording turns up: only that scene is computed.
+    let before = fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap();
+    fs::write(scenes.join("b.toml"), fs::read_to_string(scenes.join("a.toml")).unwrap()).unwrap();
+    let second = run(&["--resume"]);
+    assert_eq!(second.code, 0, "{}", second.err);
+    assert_eq!(statuses(&out), ["complete"; 3]);
+    assert_eq!(fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap(), before);
+
+    // A scene that changed is fitted again.
+    let a = fs::read_to_string(scenes.join("a.toml")).unwrap();
+    fs::write(scenes.join("a.toml"), a.replace("seed = 4", "seed = 5")).unwrap();
+    assert_eq!(run(&["--resume"]).code, 0);
+    assert_ne!(fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap(), before);
+}
+
+#[test]
+fn an_interrupted_batch_goes_on_where_it_was() {
+    let folder = folder();
+    let list = folder.path().join("list.txt");
+    fs::write(&list, "# two scenes\nscenes/a.toml\n\nscenes/c.toml\n").unwrap();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    assert_eq!(palpate(&["batch", arg(&list), "--out", arg(&whole)]).code, 0);
+    let cut = stopped(&["batch", arg(&list), "--out", arg(&broken)], Interrupt::after(2));
+    assert_eq!(cut.code, INTERRUPTED, "{}", cut.err);
+    assert_eq!(statuses(&broken), ["interrupted"]);
+    assert_eq!(palpate(&["batch", arg(&list), "--out", arg(&broken), "--resume"]).code, 0);
+    for name in ["a", "c"] {
+        let value = |f: &std::path::Path| json(f.join(name).join("result.json"))["parameters"].clone();
+        assert_eq!(value(&whole), value(&broken), "to the last bit");
+    }
+}
+
+#[test]
+fn nothing_to_fit_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let a = palpate(&["batch", arg(folder.path())]);
+    assert!(a.code == 2 && a.err.contains("holds no scene"), "{}", a.err);
+    let list = folder.path().join("list.txt");
+    fs::write(&list, "# nothing\n").unwrap();
+    let a = palpate(&["batch", arg(&list)]);
+    assert!(a.code == 2 && a.err.contains("names no scene"), "{}", a.err);
+}
