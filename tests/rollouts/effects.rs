@@ -19,7 +19,7 @@ fn with(law: usize) -> palpate_model::scene::Scene {
 
 /// The effect's own numbers, and one of each that laws may depend on besides.
 fn touched(key: ParamKey) -> bool {
-    matches!(key, Effect { .. } | YoungsModulus | Density | Gravity(2) | Velocity(0) | PlaneHeight(0) | PlaneTheta(0))
+    matches!(key, Effect { .. } | YoungsModulus | Density | Gravity(2) | Velocity(0) | PlaneHeight(0) | PlaneTheta(0) | TimeStart)
 }
 
 fn check_family(family: Family) {
@@ -39,4 +39,9 @@ fn contact() {
 #[test]
 fn loads() {
     check_family(Family::Load);
+}
+
+#[test]
+fn slack() {
+    check_family(Family::Slack);
 }

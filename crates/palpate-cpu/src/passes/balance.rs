@@ -404,12 +404,13 @@ impl<'a> Balance<'a> {
                 self.contact_column(plane, s.u1, |t| t.slope * dn.dot(t.point) * plane.normal[0] + t.pressure * dn, &mut out);
             }
             ParamKey::TimeStart => {
-                if self.plan.clamps.iter().all(|c| c.motion.is_none()) {
+                let moving = self.plan.clamps.iter().any(|c| c.motion.is_some());
+                if !moving && self.effects.is_empty() {
                     return None;
                 }
                 // The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10.
                 let d = 1e-6;
-                for sign in [1.0, -1.0] {
+                for sign in [1.0, -1.0].into_iter().filter(|_| moving) {
                     self.clamps(Matrices::Stiffness, sign * young / (2.0 * d), sign * d, s, &mut out);
                 }
             }

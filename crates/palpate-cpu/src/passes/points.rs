@@ -8,7 +8,7 @@ use crate::passes::balance::{Balance, States};
 use crate::passes::supports::PlaneNow;
 use glam::{DMat3, DVec3};
 use palpate_model::contact;
-use palpate_model::effects::law::{COMMON, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, VELOCITY};
+use palpate_model::effects::law::{COMMON, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::{Physics, Plan};
@@ -105,13 +105,13 @@ impl<'a> Balance<'a> {
         let z = &mut z[..COMMON + k];
         z[COMMON..].copy_from_slice(&acting.values);
         put(z, GRAVITY, self.physics.gravity);
+        z[TIME] = self.time;
         z[STIFFNESS] = contact::DEFAULT_STIFFNESS * self.physics.youngs_modulus / body.grid.h;
         let place = Place {
             rest: DVec3::ZERO,
             normal: DVec3::ZERO,
             measure: 0.0,
             width: contact::WIDTH * body.grid.h,
-            time: self.time,
             rate: self.inertia.map_or(0.0, |t| t.rate),
             inertia: self.inertia.map_or(0.0, |t| t.displacement),
             momentum: self.inertia.map_or(0.0, |t| t.velocity),
@@ -220,7 +220,7 @@ impl<'a> Balance<'a> {
         for (e, a) in self.effects.iter().enumerate() {
             let own = match key {
                 ParamKey::Effect { effect, slot, .. } if usize::from(effect) == e => Some(usize::from(slot)),
-                ParamKey::Gravity(_) | ParamKey::YoungsModulus => None,
+                ParamKey::Gravity(_) | ParamKey::YoungsModulus | ParamKey::TimeStart => None,
                 ParamKey::PlaneHeight(_) | ParamKey::PlaneTheta(_) | ParamKey::PlanePhi(_) => None,
                 _ => continue,
             };
@@ -253,6 +253,7 @@ impl<'a> Balance<'a> {
                     d[PLANE + 4] = d[STIFFNESS];
                 }
             }
+            ParamKey::TimeStart => d[TIME] = 1.0,
             ParamKey::PlaneHeight(k) if at(k).is_some() => d[PLANE + 3] = 1.0,
             ParamKey::PlaneTheta(k) | ParamKey::PlanePhi(k) => {
                 let Some(p) = at(k) else { return false };

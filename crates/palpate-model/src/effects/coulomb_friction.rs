@@ -26,7 +26,7 @@ const PARAMS: [EffectParam; 1] =
 struct Friction;
 
 /// Pressure at the old state by value and derivative.
-fn old_pressure<D: Number>(place: &Place, at: &Input<D>) -> D {
+pub(super) fn old_pressure<D: Number>(place: &Place, at: &Input<D>) -> D {
     let gap = dot(at.normal(), at.old()) - at.height();
     contact::pressure_of(gap, at.plane_stiffness(), place.width)
 }

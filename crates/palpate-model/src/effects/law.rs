@@ -14,7 +14,7 @@ pub trait Number: DualNum<Primitive = f64> + Copy {}
 impl<T: DualNum<Primitive = f64> + Copy> Number for T {}
 
 /// Entries of a point's input before the law's own parameters; see [`Input`].
-pub const COMMON: usize = 18;
+pub const COMMON: usize = 19;
 /// Place of x in the input [m].
 pub const X: usize = 0;
 /// Place of the old position [m].
@@ -27,6 +27,8 @@ pub const GRAVITY: usize = 9;
 pub const STIFFNESS: usize = 12;
 /// Place of the plane's unit normal (3), height [m] and penalty stiffness [Pa/m]; zero where there is no plane.
 pub const PLANE: usize = 13;
+/// Place of the time of the new state on the recording's clock [s].
+pub const TIME: usize = 18;
 
 /// Most parameters of a point law.
 pub const MOST: usize = 22;
@@ -42,8 +44,6 @@ pub struct Place {
     pub measure: f64,
     /// Half width of the contact law's blend [m].
     pub width: f64,
-    /// Time of the new state on the recording's clock [s].
-    pub time: f64,
     /// 1/Δt [1/s]; 0 in a static problem.
     pub rate: f64,
     /// Factor 1/(θΔt²) of (x − old) in the acceleration of the θ-scheme; 0 in a static problem.
@@ -111,6 +111,11 @@ impl<'a, D: Number> Input<'a, D> {
     /// The plane's penalty stiffness [Pa/m].
     pub fn plane_stiffness(&self) -> D {
         self.z[PLANE + 4]
+    }
+
+    /// Time of the new state on the recording's clock [s].
+    pub fn time(&self) -> D {
+        self.z[TIME]
     }
 
     /// The law's parameter `i`.

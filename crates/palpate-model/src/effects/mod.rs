@@ -6,7 +6,15 @@
 
 pub mod law;
 
+mod adhesion;
+mod air_drag;
+mod contact_dissipation;
+mod contact_stiffness;
 mod coulomb_friction;
+mod point_mass;
+mod second_plane;
+mod slack;
+mod tether;
 mod uniform_force;
 
 use crate::params::Transform;
@@ -103,7 +111,18 @@ pub enum Site {
 }
 
 /// All effects, in the order in which reports list them.
-pub static ALL: &[Law] = &[coulomb_friction::LAW, uniform_force::LAW];
+pub static ALL: &[Law] = &[
+    coulomb_friction::LAW,
+    adhesion::LAW,
+    second_plane::LAW,
+    contact_stiffness::LAW,
+    contact_dissipation::LAW,
+    uniform_force::LAW,
+    point_mass::LAW,
+    tether::LAW,
+    air_drag::LAW,
+    slack::LAW,
+];
 
 /// Place in [`ALL`] of a kind.
 pub fn find(kind: &str) -> Option<usize> {

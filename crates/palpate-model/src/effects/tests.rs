@@ -1,6 +1,6 @@
 //! Every law of the table against central differences, at random states.
 
-use super::law::{COMMON, PLANE, Place, Point, STIFFNESS};
+use super::law::{COMMON, PLANE, Place, Point, STIFFNESS, TIME};
 use super::{ALL, Law, Site, Unstated};
 use crate::rotation::tests::Noise;
 use glam::DVec3;
@@ -25,7 +25,6 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
         normal: noise.vector(1.0).normalize(),
         measure: noise.uniform(0.5, 2.0),
         width,
-        time: noise.uniform(0.0, 1.0),
         rate: 100.0,
         inertia: 1e4 / 0.6,
         momentum: 1e2 / 0.6,
@@ -37,6 +36,7 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
         (z[i], z[3 + i], z[6 + i], z[9 + i], z[PLANE + i]) = (x[i], old[i], velocity[i], gravity[i], normal[i]);
     }
     (z[STIFFNESS], z[PLANE + 3], z[PLANE + 4]) = (3e5, height, 2e5);
+    z[TIME] = noise.uniform(0.0, 1.0);
     for (p, v) in law.params.iter().zip(&mut z[COMMON..]) {
         *v = match p.default {
             // Places: somewhere near the point.
@@ -59,7 +59,11 @@ fn derivatives_match_central_differences() {
     let mut noise = Noise(7);
     for (law, point) in point_laws() {
         let mut acting = 0;
-        for _ in 0..200 {
+        // Laws of rare touches get more tries.
+        for _ in 0..4000 {
+            if acting == 200 {
+                break;
+            }
             let (place, z) = state(law, &mut noise);
             if point.skips(&place, &z) {
                 assert_eq!(point.gradient(&place, &z), [0.0; 3], "{}: an idle point feels a force", law.kind);
@@ -76,12 +80,16 @@ fn derivatives_match_central_differences() {
                 let mut e = vec![0.0; z.len()];
                 e[i] = place.width;
                 let fd = difference(&z, &e, 1e-4, |z| [point.value(&place, z)])[0] / place.width;
-                let size = force.max(1e-9 * point.value(&place, &z).abs() / place.width / 1e-4);
+                // At grazing contact the force is of third order in the depth, and so is what a difference leaves.
+                let grazing = 1e-5 * z[STIFFNESS] * place.width;
+                let size = force.max(1e-9 * point.value(&place, &z).abs() / place.width / 1e-4).max(grazing);
                 assert!((fd - gradient[i]).abs() < 1e-5 * size, "{}: force {fd} {}", law.kind, gradient[i]);
             }
             let along = point.along(&place, &z, &d);
             let fd = difference(&z, &d, 1e-6, |z| point.gradient(&place, z));
-            let size = along.iter().map(|g| g.abs()).fold(force, f64::max);
+            // Positions of 0.1 m round to 1e-17 m, which a stiff contact turns into a force.
+            let rounding = 1e-17 * z[STIFFNESS] / 1e-6 / 1e-6;
+            let size = along.iter().map(|g| g.abs()).fold(force.max(rounding), f64::max);
             for i in 0..3 {
                 assert!((fd[i] - along[i]).abs() < 1e-6 * size, "{}: {fd:?} {along:?}", law.kind);
             }
@@ -103,7 +111,7 @@ fn derivatives_match_central_differences() {
                 (row.iter().zip(&d).map(|(r, d)| r * d).sum::<f64>(), w.iter().zip(&along).map(|(w, a)| w * a).sum::<f64>());
             assert!((left - right).abs() <= 1e-11 * size, "{}: transposed {left} {right}", law.kind);
         }
-        assert!(acting >= 50, "{}: only {acting} of 200 random states feel it", law.kind);
+        assert!(acting >= 50, "{}: only {acting} of 4000 random states feel it", law.kind);
     }
 }
 

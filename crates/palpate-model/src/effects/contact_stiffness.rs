@@ -1,0 +1,35 @@
+//! Contact that is stiffer or softer than the plane's stated stiffness: a padded floor, a skin that gives before the body does.
+//!
+//! Adds c times the contact energy of `palpate_model::contact` at the new state, so that every pressure is (1 + c) times the stated one.
+//! Relative to the stiffness in use, whether the scene states it or it follows Young's modulus. Valid for all c above −1; the
+//! layer keeps its width, so a soft floor lets the body sink in by its pressure over the stiffness.
+
+use super::law::{Input, Number, Place, PointLaw, dot};
+use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
+use crate::contact;
+
+pub(super) const LAW: Law = Law {
+    kind: "contact-stiffness",
+    family: Family::Contact,
+    sentence: "the contact with the ground is stiffer or softer than stated",
+    params: &PARAMS,
+    trial: Trial::Score,
+    site: Site::Contact(&ContactStiffness),
+};
+
+const PARAMS: [EffectParam; 1] =
+    [number("change", "1", [-0.999, 1e3, 0.5], Unstated::Absent(0.0), "change of the contact stiffness, relative to it")];
+
+struct ContactStiffness;
+
+impl PointLaw for ContactStiffness {
+    fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
+        let gap = dot(at.normal(), at.x()) - at.height();
+        at.p(0) * contact::energy_of(gap, at.plane_stiffness(), place.width) * place.measure
+    }
+
+    fn idle(&self, place: &Place, z: &[f64]) -> bool {
+        let at = Input::new(z);
+        dot(at.normal(), at.x()) - at.height() >= place.width
+    }
+}
