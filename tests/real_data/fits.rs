@@ -1,45 +1,146 @@
-//! Recordings are fitted from their scene files, and what is found agrees with what was measured without a simulation.
+//! Every measured recording is fitted from its scene file, bounded to stay cheap, and what is found agrees with what was measured
+//! without a simulation. Where the model misses, docs/real-data.md says by how much; the ranges here hold those misses in view.
 
+use palpate::{Experiment, Fitted};
+use std::path::Path;
 use support::data::data_dir;
 use support::measured::{fit, found, open, swings};
+use support::swing::Swing;
 use support::tracks::{rms, track};
 
+/// The first three periods instead of all seven.
+const SHORT: [&[(&str, &str)]; 2] = [
+    &[("duration = 1.0", "duration = 0.45"), ("to = 1.06", "to = 0.52")],
+    &[("duration = 1.6", "duration = 0.8"), ("to = 1.7", "to = 0.95")],
+];
+/// Every third row and column and few iterations: E moves by less than 2 %.
+const SPARSE: &[(&str, &str)] = &[("band      = 4.0", "band = 4.0\npixel_stride = 3"), ("iterations = 60", "iterations = 8")];
+
+fn stiffness(fitted: &Fitted) -> f64 {
+    found(fitted, "material.youngs_modulus")
+}
+
+/// Measured and simulated swing of a marker after a fit, printed beside E and what is left of this marker.
+fn compare(name: &str, experiment: &Experiment, fitted: &Fitted, marker: &str, guess: f64) -> (Swing, Swing) {
+    let theta = &fitted.result.theta[0];
+    let (seen, simulated) = swings(experiment, theta, marker, guess);
+    let left = 1e3 * rms(&track(experiment, theta, marker));
+    println!(
+        "{name}, {marker}: {:.3} / {:.3} Hz, damping {:.4} / {:.4}, centre {:.2} / {:.2} mm simulated / measured, rms {left:.2} mm",
+        simulated.frequency,
+        seen.frequency,
+        simulated.damping_ratio(),
+        seen.damping_ratio(),
+        1e3 * simulated.centre,
+        1e3 * seen.centre
+    );
+    (seen, simulated)
+}
+
 #[test]
-fn swinging_beam() {
+fn swinging_beams_and_what_one_tells_of_the_other() {
     let Some(data) = data_dir() else { return };
-    // Three periods instead of seven.
-    let experiment = open(&data, "beam-gravity", &[("duration = 1.0", "duration = 0.45"), ("to = 1.06", "to = 0.52")]);
-    let fitted = fit(&experiment);
-    let e = found(&fitted, "material.youngs_modulus");
+    let own = open(&data, "beam-gravity", SHORT[0]);
+    let fitted = fit(&own);
+    let e = stiffness(&fitted);
     // The source's own fits lie between 264 and 294 kPa.
     assert!((255e3..310e3).contains(&e), "E = {e}");
-    let (seen, simulated) = swings(&experiment, &fitted.result.theta[0], "tip1", 7.5);
+    let (seen, simulated) = compare("own weight", &own, &fitted, "tip1", 7.5);
     // Frequency follows from E, which the sag wants a little smaller (docs/real-data.md).
     assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.01, "{seen:?} {simulated:?}");
     // Decay of three periods is less certain than their frequency.
     assert!((simulated.damping_ratio() / seen.damping_ratio() - 1.0).abs() < 0.15, "{seen:?} {simulated:?}");
     for marker in ["tip1", "tip2", "tip3"] {
         // The markers' places at rest are known to 0.8 mm.
-        let left = rms(&track(&experiment, &fitted.result.theta[0], marker));
+        let left = rms(&track(&own, &fitted.result.theta[0], marker));
         assert!(left < 0.8e-3, "{marker}: {left}");
     }
+
+    // The same beam with its load, E taken from above.
+    let known = format!("youngs_modulus    = {e}");
+    let free = "[[fit.parameter]]\npath   = \"material.youngs_modulus\"\nstart  = 2.0e5\nbounds = [1.0e4, 1.0e7]\n";
+    let given = [("youngs_modulus    = 2.5e5", known.as_str()), (free, "")];
+    let loaded = open(&data, "beam-load52", &[SHORT[1], &given].concat());
+    let (seen, simulated) = compare("with 52 g, E of the own weight", &loaded, &fit(&loaded), "tip1", 4.3);
+    // Aim of the project for what one beam says of the other.
+    assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.03, "{seen:?} {simulated:?}");
+    // The hold's shape is straight to about 1 mm and the markers fit the frame to 0.8 mm: together 1.3 mm of the sag of 17 mm.
+    assert!((simulated.centre - seen.centre).abs() < 1.3e-3, "{seen:?} {simulated:?}");
+}
+
+#[test]
+fn loaded_beam() {
+    let Some(data) = data_dir() else { return };
+    let experiment = open(&data, "beam-load52", SHORT[1]);
+    let fitted = fit(&experiment);
+    let e = stiffness(&fitted);
+    // Between the source's fits (264 to 294 kPa), widened by what 1 mm of unknown rest shape makes of a sag of 17 mm.
+    assert!((248e3..311e3).contains(&e), "E = {e}");
+    let (seen, simulated) = compare("with 52 g", &experiment, &fitted, "tip1", 4.3);
+    // What was measured, as the recording's description has it.
+    assert!((seen.frequency / 4.33 - 1.0).abs() < 0.02 && (seen.damping_ratio() / 0.058 - 1.0).abs() < 0.2, "{seen:?}");
+    // The known miss (docs/real-data.md): 5 % low.
+    assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.06, "{seen:?} {simulated:?}");
+    for marker in ["tip1", "tip2", "tip3"] {
+        // Rest shape (1 mm) and markers' places (0.8 mm).
+        let left = rms(&track(&experiment, &fitted.result.theta[0], marker));
+        assert!(left < 1.6e-3, "{marker}: {left}");
+    }
+}
+
+#[test]
+fn swinging_cantilever() {
+    let Some(data) = data_dir() else { return };
+    let experiment = open(&data, "cantilever-moldstar-oscillating", &[]);
+    let fitted = fit(&experiment);
+    let e = stiffness(&fitted);
+    // The source's fits begin at 220 kPa, the data sheet's secant modulus is 379 kPa.
+    assert!((220e3..379e3).contains(&e), "E = {e}");
+    let (seen, simulated) = compare("MoldStar", &experiment, &fitted, "head_outer_top", 2.6);
+    // Stated: 2.64 to 2.67 Hz. The known miss: 8 % low, as sag decides E.
+    assert!((simulated.frequency / 2.65 - 1.0).abs() < 0.1, "{simulated:?}");
+    // Stated: damping ratio 0.035 to 0.05; a period and a half of 15 frames leaves a third of it open.
+    assert!((0.023..0.067).contains(&simulated.damping_ratio()), "{simulated:?}");
+    // The points have a common offset of 1 to 2 mm, and scale 1 to 2 % of an amplitude of 37 mm.
+    assert!((simulated.centre - seen.centre).abs() < 2.0e-3, "{seen:?} {simulated:?}");
+    let left = fitted.residual().0;
+    assert!(left < 3.0e-3, "{left}");
+}
+
+/// Fits a hanging cantilever: E [Pa], rms residual [m], points without a match, points.
+fn hanging(data: &Path, name: &str) -> (f64, f64, usize, usize, Vec<String>) {
+    let fitted = fit(&open(data, name, SPARSE));
+    let unmatched = fitted.after.iter().map(|r| r.unmatched).sum();
+    let (rms, _, points) = fitted.residual();
+    println!("{name}: {:.1} kPa, rms {:.2} mm, {unmatched} unmatched, {points} matched", 1e-3 * stiffness(&fitted), 1e3 * rms);
+    (stiffness(&fitted), rms, unmatched, points, fitted.warnings.clone())
 }
 
 #[test]
 fn hanging_cantilever_and_the_bias_of_its_sensor() {
     let Some(data) = data_dir() else { return };
-    let corrected = fit(&open(&data, "cantilever-ecoflex-hanging", &[]));
-    let e = found(&corrected, "material.youngs_modulus");
+    let (e, rms, ..) = hanging(&data, "cantilever-ecoflex-hanging");
     // An inextensible beam clamped at x = 70 mm whose head sinks by the observed 106 mm has 126 kPa, one clamped where the block
     // begins to guide the bar, at 57 mm, has 84 kPa (large deflections, EI θ' integrated).
     assert!((84e3..126e3).contains(&e), "E = {e}");
-    let (rms, ..) = corrected.residual();
     // The surface scatters by 1.8 mm about a smooth face in this frame.
-    assert!(rms < 2.2e-3, "{rms}");
+    assert!(rms < 2.3e-3, "{rms}");
 
-    let raw = fit(&open(&data, "cantilever-ecoflex-hanging-raw", &[]));
-    let unmatched: usize = raw.after.iter().map(|r| r.unmatched).sum();
-    let (raw_rms, _, points) = raw.residual();
+    let (_, raw_rms, unmatched, points, warnings) = hanging(&data, "cantilever-ecoflex-hanging-raw");
     assert!(raw_rms > 2.0 * rms && unmatched * 5 > points, "{raw_rms} {unmatched} of {points}");
-    assert!(raw.warnings.iter().any(|w| w.contains("met no part")), "{:?}", raw.warnings);
+    assert!(warnings.iter().any(|w| w.contains("met no part")), "{warnings:?}");
+}
+
+#[test]
+fn hanging_cantilever_of_two_materials() {
+    let Some(data) = data_dir() else { return };
+    let (e, rms, unmatched, points, _) = hanging(&data, "cantilever-two-materials-hanging");
+    // The source's fits of its two halves: 79 ± 11 and 162 ± 28 kPa. One modulus for both lies between.
+    assert!((68e3..190e3).contains(&e), "E = {e}");
+    // Stated about the fitted bent shape: 0.67 mm in the median, nine tenths below 1.6 mm.
+    assert!(rms < 1.6e-3 && unmatched * 20 < points, "{rms} {unmatched} of {points}");
+
+    let (_, raw_rms, raw_unmatched, ..) = hanging(&data, "cantilever-two-materials-hanging-raw");
+    // Half of the body is read 23 mm too deep.
+    assert!(raw_rms > 1.5 * rms && raw_unmatched > 5 * unmatched, "{raw_rms} {raw_unmatched}");
 }
