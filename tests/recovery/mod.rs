@@ -62,29 +62,64 @@ fn a_finer_simulation_is_understood_by_a_coarser_one() {
     }
 }
 
-#[test]
-fn gravity_is_found_beside_stiffness_and_damping() {
-    let truth = scenes::ball(0.0167, 1);
+/// A ball's bounce of 20 steps, every so-th of them seen by one camera of 50² pixels with noise of a tenth of a cell.
+fn bounce(every: usize) -> Plan {
     let watch = Watch {
-        cameras: cameras(DVec3::new(0.0, 0.0, 0.07), 0.6, 30.0, 1, 40),
+        cameras: cameras(DVec3::new(0.0, 0.0, 0.07), 0.6, 30.0, 1, 50),
         noise: 0.1 * 0.0167,
-        every: 1,
+        every,
         refine: 1.0,
         seed: 4,
     };
-    let plan = study::plan(&truth, &study::record(&truth, &watch).unwrap(), 4.0).unwrap();
+    let truth = scenes::ball(0.0167, 1);
+    study::plan(&truth, &study::record(&truth, &watch).unwrap(), 4.0).unwrap()
+}
+
+/// Warnings that speak of stiffness and damping together.
+fn ambiguous(warnings: &[String]) -> bool {
+    warnings.iter().any(|w| w.contains("material.youngs_modulus") && w.contains("material.stiffness_damping"))
+}
+
+#[test]
+fn gravity_is_found_beside_stiffness_and_damping() {
+    let plan = bounce(1);
     let unknowns = scenes::gravity_stiffness_damping(&plan);
     let r = study::search(&plan, &unknowns, &gauss_newton(2)).unwrap();
     for run in &r.runs {
         println!("{:?} -> {:?}, cost {:.6}, {:?}", run.start, run.end, run.cost, run.status);
         let g = DVec3::new(run.end[0], run.end[1], run.end[2]);
-        assert!((g - truth.gravity).length() < 0.005 * 9.81, "gravity {g}");
+        assert!((g - DVec3::new(0.0, 0.0, -9.81)).length() < 0.005 * 9.81, "gravity {g}");
     }
-    // Every step of a whole bounce is seen, so that even what the paper reports as ambiguous is told apart.
+    // Every step of a whole bounce is seen, so that stiffness and damping are told apart: neither strongly correlated nor said to be.
     for (p, truth) in r.parameters[3..].iter().zip([2000.0, 0.01]) {
         let error = p.standard_error.unwrap();
         println!("{} = {} ± {error}", p.path, p.value);
         assert!((p.value - truth).abs() < 4.0 * error && error < 0.05 * truth, "{} = {} ± {error}", p.path, p.value);
+    }
+    println!("correlation of stiffness and damping {:.3}, {:?}", r.correlation[3][4], r.warnings);
+    assert!(r.correlation[3][4].abs() < 0.5 && !ambiguous(&r.warnings), "{:?}", r.warnings);
+}
+
+#[test]
+fn a_bounce_seen_in_two_frames_does_not_tell_stiffness_from_damping() {
+    let plan = bounce(10);
+    let unknowns: Vec<Unknown> = scenes::gravity_stiffness_damping(&plan)
+        .into_iter()
+        .map(|u| match u.key {
+            // A fifth of the usual ranges, 1 m/s² and a factor of 1.6: what is tested is the optimum, not the way there.
+            ParamKey::Gravity(_) => Unknown { start: (u.start.0 + 4.0, u.start.1 - 4.0), ..u },
+            key => Unknown::within(&plan, key, 1.6),
+        })
+        .collect();
+    let r = study::search(&plan, &unknowns, &gauss_newton(1)).unwrap();
+    println!("{:?}, correlation of stiffness and damping {:.3}, {:?}", r.parameters, r.correlation[3][4], r.warnings);
+    assert!(r.correlation[3][4] > 0.95 && ambiguous(&r.warnings), "{:?}", r.warnings);
+    // The truth is within the errors that go with the warning.
+    for (p, truth) in r.parameters.iter().zip([0.0, 0.0, -9.81, 2000.0, 0.01]) {
+        let error = p.standard_error.unwrap();
+        // For the damping, known to a factor of two, the error is one of the logarithm.
+        let off = if p.path.ends_with("damping") { p.value * (p.value / truth).ln().abs() } else { (p.value - truth).abs() };
+        assert!(off < 4.0 * error, "{} = {} ± {error}", p.path, p.value);
     }
 }
 
@@ -107,7 +142,5 @@ fn stiffness_and_damping_of_a_creeping_ball_are_reported_as_one_number() {
         // The viscosity E β is what the ball shows.
         assert!((run.end[0] * run.end[1] / (e * damping) - 1.0).abs() < 0.05, "{:?}", run.end);
     }
-    println!("{:?}", r.warnings);
-    let says = |w: &String| w.contains("material.youngs_modulus") && w.contains("material.stiffness_damping");
-    assert!(r.warnings.iter().any(says), "{:?}", r.warnings);
+    assert!(ambiguous(&r.warnings), "{:?}", r.warnings);
 }
