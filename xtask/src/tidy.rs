@@ -9,20 +9,22 @@ const LONGEST: usize = 450;
 const LARGEST: u64 = 300_000;
 
 /// Which rooms a room may import (`palpate-` left out); nobody but tests and xtask imports `palpate`.
-const ARROWS: [(&str, &[&str]); 7] = [
+const ARROWS: [(&str, &[&str]); 8] = [
     ("palpate-model", &[]),
     ("palpate-io", &["model"]),
     ("palpate-engine", &["model"]),
     ("palpate-cpu", &["model", "engine"]),
     ("palpate-gpu", &["model", "engine"]),
     ("palpate-fit", &["model", "engine"]),
-    ("palpate", &["model", "io", "engine", "cpu", "fit"]),
+    ("palpate-diagnose", &["model", "engine"]),
+    ("palpate", &["model", "io", "engine", "cpu", "fit", "diagnose"]),
 ];
 
 /// Checks the workspace at `root`; one line per finding.
 pub fn check(root: &Path) -> Vec<String> {
     let mut found = Vec::new();
     rooms(root, &mut found);
+    tables(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
         let size = fs::metadata(&file).map_or(0, |m| m.len());
@@ -64,6 +66,21 @@ fn rooms(root: &Path, found: &mut Vec<String>) {
         let text = fs::read_to_string(root.join(page)).unwrap_or_default();
         for name in names.iter().filter(|n| !text.contains(n.as_str())) {
             found.push(format!("{page}: does not name the room {name}"));
+        }
+    }
+}
+
+/// Tables that README shares with a page under `docs/`: the text between two lines `<!-- NAME table -->` is the same in both.
+fn tables(root: &Path, found: &mut Vec<String>) {
+    const SHARED: [(&str, &str); 1] = [("docs/real-data.md", "<!-- real-data table -->")];
+    for (page, mark) in SHARED {
+        let table = |page: &str| {
+            let text = fs::read_to_string(root.join(page)).unwrap_or_default();
+            let parts: Vec<&str> = text.split(mark).collect();
+            (parts.len() == 3).then(|| parts[1].to_string())
+        };
+        if table(page).is_none() || table(page) != table("README.md") {
+            found.push(format!("README.md: the table between two lines {mark} is not that of {page}"));
         }
     }
 }
@@ -125,10 +142,23 @@ mod tests {
         fs::write(room.join("src/lib.rs"), format!("fn f() {{}}\n#[ignore]\n{}", "\n".repeat(LONGEST))).unwrap();
         fs::create_dir_all(folder.path().join("assets")).unwrap();
         fs::write(folder.path().join("assets/big.bin"), vec![0; LARGEST as usize + 1]).unwrap();
+        // Both pages have the table, with one figure changed in one of them.
+        fs::create_dir_all(folder.path().join("docs")).unwrap();
+        let table = |figure: u8| format!("<!-- real-data table -->\n| {figure} |\n<!-- real-data table -->\n");
+        fs::write(folder.path().join("docs/real-data.md"), table(1)).unwrap();
+        fs::write(folder.path().join("README.md"), table(1)).unwrap();
+        assert!(!check(folder.path()).join("\n").contains("is not that of docs/real-data.md"));
+        fs::write(folder.path().join("README.md"), table(2)).unwrap();
         let found = check(folder.path()).join("\n");
-        for part in
-            ["may not import palpate-cpu", "lines; split", "begins without", "needs its reason", "assets may have", "README.md"]
-        {
+        for part in [
+            "may not import palpate-cpu",
+            "lines; split",
+            "begins without",
+            "needs its reason",
+            "assets may have",
+            "README.md",
+            "is not that of",
+        ] {
             assert!(found.contains(part), "{part} in\n{found}");
         }
         assert!(!found.contains("may not import palpate-model"));
