@@ -7,13 +7,31 @@ use crate::simulate::balance;
 use crate::world::World;
 use glam::{DAffine3, DVec3};
 use palpate_engine::ParamBatch;
+use palpate_model::effects::{ALL, Effect, Site};
 use palpate_model::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
 use palpate_model::scene::*;
 
-fn plan(rotation: RotationUpdate) -> Plan {
+/// Every effect that changes the body, its material or its clamps, at a size that matters.
+fn altering(rotation: RotationUpdate) -> Vec<Effect> {
+    let alters = |site: &Site| match site {
+        Site::Modulus(_) | Site::Density(_) | Site::Aging(_) | Site::Rest(_) | Site::Clamps(_) => true,
+        Site::Cells(_) => rotation == RotationUpdate::Converged,
+        _ => false,
+    };
+    let make = |law: usize| {
+        let mut effect = Effect::absent(law);
+        for (value, p) in effect.values.iter_mut().zip(ALL[law].params) {
+            *value = value.map(|v| (v + 0.3 * p.typical).clamp(p.lower, p.upper));
+        }
+        effect
+    };
+    (0..ALL.len()).filter(|l| alters(&ALL[*l].site)).map(make).collect()
+}
+
+fn plan(rotation: RotationUpdate, effects: Vec<Effect>) -> Plan {
     let motion = RigidMotion {
         times: vec![-1.0, 0.0, 1.0],
         translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],
@@ -44,7 +62,7 @@ fn plan(rotation: RotationUpdate) -> Plan {
         }],
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
         masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
-        effects: Vec::new(),
+        effects,
         initial: Initial {
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
@@ -91,15 +109,18 @@ fn moved(v: &[DVec3], s: f64, d: &[DVec3]) -> Vec<DVec3> {
     v.iter().zip(d).map(|(v, d)| *v + s * *d).collect()
 }
 
-/// Runs a check for the static balance and for a step, with both ways of taking the rotation, at two states each.
+/// Runs a check for the static balance and for a step, with both ways of taking the rotation, without effects and with all that change
+/// the body, at two states each.
 fn everywhere(check: impl Fn(&Plan, Option<usize>, &[Vec<DVec3>; 3])) {
     for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
-        let p = plan(rotation);
-        let n = p.body.nodes.len();
-        for step in [None, Some(1)] {
-            for seed in [1, 2] {
-                // Strains of some 10 %, contact active, the old state elsewhere, fast.
-                check(&p, step, &[random(n, 0.003, seed), random(n, 0.003, seed + 10), random(n, 0.3, seed + 20)]);
+        for effects in [Vec::new(), altering(rotation)] {
+            let p = plan(rotation, effects);
+            let n = p.body.nodes.len();
+            for step in [None, Some(1)] {
+                for seed in [1, 2] {
+                    // Strains of some 10 %, contact active, the old state elsewhere, fast.
+                    check(&p, step, &[random(n, 0.003, seed), random(n, 0.003, seed + 10), random(n, 0.3, seed + 20)]);
+                }
             }
         }
     }

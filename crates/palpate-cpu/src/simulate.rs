@@ -8,6 +8,7 @@ use crate::passes::cells::{Mix, zeros};
 use crate::world::{Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
 use palpate_engine::FailureKind;
+use palpate_model::changes;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::InitialShape;
 
@@ -37,6 +38,7 @@ pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usiz
         physics: p,
         planes: &member.planes,
         effects: &member.effects,
+        altered: &member.altered,
         inertia,
         mix,
         time,
@@ -84,8 +86,12 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
         return Err((FailureKind::BadParameter, format!("material.poisson_ratio = {} must lie in (-1, 0.5)", p.poisson_ratio)));
     }
     s.u.fill(DVec3::ZERO);
-    for (v, x) in s.v.iter_mut().zip(&plan.body.nodes) {
-        *v = p.velocity + p.angular_velocity.cross(*x - plan.pivot);
+    if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.altered.changes.rest) {
+        // At rest is where nothing is strained.
+        s.u.copy_from_slice(w);
+    }
+    for ((v, x), u) in s.v.iter_mut().zip(&plan.body.nodes).zip(&s.u) {
+        *v = p.velocity + p.angular_velocity.cross(*x + *u - plan.pivot);
     }
     if plan.initial == InitialShape::StaticEquilibrium {
         if plan.clamps.is_empty() {
@@ -105,6 +111,14 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
     check(shared, s)
 }
 
+/// Where a node starts, away from the given shape [m]: the stress-free shape of a body that starts at rest.
+fn rest_offset(shared: &Shared, member: &Member, node: usize) -> DVec3 {
+    match &member.altered.changes.rest {
+        Some(w) if shared.plan.initial == InitialShape::Rest => w[node],
+        _ => DVec3::ZERO,
+    }
+}
+
 /// dJ/dθ of the start: adds to `gradient` `[P]`.
 pub fn start_adjoint(
     shared: &Shared,
@@ -118,8 +132,14 @@ pub fn start_adjoint(
         match key {
             ParamKey::Velocity(a) => gradient[p] += adj.v.iter().map(|v| v[*a as usize]).sum::<f64>(),
             ParamKey::AngularVelocity(a) => {
-                gradient[p] +=
-                    adj.v.iter().zip(&plan.body.nodes).map(|(v, x)| (*x - plan.pivot).cross(*v)[*a as usize]).sum::<f64>();
+                let arm = |i: usize| plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
+                gradient[p] += adj.v.iter().enumerate().map(|(i, v)| arm(i).cross(*v)[*a as usize]).sum::<f64>();
+            }
+            ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
+                if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(*effect), usize::from(*slot)) {
+                    let spin = member.physics.angular_velocity;
+                    gradient[p] += dot(&adj.u, &dw) + adj.v.iter().zip(&dw).map(|(v, w)| v.dot(spin.cross(*w))).sum::<f64>();
+                }
             }
             _ => {}
         }
@@ -160,8 +180,16 @@ pub fn start_tangent(
         match plan.layout.keys[p] {
             ParamKey::Velocity(a) => t.dv[q].fill(DVec3::AXES[a as usize]),
             ParamKey::AngularVelocity(a) => {
-                for (v, x) in t.dv[q].iter_mut().zip(&plan.body.nodes) {
-                    *v = DVec3::AXES[a as usize].cross(*x - plan.pivot);
+                for (i, v) in t.dv[q].iter_mut().enumerate() {
+                    let arm = plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
+                    *v = DVec3::AXES[a as usize].cross(arm);
+                }
+            }
+            ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
+                if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(effect), usize::from(slot)) {
+                    let spin = member.physics.angular_velocity;
+                    t.dv[q].iter_mut().zip(&dw).for_each(|(v, w)| *v = spin.cross(*w));
+                    t.du[q] = dw;
                 }
             }
             _ => {}

@@ -3,6 +3,7 @@
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
+use crate::passes::altered::Altered;
 use crate::passes::frames::Compared;
 use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::points::{self, Acting};
@@ -41,6 +42,7 @@ pub struct Member {
     pub(crate) physics: Physics,
     pub(crate) planes: Vec<PlaneNow>,
     pub(crate) effects: Vec<Acting>,
+    pub(crate) altered: Altered,
     pub(crate) elements: Arc<Elements>,
     pub(crate) matrix: Matrix,
 }
@@ -74,11 +76,13 @@ impl World {
             });
             let planes = supports::planes(&shared.plan, &physics);
             let effects = points::acting(&shared.plan, &physics);
+            let altered = Altered::new(&shared.plan, &physics, &elements);
             self.members.push(Member {
                 theta: row.to_vec(),
                 physics,
                 planes,
                 effects,
+                altered,
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),
             });

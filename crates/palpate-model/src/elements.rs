@@ -115,3 +115,49 @@ fn clamp_matrix(c: &ClampCell, h: f64, fraction: f64, lambda: f64, mu: f64) -> [
     }
     k
 }
+
+/// Matrix ∫ t(u)·t(v) / (λ + 2μ) of one clamp cell over its held surface, and its derivative by ν, with t the same traction as in
+/// Nitsche's terms: what a compliant layer behind the surface adds (Juntunen & Stenberg, *Math. Comp.* 78, 2009), per metre of
+/// layer and for 1 Pa. The surface's mean normal stands for the surface, which never overestimates the term.
+pub fn layer_matrix(c: &ClampCell, fraction: f64, nu: f64) -> [Box<[f64; 576]>; 2] {
+    let fade = (fraction / 0.1).min(1.0);
+    let normal: glam::DVec3 = c.surface_normal.iter().sum();
+    let area: f64 = c.surface_mass.iter().flatten().sum();
+    let ((l, m), (dl, dm)) = (lame(1.0, nu), lame_by_nu(1.0, nu));
+    // Rows r of the traction by corner displacements, per square root of area.
+    let rows = |l: f64, m: f64| {
+        let mut t = [[0.0; 24]; 3];
+        let scale = if area > 0.0 { fade / area.sqrt() } else { 0.0 };
+        for (j, g) in c.mean_gradient.iter().enumerate() {
+            for (r, row) in t.iter_mut().enumerate() {
+                for k in 0..3 {
+                    let same = if r == k { m * g.dot(normal) } else { 0.0 };
+                    row[3 * j + k] = scale * (l * normal[r] * g[k] + m * g[r] * normal[k] + same);
+                }
+            }
+        }
+        t
+    };
+    let (t, dt) = (rows(l, m), rows(dl, dm));
+    let (stiff, d_stiff) = (l + 2.0 * m, dl + 2.0 * dm);
+    let mut out = [Box::new([0.0; 576]), Box::new([0.0; 576])];
+    for i in 0..24 {
+        for j in 0..24 {
+            let (mut own, mut by_nu) = (0.0, 0.0);
+            for r in 0..3 {
+                own += t[r][i] * t[r][j];
+                by_nu += dt[r][i] * t[r][j] + t[r][i] * dt[r][j];
+            }
+            out[0][24 * i + j] = own / stiff;
+            out[1][24 * i + j] = by_nu / stiff - own * d_stiff / (stiff * stiff);
+        }
+    }
+    out
+}
+
+/// Clamp matrix with a layer of thickness ℓ [m]: s (K − ℓ K₃) with s = 1/(1 + 20 ℓ/h); with `slope` its derivative by ℓ.
+pub fn layered(k: &[f64; 576], k3: &[f64; 576], h: f64, layer: f64, slope: bool) -> [f64; 576] {
+    let s = 1.0 / (1.0 + CLAMP_SURFACE * layer / h);
+    let (a, b) = if slope { (-CLAMP_SURFACE / h * s * s, s * s) } else { (s, s * layer) };
+    std::array::from_fn(|i| a * k[i] - b * k3[i])
+}

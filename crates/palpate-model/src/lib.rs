@@ -5,6 +5,7 @@
 //! data in SI units or a small function whose derivative is tested beside it.
 
 pub mod body;
+pub mod changes;
 pub mod contact;
 pub mod corotation;
 pub mod cut;

@@ -7,10 +7,13 @@
 
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, dot};
+use crate::passes::altered::Altered;
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
+use crate::passes::clamps::Clamps;
 use crate::passes::points::Acting;
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
+use palpate_model::changes;
 use palpate_model::contact;
 use palpate_model::elements::Elements;
 use palpate_model::params::ParamKey;
@@ -46,6 +49,8 @@ pub struct Balance<'a> {
     pub planes: &'a [PlaneNow],
     /// The member's effects.
     pub effects: &'a [Acting],
+    /// What effects change of the body itself.
+    pub altered: &'a Altered,
     /// Inertia; `None` = static.
     pub inertia: Option<Inertia>,
     /// How the two states enter the elastic force.
@@ -68,10 +73,48 @@ pub struct States<'a> {
 impl<'a> Balance<'a> {
     /// The elastic part.
     pub fn elasticity(&self) -> Elasticity<'a> {
-        Elasticity { body: &self.plan.body, pattern: self.pattern, elements: self.elements, young: self.physics.youngs_modulus }
+        Elasticity {
+            body: &self.plan.body,
+            pattern: self.pattern,
+            elements: self.elements,
+            young: self.young(),
+            modulus: self.altered.changes.modulus.as_deref(),
+            rest: self.altered.rest.as_deref(),
+        }
     }
 
-    fn ghost_scale(&self, shear: f64) -> f64 {
+    /// The clamps.
+    pub(super) fn held(&self) -> Clamps<'a> {
+        Clamps {
+            plan: self.plan,
+            physics: self.physics,
+            elements: self.elements,
+            changes: &self.altered.changes,
+            grips: self.altered.grips.as_deref(),
+        }
+    }
+
+    /// Young's modulus [Pa] at the time that the step's forces are taken at.
+    pub(super) fn young(&self) -> f64 {
+        self.physics.youngs_modulus * self.aging()
+    }
+
+    fn aging(&self) -> f64 {
+        if self.effects.is_empty() { 1.0 } else { changes::aging(self.plan, self.physics, self.elapsed()) }
+    }
+
+    /// Time from the start of the simulation to the instant between the states that the scheme weights them for [s].
+    pub(super) fn elapsed(&self) -> f64 {
+        let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
+        self.time - self.physics.start - (1.0 - self.mix.new) * dt
+    }
+
+    /// Density [kg/m³] around a node.
+    fn density(&self, node: usize) -> f64 {
+        self.physics.density * self.altered.changes.density.as_ref().map_or(1.0, |d| d[node])
+    }
+
+    pub(super) fn ghost_scale(&self, shear: f64) -> f64 {
         self.plan.solver.ghost * self.plan.body.grid.h * shear
     }
 
@@ -85,13 +128,15 @@ impl<'a> Balance<'a> {
         if mix.old != mix.rate {
             supports::ghost_product(&self.plan.body, scale * (mix.old - mix.rate), s.u0, out);
         }
+        if let Some(w) = &self.altered.changes.rest {
+            supports::ghost_product(&self.plan.body, -scale * (mix.new + mix.old), w, out);
+        }
     }
 
     /// Adds M a for accelerations a(node) of the body alone and of the point masses.
     fn masses(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
-        let rho = self.physics.density;
         for (i, w) in self.plan.body.node_volume.iter().enumerate() {
-            out[i] += rho * w * body(i);
+            out[i] += self.density(i) * w * body(i);
         }
         for (site, m) in self.plan.masses.iter().zip(&self.physics.masses) {
             let mut a = DVec3::ZERO;
@@ -120,7 +165,7 @@ impl<'a> Balance<'a> {
     /// r(u₁), shape `[N]` [N].
     pub fn residual(&self, s: States<'a>) -> Nodes {
         let mut r = zeros(s.u1.len());
-        self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut r);
+        self.elasticity().force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut r);
         self.ghost(self.physics.youngs_modulus * self.elements.shear[0], &self.mix, s, &mut r);
         self.supports(s, &mut r);
         self.bodily(s, &mut r);
@@ -129,24 +174,25 @@ impl<'a> Balance<'a> {
     }
 
     /// The two instants that clamps act at, each with its weight, time on the recording's clock and displacement.
-    fn instants(&self, s: States<'a>) -> impl Iterator<Item = (f64, f64, &'a [DVec3])> {
+    pub(super) fn instants(&self, s: States<'a>) -> impl Iterator<Item = (f64, f64, &'a [DVec3])> {
         let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
         [(self.mix.new, self.time, s.u1), (self.mix.old, self.time - dt, s.u0)].into_iter().filter(|i| i.0 != 0.0)
     }
 
     /// Adds the clamps' force, moved in time by `shift`, with matrices scaled by `young`.
     fn clamps(&self, which: Matrices, young: f64, shift: f64, s: States<'a>, out: &mut [DVec3]) {
-        for (i, clamp) in self.plan.clamps.iter().enumerate() {
+        let held = self.held();
+        for i in 0..self.plan.clamps.len() {
             for (weight, time, u) in self.instants(s) {
-                let pose = supports::pose_at(clamp, time + shift);
-                supports::clamp_force(self.plan, i, self.elements, which, pose, weight * young, u, out);
+                let pose = held.pose(i, time + shift, time - self.physics.start);
+                held.force(i, which, pose, weight * young, u, out);
             }
         }
     }
 
     /// Adds clamps and contact.
     fn supports(&self, s: States<'a>, out: &mut [DVec3]) {
-        self.clamps(Matrices::Stiffness, self.physics.youngs_modulus, 0.0, s, out);
+        self.clamps(Matrices::Stiffness, self.young(), 0.0, s, out);
         for plane in self.planes {
             for t in supports::touches(&self.plan.body, plane, s.u1) {
                 for i in 0..8 {
@@ -167,7 +213,7 @@ impl<'a> Balance<'a> {
             self.masses(|i| t.velocity * s.v0[i], |i| t.velocity * s.v0[i], &mut momentum);
         }
         let mut elastic = zeros(n);
-        self.elasticity().force(&self.mix, Matrices::Stiffness, self.physics.youngs_modulus, s.u1, s.u0, &mut elastic);
+        self.elasticity().force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut elastic);
         let mut support = zeros(n);
         self.supports(s, &mut support);
         self.add_effects(s, &mut support);
@@ -183,16 +229,20 @@ impl<'a> Balance<'a> {
             let mut gu = zeros(s.u1.len());
             supports::ghost_product(&self.plan.body, scale * (self.mix.new + self.mix.rate), s.u1, &mut gu);
             supports::ghost_product(&self.plan.body, 2.0 * scale * (self.mix.old - self.mix.rate), s.u0, &mut gu);
+            if let Some(rest) = &self.altered.changes.rest {
+                supports::ghost_product(&self.plan.body, -2.0 * scale * (self.mix.new + self.mix.old), rest, &mut gu);
+            }
             w += 0.5 * dot(s.u1, &gu);
         }
-        for (i, clamp) in self.plan.clamps.iter().enumerate() {
-            let pose = supports::pose_at(clamp, self.time);
-            w += supports::clamp_energy(self.plan, i, self.elements, pose, self.mix.new * young, s.u1);
+        let held = self.held();
+        for i in 0..self.plan.clamps.len() {
+            let pose = held.pose(i, self.time, self.time - self.physics.start);
+            w += held.energy(i, pose, self.mix.new * self.young(), s.u1);
         }
         if self.mix.old != 0.0 && !self.plan.clamps.is_empty() {
             // The old state's force does not change with u₁: its potential is linear.
             let mut old = zeros(s.u1.len());
-            Balance { mix: Mix { new: 0.0, ..self.mix }, ..*self }.clamps(Matrices::Stiffness, young, 0.0, s, &mut old);
+            Balance { mix: Mix { new: 0.0, ..self.mix }, ..*self }.clamps(Matrices::Stiffness, self.young(), 0.0, s, &mut old);
             w += dot(s.u1, &old);
         }
         let width = contact::WIDTH * self.plan.body.grid.h;
@@ -257,7 +307,7 @@ impl<'a> Balance<'a> {
         if let Some(t) = self.inertia {
             let factor = t.displacement + physics.mass_damping * t.rate;
             for (i, w) in plan.body.node_volume.iter().enumerate() {
-                values[pattern.blocks.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(physics.density * w * factor));
+                values[pattern.blocks.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(self.density(i) * w * factor));
             }
             for (k, (site, m)) in plan.masses.iter().zip(&physics.masses).enumerate() {
                 for b in 0..64 {
@@ -266,14 +316,15 @@ impl<'a> Balance<'a> {
                 }
             }
         }
+        let held = self.held();
         for (c, clamp) in plan.clamps.iter().enumerate() {
-            let (a, _) = supports::pose_at(clamp, self.time);
+            let (a, _) = held.pose(c, self.time, self.time - physics.start);
             for (m, cell) in clamp.cells.iter().enumerate() {
-                let k = &self.elements.clamps[c][m].k;
+                let (k, factor) = held.stiffness(c, m);
                 let places = &self.places.cells[cell.cell as usize];
                 for b in 0..64 {
                     values[places[b] as usize] +=
-                        a * block(k, b / 8, b % 8) * a.transpose() * (self.mix.new * physics.youngs_modulus);
+                        a * block(k, b / 8, b % 8) * a.transpose() * (self.mix.new * self.young() * factor);
                 }
             }
         }
@@ -322,17 +373,10 @@ impl<'a> Balance<'a> {
         }
         if self.mix.old != 0.0 {
             let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
-            for (i, clamp) in self.plan.clamps.iter().enumerate() {
-                let turn = supports::pose_at(clamp, self.time - dt).0;
-                supports::clamp_product(
-                    self.plan,
-                    i,
-                    self.elements,
-                    turn,
-                    self.mix.old * self.physics.youngs_modulus,
-                    du0,
-                    &mut out,
-                );
+            let held = self.held();
+            for i in 0..self.plan.clamps.len() {
+                let turn = held.pose(i, self.time - dt, self.time - dt - self.physics.start).0;
+                held.product(i, turn, self.mix.old * self.young(), du0, &mut out);
             }
         }
         out
@@ -347,8 +391,8 @@ impl<'a> Balance<'a> {
         match key {
             ParamKey::YoungsModulus | ParamKey::PoissonRatio => {
                 let (which, factor, shear) = match key {
-                    ParamKey::YoungsModulus => (Matrices::Stiffness, 1.0, elements.shear[0]),
-                    _ => (Matrices::ByPoisson, young, young * elements.shear[1]),
+                    ParamKey::YoungsModulus => (Matrices::Stiffness, self.aging(), elements.shear[0]),
+                    _ => (Matrices::ByPoisson, self.young(), young * elements.shear[1]),
                 };
                 self.elasticity().force(&self.mix, which, factor, s.u1, s.u0, &mut out);
                 self.ghost(shear, &self.mix, s, &mut out);
@@ -376,7 +420,7 @@ impl<'a> Balance<'a> {
             ParamKey::StiffnessDamping => {
                 let t = self.inertia?;
                 let mix = Mix { new: 0.0, old: 0.0, rate: t.rate, ..self.mix };
-                self.elasticity().force(&mix, Matrices::Stiffness, young, s.u1, s.u0, &mut out);
+                self.elasticity().force(&mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut out);
                 self.ghost(young * elements.shear[0], &mix, s, &mut out);
             }
             ParamKey::Gravity(a) => self.masses(|_| -DVec3::AXES[a as usize], |_| -DVec3::AXES[a as usize], &mut out),
@@ -411,11 +455,12 @@ impl<'a> Balance<'a> {
                 // The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10.
                 let d = 1e-6;
                 for sign in [1.0, -1.0].into_iter().filter(|_| moving) {
-                    self.clamps(Matrices::Stiffness, sign * young / (2.0 * d), sign * d, s, &mut out);
+                    self.clamps(Matrices::Stiffness, sign * self.young() / (2.0 * d), sign * d, s, &mut out);
                 }
             }
-            // What effects depend on is added below.
-            ParamKey::Effect { .. } => {}
+            ParamKey::Effect { effect, slot, .. } => {
+                self.add_altered_column(usize::from(effect), usize::from(slot), s, &mut out);
+            }
             ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => return None,
         }
         self.add_effects_column(key, s, &mut out);

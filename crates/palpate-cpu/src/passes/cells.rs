@@ -127,6 +127,10 @@ pub struct Elasticity<'a> {
     pub elements: &'a Elements,
     /// Young's modulus [Pa].
     pub young: f64,
+    /// Factor on it per cell, where effects change it.
+    pub modulus: Option<&'a [f64]>,
+    /// Every cell in the stress-free shape, where effects change that.
+    pub rest: Option<&'a [CellPose]>,
 }
 
 impl<'a> Elasticity<'a> {
@@ -139,7 +143,23 @@ impl<'a> Elasticity<'a> {
     }
 
     fn poses(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> Poses {
-        Poses::new(mix, self.body.grid.h, &corners(self.body, e, u1), &corners(self.body, e, u0))
+        let mut poses = Poses::new(mix, self.body.grid.h, &corners(self.body, e, u1), &corners(self.body, e, u0));
+        if let Some(rest) = self.rest {
+            let shift = |p: &mut CellPose| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w);
+            shift(&mut poses.new);
+            poses.old.iter_mut().for_each(shift);
+        }
+        poses
+    }
+
+    /// Factor on Young's modulus in a cell.
+    fn factor(&self, e: usize) -> f64 {
+        self.modulus.map_or(1.0, |m| m[e])
+    }
+
+    /// Young's modulus in a cell [Pa].
+    fn young_of(&self, e: usize) -> f64 {
+        self.young * self.factor(e)
     }
 
     /// Adds per-cell corner vectors to nodes, always in the same order.
@@ -160,7 +180,7 @@ impl<'a> Elasticity<'a> {
         self.gather(
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
-                poses.force(&poses.stress(mix, self.matrix(e, which), young))
+                poses.force(&poses.stress(mix, self.matrix(e, which), young * self.factor(e)))
             },
             out,
         );
@@ -170,14 +190,14 @@ impl<'a> Elasticity<'a> {
     pub fn potential(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3]) -> f64 {
         let cell = |e: usize| {
             let poses = self.poses(mix, e, u1, u0);
-            let k = self.matrix(e, Matrices::Stiffness);
+            let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
             let (a, b) = poses.factors(mix);
-            let kq = times(k, &poses.new.q, self.young);
+            let kq = times(k, &poses.new.q, young);
             let mut w = 0.5 * a * dot24(&poses.new.q, &kq);
             if let Some(old) = &poses.old {
                 w += b * dot24(&old.q, &kq);
                 if poses.spin.is_none() && mix.old != 0.0 {
-                    let f0 = old.force(&times(k, &old.q, self.young * mix.old));
+                    let f0 = old.force(&times(k, &old.q, young * mix.old));
                     w += pick(self.body, e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
                 }
             }
@@ -190,23 +210,31 @@ impl<'a> Elasticity<'a> {
     /// (second derivative of the rotation) is left out.
     pub fn tangent(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3], convex: bool, out: &mut M24) {
         let poses = self.poses(mix, e, u1, u0);
-        let k = self.matrix(e, Matrices::Stiffness);
-        let scale = self.young * poses.factors(mix).0;
+        let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
+        let scale = young * poses.factors(mix).0;
         if convex || poses.spin.is_some() {
             poses.new.gauss_newton(k, scale, out);
         } else {
-            let y = poses.stress(mix, k, self.young).0;
+            let y = poses.stress(mix, k, young).0;
             poses.new.hessian(k, scale, &y, out);
         }
     }
 
     /// Derivative by the old state with converged rotation, for one cell: `b` Pᵀ_to E K P_from d, and the symmetric share of the
     /// old state's own force. `[from, to]` is [old, new]; the other way round it is the transpose.
-    fn converged_by_old(&self, mix: &Mix, k: &M24, old: &CellPose, [from, to]: [&CellPose; 2], b: f64, d: &Corners) -> Corners {
-        let mut f = to.force(&times(k, &from.strain_rate(d), self.young * b));
+    fn converged_by_old(
+        &self,
+        mix: &Mix,
+        k: &M24,
+        old: &CellPose,
+        [from, to]: [&CellPose; 2],
+        [young, b]: [f64; 2],
+        d: &Corners,
+    ) -> Corners {
+        let mut f = to.force(&times(k, &from.strain_rate(d), young * b));
         if mix.old != 0.0 {
-            let y0 = times(k, &old.q, self.young * mix.old);
-            let g = old.hessian_product(k, self.young * mix.old, &y0, d);
+            let y0 = times(k, &old.q, young * mix.old);
+            let g = old.hessian_product(k, young * mix.old, &y0, d);
             for i in 0..8 {
                 f[i] += g[i];
             }
@@ -219,23 +247,23 @@ impl<'a> Elasticity<'a> {
         self.gather(
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
-                let k = self.matrix(e, Matrices::Stiffness);
+                let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, du0);
                 let (a, b) = poses.factors(mix);
                 if let Some(turn) = &poses.spin {
                     let old = poses.old.as_ref().expect("lagged rotation has an old pose");
-                    let y = poses.stress(mix, k, self.young).0;
+                    let y = poses.stress(mix, k, young).0;
                     let w = turn.spin_of(&d);
                     let direct = old.strain_rate(&d);
                     let dq: V24 = std::array::from_fn(|i| {
                         let (c, r) = (i / 3, i % 3);
                         b * direct[i] - w.cross(a * vector(&poses.new.z, c) + b * vector(&old.z, c))[r]
                     });
-                    let ky = times(k, &dq, self.young);
+                    let ky = times(k, &dq, young);
                     let turned: V24 = std::array::from_fn(|i| ky[i] + w.cross(vector(&y, i / 3))[i % 3]);
                     poses.new.force(&turned)
                 } else if let Some(old) = &poses.old {
-                    self.converged_by_old(mix, k, old, [old, &poses.new], b, &d)
+                    self.converged_by_old(mix, k, old, [old, &poses.new], [young, b], &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
@@ -249,14 +277,14 @@ impl<'a> Elasticity<'a> {
         self.gather(
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
-                let k = self.matrix(e, Matrices::Stiffness);
+                let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, z);
                 let (a, b) = poses.factors(mix);
                 if let Some(turn) = &poses.spin {
                     let old = poses.old.as_ref().expect("lagged rotation has an old pose");
-                    let y = poses.stress(mix, k, self.young).0;
+                    let y = poses.stress(mix, k, young).0;
                     let s = poses.new.strain_rate(&d);
-                    let t = times(k, &s, self.young);
+                    let t = times(k, &s, young);
                     let mut g = DVec3::ZERO;
                     for i in 0..8 {
                         g += vector(&y, i).cross(vector(&s, i));
@@ -269,10 +297,32 @@ impl<'a> Elasticity<'a> {
                     }
                     f
                 } else if let Some(old) = &poses.old {
-                    self.converged_by_old(mix, k, old, [&poses.new, old], b, &d)
+                    self.converged_by_old(mix, k, old, [&poses.new, old], [young, b], &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
+            },
+            out,
+        );
+    }
+
+    /// Adds the force's derivative by a change `dw` [m] of the stress-free shape at the nodes.
+    pub fn by_rest(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], dw: &[DVec3], out: &mut [DVec3]) {
+        let Some(rest) = self.rest else { return };
+        self.gather(
+            |e| {
+                let poses = self.poses(mix, e, u1, u0);
+                let ds = rest[e].strain_rate(&pick(self.body, e, dw));
+                let y = times(self.matrix(e, Matrices::Stiffness), &ds, -self.young_of(e));
+                // The rate's part does not see it: both states shift alike.
+                let weight = if poses.spin.is_some() { mix.new + mix.old } else { mix.new };
+                let mut f = poses.new.force(&y.map(|y| weight * y));
+                if let (None, Some(old), true) = (&poses.spin, &poses.old, mix.old != 0.0) {
+                    for (f, g) in f.iter_mut().zip(old.force(&y)) {
+                        *f += mix.old * g;
+                    }
+                }
+                f
             },
             out,
         );

@@ -1,7 +1,9 @@
 //! The passes of a simulation, one idea a file.
 
+pub mod altered;
 pub mod balance;
 pub mod cells;
+pub mod clamps;
 pub mod frames;
 pub mod markers;
 pub mod matching;

@@ -151,6 +151,8 @@ impl<'a> Balance<'a> {
                     }
                 }
             }
+            // Everything else does not act on points.
+            _ => {}
         }
     }
 

@@ -4,6 +4,8 @@
 //! loop over sites and know no effect by name. From the table follow the scene's keys, the fit parameters, the tests of
 //! derivatives and the hypotheses of `diagnose`.
 
+pub mod cell;
+pub mod field;
 pub mod law;
 
 mod adhesion;
@@ -17,7 +19,21 @@ mod slack;
 mod tether;
 mod uniform_force;
 
+mod clamp_slip;
+mod compliant_clamp;
+mod creep;
+mod density_gradient;
+mod density_inclusion;
+mod inclusion;
+mod rest_shape;
+mod stiffness_gradient;
+mod stiffness_modes;
+mod two_part_stiffness;
+
+use crate::changes::HOLD;
 use crate::params::Transform;
+use cell::Cell;
+use field::Field;
 use law::Point;
 
 /// An effect: what it is called, what it needs, where it acts.
@@ -108,6 +124,18 @@ pub enum Site {
     Surface(&'static dyn Point),
     /// Every surface patch and every plane of the scene.
     Contact(&'static dyn Point),
+    /// Every cell's Young's modulus: a factor.
+    Modulus(&'static dyn Field<1>),
+    /// Every node's density: a factor.
+    Density(&'static dyn Field<1>),
+    /// Young's modulus of the whole body as a function of time: a factor.
+    Aging(&'static dyn Field<1>),
+    /// Energy and dissipation of every cell.
+    Cells(&'static dyn Cell),
+    /// The stress-free shape: displacement of every node from the shape given.
+    Rest(&'static dyn Field<3>),
+    /// Every clamp: numbers as in [`crate::changes::HOLD`].
+    Clamps(&'static dyn Field<HOLD>),
 }
 
 /// All effects, in the order in which reports list them.
@@ -117,6 +145,16 @@ pub static ALL: &[Law] = &[
     second_plane::LAW,
     contact_stiffness::LAW,
     contact_dissipation::LAW,
+    stiffness_gradient::LAW,
+    two_part_stiffness::LAW,
+    inclusion::LAW,
+    stiffness_modes::LAW,
+    creep::LAW,
+    density_gradient::LAW,
+    density_inclusion::LAW,
+    rest_shape::LAW,
+    compliant_clamp::LAW,
+    clamp_slip::LAW,
     uniform_force::LAW,
     point_mass::LAW,
     tether::LAW,
@@ -138,6 +176,18 @@ const fn number(
     doc: &'static str,
 ) -> EffectParam {
     EffectParam { key, axis: None, unit, transform: Transform::Linear, lower, upper, typical, default, doc }
+}
+
+/// One component of a direction, of which the length does not count; x unless stated.
+const fn direction(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
+    let default = Unstated::Stated(if axis == 0 { 1.0 } else { 0.0 });
+    let p = component(key, axis, "1", 1.0, doc);
+    EffectParam { default, lower: -1e3, upper: 1e3, ..p }
+}
+
+/// One coordinate of a place; the body's centre of mass unless stated.
+const fn place(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
+    EffectParam { default: Unstated::Center, typical: 0.02, ..component(key, axis, "m", 0.02, doc) }
 }
 
 /// One component of a vector of any sign that is zero when absent.

@@ -7,8 +7,9 @@ use glam::DVec3;
 
 /// The point laws of the table.
 fn point_laws() -> impl Iterator<Item = (&'static Law, &'static dyn Point)> {
-    ALL.iter().map(|l| match l.site {
-        Site::Nodes(p) | Site::Surface(p) | Site::Contact(p) => (l, p),
+    ALL.iter().filter_map(|l| match l.site {
+        Site::Nodes(p) | Site::Surface(p) | Site::Contact(p) => Some((l, p)),
+        _ => None,
     })
 }
 

@@ -1,0 +1,88 @@
+//! Effects that change the body itself (stiffness, density, stress-free shape, clamps): a member's fields, and ∂r/∂p of each.
+
+use crate::linear::vector::Nodes;
+use crate::passes::balance::{Balance, States};
+use crate::passes::cells::{Elasticity, Matrices};
+use crate::passes::clamps;
+use crate::passes::supports;
+use glam::DVec3;
+use palpate_model::changes::{self, Changes};
+use palpate_model::corotation::CellPose;
+use palpate_model::element::CellMatrices;
+use palpate_model::elements::Elements;
+use palpate_model::plan::{Physics, Plan};
+
+/// What a member's effects make of the body; all empty without such effects.
+#[derive(Debug, Default)]
+pub struct Altered {
+    /// Fields on cells and nodes.
+    pub changes: Changes,
+    /// Every cell in the stress-free shape.
+    pub rest: Option<Vec<CellPose>>,
+    /// Clamp matrices with compliant layers.
+    pub grips: Option<Vec<Vec<CellMatrices>>>,
+}
+
+impl Altered {
+    /// The body of one member.
+    pub fn new(plan: &Plan, physics: &Physics, elements: &Elements) -> Altered {
+        let changes = Changes::new(plan, physics);
+        let (body, h) = (&plan.body, plan.body.grid.h);
+        let rest = changes.rest.as_ref().map(|w| {
+            let at = |n: u32| body.nodes[n as usize] + w[n as usize];
+            body.cells.iter().map(|c| CellPose::new(&c.nodes.map(at), h)).collect()
+        });
+        Altered { changes, rest, grips: clamps::grips(plan, physics, elements) }
+    }
+}
+
+impl<'a> Balance<'a> {
+    /// Adds the part of ∂r/∂p that comes through the body itself, for number `slot` of effect `effect`.
+    pub(super) fn add_altered_column(&self, effect: usize, slot: usize, s: States<'a>, out: &mut Nodes) {
+        let (plan, physics) = (self.plan, self.physics);
+        let changes = &self.altered.changes;
+        if let Some(slope) = changes.modulus_slope(plan, physics, effect, slot) {
+            let elasticity = Elasticity { modulus: Some(&slope), ..self.elasticity() };
+            elasticity.force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, out);
+            self.each_clamp(s, |c, i, pose, weight, u| c.modulus_column(i, &slope, pose, weight * self.young(), u, out));
+        }
+        if let Some(slope) = changes.density_slope(plan, physics, effect, slot) {
+            let (g, drag) = (physics.gravity, physics.mass_damping);
+            for (i, d) in slope.iter().enumerate() {
+                let a = self
+                    .inertia
+                    .map_or(-g, |t| (t.displacement + drag * t.rate) * (s.u1[i] - s.u0[i]) - t.velocity * s.v0[i] - g);
+                out[i] += physics.density * plan.body.node_volume[i] * d * a;
+            }
+        }
+        if let Some(slope) = changes::aging_slope(plan, physics, self.elapsed(), effect, slot) {
+            let young = physics.youngs_modulus * slope;
+            self.elasticity().force(&self.mix, Matrices::Stiffness, young, s.u1, s.u0, out);
+            self.each_clamp(s, |c, i, pose, weight, u| c.force(i, Matrices::Stiffness, pose, weight * young, u, out));
+        }
+        if let Some(dw) = changes::rest_slope(plan, physics, effect, slot) {
+            self.elasticity().by_rest(&self.mix, s.u1, s.u0, &dw, out);
+            let scale = -self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.old);
+            supports::ghost_product(&plan.body, scale, &dw, out);
+            self.each_clamp(s, |c, i, pose, weight, _| c.rest_column(i, pose.0, weight * self.young(), &dw, out));
+        }
+        if self.altered.grips.is_some() {
+            for (weight, time, u) in self.instants(s) {
+                for i in 0..plan.clamps.len() {
+                    let now = [time, time - physics.start];
+                    self.held().hold_column(i, [effect, slot], now, weight * self.young(), u, out);
+                }
+            }
+        }
+    }
+
+    /// Visits every clamp at both instants: clamp number, pose, weight in time and displacement.
+    fn each_clamp(&self, s: States<'a>, mut visit: impl FnMut(&clamps::Clamps, usize, clamps::Pose, f64, &[DVec3])) {
+        let held = self.held();
+        for (weight, time, u) in self.instants(s) {
+            for i in 0..self.plan.clamps.len() {
+                visit(&held, i, held.pose(i, time, time - self.physics.start), weight, u);
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! What a member's effects change of the body itself: stiffness, density and stress-free shape, evaluated where backends need them.
+
+use crate::effects::field::{Field, Spot};
+use crate::effects::{Law, Site};
+use crate::params::Layout;
+use crate::plan::{Physics, Plan};
+use glam::DVec3;
+
+/// Numbers of a clamp's field: factor on its matrices, layer [m], offset [m] and Cayley rotation vector (3 each).
+pub const HOLD: usize = 8;
+
+/// Fields that do not change in time; `None` where no effect changes anything.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Factor on Young's modulus per cell.
+    pub modulus: Option<Vec<f64>>,
+    /// Factor on the density per node.
+    pub density: Option<Vec<f64>>,
+    /// Displacement W of the stress-free shape per node [m].
+    pub rest: Option<Vec<DVec3>>,
+}
+
+/// An effect: number, law, parameters.
+type Numbered<'a> = (usize, &'static Law, &'a [f64]);
+
+fn effects<'a>(layout: &'a Layout, physics: &'a Physics) -> impl Iterator<Item = Numbered<'a>> {
+    layout.effects().zip(&physics.effects).enumerate().map(|(i, ((law, _), p))| (i, law, p.as_slice()))
+}
+
+impl Spot {
+    /// A spot of a plan's body, at its centre and at the start.
+    pub fn of(plan: &Plan) -> Spot {
+        let body = &plan.body;
+        let corner = |f: fn(DVec3, DVec3) -> DVec3| body.patches.iter().map(|p| p.point).reduce(f).unwrap_or(body.center);
+        let size = 0.5 * (corner(DVec3::max) - corner(DVec3::min)).max_element().max(body.grid.h);
+        let anchor = plan.clamps.first().map_or(body.center, |c| {
+            let middle = |cell: u32| body.grid.position(body.cells[cell as usize].lattice) + 0.5 * body.grid.h;
+            c.cells.iter().map(|c| middle(c.cell)).sum::<DVec3>() / c.cells.len() as f64
+        });
+        Spot { rest: body.center, center: body.center, anchor, size, cell: body.grid.h, elapsed: 0.0 }
+    }
+}
+
+/// Rest position of the middle of every cell [m].
+fn middles(plan: &Plan) -> impl Iterator<Item = DVec3> {
+    plan.body.cells.iter().map(|c| plan.body.grid.position(c.lattice) + 0.5 * plan.body.grid.h)
+}
+
+fn modulus_law(law: &Law) -> Option<&'static dyn Field<1>> {
+    if let Site::Modulus(f) = law.site { Some(f) } else { None }
+}
+
+fn density_law(law: &Law) -> Option<&'static dyn Field<1>> {
+    if let Site::Density(f) = law.site { Some(f) } else { None }
+}
+
+fn rest_law(law: &Law) -> Option<&'static dyn Field<3>> {
+    if let Site::Rest(f) = law.site { Some(f) } else { None }
+}
+
+/// Product of the factors of all laws that `pick` finds, at all spots.
+fn product(
+    plan: &Plan,
+    physics: &Physics,
+    pick: fn(&Law) -> Option<&'static dyn Field<1>>,
+    spots: impl Fn() -> Vec<DVec3>,
+) -> Option<Vec<f64>> {
+    let mut out: Option<Vec<f64>> = None;
+    let spot = Spot::of(plan);
+    for (field, p) in effects(&plan.layout, physics).filter_map(|(_, law, p)| Some((pick(law)?, p))) {
+        let spots = spots();
+        let values = out.get_or_insert_with(|| vec![1.0; spots.len()]);
+        for (v, rest) in values.iter_mut().zip(spots) {
+            *v *= field.at(&Spot { rest, ..spot }, p)[0];
+        }
+    }
+    out
+}
+
+impl Changes {
+    /// The fields of one member.
+    pub fn new(plan: &Plan, physics: &Physics) -> Changes {
+        if plan.layout.effects().next().is_none() {
+            return Changes::default();
+        }
+        let mut rest: Option<Vec<DVec3>> = None;
+        let spot = Spot::of(plan);
+        for (field, p) in effects(&plan.layout, physics).filter_map(|(_, law, p)| Some((rest_law(law)?, p))) {
+            let w = rest.get_or_insert_with(|| vec![DVec3::ZERO; plan.body.nodes.len()]);
+            for (w, x) in w.iter_mut().zip(&plan.body.nodes) {
+                *w += DVec3::from_array(field.at(&Spot { rest: *x, ..spot }, p));
+            }
+        }
+        Changes {
+            modulus: product(plan, physics, modulus_law, || middles(plan).collect()),
+            density: product(plan, physics, density_law, || plan.body.nodes.clone()),
+            rest,
+        }
+    }
+
+    /// Derivative of the modulus factor of every cell by number `slot` of effect `effect`; `None` for other effects.
+    pub fn modulus_slope(&self, plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<Vec<f64>> {
+        let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+        slope(plan, modulus_law(law)?, p, slot, self.modulus.as_deref()?, middles(plan))
+    }
+
+    /// Derivative of the density factor of every node.
+    pub fn density_slope(&self, plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<Vec<f64>> {
+        let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+        slope(plan, density_law(law)?, p, slot, self.density.as_deref()?, plan.body.nodes.iter().copied())
+    }
+}
+
+/// Derivative of a product of factors by a parameter of one of them.
+fn slope(
+    plan: &Plan,
+    field: &dyn Field<1>,
+    p: &[f64],
+    slot: usize,
+    product: &[f64],
+    spots: impl Iterator<Item = DVec3>,
+) -> Option<Vec<f64>> {
+    let spot = Spot::of(plan);
+    let at = |(whole, rest): (&f64, DVec3)| {
+        let s = Spot { rest, ..spot };
+        whole * field.slope(&s, p, slot)[0] / field.at(&s, p)[0]
+    };
+    Some(product.iter().zip(spots).map(at).collect())
+}
+
+/// Derivative of W at every node by number `slot` of effect `effect` [m per unit]; `None` for other effects.
+pub fn rest_slope(plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<Vec<DVec3>> {
+    let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+    let (field, spot) = (rest_law(law)?, Spot::of(plan));
+    let at = |x: &DVec3| DVec3::from_array(field.slope(&Spot { rest: *x, ..spot }, p, slot));
+    Some(plan.body.nodes.iter().map(at).collect())
+}
+
+/// Factor on the whole body's Young's modulus after `elapsed` seconds.
+pub fn aging(plan: &Plan, physics: &Physics, elapsed: f64) -> f64 {
+    let aging = |law: &Law, p: &[f64]| match law.site {
+        Site::Aging(f) => f.at(&Spot { elapsed, ..Spot::of(plan) }, p)[0],
+        _ => 1.0,
+    };
+    effects(&plan.layout, physics).map(|(_, law, p)| aging(law, p)).product()
+}
+
+/// Derivative of [`aging`] by number `slot` of effect `effect`; `None` for other effects.
+pub fn aging_slope(plan: &Plan, physics: &Physics, elapsed: f64, effect: usize, slot: usize) -> Option<f64> {
+    let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+    let Site::Aging(field) = law.site else { return None };
+    let spot = Spot { elapsed, ..Spot::of(plan) };
+    Some(aging(plan, physics, elapsed) * field.slope(&spot, p, slot)[0] / field.at(&spot, p)[0])
+}
+
+/// How clamps hold at a spot of the first clamp's middle after `elapsed` seconds: [`HOLD`] numbers, factors multiplied, the others added.
+pub fn hold(plan: &Plan, physics: &Physics, spot: &Spot) -> [f64; HOLD] {
+    let mut out = [0.0; HOLD];
+    out[0] = 1.0;
+    for (_, law, p) in effects(&plan.layout, physics) {
+        if let Site::Clamps(field) = law.site {
+            let own = field.at(spot, p);
+            out[0] *= own[0];
+            (1..HOLD).for_each(|k| out[k] += own[k]);
+        }
+    }
+    out
+}
+
+/// Derivative of [`hold`] by number `slot` of effect `effect`; `None` for other effects.
+pub fn hold_slope(plan: &Plan, physics: &Physics, spot: &Spot, effect: usize, slot: usize) -> Option<[f64; HOLD]> {
+    let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+    let Site::Clamps(field) = law.site else { return None };
+    let mut out = field.slope(spot, p, slot);
+    out[0] *= hold(plan, physics, spot)[0] / field.at(spot, p)[0];
+    Some(out)
+}
