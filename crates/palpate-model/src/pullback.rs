@@ -4,6 +4,14 @@
 use crate::grid::{shape_functions, shape_gradients};
 use glam::{DMat3, DVec3};
 
+/// A surface that is turned away from the camera by more than this (cosine between its outward normal and the line of sight)
+/// cannot have been seen. Not zero: normals at the silhouette and along edges are uncertain.
+pub const TURNED_AWAY: f64 = 0.3;
+/// Next to a sharp edge noise puts points closest to the side that the camera does not see; calling them unmatched would make the
+/// cost jump by a whole band. Such a point lies near a visible side as well: going towards the camera by `1.5 |φ|` and so many
+/// standard deviations of the noise leaves the body. Inside a thin part, near its back, it does not.
+pub const NOISE_REACH: f64 = 4.0;
+
 /// Local coordinates ξ of world point `p` in the trilinear cell with corners `x`, by Newton's method; `None` when `p` is not in
 /// the cell (beyond a slack of 1e-9 of its size, so that no gap opens between neighbours) or the cell is folded.
 pub fn invert_trilinear(x: &[DVec3; 8], p: DVec3) -> Option<DVec3> {

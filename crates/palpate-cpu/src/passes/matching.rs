@@ -8,16 +8,8 @@ use glam::DVec3;
 use palpate_model::body::Body;
 use palpate_model::grid::shape_functions;
 use palpate_model::observation::{Camera, ObservedPoint};
-use palpate_model::pullback::{Pullback, jacobian, pull_back, triquadratic};
+use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, jacobian, pull_back, triquadratic};
 use rayon::prelude::*;
-
-/// A surface that is turned away from the camera by more than this (cosine between its outward normal and the line of sight)
-/// cannot have been seen. Not zero: normals at the silhouette and along edges are uncertain.
-const TURNED_AWAY: f64 = 0.3;
-/// Next to a sharp edge noise puts points closest to the side that the camera does not see; calling them unmatched would make the
-/// cost jump by a whole band. Such a point lies near a visible side as well: going towards the camera by `1.5 |φ|` and so many
-/// standard deviations of the noise leaves the body. Inside a thin part, near its back, it does not.
-const NOISE_REACH: f64 = 4.0;
 
 /// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
 #[derive(Clone, Debug)]
