@@ -31,6 +31,9 @@ struct Shape { // mirrored
     iterations: u32,
     chunk: u32,
     most: u32,
+    quantum: f32,
+    ghosts: u32,
+    pad: vec2<u32>,
 }
 
 struct Member { // mirrored

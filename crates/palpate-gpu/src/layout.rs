@@ -1,6 +1,9 @@
 //! Structs that host and kernels share. The build script asserts that every field lies where WGSL has it.
 
+mod looks;
+
 use bytemuck::{Pod, Zeroable};
+pub use looks::{BandCell, Look, Mark, Shot, Sight, Site};
 
 /// Arguments of one dispatch.
 #[repr(C)]
@@ -64,6 +67,12 @@ pub struct Shape {
     pub chunk: u32,
     /// Most CG iterations of one solve.
     pub most: u32,
+    /// Displacements are stored as a multiple of this power of two [m] and a rest.
+    pub quantum: f32,
+    /// 1 with a ghost penalty.
+    pub ghosts: u32,
+    /// Fills up.
+    pub pad: [u32; 2],
 }
 
 /// Parameters of one member.

@@ -1,0 +1,139 @@
+//! Structs of the observation: twins of `shaders/shared/{look,hexahedron}.wgsl` and `shaders/costs/markers.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Sizes and constants of what is observed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Sight {
+    /// Members B of the batch.
+    pub members: u32,
+    /// Simulation nodes N.
+    pub nodes: u32,
+    /// Simulation and band nodes.
+    pub extended: u32,
+    /// Band cells.
+    pub cells: u32,
+    /// Looks that scratch buffers hold.
+    pub slots: u32,
+    /// Most points of a frame.
+    pub points: u32,
+    /// Most scalar residuals of a frame.
+    pub rows: u32,
+    /// Most markers of a frame.
+    pub markers: u32,
+    /// Groups of eight lanes that share a cell's candidates.
+    pub stripes: u32,
+    /// Marker sites.
+    pub sites: u32,
+    /// Frames F.
+    pub frames: u32,
+    /// Lattice nodes along each axis.
+    pub lattice: [u32; 3],
+    /// Fills up.
+    pub pad: [u32; 2],
+    /// Edge of a cell [m].
+    pub h: f32,
+    /// Half width of the cost's band [m].
+    pub band: f32,
+    /// How far a hidden point looks towards the camera beside its distance [m].
+    pub reach: f32,
+    /// Cosine beyond which a side is turned away.
+    pub turned_away: f32,
+    /// 1/(n σ²) of depth points [1/m²].
+    pub depth: f32,
+    /// 1/(n σ²) of markers [1/m²].
+    pub marker: f32,
+    /// 1/(n σ²) of observed displacements [1/m²].
+    pub displacement: f32,
+    /// Fills up.
+    pub pad_end: f32,
+}
+
+/// One frame, seen by one member.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Look {
+    /// Member.
+    pub member: u32,
+    /// Frame.
+    pub frame: u32,
+    /// Fills up.
+    pub pad: [u32; 2],
+    /// Factors of u₀, v₀, u₁, v₁.
+    pub value: [f32; 4],
+    /// Their derivatives by time [1/s].
+    pub rate: [f32; 4],
+}
+
+/// One frame: where its parts lie, and the lattice of cubes that its points are sorted by.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Shot {
+    /// First point.
+    pub point_start: u32,
+    /// Points.
+    pub point_count: u32,
+    /// First marker.
+    pub marker_start: u32,
+    /// Markers.
+    pub marker_count: u32,
+    /// First observed node.
+    pub node_start: u32,
+    /// Observed nodes: none or all N.
+    pub node_count: u32,
+    /// First entry of `cube_starts`.
+    pub cube_start: u32,
+    /// Fills up.
+    pub pad: u32,
+    /// Cubes along each axis.
+    pub cubes: [u32; 3],
+    /// Fills up.
+    pub pad_cubes: u32,
+    /// Lowest corner of the cubes, from the frame's origin [m].
+    pub low: [f32; 3],
+    /// One over a cube's edge [1/m].
+    pub inverse_edge: f32,
+    /// Frame's origin minus the body's [m].
+    pub shift: [f32; 4],
+    /// What single precision leaves of it [m].
+    pub shift_rest: [f32; 4],
+}
+
+/// A cell of the band.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BandCell {
+    /// Extended nodes of the corners.
+    pub nodes: [u32; 8],
+    /// Lattice place of the first corner.
+    pub lattice: [u32; 3],
+    /// Fills up.
+    pub pad: u32,
+    /// Rest position of the first corner, from the body's origin [m].
+    pub corner: [f32; 4],
+}
+
+/// Where a marker sits.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Site {
+    /// From the attachment point to the marker's centre at rest [m].
+    pub stalk: [f32; 4],
+    /// Columns of the rest shape's deformation gradient, minus the identity.
+    pub excess: [[f32; 4]; 3],
+}
+
+/// A marker of a frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Mark {
+    /// Measured minus rest position [m].
+    pub goal: [f32; 3],
+    /// Site.
+    pub site: u32,
+    /// What single precision leaves of `goal` [m].
+    pub goal_rest: [f32; 3],
+    /// Fills up.
+    pub pad: u32,
+}

@@ -1,0 +1,43 @@
+//! Markers: carried rigidly by the surface point that they are attached to, also on a stalk. Twin of
+//! palpate-cpu/src/passes/markers.rs.
+// use shared/seen
+// use shared/rotation
+
+struct Site { // mirrored
+    // From the attachment point to the marker's centre at rest [m].
+    stalk: vec4<f32>,
+    // Deformation gradient at rest, minus the identity.
+    excess: mat3x3<f32>,
+}
+
+struct Mark { // mirrored
+    // Measured minus rest position [m], and what single precision leaves of it.
+    goal: vec3<f32>,
+    site: u32,
+    goal_rest: vec3<f32>,
+    pad: u32,
+}
+
+// A marker at one look.
+struct Carried {
+    turn: mat3x3<f32>,
+    // G⁻¹ of the polar decomposition.
+    pair: mat3x3<f32>,
+    // dJ/d(position), and w of the gradient by F = R [w]×.
+    pull: vec4<f32>,
+    spin: vec4<f32>,
+}
+
+var<storage, read> sites: array<Site>;
+var<storage, read> site_rows: array<u32>;
+var<storage, read> site_nodes: array<u32>;
+// Weights for the gradient [1/m] and, last, for the position.
+var<storage, read> site_weights: array<vec4<f32>>;
+var<storage, read> marks: array<Mark>;
+// [slots][most markers]
+var<storage, read_write> carried: array<Carried>;
+
+// d ⊗ g, by columns.
+fn outer(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {
+    return mat3x3(d * g.x, d * g.y, d * g.z);
+}

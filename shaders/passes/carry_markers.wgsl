@@ -1,0 +1,39 @@
+//! Where the markers of a frame are, how far from where they were seen, and what pulls them there.
+// use costs/markers
+// use shared/found
+
+@compute @workgroup_size(64)
+fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    let s = find_seat(group, groups, local, 64u);
+    let shot = shots[s.look.frame];
+    if !s.runs || s.item >= shot.marker_count {
+        return;
+    }
+    let mark = marks[shot.marker_start + s.item];
+    let site = sites[mark.site];
+    let first = site_rows[mark.site];
+    let origin = seen_at(s.slot, site_nodes[first]);
+    var moved = vec3(0.0);
+    var h = site.excess;
+    for (var k = first; k < site_rows[mark.site + 1u]; k++) {
+        let d = between(origin, seen_at(s.slot, site_nodes[k]));
+        let w = site_weights[k];
+        moved += w.w * d;
+        h += outer(d, w.xyz);
+    }
+    let excess = excess_of(rotation_of(h));
+    var c: Carried;
+    c.turn = identity3() + excess;
+    c.pair = pair_inverse(stretch_of(excess, h));
+    let far = (seen[origin].xyz - mark.goal) + (seen[rest_part() + origin].xyz - mark.goal_rest);
+    let r = far + (moved + excess * site.stalk.xyz);
+    let pull = sight.marker * r;
+    c.pull = vec4(pull, 0.0);
+    c.spin = vec4(c.pair * cross(site.stalk.xyz, transpose(c.turn) * pull), 0.0);
+    carried[s.slot * sight.markers + s.item] = c;
+    let row = s.slot * sight.rows + shot.point_count + 3u * s.item;
+    rows[row] = vec2(r.x, sight.marker);
+    rows[row + 1u] = vec2(r.y, sight.marker);
+    rows[row + 2u] = vec2(r.z, sight.marker);
+}

@@ -1,0 +1,23 @@
+//! Displacements that were observed directly: simulated minus measured.
+// use shared/seen
+// use shared/found
+
+// Measured displacements of frames that have them: a float [m], and what it leaves.
+var<storage, read> measured: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn compare_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    let s = find_seat(group, groups, local, 64u);
+    let shot = shots[s.look.frame];
+    if !s.runs || s.item >= shot.node_count {
+        return;
+    }
+    let k = 2u * (shot.node_start + s.item);
+    let at = seen_at(s.slot, s.item);
+    let r = (seen[at].xyz - measured[k].xyz) + (seen[rest_part() + at].xyz - measured[k + 1u].xyz);
+    let row = s.slot * sight.rows + shot.point_count + 3u * (shot.marker_count + s.item);
+    rows[row] = vec2(r.x, sight.displacement);
+    rows[row + 1u] = vec2(r.y, sight.displacement);
+    rows[row + 2u] = vec2(r.z, sight.displacement);
+}

@@ -1,0 +1,60 @@
+//! Derivatives of every residual along `mode` directions. Items are points, then markers, then observed nodes.
+// use shared/hexahedron
+// use costs/markers
+// use shared/found
+
+var<storage, read> changes: array<vec4<f32>>;
+// [slots][Q][most rows]
+var<storage, read_write> slopes: array<f32>;
+
+fn marker_change(base: u32, mark: Mark, c: Carried) -> vec3<f32> {
+    var moved = vec3(0.0);
+    var df = mat3x3(vec3(0.0), vec3(0.0), vec3(0.0));
+    for (var k = site_rows[mark.site]; k < site_rows[mark.site + 1u]; k++) {
+        let d = changes[base + site_nodes[k]].xyz;
+        let w = site_weights[k];
+        moved += w.w * d;
+        df += outer(d, w.xyz);
+    }
+    let spin = c.pair * axial(transpose(c.turn) * df);
+    return moved + c.turn * cross(spin, sites[mark.site].stalk.xyz);
+}
+
+@compute @workgroup_size(64)
+fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                      @builtin(local_invocation_index) local: u32) {
+    let s = find_seat(group, groups, local, 64u);
+    let shot = shots[s.look.frame];
+    let items = shot.point_count + shot.marker_count + shot.node_count;
+    let q = s.item / max(items, 1u);
+    let item = s.item % max(items, 1u);
+    if !s.runs || items == 0u || q >= call.mode {
+        return;
+    }
+    let base = (s.slot * call.mode + q) * sight.extended;
+    let out = (s.slot * call.mode + q) * sight.rows;
+    if item < shot.point_count {
+        let f = found[s.slot * sight.points + item];
+        var d = 0.0;
+        if f.cell != 0xffffffffu {
+            var change = vec3(0.0);
+            for (var i = 0u; i < 8u; i++) {
+                change += shape_at(f.xi, i) * changes[base + band_cells[f.cell].nodes[i]].xyz;
+            }
+            d = -dot(f.gradient, change);
+        }
+        slopes[out + item] = d;
+        return;
+    }
+    var change = vec3(0.0);
+    let vector = item - shot.point_count;
+    if vector < shot.marker_count {
+        change = marker_change(base, marks[shot.marker_start + vector], carried[s.slot * sight.markers + vector]);
+    } else {
+        change = changes[base + vector - shot.marker_count].xyz;
+    }
+    let row = out + shot.point_count + 3u * vector;
+    slopes[row] = change.x;
+    slopes[row + 1u] = change.y;
+    slopes[row + 2u] = change.z;
+}

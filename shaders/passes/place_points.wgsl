@@ -1,0 +1,35 @@
+//! Place, distance and gradient of every point in the cell that it belongs to.
+// use shared/candidates
+// use shared/found
+// use costs/depth
+
+var<storage, read> owners: array<u32>;
+
+@compute @workgroup_size(64)
+fn place_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                @builtin(local_invocation_index) local: u32) {
+    let s = find_seat(group, groups, local, 64u);
+    let shot = shots[s.look.frame];
+    if !s.runs || s.item >= shot.point_count {
+        return;
+    }
+    let at = s.slot * sight.points + s.item;
+    var f: Found;
+    f.cell = owners[at];
+    var row = vec2(0.0, -1.0);
+    if f.cell != 0xffffffffu {
+        let e = load_hexahedron(s.slot, f.cell, shot);
+        // The cell was found to hold the point; more slack, should a compiler round differently here.
+        let p = pull_back(e, f.cell, points[shot.point_start + s.item].xyz + e.offset, 10.0 * SLACK);
+        if p.holds {
+            f.xi = p.xi;
+            f.phi = p.phi;
+            f.gradient = p.gradient;
+            row = vec2(p.phi, sight.depth * depth_weight(p.phi, sight.band));
+        } else {
+            f.cell = 0xffffffffu;
+        }
+    }
+    found[at] = f;
+    rows[s.slot * sight.rows + s.item] = row;
+}

@@ -1,0 +1,32 @@
+//! Cost, number of residuals that met something, Σ r² and Σ φ of a look, in parts.
+// use shared/look
+// use shared/found
+// use shared/reduce
+// use costs/depth
+
+@compute @workgroup_size(64)
+fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+            @builtin(local_invocation_index) local: u32) {
+    let s = find_seat(group, groups, local, 64u);
+    if !s.runs {
+        return;
+    }
+    let shot = shots[s.look.frame];
+    var sum = vec4(0.0);
+    for (var i = s.item; i < rows_of(shot); i += 64u * call.roster) {
+        let row = rows[s.slot * sight.rows + i];
+        let r = row.x;
+        if i >= shot.point_count {
+            sum += vec4(0.5 * row.y * r * r, 1.0, r * r, 0.0);
+        } else if row.y < 0.0 {
+            // A point without a match costs what one at the edge of the band costs.
+            sum.x += sight.depth * depth_unmatched(sight.band);
+        } else {
+            sum += vec4(sight.depth * depth_cost(r, sight.band), 1.0, r * r, r);
+        }
+    }
+    let total = tree(local, sum);
+    if local == 0u {
+        partials[s.slot * PARTS + s.group] = total;
+    }
+}
