@@ -1,6 +1,7 @@
 //! The command line as its users meet it: arguments in, exit code, text and files out.
 
 mod batch;
+mod effects;
 mod fitting;
 mod usage;
 

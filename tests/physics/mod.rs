@@ -3,4 +3,6 @@
 mod beam;
 mod contact;
 mod cut;
+mod effects_contact;
+mod effects_loads;
 mod free;

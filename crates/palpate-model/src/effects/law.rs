@@ -52,6 +52,13 @@ pub struct Place {
     pub momentum: f64,
 }
 
+impl Place {
+    /// Weight θ of the new state in the θ-scheme; 1 in a static problem.
+    pub fn theta(&self) -> f64 {
+        if self.momentum == 0.0 { 1.0 } else { self.rate / self.momentum }
+    }
+}
+
 /// The numbers of a point that derivatives are taken by.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a, D> {

@@ -1,16 +1,14 @@
 //! A spring from a place on the body to a fixed point: a thread, a cable, a rubber band.
 //!
-//! Energy ½ k (|d| − L)² with d = u + (attachment − anchor), spread over the nodes around the attachment by their shares
-//! (`point_mass::around`): every node of the blob is pulled by the same spring, so the blob is not squeezed. A spring of length L = 0 is
-//! linear. It pushes when shorter than L, unlike a thread that goes slack. Massless and undamped.
+//! Energy ½ k |d|² with d = u + (attachment − anchor), spread over the nodes around the attachment by their shares
+//! (`point_mass::around`): every node of the blob is pulled by the same spring, so the blob is not squeezed. The spring has no length
+//! of its own; one that does acts like this for motion along it, with the anchor moved by its length. Massless and undamped;
+//! weighted θ and 1 − θ in time like the cells, so that a swing on it keeps its energy at θ = ½.
 
 use super::law::{Input, Number, Place, PointLaw, constant, dot, sub};
 use super::point_mass::{RADIUS, around};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, number};
 use glam::DVec3;
-
-/// Length [m] below which the spring's direction is smoothed.
-const SMOOTH: f64 = 1e-5;
 
 pub(super) const LAW: Law = Law {
     kind: "tether",
@@ -24,7 +22,7 @@ pub(super) const LAW: Law = Law {
 const ATTACHMENT: &str = "where it is attached, on the body at rest";
 const ANCHOR: &str = "fixed point at its other end";
 
-const PARAMS: [EffectParam; 9] = [
+const PARAMS: [EffectParam; 8] = [
     number("stiffness", "N/m", [0.0, 1e9, 10.0], Unstated::Absent(0.0), "force over change of length"),
     EffectParam { default: Unstated::Center, ..component("attachment", 0, "m", 0.05, ATTACHMENT) },
     EffectParam { default: Unstated::Center, ..component("attachment", 1, "m", 0.05, ATTACHMENT) },
@@ -32,7 +30,6 @@ const PARAMS: [EffectParam; 9] = [
     EffectParam { default: Unstated::Center, ..component("anchor", 0, "m", 0.05, ANCHOR) },
     EffectParam { default: Unstated::Center, ..component("anchor", 1, "m", 0.05, ANCHOR) },
     EffectParam { default: Unstated::Center, ..component("anchor", 2, "m", 0.05, ANCHOR) },
-    number("length", "m", [0.0, 1e6, 0.05], Unstated::Fixed(0.0), "length without force"),
     RADIUS,
 ];
 
@@ -40,16 +37,15 @@ struct Tether;
 
 impl PointLaw for Tether {
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
-        let u = sub(at.x(), constant(place.rest));
-        let offset = sub(at.vector(1), at.vector(4));
-        let d = std::array::from_fn(|i| u[i] + offset[i]);
-        let squared = dot(d, d);
-        // (|d| − L)² without its constant.
-        let energy = squared - at.p(7) * (squared + SMOOTH * SMOOTH).sqrt() * 2.0;
-        at.p(0) * energy * (0.5 * place.measure)
+        let (rest, offset): ([D; 3], _) = (constant(place.rest), sub(at.vector(1), at.vector(4)));
+        let stretch = |x: [D; 3]| -> [D; 3] { std::array::from_fn(|i| x[i] - rest[i] + offset[i]) };
+        let (new, theta) = (stretch(at.x()), place.theta());
+        // The old state's force has a linear potential.
+        let energy = dot(new, new) * (0.5 * theta) + dot(stretch(at.old()), at.x()) * (1.0 - theta);
+        at.p(0) * energy * place.measure
     }
 
     fn share<D: Number>(&self, rest: DVec3, p: &[D]) -> Option<D> {
-        Some(around(rest, [p[1], p[2], p[3]], p[8]))
+        Some(around(rest, [p[1], p[2], p[3]], p[7]))
     }
 }

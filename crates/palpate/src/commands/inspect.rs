@@ -1,5 +1,6 @@
 //! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
 
+use crate::catalogue;
 use crate::cli::Console;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -15,6 +16,7 @@ Examples:
   palpate inspect beam.toml
   palpate inspect my-recording
   palpate inspect beam.toml --json
+  palpate inspect --effects                    laws that a scene can add, with parameters and units
 
 A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is simulated.";
 
@@ -23,8 +25,11 @@ A scene is checked together with its recording: where both lie, and whether thei
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Scene file, or folder (or recording.toml) of a recording
-    #[arg(value_name = "SCENE|RECORDING")]
-    path: PathBuf,
+    #[arg(value_name = "SCENE|RECORDING", required_unless_present = "effects")]
+    path: Option<PathBuf>,
+    /// Show the effects that scenes can name, with their parameters, units and defaults
+    #[arg(long, conflicts_with = "path")]
+    effects: bool,
 }
 
 /// One line of the answer: key in JSON, label and text for people.
@@ -45,11 +50,15 @@ fn is_recording(path: &Path) -> bool {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let (kind, lines, warnings) = if is_recording(&a.path) {
-        let r = read_recording(&a.path)?;
+    let Some(path) = &a.path else {
+        console.print(&if console.json() { catalogue::json().to_string() } else { catalogue::markdown() });
+        return Ok(0);
+    };
+    let (kind, lines, warnings) = if is_recording(path) {
+        let r = read_recording(path)?;
         ("recording", recording(&r), r.warnings)
     } else {
-        let e = Experiment::open(&a.path)?;
+        let e = Experiment::open(path)?;
         let mut lines = scene(&e);
         lines.extend(observed(&e));
         ("scene", lines, e.warnings().to_vec())
@@ -58,13 +67,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let mut map: Map<String, Value> = lines.into_iter().map(|l| (l.key.to_string(), l.value)).collect();
         map.insert("format".into(), json!("inspection/1"));
         map.insert("kind".into(), json!(kind));
-        map.insert("path".into(), json!(a.path.display().to_string()));
+        map.insert("path".into(), json!(path.display().to_string()));
         map.insert("warnings".into(), json!(warnings));
         console.print(&Value::Object(map).to_string());
         return Ok(0);
     }
     let width = lines.iter().map(|l| l.label.len()).max().unwrap_or(0);
-    let mut text = format!("{kind} {}", a.path.display());
+    let mut text = format!("{kind} {}", path.display());
     for l in lines {
         text += &format!("\n  {:width$}  {}", l.label, l.text);
     }
