@@ -6,4 +6,5 @@
 pub mod bench;
 pub mod paper;
 pub mod table;
+pub mod test;
 pub mod tidy;

@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, paper, table, tidy};
+use studies::{bench, paper, table, test, tidy};
 
 /// Developer verbs of palpate.
 #[derive(Parser)]
@@ -33,6 +33,12 @@ enum Verb {
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
     },
+    /// Run all tests, installing Mesa's software graphics adapter first where there is none and it may be installed
+    Test {
+        /// Further arguments for `cargo test`
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        more: Vec<String>,
+    },
     /// Check rooms, imports, sizes of files
     Tidy,
 }
@@ -52,6 +58,7 @@ fn run(verb: Verb) -> Result<(), String> {
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }
+        Verb::Test { more } => test::run(&table::root(), &more)?,
         Verb::Tidy => {
             let found = tidy::check(&table::root());
             found.iter().for_each(|f| println!("{f}"));

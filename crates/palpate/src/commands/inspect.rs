@@ -2,6 +2,7 @@
 
 use crate::catalogue;
 use crate::cli::Console;
+use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use clap::Args;
@@ -16,6 +17,7 @@ Examples:
   palpate inspect beam.toml
   palpate inspect my-recording
   palpate inspect beam.toml --json
+  palpate inspect --devices                    graphics adapters, their limits, what they can run
   palpate inspect --effects                    laws that a scene can add, with parameters and units
 
 A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is simulated.";
@@ -25,11 +27,14 @@ A scene is checked together with its recording: where both lie, and whether thei
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Scene file, or folder (or recording.toml) of a recording
-    #[arg(value_name = "SCENE|RECORDING", required_unless_present = "effects")]
+    #[arg(value_name = "SCENE|RECORDING", required_unless_present_any = ["effects", "devices"])]
     path: Option<PathBuf>,
     /// Show the effects that scenes can name, with their parameters, units and defaults
     #[arg(long, conflicts_with = "path")]
     effects: bool,
+    /// List the graphics adapters of this machine and what they can run
+    #[arg(long, conflicts_with_all = ["path", "effects"])]
+    devices: bool,
 }
 
 /// One line of the answer: key in JSON, label and text for people.
@@ -50,6 +55,9 @@ fn is_recording(path: &Path) -> bool {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    if a.devices {
+        return Ok(devices::run(console));
+    }
     let Some(path) = &a.path else {
         console.print(&if console.json() { catalogue::json().to_string() } else { catalogue::markdown() });
         return Ok(0);

@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub mod batch;
+pub mod devices;
 pub mod fit;
 pub mod inspect;
 pub mod observe;

@@ -1,0 +1,83 @@
+//! All tests with one command: finds a graphics adapter, installs Mesa's software one where it may, and runs cargo.
+
+use std::path::Path;
+use std::process::Command;
+
+/// What to install where we may not: by system.
+const ADVICE: &str = "\
+  Debian, Ubuntu   sudo apt-get install mesa-vulkan-drivers
+  Fedora           sudo dnf install mesa-vulkan-drivers
+  Arch             sudo pacman -S vulkan-swrast
+  macOS, Windows   nothing: Metal and Direct3D 12 come with the system";
+
+/// Name of the first adapter that can run the kernels.
+fn adapter() -> Option<String> {
+    palpate_gpu::adapters().into_iter().find(|a| a.refusal.is_none()).map(|a| a.name)
+}
+
+/// The words before `apt-get` with which this user may install packages; `None` where that is impossible.
+fn privileged() -> Option<Vec<&'static str>> {
+    let succeeds = |program: &str, arguments: &[&str]| {
+        Command::new(program).args(arguments).output().is_ok_and(|o| o.status.success()).then_some(())
+    };
+    succeeds("apt-get", &["--version"])?;
+    let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.starts_with(b"0\n"));
+    if root {
+        return Some(Vec::new());
+    }
+    // Only where no password is asked: a test command must not wait for one.
+    succeeds("sudo", &["-n", "true"]).map(|()| vec!["sudo", "-n"])
+}
+
+/// Installs lavapipe; false when a command fails.
+fn install(before: &[&'static str]) -> bool {
+    let run = |arguments: &[&str]| {
+        let words: Vec<&str> = before.iter().copied().chain(["apt-get"]).chain(arguments.iter().copied()).collect();
+        println!("running: {}", words.join(" "));
+        Command::new(words[0]).args(&words[1..]).env("DEBIAN_FRONTEND", "noninteractive").status().is_ok_and(|s| s.success())
+    };
+    let package = ["install", "--yes", "--no-install-recommends", "mesa-vulkan-drivers"];
+    // Package lists may be fresh already; only where they are not is the network asked for them.
+    run(&package) || (run(&["update"]) && run(&package))
+}
+
+/// Runs all tests of the workspace at `root`, with `more` arguments for cargo.
+///
+/// # Errors
+/// No adapter although `PALPATE_GPU=require`, or a test fails.
+pub fn run(root: &Path, more: &[String]) -> Result<(), String> {
+    let mut found = adapter();
+    if found.is_none()
+        && let Some(before) = privileged()
+    {
+        println!("no graphics adapter: installing Mesa's software adapter (lavapipe)");
+        if install(&before) {
+            found = adapter();
+        }
+    }
+    let required = std::env::var("PALPATE_GPU").is_ok_and(|v| v == "require");
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root).args(["test", "--release", "--workspace"]).args(more);
+    match &found {
+        Some(name) => {
+            println!("GPU tests run on {name}");
+            cargo.env("PALPATE_GPU", "require");
+            // Lavapipe's own threads cost more per dispatch than small problems compute; the tests run side by side instead.
+            if std::env::var_os("LP_NUM_THREADS").is_none() {
+                cargo.env("LP_NUM_THREADS", "0");
+            }
+        }
+        None if required => {
+            return Err(format!("PALPATE_GPU=require, but there is no usable graphics adapter. Install one:\n{ADVICE}"));
+        }
+        None => println!("no graphics adapter: GPU tests are skipped. To run them, install one:\n{ADVICE}"),
+    }
+    let status = cargo.status().map_err(|e| format!("cargo cannot be started: {e}"))?;
+    if !status.success() {
+        return Err("some tests failed".into());
+    }
+    if found.is_none() {
+        println!("all tests passed except those of the GPU, which were skipped. To run them, install an adapter:\n{ADVICE}");
+    }
+    Ok(())
+}
