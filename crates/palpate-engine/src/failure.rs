@@ -30,6 +30,8 @@ pub enum FailureKind {
     BadParameter,
     /// The backend cannot compute what was asked for.
     Unsupported,
+    /// The device that the backend runs on broke.
+    Device,
 }
 
 impl FailureKind {
@@ -45,6 +47,7 @@ impl FailureKind {
             FailureKind::NoEquilibrium => "add a [[clamp]], or start from initial.state = \"rest\"",
             FailureKind::BadParameter => "set bounds for the parameter in [[fit.parameter]]",
             FailureKind::Unsupported => "use --backend cpu",
+            FailureKind::Device => "run again, with a smaller batch, or with --backend cpu; results so far are kept",
         }
     }
 }
@@ -59,6 +62,7 @@ impl fmt::Display for Failure {
             FailureKind::NoEquilibrium => "no static equilibrium was found",
             FailureKind::BadParameter => "a parameter is out of range",
             FailureKind::Unsupported => "the backend cannot do this",
+            FailureKind::Device => "the device failed",
         };
         write!(f, "{what} at t = {:.6} s: {} (hint: {})", self.time, self.detail, self.kind.hint())
     }

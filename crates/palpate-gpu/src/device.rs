@@ -251,9 +251,15 @@ impl Gpu {
             | wgpu::BufferUsages::COPY_DST
             | if label == "arguments" { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
             | if label == "shape" { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::empty() };
-        // Empty lists still need something to bind.
-        let size = bytes.max(16).next_multiple_of(16);
+        // Empty lists still need something to bind: one element of the largest struct.
+        let size = bytes.max(256).next_multiple_of(16);
         Ok(self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }))
+    }
+
+    /// The smallest buffer: something to bind where a large one could not be had.
+    pub(crate) fn small(&self) -> wgpu::Buffer {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        self.device.create_buffer(&wgpu::BufferDescriptor { label: Some("nothing"), size: 256, usage, mapped_at_creation: false })
     }
 
     /// A storage buffer that holds `data`.

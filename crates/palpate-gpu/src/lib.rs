@@ -3,12 +3,29 @@
 //!
 //! Invariant: between `set_params` and `read` nothing waits for the device, and nothing here knows where a plan comes from.
 
+// wgpu's handles hash and compare by identity; what changes behind them is no part of a key.
+#![allow(clippy::mutable_key_type)]
+
+mod backend;
+mod backward;
+mod columns;
 pub mod device;
 pub mod error;
+mod forward;
+mod geometry;
 pub mod layout;
+mod members;
+mod observe;
 pub mod pipelines;
 mod probe;
+mod read;
 pub mod recorder;
+mod solve;
+#[cfg(test)]
+mod tests;
+mod world;
 
+pub use backend::GpuBackend;
 pub use device::{AdapterReport, Choice, Gpu, Lanes, adapters};
 pub use error::GpuError;
+pub use world::{Adjoint, State, Tally, Tangent, World};

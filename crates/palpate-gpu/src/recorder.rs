@@ -157,10 +157,10 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Copies a whole buffer.
-    pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer) {
+    /// Copies the first `bytes` of a buffer to a place in another.
+    pub fn copy_part(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, at: u64, bytes: u64) {
         self.open = None;
-        self.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size()));
+        self.encoder.copy_buffer_to_buffer(from, 0, to, at, bytes);
     }
 
     /// Sets a buffer to zero.

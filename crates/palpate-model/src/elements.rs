@@ -17,7 +17,8 @@ const CLAMP_VOLUME: f64 = 10.0;
 pub struct Classes {
     /// Class of each cell.
     pub of_cell: Vec<u32>,
-    weights: Vec<([f64; 27], f64)>,
+    /// Gauss weights and fraction of each class.
+    pub weights: Vec<([f64; 27], f64)>,
 }
 
 impl Classes {
@@ -45,7 +46,8 @@ impl Classes {
 pub struct Elements {
     /// Poisson's ratio.
     pub nu: f64,
-    matrices: Vec<CellMatrices>,
+    /// One per class of [`Classes`].
+    pub matrices: Vec<CellMatrices>,
     of_cell: Vec<u32>,
     /// Per clamp and clamp cell: Nitsche's matrix and its derivative by ν.
     pub clamps: Vec<Vec<CellMatrices>>,

@@ -1,0 +1,186 @@
+//! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits.
+
+use crate::device::{Choice, Gpu};
+use crate::error::GpuError;
+use crate::world::{Adjoint, State, Tally, Tangent, World};
+use crate::{backward, forward, observe, read};
+use glam::DVec3;
+use palpate_engine::{Backend, BuildError, Evaluation, FrameResiduals, ParamBatch};
+use palpate_model::plan::Plan;
+use std::sync::Arc;
+
+/// The GPU backend.
+#[derive(Clone, Debug)]
+pub struct GpuBackend {
+    gpu: Arc<Gpu>,
+}
+
+impl GpuBackend {
+    /// On the chosen adapter.
+    ///
+    /// # Errors
+    /// There is none, or it cannot run the kernels.
+    pub fn new(choice: &Choice) -> Result<GpuBackend, GpuError> {
+        Ok(GpuBackend { gpu: Gpu::open(choice)? })
+    }
+
+    /// On an open device.
+    pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
+        GpuBackend { gpu }
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+}
+
+impl Backend for GpuBackend {
+    type World = World;
+    type State = State;
+    type Adjoint = Adjoint;
+    type Tangent = Tangent;
+    type Tally = Tally;
+
+    fn name(&self) -> String {
+        format!("gpu ({})", self.gpu.name)
+    }
+
+    fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
+        let world = World::new(self.gpu.clone(), plan, members)?;
+        match self.gpu.take_trouble() {
+            Some(e) => Err(e.into()),
+            None => Ok(world),
+        }
+    }
+
+    fn set_params(&self, world: &mut World, theta: &ParamBatch) {
+        world.set_params(theta);
+    }
+
+    fn new_state(&self, world: &World) -> State {
+        State(world.lend(3))
+    }
+
+    fn new_adjoint(&self, world: &World) -> Adjoint {
+        let adjoint = Adjoint(world.lend(2));
+        world.record(|r| r.clear(&adjoint.0.buffer));
+        adjoint
+    }
+
+    fn new_tangent(&self, world: &World, directions: &[usize]) -> Tangent {
+        let parts: Vec<_> = directions.iter().map(|_| world.lend(2)).collect();
+        world.record(|r| parts.iter().for_each(|p| r.clear(&p.buffer)));
+        Tangent { directions: directions.to_vec(), parts }
+    }
+
+    fn new_tally(&self, world: &World, directions: &[usize]) -> Tally {
+        Tally::new(world, directions)
+    }
+
+    fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {
+        forward::start(world, first, tally);
+    }
+
+    fn step(&self, world: &mut World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
+        forward::step(world, k, now, next, tally);
+    }
+
+    fn observe(&self, world: &World, k: usize, now: &State, next: &State, tally: &mut Tally) {
+        let ends = [now, next].map(|s| &s.0.buffer);
+        world.record(|r| world.observer.observe(r, k, ends, &tally.buffers));
+    }
+
+    fn observe_adjoint(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        adj: &mut Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        let ends = [now, next].map(|s| &s.0.buffer);
+        let adjoints = [&adj_now.0.buffer, &adj.0.buffer];
+        world.record(|r| world.observer.observe_adjoint(r, k, ends, adjoints, &tally.buffers));
+    }
+
+    fn step_adjoint(
+        &self,
+        world: &mut World,
+        k: usize,
+        now: &State,
+        next: &State,
+        adj: &Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        backward::step_adjoint(world, k, now, next, adj, adj_now, tally);
+    }
+
+    fn start_adjoint(&self, world: &mut World, first: &State, adj: &Adjoint, tally: &mut Tally) {
+        backward::start_adjoint(world, first, adj, tally);
+    }
+
+    fn clear_adjoint(&self, adj: &mut Adjoint) {
+        adj.0.clear(&self.gpu);
+    }
+
+    fn start_tangent(&self, world: &mut World, first: &State, tangent: &mut Tangent, tally: &mut Tally) {
+        backward::start_tangent(world, first, tangent, tally);
+    }
+
+    fn step_tangent(
+        &self,
+        world: &mut World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &mut Tangent,
+        tally: &mut Tally,
+    ) {
+        backward::step_tangent(world, k, now, next, tangent, tangent_next, tally);
+    }
+
+    fn observe_tangent(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &Tangent,
+        tally: &mut Tally,
+    ) {
+        let ends = [now, next].map(|s| &s.0.buffer);
+        let pairs = tangent.parts.iter().zip(&tangent_next.parts);
+        let tangents: Vec<_> = pairs.map(|(a, b)| [&a.buffer, &b.buffer]).collect();
+        world.record(|r| world.observer.observe_tangent(r, k, ends, &tangents, &tally.buffers));
+    }
+
+    fn all_failed(&self, _tally: &Tally) -> bool {
+        // The answer lies on the device; a broken device is known here and ends the rollout.
+        self.gpu.troubled()
+    }
+
+    fn read(&self, world: &World, tally: &Tally) -> Vec<Evaluation> {
+        read::tally(world, tally)
+    }
+
+    fn read_state(&self, world: &World, state: &State, member: usize) -> (Vec<DVec3>, Vec<DVec3>) {
+        read::state(world, state, member).unwrap_or_else(|e| {
+            self.gpu.keep(e);
+            let n = world.plan.body.nodes.len();
+            (vec![DVec3::NAN; n], vec![DVec3::NAN; n])
+        })
+    }
+
+    fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
+        observe::residuals(world, k, [&now.0.buffer, &next.0.buffer], member).unwrap_or_else(|e| {
+            self.gpu.keep(e);
+            Vec::new()
+        })
+    }
+}

@@ -1,0 +1,52 @@
+//! Start and step: what one call of the backend puts on the device's list.
+
+use crate::pipelines::pass;
+use crate::recorder::{Args, Size};
+use crate::solve::{ALL, Per, Solve};
+use crate::world::{State, Tally, World};
+use palpate_model::scene::InitialShape;
+
+/// A static problem starts far from its solution, so it gets more Newton iterations than a step.
+const STATIC_ITERATIONS: usize = 100;
+
+/// The initial state.
+pub(crate) fn start(world: &mut World, first: &mut State, tally: &mut Tally) {
+    let iterations = world.plan.solver.newton_iterations.max(STATIC_ITERATIONS);
+    world.set_iterations(iterations);
+    let world = &*world;
+    // A static problem's old state is at rest.
+    let blank = State(world.lend(3));
+    world.record(|r| {
+        r.clear(&first.0.buffer);
+        r.clear(&blank.0.buffer);
+        let steps = world.plan.initial == InitialShape::StaticEquilibrium;
+        let mut s = Solve::new(world, r, None, &blank, first, tally);
+        s.recorder.run(
+            pass::CHECK_MEMBERS,
+            &s.own.clone(),
+            Size::All { members: 1, groups: world.members().div_ceil(64) },
+            Args { extra: u32::from(steps), ..Args::default() },
+        );
+        if steps {
+            s.newton(iterations);
+        } else {
+            s.list();
+            s.run(pass::FINISH_STEP, ALL, Per::Node, 0);
+        }
+    });
+    world_steps(world);
+}
+
+/// From here on steps are taken: the kernels may use the plan's own number of Newton iterations.
+fn world_steps(world: &World) {
+    let mut shape = world.geometry.shape;
+    shape.iterations = world.plan.solver.newton_iterations as u32;
+    if let Some(buffer) = world.buffers.get("shape") {
+        world.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&shape));
+    }
+}
+
+/// Step k.
+pub(crate) fn step(world: &World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
+    world.record(|r| Solve::new(world, r, Some(k), now, next, tally).newton(world.plan.solver.newton_iterations));
+}

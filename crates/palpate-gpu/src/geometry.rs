@@ -1,0 +1,160 @@
+//! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
+
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::layout::{Cell, Mass, Patch, Shape};
+use palpate_model::elements::Classes;
+use palpate_model::pattern::{Pattern, Places};
+use palpate_model::plan::Plan;
+use palpate_model::scene::RotationUpdate;
+use std::collections::HashMap;
+
+/// A body that has moved this many times its own size has left the world (as on the CPU).
+const WORLD_SIZE: f64 = 1000.0;
+/// Best relative accuracy of a Newton solve in single precision: 30 roundings. Newton's method is quadratic there, so the
+/// solution is better than its last but one residual.
+const FINEST: f64 = 2e-6;
+/// Loop iterations that one invocation may use up in one dispatch: lavapipe silently stops at 65,535.
+pub(crate) const LOOPS: usize = 32_000;
+/// Most CG iterations of one solve; a solve that needs more is a symptom.
+const MOST_ITERATIONS: usize = 2000;
+/// Most CG iterations of one dispatch: the rest of a long chunk is lost when a member converges early in it.
+const LONGEST_CHUNK: usize = 512;
+
+/// Host side of a plan's geometry.
+#[derive(Debug)]
+pub(crate) struct Geometry {
+    pub(crate) shape: Shape,
+    pub(crate) classes: Classes,
+    /// (clamp, cell of the clamp) of every clamp cell in the device's order.
+    pub(crate) holds: Vec<(usize, usize)>,
+}
+
+fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+impl Geometry {
+    /// Uploads a plan's constants into `buffers`.
+    ///
+    /// # Errors
+    /// The plan needs something this backend lacks, or more than the device has.
+    pub(crate) fn new(gpu: &Gpu, plan: &Plan, buffers: &mut HashMap<&'static str, wgpu::Buffer>) -> Result<Geometry, GpuError> {
+        let body = &plan.body;
+        let n = body.nodes.len();
+        let pattern = Pattern::new(body);
+        let places = Places::new(plan, &pattern);
+        let classes = Classes::new(body);
+        let blocks = pattern.blocks.columns.len();
+
+        let mut holds: Vec<(usize, usize)> =
+            plan.clamps.iter().enumerate().flat_map(|(c, s)| (0..s.cells.len()).map(move |m| (c, m))).collect();
+        let cell_of = |&(c, m): &(usize, usize)| plan.clamps[c].cells[m].cell;
+        holds.sort_by_key(|h| (cell_of(h), *h));
+        let cells: Vec<Cell> = body
+            .cells
+            .iter()
+            .enumerate()
+            .map(|(e, cell)| {
+                let number = e as u32;
+                Cell {
+                    nodes: cell.nodes,
+                    kind: classes.of_cell[e],
+                    patch_start: body.patches.partition_point(|p| p.cell < number) as u32,
+                    patch_end: if plan.planes.is_empty() { 0 } else { body.patches.partition_point(|p| p.cell <= number) as u32 },
+                    hold_start: holds.partition_point(|h| cell_of(h) < number) as u32,
+                    hold_end: holds.partition_point(|h| cell_of(h) <= number) as u32,
+                    pad: [0; 3],
+                }
+            })
+            .collect();
+        let patches: Vec<Patch> = body
+            .patches
+            .iter()
+            .map(|p| Patch { point: vec4(p.point, p.area), weights: p.weights.map(|w| w as f32), cell: p.cell, pad: [0; 3] })
+            .collect();
+        let rest: Vec<[f32; 4]> = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| vec4(*x, *v)).collect();
+        let masses: Vec<Mass> =
+            plan.masses.iter().map(|m| Mass { nodes: m.nodes, weights: m.weights.map(|w| w as f32) }).collect();
+
+        // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
+        let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();
+        let node_list: Vec<u32> = pattern.cell_list.iter().map(|(e, i)| 8 * e + u32::from(*i)).collect();
+        let mut contributions: Vec<Vec<u32>> = vec![Vec::new(); blocks];
+        for (e, at) in places.cells.iter().enumerate() {
+            for (k, block) in at.iter().enumerate() {
+                contributions[*block as usize].push(64 * e as u32 + k as u32);
+            }
+        }
+        let mut place_rows = vec![0u32];
+        for list in &contributions {
+            place_rows.push(place_rows[place_rows.len() - 1] + list.len() as u32);
+        }
+        const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
+        let mut ghosts = vec![0.0f64; blocks];
+        for (line, at) in body.ghosts.iter().zip(&places.ghosts) {
+            for (k, block) in at.iter().enumerate() {
+                ghosts[*block as usize] += line.weight * STENCIL[k / 3] * STENCIL[k % 3];
+            }
+        }
+        let to_u32 = |v: &[usize]| -> Vec<u32> { v.iter().map(|x| *x as u32).collect() };
+        let hold_sites: Vec<[u32; 2]> = holds.iter().map(|h| [cell_of(h), h.0 as u32]).collect();
+
+        let widest = (0..n).map(|a| pattern.blocks.rows[a + 1] - pattern.blocks.rows[a]).max().unwrap_or(0);
+        // Per iteration and lane: rows of its nodes with their blocks (and point masses), three sweeps, two sums.
+        let loops = n.div_ceil(256) * (widest + 4 + 17 * masses.len()) + 20;
+        let chunk = (LOOPS / loops).clamp(1, LONGEST_CHUNK);
+        if loops > LOOPS {
+            let limit = "loop iterations of one invocation";
+            let what = format!("a body of {n} nodes");
+            return Err(GpuError::Limit { limit, available: LOOPS as u64, needed: loops as u64, what });
+        }
+        let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
+        let shape = Shape {
+            members: 0,
+            nodes: n as u32,
+            cells: cells.len() as u32,
+            blocks: blocks as u32,
+            patches: if plan.planes.is_empty() { 0 } else { patches.len() as u32 },
+            holds: holds.len() as u32,
+            clamps: plan.clamps.len() as u32,
+            planes: plan.planes.len() as u32,
+            masses: masses.len() as u32,
+            parameters: plan.layout.len() as u32,
+            classes: classes.weights.len() as u32,
+            lagged: u32::from(plan.solver.rotation == RotationUpdate::Lagged),
+            h: body.grid.h as f32,
+            dt: plan.clock.step as f32,
+            theta: plan.clock.theta as f32,
+            world: (WORLD_SIZE * size) as f32,
+            pivot: [plan.pivot.x as f32, plan.pivot.y as f32, plan.pivot.z as f32],
+            tolerance: plan.solver.tolerance.max(FINEST) as f32,
+            steps: plan.clock.steps as u32,
+            iterations: 0,
+            chunk: chunk as u32,
+            most: MOST_ITERATIONS as u32,
+            quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
+            ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
+            pad: [0; 2],
+        };
+        buffers.insert("cells", gpu.upload("cells", &cells)?);
+        buffers.insert("patches", gpu.upload("patches", &patches)?);
+        buffers.insert("rest", gpu.upload("rest", &rest)?);
+        buffers.insert("mass_sites", gpu.upload("mass_sites", &masses)?);
+        buffers.insert("node_rows", gpu.upload("node_rows", &node_rows)?);
+        buffers.insert("node_list", gpu.upload("node_list", &node_list)?);
+        buffers.insert("block_rows", gpu.upload("block_rows", &to_u32(&pattern.blocks.rows))?);
+        buffers.insert("columns", gpu.upload("columns", &pattern.blocks.columns)?);
+        buffers.insert("diagonals", gpu.upload("diagonals", &to_u32(&pattern.blocks.diagonal))?);
+        buffers.insert("place_rows", gpu.upload("place_rows", &place_rows)?);
+        buffers.insert("places", gpu.upload("places", &contributions.concat())?);
+        buffers.insert("ghosts", gpu.upload("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>())?);
+        buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
+        Ok(Geometry { shape, classes, holds })
+    }
+
+    /// CG dispatches that one solve may need.
+    pub(crate) fn chunks(&self) -> usize {
+        self.shape.most.div_ceil(self.shape.chunk) as usize
+    }
+}

@@ -1,0 +1,141 @@
+//! What members differ in: θ decoded, planes, clamp poses over time, element matrices per Poisson's ratio.
+
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::geometry::Geometry;
+use crate::layout::{ClampPose, Member, Plane};
+use glam::{DMat3, DVec3};
+use palpate_engine::ParamBatch;
+use palpate_model::corotation::M24;
+use palpate_model::elements::Elements;
+use palpate_model::plan::{ClampSite, Physics, Plan, clamp_pose};
+use palpate_model::plane::planes;
+use std::collections::HashMap;
+
+/// Central differences of a prescribed motion over this time [s] leave about 1e-10 of it (as on the CPU).
+const MOMENT: f64 = 1e-6;
+
+fn vec4(v: DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+fn mat3(m: DMat3) -> [[f32; 4]; 3] {
+    [m.x_axis, m.y_axis, m.z_axis].map(|c| vec4(c, 0.0))
+}
+
+/// θ of a batch on the device.
+#[derive(Debug, Default)]
+pub(crate) struct Batch {
+    pub(crate) physics: Vec<Physics>,
+    pub(crate) theta: Vec<Vec<f64>>,
+    /// Poisson's ratio of each slot of element matrices that is on the device.
+    slots: Vec<f64>,
+}
+
+impl Batch {
+    /// Uploads θ and what follows from it.
+    ///
+    /// # Errors
+    /// More than the device has.
+    pub(crate) fn set(
+        &mut self,
+        gpu: &Gpu,
+        plan: &Plan,
+        geometry: &Geometry,
+        theta: &ParamBatch,
+        buffers: &mut HashMap<&'static str, wgpu::Buffer>,
+    ) -> Result<(), GpuError> {
+        self.theta = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
+        self.physics = self.theta.iter().map(|row| Physics::new(&plan.layout, row)).collect();
+        let mut slots: Vec<f64> = Vec::new();
+        let mut members = Vec::new();
+        let mut all_planes: Vec<Plane> = Vec::new();
+        let mut poses: Vec<ClampPose> = Vec::new();
+        let mut masses: Vec<f32> = Vec::new();
+        let unit = plan.solver.ghost * plan.body.grid.h;
+        for p in &self.physics {
+            let slot = slots.iter().position(|nu| *nu == p.poisson_ratio).unwrap_or_else(|| {
+                slots.push(p.poisson_ratio);
+                slots.len() - 1
+            });
+            let shear = |s: f64| (unit * s) as f32;
+            // A ratio without matrices is refused by the kernel that refuses other parameters: no modulus goes with it.
+            let sound = p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5;
+            members.push(Member {
+                young: if sound { p.youngs_modulus as f32 } else { f32::NAN },
+                density: p.density as f32,
+                mass_damping: p.mass_damping as f32,
+                stiffness_damping: p.stiffness_damping as f32,
+                ghost: [
+                    shear(palpate_model::material::lame(1.0, p.poisson_ratio).1),
+                    shear(palpate_model::material::lame_by_nu(1.0, p.poisson_ratio).1),
+                ],
+                slot: slot as u32,
+                pad: 0,
+                gravity: vec4(p.gravity, 0.0),
+                velocity: vec4(p.velocity, 0.0),
+                spin: vec4(p.angular_velocity, 0.0),
+            });
+            all_planes.extend(planes(plan, p).iter().map(|q| Plane {
+                normal: vec4(q.normal[0], q.height),
+                by_theta: vec4(q.normal[1], 0.0),
+                by_phi: vec4(q.normal[2], 0.0),
+                stiffness: q.stiffness as f32,
+                scales: f32::from(u8::from(q.scales)),
+                pad: [0.0; 2],
+            }));
+            for k in 0..=plan.clock.steps {
+                let time = p.start + k as f64 * plan.clock.step;
+                poses.extend(plan.clamps.iter().map(|c| pose(c, time)));
+            }
+            masses.extend(p.masses.iter().map(|m| *m as f32));
+        }
+        buffers.insert("members", gpu.upload("members", &members)?);
+        buffers.insert("planes", gpu.upload("planes", &all_planes)?);
+        buffers.insert("poses", gpu.upload("poses", &poses)?);
+        buffers.insert("mass_values", gpu.upload("mass_values", &masses)?);
+        if self.slots != slots {
+            self.upload_elements(gpu, plan, geometry, &slots, buffers)?;
+            self.slots = slots;
+        }
+        Ok(())
+    }
+
+    /// Element and clamp matrices of every Poisson's ratio in the batch: `[slot][K, dK/dν][class]`.
+    fn upload_elements(
+        &self,
+        gpu: &Gpu,
+        plan: &Plan,
+        geometry: &Geometry,
+        slots: &[f64],
+        buffers: &mut HashMap<&'static str, wgpu::Buffer>,
+    ) -> Result<(), GpuError> {
+        let (mut cells, mut holds) = (Vec::new(), Vec::new());
+        let push = |out: &mut Vec<f32>, m: &M24| out.extend(m.iter().map(|x| *x as f32));
+        for nu in slots {
+            let e = Elements::new(plan, &geometry.classes, *nu);
+            e.matrices.iter().for_each(|m| push(&mut cells, &m.k));
+            e.matrices.iter().for_each(|m| push(&mut cells, &m.k_nu));
+            geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k));
+            geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k_nu));
+        }
+        buffers.insert("elements", gpu.upload("elements", &cells)?);
+        buffers.insert("hold_elements", gpu.upload("hold_elements", &holds)?);
+        Ok(())
+    }
+}
+
+/// Pose of a clamp at a time on the recording's clock, with its rate.
+fn pose(clamp: &ClampSite, time: f64) -> ClampPose {
+    let at = |t: f64| clamp_pose(clamp.motion.as_ref(), t);
+    let (a, b) = at(time);
+    let (later, earlier) = (at(time + MOMENT), at(time - MOMENT));
+    let rate = 0.5 / MOMENT;
+    ClampPose {
+        turn: mat3(a),
+        excess: mat3(a - DMat3::IDENTITY),
+        shift: vec4(b, 0.0),
+        turn_rate: mat3((later.0 - earlier.0) * rate),
+        shift_rate: vec4((later.1 - earlier.1) * rate, 0.0),
+    }
+}

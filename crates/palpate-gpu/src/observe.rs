@@ -1,0 +1,357 @@
+//! Comparison of states with what was measured: matching, costs and their derivatives, on the device.
+//!
+//! Interface to the rest of the backend: states come as buffers of `[3][B][N]` vectors (u = first + second part, v), adjoints and
+//! tangents as `[2][B][N]`; results are added to buffers of the tally. Frames of a step are worked on in rounds ([`looks`]); matches
+//! are found again on the way back, which costs less memory than keeping them for every frame and member.
+
+mod looks;
+mod results;
+mod shots;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::layout::{Look, Sight};
+use crate::pipelines::pass;
+use crate::recorder::{Args, Named, Recorder, Size};
+use crate::world::Buffers;
+use looks::{Agenda, Round};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::pullback::{NOISE_REACH, TURNED_AWAY};
+pub(crate) use results::residuals;
+use shots::Shots;
+use tables::{BandTables, SiteTables};
+
+/// Most loop iterations of one invocation: software adapters silently leave every loop beyond.
+pub(crate) const MOST_LOOPS: u64 = 65_535;
+/// Points that one group of eight lanes goes through at most for a cell; more are dealt out to more groups.
+const POINTS_OF_STRIPE: usize = 20_000;
+/// Device memory for scratch [B]; fewer looks are worked on together when they need more.
+const SCRATCH: u64 = 256 << 20;
+/// Most workgroups that share a sum (`PARTS` in `shared/reduce.wgsl`).
+const PARTS: usize = 256;
+/// Bytes of a node's vector, and of the structs `Found` and `Carried` of the kernels.
+const VECTOR: u64 = 16;
+const FOUND: u64 = 32;
+const CARRIED: u64 = 128;
+
+/// What is observed, on the device.
+#[derive(Debug)]
+pub(crate) struct Observer {
+    plan: Plan,
+    shots: Shots,
+    sight: Sight,
+    agenda: Agenda,
+    buffers: Buffers,
+    /// Largest buffer that can be bound [B].
+    largest: u64,
+    room: Room,
+}
+
+/// How work is cut into parts.
+#[derive(Clone, Copy, Debug)]
+struct Room {
+    /// Points of a stripe.
+    points: usize,
+    /// Bytes of scratch.
+    scratch: u64,
+}
+
+fn groups_of(items: usize) -> usize {
+    items.div_ceil(64).max(1)
+}
+
+impl Observer {
+    /// Tables of a plan, and scratch for up to `members` simulations.
+    ///
+    /// # Errors
+    /// A limit of the device is too small.
+    pub(crate) fn new(gpu: &Gpu, plan: &Plan, members: usize) -> Result<Observer, GpuError> {
+        Observer::within(gpu, plan, members, Room { points: POINTS_OF_STRIPE, scratch: SCRATCH })
+    }
+
+    fn within(gpu: &Gpu, plan: &Plan, members: usize, room: Room) -> Result<Observer, GpuError> {
+        let (body, obs) = (&*plan.body, &*plan.observation);
+        let shots = Shots::new(plan);
+        let band = BandTables::new(plan);
+        let sites = SiteTables::new(plan);
+        let most = |f: fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
+        let residuals = obs.residuals();
+        let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
+        let per = |noise: f64| (scale / (noise * noise)) as f32;
+        let points = most(|f| f.points.len());
+        let mut sight = Sight {
+            nodes: body.nodes.len() as u32,
+            extended: (body.nodes.len() + body.band.nodes.len()) as u32,
+            cells: band.cells.len() as u32,
+            points: points as u32,
+            rows: most(|f| f.residuals()) as u32,
+            markers: most(|f| f.markers.len()) as u32,
+            stripes: points.div_ceil(room.points).max(1) as u32,
+            sites: sites.sites.len() as u32,
+            frames: obs.frames.len() as u32,
+            lattice: body.grid.size.map(|n| n as u32),
+            h: body.grid.h as f32,
+            band: plan.band as f32,
+            reach: (NOISE_REACH * obs.depth_noise) as f32,
+            turned_away: TURNED_AWAY as f32,
+            depth: per(obs.depth_noise),
+            marker: per(obs.marker_noise),
+            displacement: per(obs.displacement_noise),
+            ..Sight::default()
+        };
+        check_loops(&sight, &shots, &band, &sites)?;
+        let largest = gpu.device.limits().max_storage_buffer_binding_size;
+        let each = scratch(&sight);
+        let widest = each.iter().map(|s| s.1).max().unwrap_or(1).max(1);
+        let whole = each.iter().map(|s| s.1).sum::<u64>().max(1);
+        let fit = (largest / widest).min(room.scratch / whole).max(1);
+        sight.slots = fit.min(members.max(1) as u64) as u32;
+
+        let mut buffers = Buffers::new();
+        if !obs.frames.is_empty() {
+            for (name, bytes) in each {
+                buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
+            }
+            let cameras: Vec<_> = obs.cameras.iter().map(|c| shots::split(c.center - body.center)[0]).collect();
+            let node_sites: Vec<[u32; 2]> =
+                sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
+            let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
+            buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
+            buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
+            buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
+            buffers.insert("points", gpu.upload("points", &shots.points)?);
+            buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
+            buffers.insert("marks", gpu.upload("marks", &shots.marks)?);
+            buffers.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
+            buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
+            buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
+            buffers.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
+            buffers.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
+            buffers.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
+            buffers.insert("band_rows", gpu.upload("band_rows", &band.extend.starts)?);
+            buffers.insert("band_columns", gpu.upload("band_columns", &band.extend.columns)?);
+            buffers.insert("band_values", gpu.upload("band_values", &band.extend.values)?);
+            buffers.insert("fold_rows", gpu.upload("fold_rows", &band.fold.starts)?);
+            buffers.insert("fold_columns", gpu.upload("fold_columns", &band.fold.columns)?);
+            buffers.insert("fold_values", gpu.upload("fold_values", &band.fold.values)?);
+            buffers.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
+            buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
+            buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
+            buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
+            buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
+            buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);
+            buffers.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
+            buffers.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
+        }
+        Ok(Observer { plan: plan.clone(), shots, sight, agenda: Agenda::default(), buffers, largest, room })
+    }
+
+    /// Device memory of tables and scratch [B].
+    pub(crate) fn bytes(&self) -> u64 {
+        self.buffers.values().map(wgpu::Buffer::size).sum()
+    }
+
+    /// A new batch: where each member starts on the recording's clock [s].
+    pub(crate) fn set(&mut self, gpu: &Gpu, starts: &[f64]) {
+        self.sight.members = starts.len() as u32;
+        self.agenda = Agenda::new(&self.plan, starts, self.sight.slots as usize);
+        if let (Some(looks), Some(sight)) = (self.buffers.get("looks"), self.buffers.get("sight")) {
+            let bytes: &[u8] = bytemuck::cast_slice(&self.agenda.looks);
+            if bytes.len() as u64 <= looks.size() {
+                gpu.queue.write_buffer(looks, 0, bytes);
+            }
+            gpu.queue.write_buffer(sight, 0, bytemuck::bytes_of(&self.sight));
+        }
+    }
+
+    /// Looks that are worked on together along `directions` directions.
+    fn tangent_slots(&self, directions: usize) -> usize {
+        let each = directions.max(1) as u64 * (VECTOR * u64::from(self.sight.extended)).max(4 * u64::from(self.sight.rows));
+        (self.largest.min(self.room.scratch) / each.max(1)).clamp(1, u64::from(self.sight.slots)) as usize
+    }
+
+    /// Adds to a tally's buffers what observations write. What the device refuses is kept as its error.
+    pub(crate) fn extend_tally(&self, gpu: &Gpu, directions: &[usize], tally: &mut Buffers) {
+        let looks = u64::from(self.sight.members) * u64::from(self.sight.frames);
+        let q = directions.len() as u64;
+        let together = if q == 0 || looks == 0 { 0 } else { self.tangent_slots(directions.len()) as u64 };
+        for (name, bytes) in [
+            ("frame_sums", VECTOR * looks),
+            ("start_sums", VECTOR * looks),
+            ("curvature", 4 * u64::from(self.sight.members) * (q + q * q)),
+            ("changes", VECTOR * together * q * u64::from(self.sight.extended)),
+            ("slopes", 4 * together * q * u64::from(self.sight.rows)),
+            ("shifts", 4 * q),
+        ] {
+            let made = gpu.buffer(name, bytes).unwrap_or_else(|e| {
+                gpu.keep(e);
+                gpu.small()
+            });
+            tally.insert(name, made);
+        }
+        let start = self.plan.layout.index(ParamKey::TimeStart);
+        let shifts: Vec<u32> = directions.iter().map(|&d| u32::from(d == start)).collect();
+        gpu.queue.write_buffer(&tally["shifts"], 0, bytemuck::cast_slice(&shifts));
+    }
+
+    fn rounds(&self, k: usize) -> impl Iterator<Item = Round> {
+        self.agenda.steps.get(k).into_iter().flatten().copied()
+    }
+
+    /// All buffers of a call: the call's own, the tally's, the observer's.
+    fn named<'a>(&'a self, own: &Named<'a>, tally: &'a Buffers) -> Vec<(&'static str, &'a wgpu::Buffer)> {
+        let rest = tally.iter().chain(&self.buffers).map(|(name, buffer)| (*name, buffer));
+        own.iter().copied().chain(rest).collect()
+    }
+
+    /// Adds the cost of the frames of step k; `ends` are the states before and after it.
+    pub(crate) fn observe(&self, r: &mut Recorder, k: usize, ends: [&wgpu::Buffer; 2], tally: &Buffers) {
+        for round in self.rounds(k) {
+            let own = self.named(&[("now", ends[0]), ("next", ends[1]), ("sums", &tally["frame_sums"])], tally);
+            look(r, &own, &self.sight, round);
+            let parts = groups_of(round.rows).min(PARTS);
+            run(r, pass::SUM_ROWS, &own, round, parts, 0);
+            run(r, pass::ADD_PARTS, &own, round, 1, parts);
+        }
+    }
+
+    /// Adds to dJ/d(now) and dJ/d(next) of the frames of step k, and to dJ/d(start).
+    pub(crate) fn observe_adjoint(
+        &self,
+        r: &mut Recorder,
+        k: usize,
+        ends: [&wgpu::Buffer; 2],
+        adjoints: [&wgpu::Buffer; 2],
+        tally: &Buffers,
+    ) {
+        for round in self.rounds(k) {
+            let states = [("now", ends[0]), ("next", ends[1])];
+            let adjoint = [("adj_now", adjoints[0]), ("adj_next", adjoints[1]), ("sums", &tally["start_sums"])];
+            let own = self.named(&[&states[..], &adjoint[..]].concat(), tally);
+            look(r, &own, &self.sight, round);
+            if round.points > 0 {
+                run(r, pass::PULL_POINTS, &own, round, cell_groups(&self.sight), 0);
+                run(r, pass::GATHER_PULLS, &own, round, groups_of(self.sight.extended as usize), 0);
+            }
+            let parts = groups_of(self.sight.nodes as usize).min(PARTS);
+            run(r, pass::FOLD_PULLS, &own, round, parts, usize::from(round.points > 0));
+            run(r, pass::ADD_PARTS, &own, round, 1, parts);
+        }
+    }
+
+    /// Adds to the Gauss–Newton gradient and matrix of the frames of step k; one tangent buffer a direction.
+    pub(crate) fn observe_tangent(
+        &self,
+        r: &mut Recorder,
+        k: usize,
+        ends: [&wgpu::Buffer; 2],
+        tangents: &[[&wgpu::Buffer; 2]],
+        tally: &Buffers,
+    ) {
+        let q = tangents.len();
+        let band = (self.sight.extended - self.sight.nodes) as usize;
+        for round in self.rounds(k).flat_map(|round| round.parts(self.tangent_slots(q))) {
+            let states = [("now", ends[0]), ("next", ends[1])];
+            let own = self.named(&states, tally);
+            look(r, &own, &self.sight, round);
+            for (i, [now, next]) in tangents.iter().enumerate() {
+                let own = self.named(&[&states[..], &[("tangent_now", *now), ("tangent_next", *next)]].concat(), tally);
+                run(r, pass::SEE_TANGENTS, &own, round, groups_of(self.sight.nodes as usize), q + (i << 16));
+            }
+            if round.points > 0 && band > 0 {
+                run(r, pass::EXTEND_TANGENTS, &own, round, groups_of(q * band), q);
+            }
+            let items = round.points + round.markers + round.nodes;
+            run(r, pass::DIFFERENTIATE_ROWS, &own, round, groups_of(q * items), q);
+            run(r, pass::WEIGH_ROWS, &own, round, q + q * (q + 1) / 2, q);
+        }
+    }
+}
+
+/// Bytes of every scratch buffer for one look.
+fn scratch(s: &Sight) -> [(&'static str, u64); 9] {
+    let (points, extended) = (u64::from(s.points), u64::from(s.extended));
+    let corners = if points == 0 { 0 } else { 8 * u64::from(s.stripes) * u64::from(s.cells) };
+    [
+        ("seen", 2 * VECTOR * extended),
+        ("keys", 4 * points),
+        ("owners", 4 * points),
+        ("found", FOUND * points),
+        ("rows", 8 * u64::from(s.rows)),
+        ("carried", CARRIED * u64::from(s.markers)),
+        ("partials", VECTOR * PARTS as u64),
+        ("corner_pulls", VECTOR * corners),
+        ("pulls", VECTOR * extended),
+    ]
+}
+
+/// Refuses sizes at which an invocation of some kernel could loop longer than every adapter allows.
+fn check_loops(sight: &Sight, shots: &Shots, band: &BandTables, sites: &SiteTables) -> Result<(), GpuError> {
+    match longest_loops(sight, shots, band, sites).into_iter().find(|l| l.1 > MOST_LOOPS) {
+        None => Ok(()),
+        Some((what, needed)) => {
+            let limit = "loop iterations of one invocation";
+            Err(GpuError::Limit { limit, available: MOST_LOOPS, needed, what: format!("the kernel `{what}`") })
+        }
+    }
+}
+
+/// Upper bounds of the loop iterations of one invocation, for the kernels that have long loops.
+fn longest_loops(s: &Sight, shots: &Shots, band: &BandTables, sites: &SiteTables) -> [(&'static str, u64); 7] {
+    let across = |s: &crate::layout::Shot| (u64::from(s.cubes[1]), u64::from(s.cubes[2]));
+    let (y, z) = shots.shots.iter().map(across).fold((0, 0), |m, c| (m.0.max(c.0), m.1.max(c.1)));
+    let (rows, stripes, points) = (y * z, u64::from(s.stripes), u64::from(s.points));
+    // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and up to twelve of Newton's.
+    let matching = z + rows + (rows + points.div_ceil(8 * stripes)) * 13;
+    let pulling = z + rows + rows + points.div_ceil(stripes);
+    let marks = u64::from(s.markers);
+    let site = sites.nodes.longest() as u64;
+    [
+        ("match_points", matching),
+        ("pull_points", pulling),
+        ("extend_band", band.extend.longest() as u64),
+        ("gather_pulls", band.corners.longest() as u64 * (1 + stripes)),
+        // A node meets every marker of the frame at most once per entry of its sites.
+        ("fold_pulls", {
+            let nodes = u64::from(s.nodes).div_ceil(64 * (u64::from(s.nodes).div_ceil(64)).clamp(1, PARTS as u64));
+            nodes * (1 + band.fold.longest() as u64 + sites.of_node.longest() as u64 + marks)
+        }),
+        // 300: rotations of Jacobi's method.
+        ("carry_markers", site + 300),
+        ("weigh_rows", u64::from(s.rows).div_ceil(64) + 500),
+    ]
+}
+
+fn cell_groups(s: &Sight) -> usize {
+    groups_of(8 * s.cells as usize * s.stripes as usize)
+}
+
+fn run(r: &mut Recorder, kernel: usize, own: &Named, round: Round, groups: usize, mode: usize) {
+    let args = Args { step: round.count as u32, mode: mode as u32, roster: groups as u32, extra: round.first as u32 };
+    r.run(kernel, own, Size::All { members: round.count, groups }, args);
+}
+
+/// Displacements, matches and residuals of a round.
+fn look(r: &mut Recorder, own: &Named, sight: &Sight, round: Round) {
+    run(r, pass::SEE_NODES, own, round, groups_of(sight.nodes as usize), 0);
+    if round.points > 0 {
+        if sight.extended > sight.nodes {
+            run(r, pass::EXTEND_BAND, own, round, groups_of((sight.extended - sight.nodes) as usize), 0);
+        }
+        run(r, pass::FORGET_MATCHES, own, round, groups_of(round.points), 0);
+        for mode in [0, 1] {
+            run(r, pass::MATCH_POINTS, own, round, cell_groups(sight), mode);
+        }
+        run(r, pass::PLACE_POINTS, own, round, groups_of(round.points), 0);
+    }
+    if round.markers > 0 {
+        run(r, pass::CARRY_MARKERS, own, round, groups_of(round.markers), 0);
+    }
+    if round.nodes > 0 {
+        run(r, pass::COMPARE_NODES, own, round, groups_of(round.nodes), 0);
+    }
+}

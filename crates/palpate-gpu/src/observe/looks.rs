@@ -1,0 +1,79 @@
+//! Which frames belong to which step, member by member, in rounds that hold at most one frame of each member.
+
+use crate::layout::Look;
+use palpate_model::instant::instants;
+use palpate_model::plan::Plan;
+
+/// Looks that are worked on together: `count` of them from `first` on in the buffer of all looks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Round {
+    pub(crate) first: usize,
+    pub(crate) count: usize,
+    /// Most points, markers, observed nodes and scalar residuals of its frames.
+    pub(crate) points: usize,
+    pub(crate) markers: usize,
+    pub(crate) nodes: usize,
+    pub(crate) rows: usize,
+}
+
+/// All looks of a batch.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Agenda {
+    pub(crate) looks: Vec<Look>,
+    /// Rounds of every step.
+    pub(crate) steps: Vec<Vec<Round>>,
+}
+
+impl Agenda {
+    /// The looks of members that start at `starts` [s] on the recording's clock, at most `slots` in a round.
+    pub(crate) fn new(plan: &Plan, starts: &[f64], slots: usize) -> Agenda {
+        let mut agenda = Agenda::default();
+        for k in 0..plan.clock.steps.max(1) {
+            let of_member: Vec<Vec<Look>> = starts
+                .iter()
+                .enumerate()
+                .map(|(member, &start)| {
+                    let look = |at: &palpate_model::instant::Instant| Look {
+                        member: member as u32,
+                        frame: at.frame as u32,
+                        pad: [0; 2],
+                        value: at.value.map(|f| f as f32),
+                        rate: at.rate.map(|f| f as f32),
+                    };
+                    instants(plan, start, k).iter().map(look).collect()
+                })
+                .collect();
+            let most = of_member.iter().map(Vec::len).max().unwrap_or(0);
+            let mut rounds = Vec::new();
+            for r in 0..most {
+                let together: Vec<Look> = of_member.iter().filter_map(|looks| looks.get(r).copied()).collect();
+                for part in together.chunks(slots.max(1)) {
+                    rounds.push(Round::new(plan, agenda.looks.len(), part));
+                    agenda.looks.extend_from_slice(part);
+                }
+            }
+            agenda.steps.push(rounds);
+        }
+        agenda
+    }
+}
+
+impl Round {
+    fn new(plan: &Plan, first: usize, looks: &[Look]) -> Round {
+        let mut round = Round { first, count: looks.len(), ..Round::default() };
+        for look in looks {
+            let f = &plan.observation.frames[look.frame as usize];
+            round.points = round.points.max(f.points.len());
+            round.markers = round.markers.max(f.markers.len());
+            round.nodes = round.nodes.max(f.displacements.len());
+            round.rows = round.rows.max(f.residuals());
+        }
+        round
+    }
+
+    /// The same round in parts of at most `count` looks.
+    pub(crate) fn parts(self, count: usize) -> impl Iterator<Item = Round> {
+        let size = count.max(1);
+        (0..self.count).step_by(size).map(move |i| Round { first: self.first + i, count: size.min(self.count - i), ..self })
+    }
+}

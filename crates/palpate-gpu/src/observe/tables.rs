@@ -1,0 +1,115 @@
+//! Tables of the band and of the markers' sites, each with its transpose, so that every sum gathers in a fixed order.
+
+use crate::layout::{BandCell, Site};
+use crate::observe::shots::split;
+use glam::{DMat3, DVec3};
+use palpate_model::observation::MarkerSite;
+use palpate_model::plan::Plan;
+
+/// Rows of a sparse matrix: where each starts, which column, which value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Rows<T> {
+    pub(crate) starts: Vec<u32>,
+    pub(crate) columns: Vec<u32>,
+    pub(crate) values: Vec<T>,
+}
+
+impl<T: Copy> Rows<T> {
+    /// Rows of a list of (row, column, value), in the list's order.
+    pub(crate) fn new(count: usize, entries: &[(u32, u32, T)]) -> Rows<T> {
+        let mut order: Vec<usize> = (0..entries.len()).collect();
+        order.sort_by_key(|&e| entries[e].0);
+        let starts = (0..=count).map(|r| order.partition_point(|&e| (entries[e].0 as usize) < r) as u32).collect();
+        Rows {
+            starts,
+            columns: order.iter().map(|&e| entries[e].1).collect(),
+            values: order.iter().map(|&e| entries[e].2).collect(),
+        }
+    }
+
+    /// Length of the longest row.
+    pub(crate) fn longest(&self) -> usize {
+        self.starts.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
+    }
+}
+
+/// The band.
+#[derive(Clone, Debug)]
+pub(crate) struct BandTables {
+    pub(crate) cells: Vec<BandCell>,
+    pub(crate) sdf: Vec<f32>,
+    /// Band cells by lattice place; `u32::MAX` = none.
+    pub(crate) lookup: Vec<u32>,
+    /// Extension: rows are band nodes, columns simulation nodes.
+    pub(crate) extend: Rows<f32>,
+    /// Its transpose; columns are extended nodes.
+    pub(crate) fold: Rows<f32>,
+    /// Corners 8 · cell + i of every extended node.
+    pub(crate) corners: Rows<()>,
+}
+
+impl BandTables {
+    pub(crate) fn new(plan: &Plan) -> BandTables {
+        let (body, band) = (&*plan.body, &plan.body.band);
+        let n = body.nodes.len();
+        let mut lookup = vec![u32::MAX; body.grid.len()];
+        let mut cells = Vec::with_capacity(band.cells.len());
+        let mut corners = Vec::with_capacity(8 * band.cells.len());
+        for (c, cell) in band.cells.iter().enumerate() {
+            lookup[body.grid.index(cell.lattice)] = c as u32;
+            let corner = split(body.grid.position(cell.lattice) - body.center)[0];
+            cells.push(BandCell { nodes: cell.nodes, lattice: cell.lattice.map(|x| x as u32), pad: 0, corner });
+            corners.extend((0..8).map(|i| (cell.nodes[i], (8 * c + i) as u32, ())));
+        }
+        let row = |p: usize| band.rows[p] as usize..band.rows[p + 1] as usize;
+        let fold: Vec<(u32, u32, f32)> = (0..band.nodes.len())
+            .flat_map(|p| row(p).map(move |k| (band.columns[k], (n + p) as u32, band.values[k] as f32)))
+            .collect();
+        BandTables {
+            cells,
+            sdf: band.cells.iter().flat_map(|c| c.sdf.map(|d| d as f32)).collect(),
+            lookup,
+            extend: Rows {
+                starts: if band.rows.is_empty() { vec![0] } else { band.rows.clone() },
+                columns: band.columns.clone(),
+                values: band.values.iter().map(|v| *v as f32).collect(),
+            },
+            fold: Rows::new(n, &fold),
+            corners: Rows::new(n + band.nodes.len(), &corners),
+        }
+    }
+}
+
+/// The markers' sites.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SiteTables {
+    pub(crate) sites: Vec<Site>,
+    /// Rows are sites, columns nodes; values hold the gradient's weights [1/m] and the position's.
+    pub(crate) nodes: Rows<[f32; 4]>,
+    /// Rows are nodes, columns sites; values are places in `nodes`.
+    pub(crate) of_node: Rows<u32>,
+}
+
+impl SiteTables {
+    pub(crate) fn new(plan: &Plan) -> SiteTables {
+        let mut tables = SiteTables::default();
+        let (mut entries, mut transposed) = (Vec::new(), Vec::new());
+        for (s, site) in plan.observation.markers.iter().enumerate() {
+            tables.sites.push(place(site, &plan.body.nodes));
+            for (k, &node) in site.nodes.iter().enumerate() {
+                let g = site.gradient_weights[k].as_vec3();
+                transposed.push((node, s as u32, entries.len() as u32));
+                entries.push((s as u32, node, [g.x, g.y, g.z, site.position_weights[k] as f32]));
+            }
+        }
+        tables.nodes = Rows::new(tables.sites.len(), &entries);
+        tables.of_node = Rows::new(plan.body.nodes.len(), &transposed);
+        tables
+    }
+}
+
+fn place(site: &MarkerSite, rest: &[DVec3]) -> Site {
+    let excess = site.carry(|i| rest[i]).1 - DMat3::IDENTITY;
+    let column = |c: DVec3| split(c)[0];
+    Site { stalk: split(site.stalk)[0], excess: [column(excess.x_axis), column(excess.y_axis), column(excess.z_axis)] }
+}

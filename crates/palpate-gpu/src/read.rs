@@ -1,0 +1,89 @@
+//! What comes back to the host: states, and the tally as evaluations.
+
+use crate::error::GpuError;
+use crate::layout::Health;
+use crate::world::{State, Tally, World};
+use glam::DVec3;
+use palpate_engine::{Curvature, Evaluation, Failure, FailureKind};
+
+/// u [m] and v [m/s] of one member, `[N]` each.
+pub(crate) fn state(world: &World, state: &State, member: usize) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
+    let n = world.geometry.shape.nodes as usize;
+    let all = world.members() * n;
+    let v: Vec<[f32; 4]> = world.gpu.download(&state.0.buffer, 3 * all)?;
+    let wide = |v: &[f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+    let of = |part: usize| v[part * all + member * n..part * all + (member + 1) * n].iter().map(wide);
+    Ok((of(0).zip(of(1)).map(|(a, b)| a + b).collect(), of(2).collect()))
+}
+
+/// The failure behind a health code of `shared/structs.wgsl`.
+fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
+    let p = &world.batch.physics[member];
+    let [a, b] = h.detail;
+    let (kind, what) = match h.code {
+        0 => return None,
+        1 => (FailureKind::NotFinite, "displacement, velocity or residual of a node".to_string()),
+        2 => (FailureKind::NewtonStalled, format!("{b} iterations left a scaled residual of {a:.1e} of the forces")),
+        3 => (FailureKind::LinearSolve, format!("{b} conjugate gradient iterations left a relative residual of {a:.1e}")),
+        4 => (FailureKind::LinearSolve, "the matrix is not positive definite".to_string()),
+        5 => (FailureKind::FellOut, format!("a node moved {a:.3} m")),
+        6 => (
+            FailureKind::BadParameter,
+            format!(
+                "material.youngs_modulus = {}, material.poisson_ratio = {}, material.density = {}",
+                p.youngs_modulus, p.poisson_ratio, p.density
+            ),
+        ),
+        _ => (FailureKind::NoEquilibrium, "no clamp holds the body".to_string()),
+    };
+    // A start that does not converge has no equilibrium.
+    let kind = match kind {
+        FailureKind::NewtonStalled | FailureKind::LinearSolve if h.step == 0 => FailureKind::NoEquilibrium,
+        kind => kind,
+    };
+    let layout = &world.plan.layout.keys;
+    let values: Vec<String> = layout
+        .iter()
+        .zip(&world.batch.theta[member])
+        .filter(|(_, v)| **v != 0.0)
+        .map(|(k, v)| {
+            let spec = k.spec();
+            format!("{} = {v:.6} {}", spec.path, spec.unit)
+        })
+        .collect();
+    let time = f64::from(h.step) * world.plan.clock.step;
+    Some(Failure { kind, time, detail: format!("{what}, with {}", values.join(", ")) })
+}
+
+/// Costs, gradients and health of every member.
+pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
+    match try_tally(world, tally) {
+        Ok(all) => all,
+        Err(e) => {
+            let detail = format!("{e} (hint: {})", e.hint());
+            let failed = Evaluation::failed(Failure { kind: FailureKind::Device, time: 0.0, detail });
+            vec![failed; world.members()]
+        }
+    }
+}
+
+fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> {
+    let (b, p, q) = (world.members(), world.plan.layout.len(), tally.directions.len());
+    let health: Vec<Health> = world.gpu.download(tally.get("health"), b)?;
+    let gradient: Vec<f32> = world.gpu.download(tally.get("gradient"), b * p)?;
+    let mut all: Vec<Evaluation> = (0..b)
+        .map(|m| {
+            let failure = failure(world, m, &health[m]);
+            Evaluation {
+                cost: if failure.is_some() { f64::INFINITY } else { 0.0 },
+                gradient: gradient[m * p..(m + 1) * p].iter().map(|g| f64::from(*g)).collect(),
+                curvature: (q > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
+                residuals: world.plan.observation.residuals(),
+                failure,
+                ..Evaluation::default()
+            }
+        })
+        .collect();
+    world.observer.add_to(&world.gpu, &tally.buffers, q, &mut all)?;
+    Ok(all)
+}

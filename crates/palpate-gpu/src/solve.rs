@@ -1,0 +1,150 @@
+//! The nonlinear and linear solves of a step as lists of dispatches. The device decides who takes part in which; the host
+//! only says how often to ask.
+
+use crate::pipelines::pass;
+use crate::recorder::{Args, Named, Recorder, Size};
+use crate::world::{KINDS, State, Tally, World};
+
+/// Sections of the roster.
+pub(crate) const ALL: u32 = 0;
+pub(crate) const MATRIX: u32 = 1;
+pub(crate) const SOLVE: u32 = 2;
+pub(crate) const TRIAL: u32 = 3;
+
+/// What the items of a dispatch are: the kinds of `list_members`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Per {
+    Member,
+    Node,
+    Cell,
+    Block,
+    Patch,
+    Hold,
+}
+
+/// Rounds beyond the allowed Newton iterations, for convex retries and halved steps.
+const SPARE_ROUNDS: usize = 8;
+
+/// One balance on the way to the device: a step, or the static problem.
+pub(crate) struct Solve<'a, 'r> {
+    pub(crate) world: &'a World,
+    pub(crate) recorder: &'a mut Recorder<'r>,
+    /// Step number; `None` = static.
+    pub(crate) step: Option<usize>,
+    /// Names of this balance's own buffers.
+    pub(crate) own: Vec<(&'static str, &'a wgpu::Buffer)>,
+}
+
+impl<'a, 'r> Solve<'a, 'r> {
+    pub(crate) fn new(
+        world: &'a World,
+        recorder: &'a mut Recorder<'r>,
+        step: Option<usize>,
+        now: &'a State,
+        next: &'a State,
+        tally: &'a Tally,
+    ) -> Solve<'a, 'r> {
+        let own = vec![
+            ("now", &now.0.buffer),
+            ("next", &next.0.buffer),
+            ("health", tally.get("health")),
+            ("gradient", tally.get("gradient")),
+            // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
+            ("probe", &world.buffers["direction"]),
+        ];
+        Solve { world, recorder, step, own }
+    }
+
+    /// One dispatch over the members of a section of the roster.
+    pub(crate) fn run(&mut self, pass: usize, section: u32, per: Per, extra: u32) {
+        self.run_with(pass, section, per, extra, &[]);
+    }
+
+    /// The same with more buffers.
+    pub(crate) fn run_with(&mut self, pass: usize, section: u32, per: Per, extra: u32, more: &Named) {
+        let shape = &self.world.geometry.shape;
+        let empty = match per {
+            Per::Patch => shape.patches == 0,
+            Per::Hold => shape.holds == 0,
+            _ => false,
+        };
+        if empty {
+            return;
+        }
+        let args = Args { step: self.step.unwrap_or(0) as u32, mode: u32::from(self.step.is_some()), roster: section, extra };
+        let offset = 12 * (section as usize * KINDS + per as usize) as u64;
+        let named: Vec<_> = more.iter().chain(&self.own).copied().collect();
+        self.recorder.run(pass, &named, Size::Indirect(offset), args);
+    }
+
+    /// Lists anew who takes part in what.
+    pub(crate) fn list(&mut self) {
+        let args = Args::default();
+        let own = self.own.clone();
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, args);
+    }
+
+    /// What the old state leaves for the whole solve.
+    pub(crate) fn prepare(&mut self) {
+        if self.step.is_none() {
+            return;
+        }
+        // The clamps' old force; its weight is zero where it does not act.
+        self.run(pass::HOLD_CELLS, ALL, Per::Hold, 1);
+        self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
+        self.run(pass::GATHER_OLD, ALL, Per::Node, 0);
+    }
+
+    /// Tangent, matrix and preconditioner of the members of a section, at the new state.
+    pub(crate) fn assemble(&mut self, section: u32) {
+        self.run(pass::TANGENT_CELLS, section, Per::Cell, 0);
+        self.run(pass::GATHER_MATRIX, section, Per::Block, 0);
+        self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
+    }
+
+    /// Newton's method from free flight.
+    pub(crate) fn newton(&mut self, iterations: usize) {
+        self.list();
+        self.prepare();
+        self.run(pass::PREDICT, ALL, Per::Node, 0);
+        self.list();
+        for _ in 0..iterations + SPARE_ROUNDS {
+            self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
+            self.run(pass::TOUCH_PATCHES, TRIAL, Per::Patch, 0);
+            self.run(pass::HOLD_CELLS, TRIAL, Per::Hold, 0);
+            self.run(pass::PRESS_CELLS, TRIAL, Per::Cell, 0);
+            self.run(pass::GATHER_RESIDUAL, TRIAL, Per::Node, 0);
+            self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, 0);
+            self.list();
+            self.assemble(MATRIX);
+            self.run(pass::BEGIN_SOLVE, MATRIX, Per::Member, 0);
+            self.list();
+            self.conjugate_gradients(0);
+        }
+        self.run(pass::FINISH_STEP, ALL, Per::Node, 0);
+        self.run(pass::CHECK_STATE, ALL, Per::Member, 0);
+    }
+
+    fn conjugate_gradients(&mut self, exact: u32) {
+        for _ in 0..self.world.geometry.chunks() {
+            self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
+            self.list();
+        }
+    }
+
+    /// Makes the exact tangent ready at a converged state.
+    pub(crate) fn linearise(&mut self) {
+        self.list();
+        self.run(pass::PREDICT, ALL, Per::Node, 0);
+        self.prepare();
+        self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
+        self.assemble(ALL);
+    }
+
+    /// Solves with the tangent of [`Solve::linearise`]: `rhs` → `direction`.
+    pub(crate) fn solve(&mut self) {
+        self.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        self.list();
+        self.conjugate_gradients(1);
+    }
+}

@@ -1,0 +1,137 @@
+//! Start and steps against the CPU; the same bits twice; subgroups and workgroup memory give the same bits; batches give what
+//! single members give.
+
+use super::scenes::{ball, device, held, plan, spread};
+use crate::GpuBackend;
+use crate::device::{Gpu, Lanes};
+use glam::DVec3;
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Backend, Evaluation, FailureKind, ParamBatch};
+use palpate_model::plan::Plan;
+use palpate_model::scene::{Analytic, BodySource, RotationUpdate, Scene};
+use std::sync::Arc;
+
+type Moment = (Vec<DVec3>, Vec<DVec3>);
+
+/// States of every member at every time, `[steps + 1][B]`, and what `read` says.
+fn states<B: Backend>(backend: &B, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<Moment>>, Vec<Evaluation>) {
+    let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(theta));
+    let mut tally = backend.new_tally(&world, &[]);
+    let mut now = backend.new_state(&world);
+    backend.start(&mut world, &mut now, &mut tally);
+    let all = |world: &B::World, s: &B::State| (0..theta.len()).map(|b| backend.read_state(world, s, b)).collect();
+    let mut found = vec![all(&world, &now)];
+    for k in 0..plan.clock.steps {
+        let mut next = backend.new_state(&world);
+        backend.step(&mut world, k, &now, &mut next, &mut tally);
+        found.push(all(&world, &next));
+        now = next;
+    }
+    let evaluations = backend.read(&world, &tally);
+    (found, evaluations)
+}
+
+fn off(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max)
+}
+
+/// Largest differences of u [m] and v [m/s] from the CPU's.
+fn difference(gpu: &Arc<Gpu>, scene: &Scene, theta: &[Vec<f64>]) -> [f64; 2] {
+    let plan = plan(scene);
+    let (found, evaluations) = states(&GpuBackend::on(gpu.clone()), &plan, theta);
+    let (exact, _) = states(&CpuBackend, &plan, theta);
+    let mut worst = [0.0f64; 2];
+    for (k, (a, b)) in found.iter().zip(&exact).enumerate() {
+        for (m, (a, b)) in a.iter().zip(b).enumerate() {
+            let d = [off(&a.0, &b.0), off(&a.1, &b.1)];
+            println!("step {k} member {m}: {:.1e} m {:.1e} m/s", d[0], d[1]);
+            worst = [worst[0].max(d[0]), worst[1].max(d[1])];
+        }
+    }
+    assert!(evaluations.iter().all(|e| e.failure.is_none()), "{:?}", evaluations[0].failure);
+    worst
+}
+
+// Displacements: a Newton solve to 2e-6 of the forces, which strain the body by some 10 % of its 0.1 m, leaves up to 2e-8 m a
+// step, rounding of u and v another 1e-8 m; six steps. Velocities: the same divided by the step of 0.01 s.
+const CLOSE: [f64; 2] = [5e-7, 1e-4];
+
+#[test]
+fn steps_agree_with_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    for scene in [ball(0.03), held(0.03)] {
+        for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
+            let mut scene = scene.clone();
+            scene.solver.rotation = rotation;
+            let d = difference(&gpu, &scene, &[plan(&scene).theta]);
+            assert!(d[0] < CLOSE[0] && d[1] < CLOSE[1], "{rotation:?}: {:.1e} m {:.1e} m/s", d[0], d[1]);
+        }
+    }
+}
+
+#[test]
+fn one_percent_of_stiffness_stands_out() {
+    let Some(gpu) = device(None) else { return };
+    let scene = ball(0.03);
+    let plan = plan(&scene);
+    let mut wrong = plan.theta.clone();
+    wrong[0] *= 1.01;
+    let found = states(&GpuBackend::on(gpu), &plan, &[wrong]).0;
+    let exact = states(&CpuBackend, &plan, &[plan.theta.clone()]).0;
+    let last = plan.clock.steps;
+    let d = [off(&found[last][0].0, &exact[last][0].0), off(&found[last][0].1, &exact[last][0].1)];
+    assert!(d[0] > 3.0 * CLOSE[0] && d[1] > 3.0 * CLOSE[1], "the comparison compares nothing: {d:?}");
+}
+
+#[test]
+fn batches_one_cell_and_two_planes_agree_with_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    // One cell alone; an odd number of nodes with two planes; each with three members of different θ.
+    let mut one = ball(0.05);
+    let (min, max) = (DVec3::new(0.0, 0.0, 0.05), DVec3::new(0.05, 0.05, 0.1));
+    one.object.source = BodySource::Analytic(Analytic::Box { min, max });
+    one.masses.clear();
+    assert_eq!(plan(&one).body.cells.len(), 1);
+    let mut two = ball(0.027);
+    two.planes.push(palpate_model::scene::Plane { point: DVec3::new(-0.045, 0.0, 0.0), normal: DVec3::X, stiffness: Some(1e6) });
+    for scene in [one, two] {
+        let theta = spread(&plan(&scene), 3);
+        let d = difference(&gpu, &scene, &theta);
+        assert!(d[0] < CLOSE[0] && d[1] < CLOSE[1], "{:.1e} m {:.1e} m/s", d[0], d[1]);
+    }
+}
+
+#[test]
+fn same_bits_twice_in_a_batch_and_in_both_variants() {
+    let Some(gpu) = device(Some(Lanes::Memory)) else { return };
+    let scene = held(0.03);
+    let plan = plan(&scene);
+    let theta = spread(&plan, 8);
+    let first = states(&GpuBackend::on(gpu.clone()), &plan, &theta).0;
+    assert!(first == states(&GpuBackend::on(gpu.clone()), &plan, &theta).0, "two runs differ");
+    let alone = states(&GpuBackend::on(gpu), &plan, &theta[5..6]).0;
+    assert!(first.iter().zip(&alone).all(|(a, b)| a[5] == b[0]), "a member alone differs from itself in a batch");
+    if crate::adapters().iter().any(|a| a.subgroups) {
+        let Some(gpu) = device(Some(Lanes::Subgroup)) else { return };
+        assert!(first == states(&GpuBackend::on(gpu), &plan, &theta).0, "subgroups and workgroup memory differ");
+    }
+}
+
+#[test]
+fn a_member_that_fails_keeps_its_slot() {
+    let Some(gpu) = device(None) else { return };
+    let scene = ball(0.03);
+    let plan = plan(&scene);
+    let mut theta = spread(&plan, 3);
+    // No stiffness at all; then gravity that throws the body out of the world.
+    theta[0][0] = -1.0;
+    theta[1][7] = 1e9;
+    let (found, evaluations) = states(&GpuBackend::on(gpu.clone()), &plan, &theta);
+    let kind = |m: usize| evaluations[m].failure.as_ref().map(|f| f.kind);
+    assert_eq!(kind(0), Some(FailureKind::BadParameter));
+    assert!(kind(1).is_some() && evaluations[1].cost.is_infinite());
+    assert_eq!(kind(2), None);
+    let alone = states(&GpuBackend::on(gpu), &plan, &theta[2..]).0;
+    assert!(found.iter().zip(&alone).all(|(a, b)| a[2] == b[0]), "the well member is not disturbed");
+}

@@ -1,0 +1,101 @@
+//! Small scenes that hold every term of the balance, and the device that tests run on.
+
+use crate::device::{Choice, Gpu, Lanes};
+use glam::{DAffine3, DQuat, DVec3};
+use palpate_model::motion::RigidMotion;
+use palpate_model::observation::Observation;
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::plan_build::build_plan;
+use palpate_model::scene::*;
+use std::sync::Arc;
+
+/// The device, or `None` with a printed word where there is none and none is required (`PALPATE_GPU=require`).
+pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
+    match Gpu::open_with(&Choice::from_env(), lanes) {
+        Ok(gpu) => Some(gpu),
+        Err(e) => {
+            assert!(std::env::var("PALPATE_GPU").as_deref() != Ok("require"), "{e} (hint: {})", e.hint());
+            println!("skipped: {e}");
+            None
+        }
+    }
+}
+
+/// A ball of radius 5 cm in cells of `h`.
+pub fn ball(h: f64) -> Scene {
+    Scene {
+        path: "in-code.toml".into(),
+        title: String::new(),
+        object: Object {
+            source: BodySource::Analytic(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.051) }),
+            pose: DAffine3::IDENTITY,
+            resolution: Resolution::CellSize(h),
+        },
+        material: Material {
+            inertia: Inertia::Density(1000.0),
+            youngs_modulus: 5000.0,
+            poisson_ratio: 0.4,
+            mass_damping: 0.3,
+            stiffness_damping: 0.004,
+        },
+        gravity: DVec3::new(0.4, -0.3, -9.0),
+        clamps: Vec::new(),
+        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
+        masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
+        effects: Vec::new(),
+        initial: Initial {
+            velocity: DVec3::new(0.2, 0.0, -0.5),
+            angular_velocity: DVec3::new(0.0, 3.0, 1.0),
+            pivot: None,
+            state: InitialShape::Rest,
+        },
+        time: Time { step: 0.01, steps: 6, start: 0.05, theta: 0.6 },
+        solver: Solver::default(),
+        observation: None,
+        fit: None,
+    }
+}
+
+/// The ball held at its top by a clamp that moves and turns, hanging from the start.
+pub fn held(h: f64) -> Scene {
+    let motion = RigidMotion {
+        times: vec![-1.0, 0.0, 1.0],
+        translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],
+        rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_z(0.1), DQuat::from_rotation_y(0.4)],
+    };
+    let mut scene = ball(h);
+    let min = DVec3::new(-1.0, -1.0, 0.07);
+    scene.clamps.push(Clamp { min, max: DVec3::ONE, object_frame: false, motion: Some(motion), motion_path: None });
+    scene.initial.state = InitialShape::StaticEquilibrium;
+    scene.initial.velocity = DVec3::ZERO;
+    scene.initial.angular_velocity = DVec3::ZERO;
+    scene
+}
+
+/// The plan of a scene.
+pub fn plan(scene: &Scene) -> Plan {
+    build_plan(scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Members around the scene's own parameters: moduli, damping, gravity and planes differ.
+pub fn spread(plan: &Plan, members: usize) -> Vec<Vec<f64>> {
+    (0..members)
+        .map(|b| {
+            let s = b as f64;
+            plan.layout
+                .keys
+                .iter()
+                .zip(&plan.theta)
+                .map(|(key, value)| match key {
+                    ParamKey::YoungsModulus => value * (1.0 + 0.5 * s),
+                    ParamKey::PoissonRatio => value - 0.03 * (s % 2.0),
+                    ParamKey::StiffnessDamping => value / (1.0 + s),
+                    ParamKey::Gravity(2) => value - 0.2 * s,
+                    ParamKey::PlaneHeight(_) => value - 0.001 * s,
+                    _ => *value,
+                })
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,55 @@
+//! Prepares conjugate gradients for a derivative: A x = rhs with the exact tangent at a converged state.
+// use shared/grid
+// use shared/totals
+// use shared/precondition
+
+var<storage, read> rhs: array<vec4<f32>>;
+var<storage, read_write> direction: array<vec4<f32>>;
+var<storage, read_write> cg_rest: array<vec4<f32>>;
+var<storage, read_write> cg_along: array<vec4<f32>>;
+var<storage, read_write> newton: array<Newton>;
+var<storage, read_write> health: array<Health>;
+
+// Relative accuracy that a solve in single precision can reach with any certainty.
+const FINEST = 2e-7;
+
+@compute @workgroup_size(256)
+fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, 0u, 1u, 1u);
+    if !p.runs {
+        return;
+    }
+    var state = vec4(0.0);
+    for (var i = local; i < shape.nodes; i += 256u) {
+        let a = at_node(p.member, i);
+        let r = rhs[a].xyz;
+        let z = scaled(a, r);
+        direction[a] = vec4(0.0);
+        cg_rest[a] = vec4(r, 0.0);
+        cg_along[a] = vec4(z, 0.0);
+        state += vec4(dot(r, z), inverses[2u * a + 1u].w, 0.0, 0.0);
+    }
+    let s = total(local, state);
+    if local != 0u {
+        return;
+    }
+    var n = newton[p.member];
+    n.rz = s.x;
+    n.norm = sqrt(max(s.x, 0.0));
+    n.goal = FINEST * n.norm;
+    n.cg = 0u;
+    n.stage = select(IDLE, WANTS_SOLVE, n.norm > 0.0);
+    var broken = 0u;
+    if s.y > 0.0 {
+        broken = INDEFINITE;
+    }
+    if !(n.norm <= 3e38) {
+        broken = NOT_FINITE;
+    }
+    if broken != 0u {
+        n.stage = IDLE;
+        health[p.member] = Health(broken, call.step + call.mode, vec2(n.norm, 0.0));
+    }
+    newton[p.member] = n;
+}

@@ -1,0 +1,79 @@
+//! Sums all forces per node at a trial: r, with the node's share of the potential in the fourth component. Inertia acts on the
+//! increment beyond free flight alone, so nothing large cancels.
+// use shared/mix
+// use shared/inertia
+
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> next: array<vec4<f32>>;
+var<storage, read> trial: array<vec4<f32>>;
+var<storage, read> cell_force: array<vec4<f32>>;
+var<storage, read> cell_support: array<vec4<f32>>;
+var<storage, read> old_force: array<vec4<f32>>;
+var<storage, read> node_rows: array<u32>;
+var<storage, read> node_list: array<u32>;
+var<storage, read> block_rows: array<u32>;
+var<storage, read> columns: array<u32>;
+var<storage, read> ghosts: array<f32>;
+var<storage, read_write> residual: array<vec4<f32>>;
+// [2][B][N]: elastic and support forces by themselves, for the size that a residual is compared with.
+var<storage, read_write> sizes: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                   @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.nodes, 64u);
+    if !p.live {
+        return;
+    }
+    let m = members[p.member];
+    let mix = mix_of(m);
+    let a = at_node(p.member, p.item);
+    let w = trial[a].xyz;
+    var elastic = vec4(0.0);
+    var support = vec4(0.0);
+    for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
+        let c = p.member * shape.cells * 8u + node_list[k];
+        elastic += cell_force[c];
+        support += cell_support[c];
+    }
+    let mass = node_mass(m, p.item);
+    var body = vec4(0.0);
+    if call.mode != 0u {
+        let before = old_force[a].xyz;
+        elastic += vec4(before, dot(before, w));
+        let flight = shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * m.gravity.xyz;
+        body = mass * vec4(mix.inertia * w + mix.drag * (flight + w),
+                           0.5 * (mix.inertia + mix.drag) * dot(w, w) + mix.drag * dot(flight, w));
+    } else {
+        body = -mass * vec4(m.gravity.xyz, dot(m.gravity.xyz, w));
+    }
+    for (var s = 0u; s < shape.masses; s++) {
+        let corner = mass_corner(s, p.item);
+        if corner < 8u {
+            var pull = -m.gravity.xyz;
+            var twice = 2.0;
+            if call.mode != 0u {
+                pull = vec3(0.0);
+                for (var j = 0u; j < 8u; j++) {
+                    pull += mass_sites[s].weights[j] * trial[at_node(p.member, mass_sites[s].nodes[j])].xyz;
+                }
+                pull *= mix.inertia;
+                twice = 1.0;
+            }
+            let f = mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner];
+            body += f * vec4(pull, 0.5 * twice * dot(pull, w));
+        }
+    }
+    if shape.ghosts != 0u {
+        let scale = m.young * m.ghost.x * mix.on_ghost;
+        for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
+            let b = at_node(p.member, columns[k]);
+            let d = (next[b].xyz - next[a].xyz) + (next[part(1u) + b].xyz - next[part(1u) + a].xyz);
+            // Rows of the penalty sum to zero: uᵀGu = −½ Σ G_ab |u_a − u_b|².
+            elastic += (scale * ghosts[k]) * vec4(d, -0.25 * dot(d, d));
+        }
+    }
+    residual[a] = elastic + support + body;
+    sizes[a] = vec4(elastic.xyz, abs(elastic.w) + abs(support.w) + abs(body.w));
+    sizes[part(1u) + a] = support;
+}

@@ -1,0 +1,127 @@
+//! A bounded number of conjugate-gradient iterations, one workgroup per member; every scalar stays on the device. Ends in the
+//! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: 0 = a Newton direction
+//! (a negative curvature asks for the convex tangent), 1 = a derivative (it is an error).
+// use shared/mix
+// use shared/inertia
+// use shared/totals
+// use shared/precondition
+
+var<storage, read> block_rows: array<u32>;
+var<storage, read> columns: array<u32>;
+var<storage, read> values: array<f32>;
+var<storage, read> residual: array<vec4<f32>>;
+var<storage, read_write> direction: array<vec4<f32>>;
+var<storage, read_write> cg_rest: array<vec4<f32>>;
+var<storage, read_write> cg_along: array<vec4<f32>>;
+var<storage, read_write> cg_image: array<vec4<f32>>;
+var<storage, read_write> newton: array<Newton>;
+var<storage, read_write> health: array<Health>;
+
+// What rounding may leave of a derivative's right-hand side when the iterations run out.
+const ACCEPTABLE = 1e-4;
+
+@compute @workgroup_size(256)
+fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+              @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, 0u, 1u, 1u);
+    if !p.runs {
+        return;
+    }
+    let m = members[p.member];
+    let mix = mix_of(m);
+    var n = newton[p.member];
+    workgroupBarrier();
+    if n.stage != WANTS_SOLVE {
+        return;
+    }
+    var ended = false;
+    var negative = false;
+    for (var iteration = 0u; iteration < shape.chunk; iteration++) {
+        storageBarrier();
+        var curvature = vec4(0.0);
+        for (var i = local; i < shape.nodes; i += 256u) {
+            var q = (mix.inertia * node_mass(m, i)) * cg_along[at_node(p.member, i)].xyz;
+            for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
+                let x = cg_along[at_node(p.member, columns[k])].xyz;
+                let v = (p.member * shape.blocks + k) * 9u;
+                q += vec3(
+                    values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
+                    values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
+                    values[v + 6u] * x.x + values[v + 7u] * x.y + values[v + 8u] * x.z,
+                );
+            }
+            for (var s = 0u; s < shape.masses; s++) {
+                let corner = mass_corner(s, i);
+                if corner < 8u {
+                    var x = vec3(0.0);
+                    for (var j = 0u; j < 8u; j++) {
+                        x += mass_sites[s].weights[j] * cg_along[at_node(p.member, mass_sites[s].nodes[j])].xyz;
+                    }
+                    q += (mix.inertia * mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner]) * x;
+                }
+            }
+            let a = at_node(p.member, i);
+            cg_image[a] = vec4(q, 0.0);
+            curvature.x += dot(cg_along[a].xyz, q);
+        }
+        let bend = total(local, curvature).x;
+        n.cg += 1u;
+        if !(bend > 0.0) {
+            negative = true;
+            break;
+        }
+        let alpha = n.rz / bend;
+        var left = vec4(0.0);
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            direction[a] += alpha * cg_along[a];
+            let r = cg_rest[a].xyz - alpha * cg_image[a].xyz;
+            cg_rest[a] = vec4(r, 0.0);
+            left.x += dot(r, scaled(a, r));
+        }
+        let rz = total(local, left).x;
+        let beta = rz / n.rz;
+        n.rz = rz;
+        if !(sqrt(max(rz, 0.0)) > n.goal) || n.cg >= shape.most {
+            ended = true;
+            break;
+        }
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            cg_along[a] = vec4(scaled(a, cg_rest[a].xyz), 0.0) + beta * cg_along[a];
+        }
+    }
+    var broken = 0u;
+    if negative {
+        n.total += n.cg;
+        n.stage = WANTS_MATRIX;
+        if call.extra == 1u || n.convex == 1u {
+            broken = INDEFINITE;
+        }
+        n.convex = 1u;
+    }
+    if ended {
+        n.total += n.cg;
+        n.stage = select(WANTS_TRIAL, IDLE, call.extra == 1u);
+        n.length = 1.0;
+        let relative = sqrt(max(n.rz, 0.0)) / n.norm;
+        // A poor Newton direction is the line search's business.
+        let enough = select(0.5, ACCEPTABLE, call.extra == 1u);
+        if !(relative <= enough) {
+            broken = UNSOLVED;
+        }
+        var slope = vec4(0.0);
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            slope.x += dot(residual[a].xyz, direction[a].xyz);
+        }
+        n.slope = total(local, slope).x;
+    }
+    if local == 0u {
+        if broken != 0u {
+            n.stage = IDLE;
+            health[p.member] = Health(broken, call.step + call.mode, vec2(sqrt(max(n.rz, 0.0)) / n.norm, f32(n.cg)));
+        }
+        newton[p.member] = n;
+    }
+}

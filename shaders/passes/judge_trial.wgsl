@@ -1,0 +1,79 @@
+//! Judges a trial of the line search: takes it where it halves the residual or lowers the potential enough (Armijo 1966), else
+//! halves the step. A taken trial becomes the new increment.
+// use shared/grid
+// use shared/totals
+// use shared/precondition
+
+var<storage, read> residual: array<vec4<f32>>;
+var<storage, read> sizes: array<vec4<f32>>;
+var<storage, read> trial: array<vec4<f32>>;
+var<storage, read_write> increment: array<vec4<f32>>;
+var<storage, read_write> newton: array<Newton>;
+
+// A step shorter than this is taken whatever it brings.
+const MOST_TRIALS = 12u;
+
+@compute @workgroup_size(256)
+fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, 0u, 1u, 1u);
+    if !p.runs {
+        return;
+    }
+    var n = newton[p.member];
+    workgroupBarrier();
+    let first = n.length == 0.0;
+    var state = vec4(0.0);
+    for (var i = local; i < shape.nodes; i += 256u) {
+        let a = at_node(p.member, i);
+        let r = residual[a];
+        var squared = 0.0;
+        if !first {
+            squared = dot(r.xyz, scaled(a, r.xyz));
+        }
+        state += vec4(squared, r.w, sizes[a].w, 0.0);
+    }
+    let s = total(local, state);
+    let after = sqrt(max(s.x, 0.0));
+    var taken = first;
+    if !first {
+        // Close to the solution the change drowns in rounding of the nodes' shares; then the step is as good as any.
+        let rounding = 1e-7 * (n.shares + s.z);
+        let lower = s.y <= n.potential + 1e-4 * n.length * n.slope + rounding;
+        taken = (n.length == 1.0 && after <= 0.5 * n.norm) || lower || n.trial >= MOST_TRIALS;
+        if !(s.x <= 3e38 && abs(s.y) <= 3e38) {
+            taken = n.trial >= MOST_TRIALS;
+        }
+    }
+    if !taken {
+        n.length *= 0.5;
+        n.trial += 1u;
+    } else {
+        n.potential = s.y;
+        n.shares = s.z;
+        n.stage = WANTS_MATRIX;
+        if !first {
+            n.iteration += 1u;
+            n.convex = 0u;
+            let ratio = after / n.norm;
+            // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
+            n.forcing = clamp(0.9 * ratio * ratio, 1e-3, 0.1);
+            let goal = max(shape.tolerance * n.scale, n.floor);
+            // A full step that no longer halves a residual this small has met rounding.
+            let stuck = n.length == 1.0 && after > 0.5 * n.norm && after <= 20.0 * goal;
+            if after <= goal || stuck {
+                n.stage = IDLE;
+            }
+            n.norm = after;
+        }
+    }
+    if local == 0u {
+        newton[p.member] = n;
+    }
+    if taken {
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            increment[a] = trial[a];
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Lists who takes part in what comes next (section 0: all that are well; 1, 2, 3: those that want a matrix, a solve, a trial)
+//! and writes the sizes of the dispatches for each list, so that work that nobody wants shrinks to nothing.
+// use shared/structs
+
+var<uniform> shape: Shape;
+var<storage, read_write> roster: array<u32>;
+var<storage, read_write> arguments: array<u32>;
+var<storage, read> newton: array<Newton>;
+var<storage, read> health: array<Health>;
+
+const SECTIONS = 4u;
+const KINDS = 6u;
+const WIDEST = 65535u;
+
+// Workgroups of one member, by what the items are: one, nodes, cells, blocks, patches, clamp cells.
+fn groups_of(kind: u32) -> u32 {
+    switch kind {
+        case 1u: { return (shape.nodes + 63u) / 64u; }
+        case 2u: { return (shape.cells + 7u) / 8u; }
+        case 3u: { return (shape.blocks + 63u) / 64u; }
+        case 4u: { return (shape.patches + 63u) / 64u; }
+        case 5u: { return (shape.holds + 7u) / 8u; }
+        default: { return 1u; }
+    }
+}
+
+@compute @workgroup_size(4)
+fn list_members(@builtin(local_invocation_index) section: u32) {
+    let start = section * (shape.members + 1u);
+    var count = 0u;
+    for (var b = 0u; b < shape.members; b++) {
+        if health[b].code == WELL && (section == 0u || newton[b].stage == section) {
+            count += 1u;
+            roster[start + count] = b;
+        }
+    }
+    roster[start] = count;
+    for (var kind = 0u; kind < KINDS; kind++) {
+        let total = count * groups_of(kind);
+        let at = (section * KINDS + kind) * 3u;
+        arguments[at] = min(total, WIDEST);
+        arguments[at + 1u] = (total + WIDEST - 1u) / WIDEST;
+        arguments[at + 2u] = 1u;
+    }
+}

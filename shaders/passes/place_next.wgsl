@@ -1,0 +1,32 @@
+//! Puts the new state where the next trial is: free flight plus the increment, moved along the direction. The displacement is
+//! kept as a multiple of the quantum and a rest, so that a long fall costs the cells no accuracy.
+// use shared/mix
+
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read_write> next: array<vec4<f32>>;
+var<storage, read> increment: array<vec4<f32>>;
+var<storage, read> direction: array<vec4<f32>>;
+var<storage, read_write> trial: array<vec4<f32>>;
+var<storage, read> newton: array<Newton>;
+
+@compute @workgroup_size(64)
+fn place_next(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+              @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.nodes, 64u);
+    if !p.live {
+        return;
+    }
+    let a = at_node(p.member, p.item);
+    let w = increment[a].xyz + newton[p.member].length * direction[a].xyz;
+    trial[a] = vec4(w, 0.0);
+    var whole = vec3(0.0);
+    var rest = w;
+    if call.mode != 0u {
+        let v = now[part(2u) + a].xyz;
+        whole = now[a].xyz;
+        rest = now[part(1u) + a].xyz + (shape.dt * v + (shape.theta * shape.dt * shape.dt * members[p.member].gravity.xyz + w));
+    }
+    let steps = round(rest / shape.quantum);
+    next[a] = vec4(whole + steps * shape.quantum, 0.0);
+    next[part(1u) + a] = vec4(rest - steps * shape.quantum, 0.0);
+}

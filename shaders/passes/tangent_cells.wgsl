@@ -1,0 +1,76 @@
+//! What a cell's tangent H_ij = R (s K_ij + Ω_i D_jᵀ + D_i Ω_jᵀ) Rᵀ is made of, beside K: R, G⁻¹ and R D_i per corner
+//! (corotation.rs: D = B + ½QΩ − s(N − ½TΩ); without B and Q where the convex part is wanted). 30 vectors per cell: no 24 × 24
+//! matrix is ever stored.
+// use shared/cells
+
+var<storage, read> next: array<vec4<f32>>;
+var<storage, read> old_turn: array<vec4<f32>>;
+var<storage, read> old_stress: array<vec4<f32>>;
+var<storage, read> newton: array<Newton>;
+var<storage, read_write> tangents: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    lanes_start(local);
+    let p = find_place(group, groups, local / 8u, shape.cells, 8u);
+    let e = min(p.item, shape.cells - 1u);
+    let corner = local % 8u;
+    let sign = sign_of(corner);
+    let cell = cells[e];
+    let m = members[p.member];
+    let mix = mix_of(m);
+    let a = at_node(p.member, cell.nodes[corner]);
+    let o = at_node(p.member, cell.nodes[0]);
+    let d = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
+    let scale = mix.on_new * m.young;
+    let matrix = matrix_at(m.slot, 0u, cell.kind);
+    var pose: Pose;
+    var half = mat3x3<f32>();
+    if is_lagged() {
+        pose = held_pose(old_turn[p.member * shape.cells + e], d, sign);
+    } else {
+        pose = free_pose(d, sign);
+    }
+    // N_i: column m is Σ_j K_ij (e_m × z_j).
+    let nx = stiff(matrix, corner, vec3(0.0, -pose.z.z, pose.z.y));
+    let ny = stiff(matrix, corner, vec3(pose.z.z, 0.0, -pose.z.x));
+    let nz = stiff(matrix, corner, vec3(-pose.z.y, pose.z.x, 0.0));
+    // T = ZᵀKZ: rows Σ z_i × N_i.
+    let tx = sum8(cross(pose.z, nx));
+    let ty = sum8(cross(pose.z, ny));
+    let tz = sum8(cross(pose.z, nz));
+    var q = mat3x3(tx, ty, tz) * scale;
+    var before = vec3(0.0);
+    if call.mode != 0u {
+        before = mix.on_old * old_stress[(p.member * shape.cells + e) * 8u + corner].xyz;
+    }
+    let y = centred(scale * stiff(matrix, corner, pose.q) + before);
+    let f = force_body(pose, y, sign);
+    let bend = spin_stiffness(pose, y);
+    half = mat3x3(nx, ny, nz) * -scale;
+    if newton[p.member].convex == 0u {
+        half -= cross_matrix(f);
+        q += bend;
+    }
+    // Ω_i = −[b_i]× G⁻¹.
+    let omega = cross_matrix(sign * (-0.25 / shape.h)) * pose.g;
+    half += omega * (q * 0.5);
+    // A rotation that is given does not answer to the corners.
+    if is_lagged() {
+        half = mat3x3<f32>();
+    }
+    let turned = pose.r * half;
+    if p.live {
+        let at = (p.member * shape.cells + e) * 30u;
+        for (var c = 0u; c < 3u; c++) {
+            tangents[at + 6u + 3u * corner + c] = vec4(turned[c], 0.0);
+        }
+        if corner == 0u {
+            for (var c = 0u; c < 3u; c++) {
+                tangents[at + c] = vec4(pose.r[c], 0.0);
+                tangents[at + 3u + c] = vec4(pose.g[c], 0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What the planes do to every surface patch: the vector that corner forces take with the minus sign and their shape function,
+//! and the patch's stiffness. With call.extra > 0 the vector belongs to ∂r/∂p instead: 1 = Young's modulus, and for plane
+//! call.extra / 8: 2 = height, 3 = θ, 4 = φ; 5 = nothing.
+// use shared/mix
+// use shared/contact
+
+var<storage, read> next: array<vec4<f32>>;
+var<storage, read> cells: array<Cell>;
+var<storage, read> patches: array<Patch>;
+var<storage, read> planes: array<Plane>;
+var<storage, read_write> touches: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.patches, 64u);
+    if !p.live {
+        return;
+    }
+    let site = patches[p.item];
+    var whole = site.point.xyz;
+    var rest = vec3(0.0);
+    for (var i = 0u; i < 8u; i++) {
+        let a = at_node(p.member, cells[site.cell].nodes[i]);
+        whole += site.weights[i] * next[a].xyz;
+        rest += site.weights[i] * next[part(1u) + a].xyz;
+    }
+    let area = site.point.w;
+    let width = contact_width * shape.h;
+    let what = call.extra % 8u;
+    var vector = vec3(0.0);
+    var energy = 0.0;
+    var diagonal = vec3(0.0);
+    var mixed = vec3(0.0);
+    for (var k = 0u; k < shape.planes; k++) {
+        if what >= 2u && k != call.extra / 8u {
+            continue;
+        }
+        let plane = planes[p.member * shape.planes + k];
+        let n = plane.normal.xyz;
+        let gap = (dot(n, whole) - plane.normal.w) + dot(n, rest);
+        let law = contact_law(gap, width);
+        let s = area * plane.stiffness;
+        switch what {
+            case 1u: { vector += (s * law.pressure * plane.scales / members[p.member].young) * n; }
+            case 2u: { vector -= (s * law.slope) * n; }
+            case 3u: { vector += s * (law.slope * dot(plane.by_theta.xyz, whole + rest) * n + law.pressure * plane.by_theta.xyz); }
+            case 4u: { vector += s * (law.slope * dot(plane.by_phi.xyz, whole + rest) * n + law.pressure * plane.by_phi.xyz); }
+            case 5u: {}
+            default: {
+                vector += (s * law.pressure) * n;
+                energy += s * law.energy;
+                diagonal -= (s * law.slope) * (n * n);
+                mixed -= (s * law.slope) * (n.xxy * n.yzz);
+            }
+        }
+    }
+    let at = 3u * (p.member * shape.patches + p.item);
+    touches[at] = vec4(vector, energy);
+    if what == 0u {
+        touches[at + 1u] = vec4(diagonal, 0.0);
+        touches[at + 2u] = vec4(mixed, 0.0);
+    }
+}

@@ -1,0 +1,35 @@
+//! Clamp cells: how far their corners are from where the clamp wants them, and the force and product of Nitsche's matrix.
+// use shared/lanes
+// use shared/mix
+
+var<storage, read> cells: array<Cell>;
+// (cell, clamp) of each clamp cell, ordered by cell.
+var<storage, read> holds: array<vec2<u32>>;
+// [slot][K, dK/dν][clamp cell][24 · 24].
+var<storage, read> hold_elements: array<f32>;
+// [B][steps + 1][clamps]: poses at the start and at the end of every step.
+var<storage, read> poses: array<ClampPose>;
+var<storage, read> rest: array<vec4<f32>>;
+
+fn pose_at(member: u32, instant: u32, clamp_number: u32) -> ClampPose {
+    return poses[(member * (shape.steps + 1u) + instant) * shape.clamps + clamp_number];
+}
+
+fn hold_stiff(slot: u32, which: u32, hold: u32, corner: u32, v: vec3<f32>) -> vec3<f32> {
+    publish(v);
+    let start = ((slot * 2u + which) * shape.holds + hold) * 576u + 3u * corner;
+    var sum = vec3(0.0);
+    for (var j = 0u; j < 8u; j++) {
+        let a = start + 72u * j;
+        let w = published(j);
+        sum += w.x * vec3(hold_elements[a], hold_elements[a + 1u], hold_elements[a + 2u])
+            + w.y * vec3(hold_elements[a + 24u], hold_elements[a + 25u], hold_elements[a + 26u])
+            + w.z * vec3(hold_elements[a + 48u], hold_elements[a + 49u], hold_elements[a + 50u]);
+    }
+    return sum;
+}
+
+// Aᵀ(x − b) − X without cancellation.
+fn deviation(pose: ClampPose, u: vec3<f32>, x: vec3<f32>) -> vec3<f32> {
+    return transpose(pose.turn) * (u - pose.shift.xyz) + transpose(pose.excess) * x;
+}

@@ -1,0 +1,13 @@
+//! Kinds of parameters, as crates/palpate-gpu/src/columns.rs numbers them.
+
+const YOUNGS_MODULUS = 0u;
+const POISSON_RATIO = 1u;
+const DENSITY = 2u;
+const MASS_DAMPING = 3u;
+const STIFFNESS_DAMPING = 4u;
+const GRAVITY = 5u;
+const VELOCITY = 6u;
+const ANGULAR_VELOCITY = 7u;
+const TIME_START = 8u;
+const PLANE = 9u;
+const POINT_MASS = 10u;
