@@ -5,4 +5,5 @@ mod contact;
 mod cut;
 mod effects_contact;
 mod effects_loads;
+mod effects_materials;
 mod free;

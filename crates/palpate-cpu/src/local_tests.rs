@@ -24,7 +24,9 @@ fn altering(rotation: RotationUpdate) -> Vec<Effect> {
     let make = |law: usize| {
         let mut effect = Effect::absent(law);
         for (value, p) in effect.values.iter_mut().zip(ALL[law].params) {
-            *value = value.map(|v| (v + 0.3 * p.typical).clamp(p.lower, p.upper));
+            // Cell laws three times stronger, to show beside the linear material at these strains.
+            let size = if matches!(ALL[law].site, Site::Cells(_)) { 3.0 } else { 0.3 };
+            *value = value.map(|v| (v + size * p.typical).clamp(p.lower, p.upper));
         }
         effect
     };

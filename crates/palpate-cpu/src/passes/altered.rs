@@ -4,6 +4,7 @@ use crate::linear::vector::Nodes;
 use crate::passes::balance::{Balance, States};
 use crate::passes::cells::{Elasticity, Matrices};
 use crate::passes::clamps;
+use crate::passes::materials::{CellActing, Materials, cell_laws};
 use crate::passes::supports;
 use glam::DVec3;
 use palpate_model::changes::{self, Changes};
@@ -21,6 +22,8 @@ pub struct Altered {
     pub rest: Option<Vec<CellPose>>,
     /// Clamp matrices with compliant layers.
     pub grips: Option<Vec<Vec<CellMatrices>>>,
+    /// Laws of cells.
+    pub laws: Vec<CellActing>,
 }
 
 impl Altered {
@@ -32,7 +35,7 @@ impl Altered {
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
             body.cells.iter().map(|c| CellPose::new(&c.nodes.map(at), h)).collect()
         });
-        Altered { changes, rest, grips: clamps::grips(plan, physics, elements) }
+        Altered { changes, rest, grips: clamps::grips(plan, physics, elements), laws: cell_laws(plan, physics) }
     }
 }
 
@@ -44,6 +47,9 @@ impl<'a> Balance<'a> {
         if let Some(slope) = changes.modulus_slope(plan, physics, effect, slot) {
             let elasticity = Elasticity { modulus: Some(&slope), ..self.elasticity() };
             elasticity.force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, out);
+            if let Some(m) = self.materials() {
+                Materials { elasticity, ..m }.force(self.young(), s.u1, s.u0, out);
+            }
             self.each_clamp(s, |c, i, pose, weight, u| c.modulus_column(i, &slope, pose, weight * self.young(), u, out));
         }
         if let Some(slope) = changes.density_slope(plan, physics, effect, slot) {
@@ -58,13 +64,22 @@ impl<'a> Balance<'a> {
         if let Some(slope) = changes::aging_slope(plan, physics, self.elapsed(), effect, slot) {
             let young = physics.youngs_modulus * slope;
             self.elasticity().force(&self.mix, Matrices::Stiffness, young, s.u1, s.u0, out);
+            if let Some(m) = self.materials() {
+                m.force(young, s.u1, s.u0, out);
+            }
             self.each_clamp(s, |c, i, pose, weight, u| c.force(i, Matrices::Stiffness, pose, weight * young, u, out));
         }
         if let Some(dw) = changes::rest_slope(plan, physics, effect, slot) {
             self.elasticity().by_rest(&self.mix, s.u1, s.u0, &dw, out);
+            if let Some(m) = self.materials() {
+                m.rest_column(s.u1, s.u0, &dw, out);
+            }
             let scale = -self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.old);
             supports::ghost_product(&plan.body, scale, &dw, out);
             self.each_clamp(s, |c, i, pose, weight, _| c.rest_column(i, pose.0, weight * self.young(), &dw, out));
+        }
+        if let Some(m) = self.materials() {
+            m.own_column(effect, slot, s.u1, s.u0, out);
         }
         if self.altered.grips.is_some() {
             for (weight, time, u) in self.instants(s) {
@@ -74,6 +89,16 @@ impl<'a> Balance<'a> {
                 }
             }
         }
+    }
+
+    /// The laws of cells, if there are any.
+    pub(super) fn materials(&self) -> Option<Materials<'a>> {
+        (!self.altered.laws.is_empty()).then(|| Materials {
+            elasticity: self.elasticity(),
+            laws: &self.altered.laws,
+            mix: self.mix,
+            rate: self.inertia.map_or(0.0, |t| t.rate),
+        })
     }
 
     /// Visits every clamp at both instants: clamp number, pose, weight in time and displacement.

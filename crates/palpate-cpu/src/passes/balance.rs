@@ -166,6 +166,9 @@ impl<'a> Balance<'a> {
     pub fn residual(&self, s: States<'a>) -> Nodes {
         let mut r = zeros(s.u1.len());
         self.elasticity().force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut r);
+        if let Some(m) = self.materials() {
+            m.force(self.young(), s.u1, s.u0, &mut r);
+        }
         self.ghost(self.physics.youngs_modulus * self.elements.shear[0], &self.mix, s, &mut r);
         self.supports(s, &mut r);
         self.bodily(s, &mut r);
@@ -224,6 +227,7 @@ impl<'a> Balance<'a> {
     pub fn potential(&self, s: States<'a>) -> f64 {
         let young = self.physics.youngs_modulus;
         let mut w = self.elasticity().potential(&self.mix, s.u1, s.u0);
+        w += self.materials().map_or(0.0, |m| m.potential(s.u1, s.u0));
         if !self.plan.body.ghosts.is_empty() {
             let scale = self.ghost_scale(young * self.elements.shear[0]);
             let mut gu = zeros(s.u1.len());
@@ -263,7 +267,7 @@ impl<'a> Balance<'a> {
     pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
         let (plan, pattern) = (self.plan, self.pattern);
         matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
-        let elasticity = self.elasticity();
+        let (elasticity, materials) = (self.elasticity(), self.materials());
         let mut slices = Vec::new();
         let mut rest = matrix.values.as_mut_slice();
         for part in &pattern.parts {
@@ -281,6 +285,9 @@ impl<'a> Balance<'a> {
                     continue;
                 }
                 elasticity.tangent(&self.mix, e, s.u1, s.u0, convex, &mut h);
+                if let Some(m) = &materials {
+                    m.add_tangent(e, s.u1, s.u0, convex, &mut h);
+                }
                 for i in (0..8).filter(|&i| inside[i]) {
                     for j in 0..8 {
                         values[self.places.cells[e][8 * i + j] as usize - base] += block(&h, i, j);
@@ -344,6 +351,9 @@ impl<'a> Balance<'a> {
     pub fn by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
         let mut out = self.by_old_linear(du0, dv0);
         self.elasticity().by_old(&self.mix, s.u1, s.u0, du0, &mut out);
+        if let Some(m) = self.materials() {
+            m.by_old(s.u1, s.u0, du0, &mut out);
+        }
         self.add_effects_by_old(s, du0, dv0, &mut out);
         out
     }
@@ -353,6 +363,9 @@ impl<'a> Balance<'a> {
         let zero = zeros(z.len());
         let mut to_u = self.by_old_linear(z, &zero);
         self.elasticity().by_old_transposed(&self.mix, s.u1, s.u0, z, &mut to_u);
+        if let Some(m) = self.materials() {
+            m.by_old_transposed(s.u1, s.u0, z, &mut to_u);
+        }
         let mut to_v = self.by_old_linear(&zero, z);
         self.add_effects_transposed(s, z, &mut to_u, &mut to_v);
         (to_u, to_v)
@@ -395,6 +408,11 @@ impl<'a> Balance<'a> {
                     _ => (Matrices::ByPoisson, self.young(), young * elements.shear[1]),
                 };
                 self.elasticity().force(&self.mix, which, factor, s.u1, s.u0, &mut out);
+                match (self.materials(), which) {
+                    (Some(m), Matrices::Stiffness) => m.force(factor, s.u1, s.u0, &mut out),
+                    (Some(m), Matrices::ByPoisson) => m.poisson_column(s.u1, s.u0, &mut out),
+                    (None, _) => {}
+                }
                 self.ghost(shear, &self.mix, s, &mut out);
                 self.clamps(which, factor, 0.0, s, &mut out);
                 if which == Matrices::Stiffness {

@@ -41,7 +41,7 @@ pub fn corners(body: &Body, e: usize, u: &[DVec3]) -> Corners {
     body.cells[e].nodes.map(|n| body.nodes[n as usize] + u[n as usize])
 }
 
-fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
+pub(super) fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
     body.cells[e].nodes.map(|n| v[n as usize])
 }
 
@@ -152,8 +152,24 @@ impl<'a> Elasticity<'a> {
         poses
     }
 
+    /// Stiffness of a cell at E = 1 Pa.
+    pub(super) fn stiffness(&self, e: usize) -> &'a M24 {
+        self.matrix(e, Matrices::Stiffness)
+    }
+
+    /// Its derivative by Poisson's ratio.
+    pub(super) fn by_poisson(&self, e: usize) -> &'a M24 {
+        self.matrix(e, Matrices::ByPoisson)
+    }
+
+    /// A cell in both states, for laws of cells (converged rotation only).
+    pub(super) fn both(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> (CellPose, Option<CellPose>) {
+        let poses = self.poses(mix, e, u1, u0);
+        (poses.new, poses.old)
+    }
+
     /// Factor on Young's modulus in a cell.
-    fn factor(&self, e: usize) -> f64 {
+    pub(super) fn factor(&self, e: usize) -> f64 {
         self.modulus.map_or(1.0, |m| m[e])
     }
 
@@ -163,7 +179,7 @@ impl<'a> Elasticity<'a> {
     }
 
     /// Adds per-cell corner vectors to nodes, always in the same order.
-    fn gather(&self, cell: impl Fn(usize) -> Corners + Sync + Send, out: &mut [DVec3]) {
+    pub(super) fn gather(&self, cell: impl Fn(usize) -> Corners + Sync + Send, out: &mut [DVec3]) {
         let parts: Vec<Corners> = (0..self.body.cells.len()).into_par_iter().with_min_len(256).map(cell).collect();
         let p = self.pattern;
         let sum = |a: usize, v: &mut DVec3| {

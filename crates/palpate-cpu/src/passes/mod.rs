@@ -7,5 +7,6 @@ pub mod clamps;
 pub mod frames;
 pub mod markers;
 pub mod matching;
+pub mod materials;
 pub mod points;
 pub mod supports;

@@ -25,9 +25,13 @@ mod creep;
 mod density_gradient;
 mod density_inclusion;
 mod inclusion;
+mod power_law_viscosity;
 mod rest_shape;
 mod stiffness_gradient;
 mod stiffness_modes;
+mod strain_stiffening;
+mod structural_damping;
+mod transverse_anisotropy;
 mod two_part_stiffness;
 
 use crate::changes::HOLD;
@@ -150,6 +154,10 @@ pub static ALL: &[Law] = &[
     inclusion::LAW,
     stiffness_modes::LAW,
     creep::LAW,
+    strain_stiffening::LAW,
+    transverse_anisotropy::LAW,
+    power_law_viscosity::LAW,
+    structural_damping::LAW,
     density_gradient::LAW,
     density_inclusion::LAW,
     rest_shape::LAW,
