@@ -52,6 +52,13 @@ pub struct AdapterReport {
     pub refusal: Option<GpuError>,
 }
 
+impl AdapterReport {
+    /// True for adapters that compute on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.kind == wgpu::DeviceType::Cpu
+    }
+}
+
 /// Features without which no kernel runs: small arguments of a dispatch.
 const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 /// Features that are used where they are.

@@ -3,36 +3,127 @@
 use crate::error::Error;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Rollout, Snapshot};
+use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBatch, Request, Rollout, Snapshot};
+use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
+use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 /// What computes the physics.
+///
+/// ```
+/// use palpate::{Backend, Experiment};
+///
+/// let scene = r#"
+///     format = "scene/1"
+///     [object]
+///     shape = { ball = { radius = 0.05, center = [0, 0, 0.3] } }
+///     cell_size = 0.05
+///     [material]
+///     density = 1000.0
+///     youngs_modulus = 2.0e4
+///     poisson_ratio = 0.4
+///     [time]
+///     step = 0.01
+///     steps = 2
+/// "#;
+/// let experiment = Experiment::from_toml(scene, "ball.toml")?;
+/// // What `auto` picks for this body, and why: the CPU, unless a graphics processor was measured to be faster.
+/// let (backend, reason) = Backend::Auto.resolve(experiment.plan(), 1);
+/// assert_ne!(backend, Backend::Auto);
+/// println!("{}: {reason}", backend.name());
+/// let simulation = experiment.simulate(backend)?;
+/// assert_eq!(simulation.snapshots.len(), 3);
+/// # Ok::<(), palpate::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Backend {
     /// The reference in double precision.
     Cpu,
-    /// The fastest that this build and machine have.
+    /// WGSL kernels on the graphics adapter that `PALPATE_ADAPTER` names (part of its name), else on the best one.
+    Gpu,
+    /// The faster of the two for the body at hand.
     #[default]
     Auto,
 }
 
+/// Steps that `auto` times on both backends.
+const TRIAL_STEPS: usize = 2;
+
+/// The device of this process: kernels are compiled once.
+fn gpu() -> Result<GpuBackend, GpuError> {
+    static OPEN: Mutex<Option<Arc<Gpu>>> = Mutex::new(None);
+    let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+    if open.is_none() {
+        *open = Some(Gpu::open(&Choice::from_env())?);
+    }
+    Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
+}
+
+fn refused(e: &GpuError) -> Error {
+    Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
+}
+
+/// Seconds of a forward step of `members` simulations; the first round warms up.
+fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, members: usize) -> Option<f64> {
+    let mut plan =
+        Plan { observation: Arc::new(Observation { frames: Vec::new(), ..(*plan.observation).clone() }), ..plan.clone() };
+    plan.clock.steps = plan.clock.steps.min(TRIAL_STEPS);
+    let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
+    let mut rollout = Rollout::new(backend, &plan, members).ok()?;
+    rollout.evaluate(&rows, &Request::default());
+    let clock = Instant::now();
+    let done = rollout.evaluate(&rows, &Request::default());
+    let seconds = clock.elapsed().as_secs_f64() / plan.clock.steps.max(1) as f64;
+    done.iter().all(|e| e.failure.is_none()).then_some(seconds)
+}
+
 impl Backend {
-    /// Name of the backend that is really used, for result files.
-    pub fn resolved(self) -> &'static str {
+    /// Name for result files and messages.
+    pub fn name(self) -> &'static str {
         match self {
-            // The only one in this build; `auto` has nothing to choose from.
-            Backend::Cpu | Backend::Auto => "cpu",
+            Backend::Cpu => "cpu",
+            Backend::Gpu => "gpu",
+            Backend::Auto => "auto",
+        }
+    }
+
+    /// What `auto` means for a plan in batches of `members`, and the reason: a graphics processor is taken where a step of this body
+    /// takes less time on it than on the CPU, both measured here. Software adapters are never faster and not tried, unless
+    /// `PALPATE_ADAPTER` names one.
+    pub fn resolve(self, plan: &Plan, members: usize) -> (Backend, String) {
+        if self != Backend::Auto {
+            return (self, "asked for".into());
+        }
+        let named = Choice::from_env() != Choice::Auto;
+        if !named && !palpate_gpu::adapters().iter().any(|a| a.refusal.is_none() && !a.is_software()) {
+            return (Backend::Cpu, "there is no graphics processor".into());
+        }
+        let device = match gpu() {
+            Ok(g) => g,
+            Err(e) => return (Backend::Cpu, e.to_string()),
+        };
+        let name = device.name();
+        let cpu = time_step(CpuBackend, plan, members);
+        let gpu = time_step(device, plan, members);
+        let ms = |s: f64| format!("{:.2} ms", s * 1e3);
+        match (cpu, gpu) {
+            (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("a step takes {} on {name}, {} on the CPU", ms(g), ms(c))),
+            (Some(c), Some(g)) => (Backend::Cpu, format!("a step takes {}, {} on {name}", ms(c), ms(g))),
+            _ => (Backend::Cpu, format!("{name} cannot compute this body")),
         }
     }
 
     /// A plan as a function of θ, for up to `members` simulations at once.
     ///
     /// # Errors
-    /// The backend refuses the plan.
+    /// There is no usable adapter, or the backend refuses the plan.
     pub fn evaluator(self, plan: &Plan, members: usize) -> Result<Box<dyn Evaluate>, Error> {
-        match self {
-            Backend::Cpu | Backend::Auto => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?)),
+        match self.resolve(plan, members).0 {
+            Backend::Gpu => Ok(Box::new(Rollout::new(gpu().map_err(|e| refused(&e))?, plan, members)?)),
+            _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?)),
         }
     }
 
@@ -40,16 +131,22 @@ impl Backend {
     /// end the simulation.
     ///
     /// # Errors
-    /// The backend refuses the plan, or the simulation fails.
+    /// There is no usable adapter, the backend refuses the plan, or the simulation fails.
     pub fn visit(
         self,
         plan: &Plan,
         theta: &[f64],
         visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
-        match self {
-            Backend::Cpu | Backend::Auto => Ok(Rollout::new(CpuBackend, plan, 1)?.visit(theta, visit)?),
+        match self.resolve(plan, 1).0 {
+            Backend::Gpu => Ok(Rollout::new(gpu().map_err(|e| refused(&e))?, plan, 1)?.visit(theta, visit)?),
+            _ => Ok(Rollout::new(CpuBackend, plan, 1)?.visit(theta, visit)?),
         }
+    }
+
+    /// An error where this backend was asked for and cannot be had.
+    pub(crate) fn check(self) -> Result<(), Error> {
+        if self == Backend::Gpu { gpu().map(|_| ()).map_err(|e| refused(&e)) } else { Ok(()) }
     }
 }
 

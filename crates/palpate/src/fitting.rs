@@ -138,11 +138,12 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         errors: errors(experiments),
         ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
     };
+    let backend = options.backend.resolve(first.plan(), settings.starts.min(16)).0;
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
     let mut scenes = Vec::new();
     for e in experiments {
         let members = batch(e.plan(), settings.starts, free.len());
-        let inner = options.backend.evaluator(e.plan(), members)?;
+        let inner = backend.evaluator(e.plan(), members)?;
         scenes.push(FitScene {
             name: e.scene().path.display().to_string(),
             fingerprint: fingerprint(e.plan()),
@@ -152,7 +153,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     }
     let mut problem = Problem::new(scenes, free).map_err(|e| Error::Input(format!("{}: {e}", first.scene().path.display())))?;
     let threads = options.threads.unwrap_or(spec.threads);
-    let (backend, interrupt) = (options.backend, options.interrupt.clone());
+    let interrupt = options.interrupt.clone();
     let mut history = Vec::new();
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
     let mut told = options.on_iteration.take();
@@ -178,7 +179,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     warnings.extend(result.warnings.iter().cloned());
     let interrupted = result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
-        backend: backend.resolved(),
+        backend: backend.name(),
         free: numbers,
         optimizer: settings.optimizer,
         result,

@@ -3,6 +3,7 @@
 use crate::engine::Backend;
 use crate::error::Error;
 use clap::{Args, ValueEnum};
+use palpate_model::plan::Plan;
 use std::path::{Path, PathBuf};
 
 /// What `--backend` may say.
@@ -10,22 +11,31 @@ use std::path::{Path, PathBuf};
 pub enum BackendName {
     /// Reference in double precision
     Cpu,
-    /// Not in this build
+    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER=name chooses one)
     Gpu,
-    /// The fastest available
+    /// The faster one, as measured
     Auto,
 }
 
 impl BackendName {
-    /// The backend, and a line about the choice where it was left open.
-    pub fn choose(self) -> Result<(Backend, Option<String>), Error> {
+    /// The backend, left open where it is `auto`.
+    fn backend(self) -> Backend {
         match self {
-            BackendName::Cpu => Ok((Backend::Cpu, None)),
-            BackendName::Auto => Ok((Backend::Auto, Some(format!("backend: {} (auto)", Backend::Auto.resolved())))),
-            BackendName::Gpu => {
-                Err(Error::Input("--backend gpu: this build has only the cpu backend; allowed are cpu and auto".into()))
-            }
+            BackendName::Cpu => Backend::Cpu,
+            BackendName::Gpu => Backend::Gpu,
+            BackendName::Auto => Backend::Auto,
         }
+    }
+
+    /// The backend for a plan in batches of `members`, and a line about the choice where it was left open.
+    ///
+    /// # Errors
+    /// The GPU was asked for and there is no usable adapter.
+    pub fn choose(self, plan: &Plan, members: usize) -> Result<(Backend, Option<String>), Error> {
+        let asked = self.backend();
+        asked.check()?;
+        let (backend, reason) = asked.resolve(plan, members);
+        Ok((backend, (asked == Backend::Auto).then(|| format!("backend: {} (auto: {reason})", backend.name()))))
     }
 }
 

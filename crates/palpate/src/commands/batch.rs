@@ -1,8 +1,7 @@
 //! `palpate batch`: many recordings, one after the other, none of which can stop the rest.
 
 use crate::cli::{Console, INTERRUPTED};
-use crate::commands::fit::{Choices, rounds, run_in};
-use crate::engine::Backend;
+use crate::commands::fit::{Choices, choose, rounds, run_in};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::fingerprint;
@@ -135,7 +134,7 @@ fn finished(out: &Path, name: &str, fingerprint: &str) -> Option<Value> {
 }
 
 /// Fits one scene; whatever goes wrong ends up in the row.
-fn one(a: &Arguments, backend: Backend, scene: &Path, name: &str, label: &str, console: &mut Console) -> Row {
+fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Console) -> Row {
     let clock = Instant::now();
     let mut row = Row {
         scene: scene.to_path_buf(),
@@ -158,11 +157,13 @@ fn one(a: &Arguments, backend: Backend, scene: &Path, name: &str, label: &str, c
         {
             return Ok(Some(result));
         }
+        let (backend, note) = choose(&a.choices, &experiment)?;
         let bar = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
         // The journal of another problem is of no use; it is moved aside with the results.
         let mark = folder.join(MARK);
+        note.iter().for_each(|n| quiet.note(n));
         let resume = a.resume && std::fs::read_to_string(&mark).is_ok_and(|m| m == row.fingerprint);
         make_folder(&folder)?;
         write_file(&mark, |w| w.write_all(row.fingerprint.as_bytes()))?;
@@ -216,20 +217,20 @@ fn hash(text: &str) -> u64 {
 }
 
 /// `summary.json`.
-fn summary(rows: &[Row], backend: Backend) -> Value {
+fn summary(rows: &[Row]) -> Value {
     let scenes: Vec<Value> = rows
         .iter()
         .map(|r| {
             json!({
                 "name": r.name, "scene": r.scene.display().to_string(), "status": r.status.name(), "message": r.message,
-                "seconds": r.seconds, "fingerprint": r.fingerprint, "parameters": r.result["parameters"],
+                "seconds": r.seconds, "backend": r.result["backend"], "fingerprint": r.fingerprint, "parameters": r.result["parameters"],
                 "cost": r.result["cost"]["final"], "residual": r.result["residual"],
             })
         })
         .collect();
     let count = |s: Status| rows.iter().filter(|r| r.status == s).count();
     json!({
-        "format": "batch/1", "backend": backend.resolved(), "scenes": scenes, "complete": count(Status::Complete),
+        "format": "batch/1", "scenes": scenes, "complete": count(Status::Complete),
         "bad_input": count(Status::BadInput), "failed": count(Status::Failed), "interrupted": count(Status::Interrupted),
     })
 }
@@ -266,9 +267,7 @@ fn table(summary: &Value) -> String {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let (backend, note) = a.choices.backend.choose()?;
     let scenes = scenes(&a.paths)?;
-    note.iter().for_each(|n| console.note(n));
     make_folder(&a.out)?;
     let names = names(&scenes);
     let mut rows: Vec<Row> = Vec::new();
@@ -278,11 +277,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             break;
         }
         let label = format!("{}/{} {name}", i + 1, scenes.len());
-        let row = one(a, backend, scene, name, &label, console);
+        let row = one(a, scene, name, &label, console);
         let told = if row.status == Status::Complete { String::new() } else { format!(": {}", row.message) };
         console.note(&format!("{label}: {} in {:.1} s{told}", row.status.name(), row.seconds));
         rows.push(row);
-        all = summary(&rows, backend);
+        all = summary(&rows);
         let text = serde_json::to_string_pretty(&all).map_err(|e| Error::write(&a.out, e))? + "\n";
         write_file(a.out.join("summary.json"), |w| w.write_all(text.as_bytes()))?;
         write_file(a.out.join("summary.csv"), |w| w.write_all(table(&all).as_bytes()))?;

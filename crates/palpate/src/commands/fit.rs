@@ -192,8 +192,8 @@ fn write_all(
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let (backend, note) = a.choices.backend.choose()?;
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
+    let (backend, note) = choose(&a.choices, &experiments[0])?;
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
     let bar = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
@@ -206,6 +206,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
     }
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
+}
+
+/// The backend for a fit of this experiment, which runs all starts at once.
+pub fn choose(a: &Choices, experiment: &Experiment) -> Result<(Backend, Option<String>), Error> {
+    let starts = a.starts.unwrap_or(experiment.scene().fit.as_ref().map_or(1, |f| f.starts as u64));
+    // More members than this change nothing in what is faster.
+    a.backend.choose(experiment.plan(), starts.min(16) as usize)
 }
 
 /// Iterations that a fit may take in all.

@@ -163,12 +163,12 @@ fn markers(path: &Path, experiment: &Experiment) -> Result<Vec<(String, DVec3)>,
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     check(a)?;
-    let (backend, note) = a.backend.choose()?;
     let cameras = cameras(&a.camera)?;
     if a.out.join("recording.toml").exists() && !a.force {
         return Err(Error::Input(format!("--out {}: a recording is already there; add --force to replace it", a.out.display())));
     }
     let coarse = Experiment::open_without_recording(&a.scene)?;
+    let (backend, note) = a.backend.choose(coarse.plan(), 1)?;
     console.warn(coarse.warnings());
     note.iter().for_each(|n| console.note(n));
     let observers = Observers {
@@ -194,7 +194,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let json = serde_json::json!({
             "format": "observation/1",
             "recording": a.out.display().to_string(),
-            "backend": backend.resolved(),
+            "backend": backend.name(),
             "cameras": recording.cameras.len(),
             "frames": observers.times.len(),
             "images": recording.frames.len(),

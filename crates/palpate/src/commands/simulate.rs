@@ -111,8 +111,8 @@ fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let (backend, note) = a.backend.choose()?;
     let experiment = Experiment::open_without_recording(&a.scene)?;
+    let (backend, note) = a.backend.choose(experiment.plan(), 1)?;
     console.warn(experiment.warnings());
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scene, "");
@@ -167,7 +167,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if !writer.series.is_empty() {
         palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
     }
-    report(console, &experiment, &folder, backend.resolved(), seconds, farthest, written, writer.files);
+    report(console, &experiment, &folder, backend.name(), seconds, farthest, written, writer.files);
     Ok(if interrupted { INTERRUPTED } else { 0 })
 }
 
