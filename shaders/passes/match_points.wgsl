@@ -72,7 +72,7 @@ fn match_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                     continue;
                 }
                 // Cameras are counted from the body's origin, points from the frame's.
-                let line = (p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - cameras[bitcast<u32>(p.w)].xyz;
+                let line = (p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - cameras[u32(p.w)].xyz;
                 let size = length(line);
                 let key = key_of(cell, found, select(vec3(0.0), line / size, size > 0.0));
                 let at = s.slot * sight.points + (i - shot.point_start);

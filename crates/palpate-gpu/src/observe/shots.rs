@@ -21,7 +21,7 @@ pub(crate) fn split(v: DVec3) -> [[f32; 4]; 2] {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shots {
     pub(crate) shots: Vec<Shot>,
-    /// Positions from their frame's origin, and the camera's number as bits.
+    /// Positions from their frame's origin, and the camera's number.
     pub(crate) points: Vec<[f32; 4]>,
     /// Which point of its frame each of `points` is.
     pub(crate) point_order: Vec<u32>,
@@ -59,7 +59,7 @@ impl Shots {
             all.cube_starts.extend(cubes.starts.iter().map(|s| s + shot.point_start));
             for &i in &cubes.order {
                 let [x, y, z] = from[i as usize];
-                all.points.push([x, y, z, f32::from_bits(f.points[i as usize].camera)]);
+                all.points.push([x, y, z, f.points[i as usize].camera as f32]);
             }
             all.point_order.extend(cubes.order);
 
