@@ -29,6 +29,9 @@ enum Verb {
         /// Also a body of 100 000 nodes
         #[arg(long)]
         large: bool,
+        /// Only bodies whose name begins so, e.g. dragon or "ball 30k"; nothing is written
+        #[arg(long, value_name = "NAME")]
+        only: Option<String>,
         /// Only compare two results of earlier runs
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
@@ -53,8 +56,9 @@ fn run(verb: Verb) -> Result<(), String> {
             println!("\nwritten to {}", table::save(&name, &report)?.display());
         }
         Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
-        Verb::Bench { large, compare: None } => {
-            let report = bench::all(large)?;
+        Verb::Bench { large, only: Some(name), .. } => bench::all(large, &name)?.print(),
+        Verb::Bench { large, only: None, .. } => {
+            let report = bench::all(large, "")?;
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }
@@ -72,7 +76,8 @@ fn run(verb: Verb) -> Result<(), String> {
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().verb) {
+    // Inside the pool, as the product runs: from outside every parallel loop would wait for a thread to wake up.
+    match rayon::scope(|_| run(Arguments::parse().verb)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             eprintln!("{e}");

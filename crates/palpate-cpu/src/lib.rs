@@ -3,6 +3,8 @@
 //! Invariant: this room does not know where a plan comes from nor what gradients are for.
 
 mod backend;
+#[cfg(test)]
+mod collapse_tests;
 pub mod linear;
 #[cfg(test)]
 mod local_tests;

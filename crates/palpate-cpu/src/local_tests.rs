@@ -1,6 +1,7 @@
 //! Every local derivative of the balance by itself, at random states: against central differences, and transposes against
 //! products.
 
+use crate::linear::matrix::{Operator, Packed};
 use crate::passes::balance::{Balance, States};
 use crate::passes::cells::zeros;
 use crate::simulate::balance;
@@ -159,7 +160,7 @@ fn tangent_and_derivatives_by_the_old_state() {
         let mut matrix = crate::linear::matrix::Matrix::default();
         b.tangent(s, false, &mut matrix);
         let mut product = zeros(n);
-        matrix.multiply(&w.shared.pattern.blocks, &d, &mut product);
+        Packed::new(&w.shared.pattern.blocks, &matrix, |v| v).multiply(&d, &mut product);
         let fd = difference(&|t| b.residual(States { u1: &moved(u1, t, &d), u0, v0 }));
         assert!(off(&product, &fd) < CLOSE, "tangent {:.1e}", off(&product, &fd));
         if k.is_none() {

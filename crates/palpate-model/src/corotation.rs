@@ -25,6 +25,7 @@ pub type V24 = [f64; 24];
 pub type M24 = [f64; 576];
 
 /// Eight corner vectors as one array.
+#[inline(always)]
 pub fn flatten(v: &[DVec3; 8]) -> V24 {
     let mut out = [0.0; 24];
     for i in 0..8 {
@@ -34,23 +35,26 @@ pub fn flatten(v: &[DVec3; 8]) -> V24 {
 }
 
 /// One array as eight corner vectors.
+#[inline(always)]
 pub fn corners(v: &V24) -> [DVec3; 8] {
     std::array::from_fn(|i| DVec3::new(v[3 * i], v[3 * i + 1], v[3 * i + 2]))
 }
 
 /// K v of a symmetric matrix.
+#[inline(always)]
 pub fn multiply(k: &M24, v: &V24) -> V24 {
     let mut out = [0.0; 24];
-    // Column by column (K is symmetric): independent sums, so that the compiler may use vector instructions.
-    for (row, s) in k.as_chunks::<24>().0.iter().zip(v) {
+    // Column by column (K is symmetric), three at a time: independent sums, so that the compiler may use vector instructions.
+    for (rows, s) in k.as_chunks::<72>().0.iter().zip(v.as_chunks::<3>().0) {
         for c in 0..24 {
-            out[c] += row[c] * s;
+            out[c] += rows[c] * s[0] + rows[24 + c] * s[1] + rows[48 + c] * s[2];
         }
     }
     out
 }
 
 /// Σ a_i × b_i over the corners: the moment of forces `b` at arms `a`.
+#[inline(always)]
 pub fn cross_sum(a: &V24, b: &V24) -> DVec3 {
     let mut m = [0.0; 3];
     for i in 0..8 {
@@ -62,6 +66,7 @@ pub fn cross_sum(a: &V24, b: &V24) -> DVec3 {
     DVec3::from_array(m)
 }
 
+#[inline(always)]
 fn dot(a: &V24, b: &V24) -> f64 {
     let mut sums = [0.0; 4];
     for (a, b) in a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0) {
@@ -73,6 +78,7 @@ fn dot(a: &V24, b: &V24) -> f64 {
 }
 
 /// Multiplies every corner's vector by a matrix.
+#[inline(always)]
 fn turned(m: DMat3, v: &V24) -> V24 {
     let [a, b, c] = m.to_cols_array_2d();
     let mut out = [0.0; 24];
@@ -86,6 +92,7 @@ fn turned(m: DMat3, v: &V24) -> V24 {
 }
 
 /// Subtracts the mean of the eight corners.
+#[inline(always)]
 fn centred(mut v: V24) -> V24 {
     let mut mean = [0.0; 3];
     for i in 0..24 {
@@ -114,6 +121,7 @@ pub struct CellPose {
 
 impl CellPose {
     /// Pose of a cell with corners `x` [m] and edge `h` [m]; R follows x.
+    #[inline(always)]
     pub fn new(x: &[DVec3; 8], h: f64) -> CellPose {
         CellPose::build(Polar::new(deformation_gradient(x, h)), x, h, false)
     }
@@ -123,6 +131,7 @@ impl CellPose {
         CellPose::build(Polar { r, s: DMat3::IDENTITY, g_inv: DMat3::ZERO }, x, h, true)
     }
 
+    #[inline(always)]
     fn build(polar: Polar, x: &[DVec3; 8], h: f64, fixed: bool) -> CellPose {
         let z = turned(polar.r.transpose(), &centred(flatten(x)));
         let mut q = z;
@@ -138,6 +147,7 @@ impl CellPose {
     }
 
     /// R v per corner.
+    #[inline(always)]
     pub fn to_world(&self, v: &V24) -> [DVec3; 8] {
         corners(&turned(self.polar.r, v))
     }
@@ -181,6 +191,7 @@ impl CellPose {
         self.polar.g_inv * (DVec3::from_array(m) * self.scale)
     }
 
+    #[inline(always)]
     fn spin_adjoint_body(&self, g: DVec3) -> V24 {
         let t = (self.polar.g_inv * g) * self.scale;
         let mut out = [0.0; 24];
@@ -202,10 +213,12 @@ impl CellPose {
     }
 
     /// World-frame gradient of y·q by the corners at fixed `y`; the transpose of [`CellPose::strain_rate`].
+    #[inline(always)]
     pub fn force(&self, y: &V24) -> [DVec3; 8] {
         self.to_world(&self.force_body(&centred(*y)))
     }
 
+    #[inline(always)]
     fn force_body(&self, y: &V24) -> V24 {
         let mut f = *y;
         if !self.fixed {
@@ -218,6 +231,7 @@ impl CellPose {
     }
 
     /// Q of the second derivative, for a `y` without resultant.
+    #[inline(always)]
     fn spin_stiffness(&self, y: &V24) -> DMat3 {
         let mut m = [[0.0; 3]; 3];
         for i in 0..8 {
@@ -270,22 +284,25 @@ impl CellPose {
     /// World-frame, exactly symmetric matrix scale · PᵀKP + D²q\[y\]; not definite in general.
     ///
     /// With y = scale · K q this is the second derivative of [`CellPose::energy`].
+    #[inline(always)]
     pub fn hessian(&self, k: &M24, scale: f64, y: &V24, out: &mut M24) {
         self.assemble(k, scale, Some(y), out);
     }
 
     /// World-frame, exactly symmetric and positive semi-definite part scale · PᵀKP.
+    #[inline(always)]
     pub fn gauss_newton(&self, k: &M24, scale: f64, out: &mut M24) {
         self.assemble(k, scale, None, out);
     }
 
+    #[inline(always)]
     fn assemble(&self, k: &M24, scale: f64, y: Option<&V24>, out: &mut M24) {
         // W = ½ scale K + ΩᵀD with D = B + ½QΩ − scale (N − ½TΩ), rows of N = ZᵀK; then H = R (W + Wᵀ) Rᵀ.
         let mut w = k.map(|k| 0.5 * scale * k);
         if !self.fixed {
             let omega = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| self.spin_adjoint_body(e));
             let arms = self.arm_rows();
-            let mut d = arms.map(|z| multiply(k, &z));
+            let mut d = self.arm_products(k);
             let mut q = DMat3::from_cols_array_2d(&arms.map(|z| d.map(|n| scale * dot(&n, &z))));
             d.iter_mut().flatten().for_each(|n| *n *= -scale);
             if let Some(y) = y {
@@ -309,7 +326,22 @@ impl CellPose {
         rotate_and_symmetrise(&w, self.polar.r.to_cols_array_2d(), out);
     }
 
+    /// Rows of N = ZᵀK.
+    #[inline(always)]
+    fn arm_products(&self, k: &M24) -> [V24; 3] {
+        let mut n = [[0.0; 24]; 3];
+        for (rows, z) in k.as_chunks::<72>().0.iter().zip(self.z.as_chunks::<3>().0) {
+            for c in 0..24 {
+                n[0][c] += z[1] * rows[48 + c] - z[2] * rows[24 + c];
+                n[1][c] += z[2] * rows[c] - z[0] * rows[48 + c];
+                n[2][c] += z[0] * rows[24 + c] - z[1] * rows[c];
+            }
+        }
+        n
+    }
+
     /// Columns of Z: e_a × z_i.
+    #[inline(always)]
     fn arm_rows(&self) -> [V24; 3] {
         let mut out = [[0.0; 24]; 3];
         for i in 0..8 {
@@ -326,6 +358,7 @@ impl CellPose {
 }
 
 /// Deformation gradient at a cell's centre: F = (1/4h) Σ x_i σ_iᵀ.
+#[inline(always)]
 pub fn deformation_gradient(x: &[DVec3; 8], h: f64) -> DMat3 {
     let mut f = DMat3::ZERO;
     for i in 0..8 {
@@ -336,6 +369,7 @@ pub fn deformation_gradient(x: &[DVec3; 8], h: f64) -> DMat3 {
 }
 
 /// out_i −= ω × v_i.
+#[inline(always)]
 fn subtract_cross(out: &mut V24, omega: DVec3, v: &V24) {
     for i in 0..8 {
         let (x, y, z) = (v[3 * i], v[3 * i + 1], v[3 * i + 2]);
@@ -346,6 +380,7 @@ fn subtract_cross(out: &mut V24, omega: DVec3, v: &V24) {
 }
 
 /// Adds the blocks [f_i]× to three rows.
+#[inline(always)]
 fn add_cross_rows(rows: &mut [V24; 3], f: &V24) {
     for i in 0..8 {
         let (a, b, c) = (f[3 * i], f[3 * i + 1], f[3 * i + 2]);
@@ -359,6 +394,7 @@ fn add_cross_rows(rows: &mut [V24; 3], f: &V24) {
 }
 
 /// out = R (W + Wᵀ) Rᵀ per 3 × 3 block, exactly symmetric; `r` by columns.
+#[inline(always)]
 fn rotate_and_symmetrise(w: &M24, r: [[f64; 3]; 3], out: &mut M24) {
     // Rows only, so that the compiler may use vector instructions: R (R W)ᵀ = (R W Rᵀ)ᵀ.
     let mut half = [0.0; 576];
@@ -372,6 +408,7 @@ fn rotate_and_symmetrise(w: &M24, r: [[f64; 3]; 3], out: &mut M24) {
     }
 }
 
+#[inline(always)]
 fn transpose(m: &M24, out: &mut M24) {
     for i in 0..24 {
         for j in 0..24 {
@@ -380,6 +417,7 @@ fn transpose(m: &M24, out: &mut M24) {
     }
 }
 
+#[inline(always)]
 fn rotate_rows(w: &M24, r: [[f64; 3]; 3], out: &mut M24) {
     for (w, out) in w.as_chunks::<72>().0.iter().zip(out.as_chunks_mut::<72>().0) {
         for a in 0..3 {

@@ -28,23 +28,27 @@ const BAND: f64 = 4.0;
 /// The paper's table 2 for the dragon: forward, cost, adjoint of one step [ms].
 const PAPER_DRAGON: [f64; 3] = [318.0, 172.0, 462.0];
 
-/// Runs everything; `large` adds a body of 100 000 nodes.
+/// Runs everything whose name begins with `only`; `large` adds a body of 100 000 nodes.
 ///
 /// # Errors
 /// A body cannot be built.
-pub fn all(large: bool) -> Result<Report, String> {
+pub fn all(large: bool, only: &str) -> Result<Report, String> {
     let mut report = Report { date: table::today(), threads: rayon::current_num_threads(), lines: Vec::new() };
     let mut add = |line: Line| {
         println!("{}: {} nodes, forward {:.1} ms", line.name, line.nodes, 1e3 * line.forward.median);
         report.lines.push(line);
     };
+    let wanted = |name: &str| name.starts_with(only);
     match data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
         Some(file) => {
             // Longest side 0.3 m: the file's unit is a fifth of it, with 6 cells to a unit.
             let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
             for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
-                let line = one(&format!("dragon, {rotation:?}").to_lowercase(), &sdf, 0.3 / 5.0 / 6.0, rotation, 5e4)?;
-                add(Line { paper: Some(PAPER_DRAGON.map(|ms| 1e-3 * ms)), ..line });
+                let name = format!("dragon, {rotation:?}").to_lowercase();
+                if wanted(&name) {
+                    let line = one(&name, &sdf, 0.3 / 5.0 / 6.0, rotation, 5e4)?;
+                    add(Line { paper: Some(PAPER_DRAGON.map(|ms| 1e-3 * ms)), ..line });
+                }
             }
         }
         None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
@@ -54,9 +58,13 @@ pub fn all(large: bool) -> Result<Report, String> {
     let blocks = [9.0, 13.0, 20.5, 30.0, 45.5];
     for k in 0..if large { 5 } else { 4 } {
         let ball = Analytic::Ball { radius: 0.1, center: DVec3::new(0.001, 0.002, 0.103) };
-        add(one(&format!("ball {}", SIZES[k]), &placed(ball), 0.2 / balls[k], RotationUpdate::Converged, 5e4)?);
         let block = Analytic::Box { min: DVec3::new(-0.1, -0.1, 0.003), max: DVec3::new(0.1, 0.1, 0.203) };
-        add(one(&format!("block {}", SIZES[k]), &placed(block), 0.2 / blocks[k], RotationUpdate::Converged, 5e4)?);
+        for (kind, shape, across) in [("ball", ball, balls[k]), ("block", block, blocks[k])] {
+            let name = format!("{kind} {}", SIZES[k]);
+            if wanted(&name) {
+                add(one(&name, &placed(shape), 0.2 / across, RotationUpdate::Converged, 5e4)?);
+            }
+        }
     }
     Ok(report)
 }

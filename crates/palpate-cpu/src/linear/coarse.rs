@@ -136,18 +136,11 @@ impl Coarsening {
         Matrix { values: strips.concat() }
     }
 
-    /// A preconditioner for a matrix at displacement u.
-    pub fn prepare(
-        &self,
-        body: &Body,
-        rows: &BlockRows,
-        matrix: &Matrix,
-        jacobi: BlockJacobi,
-        u: &[DVec3],
-    ) -> Result<TwoLevel<'_>, String> {
+    /// The second level for a matrix at displacement u.
+    pub fn level(&self, body: &Body, rows: &BlockRows, matrix: &Matrix, u: &[DVec3]) -> Result<Level, String> {
         let arms = self.arms(body, u);
         let factor = self.analysis.factor(&self.project(rows, matrix, &arms))?;
-        Ok(TwoLevel { coarsening: self, jacobi, arms, factor })
+        Ok(Level { arms, factor })
     }
 }
 
@@ -155,12 +148,21 @@ fn cross(w: DVec3) -> DMat3 {
     palpate_model::rotation::cross_matrix(w)
 }
 
-/// Block-Jacobi plus the coarse solve.
-pub struct TwoLevel<'a> {
-    coarsening: &'a Coarsening,
-    jacobi: BlockJacobi,
+/// The factorised stiffness of the groups. It stays a good preconditioner for the neighbouring matrices of one Newton solve.
+#[derive(Debug)]
+pub struct Level {
     arms: Vec<DVec3>,
     factor: Factor,
+}
+
+/// Block-Jacobi plus the coarse solve.
+pub struct TwoLevel<'a> {
+    /// The groups.
+    pub coarsening: &'a Coarsening,
+    /// First level.
+    pub jacobi: &'a BlockJacobi,
+    /// Second level.
+    pub level: &'a Level,
 }
 
 impl Precondition for TwoLevel<'_> {
@@ -171,13 +173,13 @@ impl Precondition for TwoLevel<'_> {
         for (g, nodes) in c.groups.iter().enumerate() {
             for &i in nodes {
                 coarse[2 * g] += r[i as usize];
-                coarse[2 * g + 1] += self.arms[i as usize].cross(r[i as usize]);
+                coarse[2 * g + 1] += self.level.arms[i as usize].cross(r[i as usize]);
             }
         }
-        self.factor.solve(&mut [&mut coarse]);
+        self.level.factor.solve(&mut [&mut coarse]);
         for (i, z) in z.iter_mut().enumerate() {
             let g = c.group_of[i] as usize;
-            *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.arms[i]);
+            *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.level.arms[i]);
         }
     }
 }

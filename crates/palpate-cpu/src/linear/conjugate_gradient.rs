@@ -1,9 +1,8 @@
 //! Preconditioned conjugate gradients with a residual norm that small cells cannot hide from.
 
-use super::matrix::Matrix;
+use super::matrix::Operator;
 use super::vector::{add_scaled, dot};
 use glam::DVec3;
-use palpate_model::pattern::BlockRows;
 
 /// Something that approximates A⁻¹ and is symmetric positive definite.
 pub trait Precondition {
@@ -25,8 +24,7 @@ pub enum CgEnd {
 /// Solves A x = b from the given x. Stops when `‖r‖ ≤ max(relative·‖b‖, absolute)` in the norm `sqrt(rᵀ M⁻¹ r)`: scaled by the
 /// preconditioner, a nearly massless node counts as much as any other (plain norms are blind to it).
 pub fn solve(
-    rows: &BlockRows,
-    matrix: &Matrix,
+    matrix: &dyn Operator,
     precondition: &dyn Precondition,
     b: &[DVec3],
     x: &mut [DVec3],
@@ -46,7 +44,7 @@ pub fn solve(
     }
     let target = (relative * scale).max(absolute);
     if x.iter().any(|v| *v != DVec3::ZERO) {
-        matrix.multiply(rows, x, &mut q);
+        matrix.multiply(x, &mut q);
         add_scaled(&mut r, -1.0, &q);
         precondition.apply(&r, &mut z);
     }
@@ -56,7 +54,7 @@ pub fn solve(
         if rz.max(0.0).sqrt() <= target {
             return CgEnd::Converged(iteration);
         }
-        matrix.multiply(rows, &p, &mut q);
+        matrix.multiply(&p, &mut q);
         let curvature = dot(&p, &q);
         if !curvature.is_finite() {
             return CgEnd::Unconverged(f64::NAN);

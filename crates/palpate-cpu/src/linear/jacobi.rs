@@ -25,7 +25,7 @@ impl BlockJacobi {
     }
 }
 
-impl Precondition for BlockJacobi {
+impl Precondition for &BlockJacobi {
     fn apply(&self, r: &[DVec3], z: &mut [DVec3]) {
         for ((z, r), d) in z.iter_mut().zip(r).zip(&self.inverse) {
             *z = *d * *r;

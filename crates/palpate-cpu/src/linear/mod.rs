@@ -5,16 +5,17 @@ pub mod coarse;
 pub mod conjugate_gradient;
 pub mod jacobi;
 pub mod matrix;
+pub mod simd;
 pub mod vector;
 
 use cholesky::{Analysis, Factor};
-use coarse::Coarsening;
+use coarse::{Coarsening, Level, TwoLevel};
 use conjugate_gradient::{CgEnd, Precondition};
 use glam::DVec3;
 use jacobi::BlockJacobi;
-use matrix::Matrix;
+use matrix::{Matrix, Operator, Packed};
 use palpate_model::body::Body;
-use palpate_model::pattern::{BlockRows, Pattern};
+use palpate_model::pattern::Pattern;
 use palpate_model::scene::LinearSolver;
 use std::sync::OnceLock;
 
@@ -47,12 +48,40 @@ pub enum Purpose {
     Step(usize),
 }
 
+/// How exactly the matrix must be kept for an iterative solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Digits {
+    /// To 6e-8: directions of Newton's method, whose own model is worse.
+    Few,
+    /// In full: derivatives.
+    All,
+}
+
+/// A matrix of a body at displacement `u`, and what it is to be solved for.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// Pattern of the matrix.
+    pub pattern: &'a Pattern,
+    /// The matrix.
+    pub matrix: &'a Matrix,
+    /// Its inverted diagonal blocks.
+    pub diagonal: &'a BlockJacobi,
+    /// Displacement [m].
+    pub u: &'a [DVec3],
+    /// Decides between direct and iterative.
+    pub purpose: Purpose,
+    /// How exactly CG sees the matrix.
+    pub digits: Digits,
+}
+
 /// A matrix made ready for solves.
 pub enum Prepared<'a> {
     /// Factorised.
     Direct(Factor),
     /// With a preconditioner.
-    Iterative(&'a BlockRows, &'a Matrix, Box<dyn Precondition + Send + Sync + 'a>),
+    Iterative(Box<dyn Operator + 'a>, Box<dyn Precondition + 'a>),
 }
 
 /// A solve that failed.
@@ -79,29 +108,28 @@ impl Solvers {
         }
     }
 
-    /// Factorises or preconditions the matrix of a body at displacement u.
-    pub fn prepare<'a>(
-        &'a self,
-        body: &Body,
-        pattern: &'a Pattern,
-        matrix: &'a Matrix,
-        purpose: Purpose,
-        u: &[DVec3],
-    ) -> Result<Prepared<'a>, Trouble> {
-        let rows = &pattern.blocks;
-        if self.direct(rows.len(), purpose) {
+    /// Factorises or preconditions a matrix. A second level that is there already is used as it is; else it is made.
+    pub fn prepare<'a>(&'a self, task: Task<'a>, level: &'a mut Option<Level>) -> Result<Prepared<'a>, Trouble> {
+        let rows = &task.pattern.blocks;
+        if self.direct(rows.len(), task.purpose) {
             let analysis = self.analysis.get_or_init(|| Analysis::new(rows));
             let analysis = analysis.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
-            return analysis.factor(matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
+            return analysis.factor(task.matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
         }
-        let jacobi = BlockJacobi::new(rows, matrix).map_err(|a| Trouble::Indefinite(format!("diagonal block of node {a}")))?;
+        let operator: Box<dyn Operator> = match task.digits {
+            Digits::Few => Box::new(Packed::new(rows, task.matrix, |v| v as f32)),
+            Digits::All => Box::new(Packed::new(rows, task.matrix, |v| v)),
+        };
         if rows.len() < COARSE_FROM {
-            return Ok(Prepared::Iterative(rows, matrix, Box::new(jacobi)));
+            return Ok(Prepared::Iterative(operator, Box::new(task.diagonal)));
         }
-        let coarsening = self.coarsening.get_or_init(|| Coarsening::new(body, pattern, GROUP));
+        let coarsening = self.coarsening.get_or_init(|| Coarsening::new(task.body, task.pattern, GROUP));
         let coarsening = coarsening.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
-        let two_level = coarsening.prepare(body, rows, matrix, jacobi, u).map_err(Trouble::Indefinite)?;
-        Ok(Prepared::Iterative(rows, matrix, Box::new(two_level)))
+        if level.is_none() {
+            *level = Some(coarsening.level(task.body, rows, task.matrix, task.u).map_err(Trouble::Indefinite)?);
+        }
+        let level = level.as_ref().expect("made above");
+        Ok(Prepared::Iterative(operator, Box::new(TwoLevel { coarsening, jacobi: task.diagonal, level })))
     }
 }
 
@@ -114,8 +142,9 @@ impl Prepared<'_> {
                 factor.solve(&mut [x]);
                 Ok(())
             }
-            Prepared::Iterative(rows, matrix, precondition) => {
-                match conjugate_gradient::solve(rows, matrix, precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS) {
+            Prepared::Iterative(matrix, precondition) => {
+                match conjugate_gradient::solve(matrix.as_ref(), precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS)
+                {
                     CgEnd::Converged(_) => Ok(()),
                     CgEnd::Unconverged(left) => Err(Trouble::Unconverged(left)),
                     CgEnd::Indefinite => Err(Trouble::Indefinite("a direction of negative curvature".into())),

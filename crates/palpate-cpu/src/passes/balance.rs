@@ -8,6 +8,7 @@
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, dot};
 use crate::passes::altered::Altered;
+use crate::passes::assembly::{self, block};
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
 use crate::passes::clamps::Clamps;
 use crate::passes::points::Acting;
@@ -19,7 +20,6 @@ use palpate_model::elements::Elements;
 use palpate_model::params::ParamKey;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
-use rayon::prelude::*;
 
 /// Factors of the inertia terms; `None` in a static problem.
 #[derive(Clone, Copy, Debug)]
@@ -265,36 +265,7 @@ impl<'a> Balance<'a> {
 
     /// ∂r/∂u₁, symmetric. With `convex` the indefinite part of the elastic tangent is left out.
     pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
-        let (plan, pattern) = (self.plan, self.pattern);
-        matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
-        let (elasticity, materials) = (self.elasticity(), self.materials());
-        let mut slices = Vec::new();
-        let mut rest = matrix.values.as_mut_slice();
-        for part in &pattern.parts {
-            let (a, b) = rest.split_at_mut(pattern.blocks.rows[part.end] - pattern.blocks.rows[part.start]);
-            slices.push((part.clone(), a));
-            rest = b;
-        }
-        slices.into_par_iter().for_each(|(rows, values)| {
-            values.fill(DMat3::ZERO);
-            let base = pattern.blocks.rows[rows.start];
-            let mut h = [0.0; 576];
-            for (e, cell) in plan.body.cells.iter().enumerate() {
-                let inside = cell.nodes.map(|n| rows.contains(&(n as usize)));
-                if !inside.contains(&true) {
-                    continue;
-                }
-                elasticity.tangent(&self.mix, e, s.u1, s.u0, convex, &mut h);
-                if let Some(m) = &materials {
-                    m.add_tangent(e, s.u1, s.u0, convex, &mut h);
-                }
-                for i in (0..8).filter(|&i| inside[i]) {
-                    for j in 0..8 {
-                        values[self.places.cells[e][8 * i + j] as usize - base] += block(&h, i, j);
-                    }
-                }
-            }
-        });
+        assembly::cells(&self.elasticity(), self.materials().as_ref(), self.pattern, self.places, &self.mix, s, convex, matrix);
         self.add_sparse(s.u1, matrix);
         self.add_effects_tangent(s, convex, matrix);
     }
@@ -494,14 +465,4 @@ impl<'a> Balance<'a> {
             }
         }
     }
-}
-
-/// Block (i, j) of a 24 × 24 row-major matrix.
-fn block(k: &[f64; 576], i: usize, j: usize) -> DMat3 {
-    let at = |r: usize, c: usize| k[24 * (3 * i + r) + 3 * j + c];
-    DMat3::from_cols(
-        DVec3::new(at(0, 0), at(1, 0), at(2, 0)),
-        DVec3::new(at(0, 1), at(1, 1), at(2, 1)),
-        DVec3::new(at(0, 2), at(1, 2), at(2, 2)),
-    )
 }

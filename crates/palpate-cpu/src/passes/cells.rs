@@ -6,6 +6,7 @@
 //! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
 //! With lagged rotation both q use R(x₀) and R is not differentiated by x₁, as in the paper.
 
+use crate::linear::simd::wide;
 use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_model::body::Body;
@@ -14,6 +15,9 @@ use palpate_model::elements::Elements;
 use palpate_model::pattern::Pattern;
 use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
+
+/// Cells that one task treats in a row.
+const CHUNK: usize = 128;
 
 /// Eight vectors, one per corner.
 pub type Corners = [DVec3; 8];
@@ -45,6 +49,7 @@ pub(super) fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
     body.cells[e].nodes.map(|n| v[n as usize])
 }
 
+#[inline(always)]
 fn times(k: &M24, q: &V24, scale: f64) -> V24 {
     multiply(k, q).map(|y| scale * y)
 }
@@ -65,6 +70,7 @@ struct Poses {
 }
 
 impl Poses {
+    #[inline(always)]
     fn new(mix: &Mix, h: f64, x1: &Corners, x0: &Corners) -> Poses {
         match mix.rotation {
             RotationUpdate::Converged => {
@@ -80,6 +86,7 @@ impl Poses {
     }
 
     /// Body-frame force that goes with the new pose, and the one that goes with the old pose.
+    #[inline(always)]
     fn stress(&self, mix: &Mix, k: &M24, e: f64) -> (V24, Option<V24>) {
         let (a, b) = self.factors(mix);
         let zero = [0.0; 24];
@@ -95,6 +102,7 @@ impl Poses {
         (mix.new + mix.rate, b)
     }
 
+    #[inline(always)]
     fn force(&self, y: &(V24, Option<V24>)) -> Corners {
         let mut f = self.new.force(&y.0);
         if let (Some(old), Some(y0)) = (&self.old, &y.1) {
@@ -142,6 +150,7 @@ impl<'a> Elasticity<'a> {
         }
     }
 
+    #[inline(always)]
     fn poses(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> Poses {
         let mut poses = Poses::new(mix, self.body.grid.h, &corners(self.body, e, u1), &corners(self.body, e, u0));
         if let Some(rest) = self.rest {
@@ -178,9 +187,25 @@ impl<'a> Elasticity<'a> {
         self.young * self.factor(e)
     }
 
+    /// A value of every cell.
+    fn each_cell<T: Clone + Default + Send>(&self, cell: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        let mut values = vec![T::default(); self.body.cells.len()];
+        values.par_chunks_mut(CHUNK).enumerate().for_each(|(c, values)| {
+            wide(
+                #[inline(always)]
+                || {
+                    for (i, value) in values.iter_mut().enumerate() {
+                        *value = cell(CHUNK * c + i);
+                    }
+                },
+            );
+        });
+        values
+    }
+
     /// Adds per-cell corner vectors to nodes, always in the same order.
     pub(super) fn gather(&self, cell: impl Fn(usize) -> Corners + Sync + Send, out: &mut [DVec3]) {
-        let parts: Vec<Corners> = (0..self.body.cells.len()).into_par_iter().with_min_len(256).map(cell).collect();
+        let parts = self.each_cell(cell);
         let p = self.pattern;
         let sum = |a: usize, v: &mut DVec3| {
             for &(e, i) in &p.cell_list[p.cell_rows[a]..p.cell_rows[a + 1]] {
@@ -194,6 +219,7 @@ impl<'a> Elasticity<'a> {
     /// derivative by Young's modulus).
     pub fn force(&self, mix: &Mix, which: Matrices, young: f64, u1: &[DVec3], u0: &[DVec3], out: &mut [DVec3]) {
         self.gather(
+            #[inline(always)]
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
                 poses.force(&poses.stress(mix, self.matrix(e, which), young * self.factor(e)))
@@ -204,26 +230,31 @@ impl<'a> Elasticity<'a> {
 
     /// Incremental potential whose gradient by u₁ is [`Elasticity::force`], up to a constant.
     pub fn potential(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3]) -> f64 {
-        let cell = |e: usize| {
-            let poses = self.poses(mix, e, u1, u0);
-            let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
-            let (a, b) = poses.factors(mix);
-            let kq = times(k, &poses.new.q, young);
-            let mut w = 0.5 * a * dot24(&poses.new.q, &kq);
-            if let Some(old) = &poses.old {
-                w += b * dot24(&old.q, &kq);
-                if poses.spin.is_none() && mix.old != 0.0 {
-                    let f0 = old.force(&times(k, &old.q, young * mix.old));
-                    w += pick(self.body, e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
+        self.each_cell(
+            #[inline(always)]
+            |e| {
+                let poses = self.poses(mix, e, u1, u0);
+                let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
+                let (a, b) = poses.factors(mix);
+                let kq = times(k, &poses.new.q, young);
+                let mut w = 0.5 * a * dot24(&poses.new.q, &kq);
+                if let Some(old) = &poses.old {
+                    w += b * dot24(&old.q, &kq);
+                    if poses.spin.is_none() && mix.old != 0.0 {
+                        let f0 = old.force(&times(k, &old.q, young * mix.old));
+                        w += pick(self.body, e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
+                    }
                 }
-            }
-            w
-        };
-        (0..self.body.cells.len()).into_par_iter().with_min_len(256).map(cell).collect::<Vec<_>>().iter().sum()
+                w
+            },
+        )
+        .iter()
+        .sum()
     }
 
     /// Derivative of cell e's force by the new state, world frame, 24 × 24. With `convex` the part that may be indefinite
     /// (second derivative of the rotation) is left out.
+    #[inline(always)]
     pub fn tangent(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3], convex: bool, out: &mut M24) {
         let poses = self.poses(mix, e, u1, u0);
         let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
@@ -261,6 +292,7 @@ impl<'a> Elasticity<'a> {
     /// Adds (∂force/∂u₀) du₀.
     pub fn by_old(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], du0: &[DVec3], out: &mut [DVec3]) {
         self.gather(
+            #[inline(always)]
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
@@ -291,6 +323,7 @@ impl<'a> Elasticity<'a> {
     /// Adds (∂force/∂u₀)ᵀ z.
     pub fn by_old_transposed(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3], z: &[DVec3], out: &mut [DVec3]) {
         self.gather(
+            #[inline(always)]
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));

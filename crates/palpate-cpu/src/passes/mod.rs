@@ -1,6 +1,7 @@
 //! The passes of a simulation, one idea a file.
 
 pub mod altered;
+pub mod assembly;
 pub mod balance;
 pub mod cells;
 pub mod clamps;

@@ -1,0 +1,112 @@
+//! Adds the cells' tangents into the system matrix, every cell computed once, in an order that does not depend on threads.
+//!
+//! Rows are cut into parts that are filled side by side. A cell belongs to the part of its first node; blocks in rows of other
+//! parts are set aside and added in a second pass.
+
+use crate::linear::matrix::Matrix;
+use crate::linear::simd::wide;
+use crate::passes::balance::States;
+use crate::passes::cells::{Elasticity, Mix};
+use crate::passes::materials::Materials;
+use glam::{DMat3, DVec3};
+use palpate_model::corotation::M24;
+use palpate_model::pattern::{Pattern, Places};
+use rayon::prelude::*;
+
+/// Blocks of one part's cells in rows of every other part `[part]`: place in the matrix, and block.
+type Spill = Vec<Vec<(u32, DMat3)>>;
+
+/// Overwrites the matrix with the sum of the cells' tangents.
+pub fn cells(
+    elasticity: &Elasticity,
+    materials: Option<&Materials>,
+    pattern: &Pattern,
+    places: &Places,
+    mix: &Mix,
+    s: States,
+    convex: bool,
+    matrix: &mut Matrix,
+) {
+    matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
+    let spills: Vec<Spill> = slices(pattern, matrix)
+        .into_par_iter()
+        .map(|(part, values)| {
+            wide(
+                #[inline(always)]
+                || fill(elasticity, materials, pattern, places, mix, s, convex, part, values),
+            )
+        })
+        .collect();
+    slices(pattern, matrix).into_par_iter().for_each(|(part, values)| {
+        let base = pattern.blocks.rows[pattern.parts[part].start];
+        for (place, block) in spills.iter().flat_map(|s| &s[part]) {
+            values[*place as usize - base] += *block;
+        }
+    });
+}
+
+/// Overwrites the rows of one part with its own cells' blocks, and returns those in other rows.
+#[inline(always)]
+fn fill(
+    elasticity: &Elasticity,
+    materials: Option<&Materials>,
+    pattern: &Pattern,
+    places: &Places,
+    mix: &Mix,
+    s: States,
+    convex: bool,
+    part: usize,
+    values: &mut [DMat3],
+) -> Spill {
+    let rows = pattern.parts[part].clone();
+    let base = pattern.blocks.rows[rows.start];
+    let mut spill: Spill = vec![Vec::new(); pattern.parts.len()];
+    let mut h = [0.0; 576];
+    values.fill(DMat3::ZERO);
+    for (e, cell) in elasticity.body.cells.iter().enumerate() {
+        if !rows.contains(&(cell.nodes[0] as usize)) {
+            continue;
+        }
+        elasticity.tangent(mix, e, s.u1, s.u0, convex, &mut h);
+        if let Some(m) = materials {
+            m.add_tangent(e, s.u1, s.u0, convex, &mut h);
+        }
+        for i in 0..8 {
+            let row = cell.nodes[i] as usize;
+            let places = &places.cells[e][8 * i..8 * i + 8];
+            if rows.contains(&row) {
+                for j in 0..8 {
+                    values[places[j] as usize - base] += block(&h, i, j);
+                }
+            } else {
+                let other = pattern.parts.partition_point(|p| p.end <= row);
+                for j in 0..8 {
+                    spill[other].push((places[j], block(&h, i, j)));
+                }
+            }
+        }
+    }
+    spill
+}
+
+/// The matrix cut into parts, each with its number.
+fn slices<'a>(pattern: &Pattern, matrix: &'a mut Matrix) -> Vec<(usize, &'a mut [DMat3])> {
+    let mut rest = matrix.values.as_mut_slice();
+    let cut = |(number, part): (usize, &std::ops::Range<usize>)| {
+        let (a, b) = std::mem::take(&mut rest).split_at_mut(pattern.blocks.rows[part.end] - pattern.blocks.rows[part.start]);
+        rest = b;
+        (number, a)
+    };
+    pattern.parts.iter().enumerate().map(cut).collect()
+}
+
+/// Block (i, j) of a 24 × 24 row-major matrix.
+#[inline(always)]
+pub fn block(k: &M24, i: usize, j: usize) -> DMat3 {
+    let at = |r: usize, c: usize| k[24 * (3 * i + r) + 3 * j + c];
+    DMat3::from_cols(
+        DVec3::new(at(0, 0), at(1, 0), at(2, 0)),
+        DVec3::new(at(0, 1), at(1, 1), at(2, 1)),
+        DVec3::new(at(0, 2), at(1, 2), at(2, 2)),
+    )
+}
