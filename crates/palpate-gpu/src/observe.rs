@@ -9,6 +9,8 @@ mod results;
 mod shots;
 mod tables;
 #[cfg(test)]
+mod rollout_tests;
+#[cfg(test)]
 mod tests;
 
 use crate::device::Gpu;

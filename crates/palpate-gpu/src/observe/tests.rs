@@ -18,19 +18,19 @@ use palpate_model::plan_build::build_plan;
 use palpate_model::scene::{Analytic, BodySource, CostKind, ObservationSpec, Resolution, Scene};
 
 /// Cost, sums and derivatives agree to this much of their size. Rounding of φ is some 1e-7 of a cell, 1e-6 of a residual of a tenth
-/// of a cell; sums of a thousand terms of both signs lose another factor of ten to a hundred.
-const AGREEMENT: f64 = 3e-4;
+/// of a cell; where a thousand terms of both signs nearly cancel, ten to a hundred times that.
+const AGREEMENT: f64 = 5e-5;
 
 /// Reproducible numbers in [-1, 1].
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(super) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.next(), self.next(), self.next())
     }
 }
@@ -112,7 +112,7 @@ fn observed(scene: &Scene, rest: &[MarkerRest], per_patch: usize) -> Plan {
     build_plan(scene, observation, rest).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn scene(source: Analytic, h: f64) -> Scene {
+pub(super) fn scene(source: Analytic, h: f64) -> Scene {
     let mut s = ball(h);
     s.object.source = BodySource::Analytic(source);
     s.object.resolution = Resolution::CellSize(h);
@@ -313,7 +313,7 @@ fn differences(a: &Outcome, b: &Outcome) -> Vec<(&'static str, f64)> {
         (x.0, worst / size)
     };
     let all: Vec<_> = a.iter().zip(b).map(off).collect();
-    println!("{all:.1e?}");
+    println!("{}", all.iter().map(|(name, d)| format!("{name} {d:.1e}")).collect::<Vec<_>>().join(", "));
     // Not `>`: a number that is none must not pass.
     all.into_iter().filter(|d| !(d.1 <= AGREEMENT)).collect()
 }
@@ -326,8 +326,9 @@ fn cost_and_derivatives_are_those_of_the_cpu_and_one_percent_shows() {
     let all = found(&backend, &plan, 3, None);
     for (m, found) in all.iter().enumerate() {
         let right = expected(&plan, m);
-        assert!(right.iter().all(|(name, v)| v.iter().any(|x| *x != 0.0) && !v.is_empty()), "{m}: something is not tested");
-        assert_eq!(differences(found, &right), [], "member {m}");
+        assert!(right.iter().all(|(_, v)| v.iter().any(|x| *x != 0.0) && !v.is_empty()), "{m}: something is not tested");
+        let off = differences(found, &right);
+        assert!(off.is_empty(), "member {m}: {off:?}");
         // Wrong by one percent in one place of any of them, the comparison fails.
         for i in 0..found.len() {
             let mut wrong = found.clone();
@@ -342,7 +343,8 @@ fn cost_and_derivatives_are_those_of_the_cpu_and_one_percent_shows() {
     assert_eq!(found(&backend, &plan, 1, None)[0], all[0]);
     let small = found(&backend, &plan, 3, Some(Room { points: 64, scratch: 1 }));
     for (m, found) in small.iter().enumerate() {
-        assert_eq!(differences(found, &expected(&plan, m)), [], "in parts, member {m}");
+        let off = differences(found, &expected(&plan, m));
+        assert!(off.is_empty(), "in parts, member {m}: {off:?}");
     }
 }
 
@@ -350,13 +352,14 @@ fn cost_and_derivatives_are_those_of_the_cpu_and_one_percent_shows() {
 fn one_cell_and_flat_bodies_agree() {
     let Some(gpu) = device(None) else { return };
     let backend = GpuBackend::on(gpu);
-    let one = Analytic::Box { min: DVec3::new(-0.02, -0.02, 0.03), max: DVec3::new(0.02, 0.02, 0.07) };
+    let one = Analytic::Box { min: DVec3::new(0.0, 0.0, 0.04), max: DVec3::new(0.04, 0.04, 0.08) };
     let flat = Analytic::Box { min: DVec3::new(-0.06, -0.05, 0.04), max: DVec3::new(0.07, 0.05, 0.065) };
     for (shape, h, each) in [(one, 0.04, 20), (flat, 0.02, 2)] {
         let plan = observed(&scene(shape, h), &[], each);
         let found = found(&backend, &plan, 3, None);
         for (m, found) in found.iter().enumerate() {
-            assert_eq!(differences(found, &expected(&plan, m)), [], "h {h}, member {m}");
+            let off = differences(found, &expected(&plan, m));
+            assert!(off.is_empty(), "h {h}, member {m}: {off:?}");
         }
     }
 }
@@ -424,12 +427,12 @@ fn loops_stay_bounded_and_strays_do_not_stretch_the_cubes() {
     let sight = |points: u32, stripes: u32| super::Sight {
         points,
         stripes,
-        nodes: 3_000_000,
+        nodes: 1_000_000,
         rows: points,
         markers: 100,
         ..Default::default()
     };
-    // A million points in the stripes that they get, the largest lattice of cubes, three million nodes.
+    // A million points in the stripes that they get, the largest lattice of cubes, a million nodes.
     let longest = super::longest_loops(&sight(1_000_000, 50), &crowd, &band, &sites);
     assert!(longest.iter().all(|l| l.1 <= MOST_LOOPS), "{longest:?}");
     // In one stripe they would be too many, and are refused.
