@@ -1,5 +1,7 @@
 //! Synthetic recordings give their parameters back: a small part of `cargo xtask paper` that runs with every change.
 
+mod measurement;
+
 use glam::DVec3;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;

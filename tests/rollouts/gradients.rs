@@ -72,7 +72,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
         .collect();
     let observation = Observation {
         // The camera sits inside the body: it sees every side, so no point is dropped by visibility.
-        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 0.05) }],
+        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 0.05), axis: DVec3::Z }],
         frames,
         markers: Vec::new(),
         depth_noise: 1e-3,

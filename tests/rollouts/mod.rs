@@ -3,5 +3,6 @@
 mod agreement;
 mod effects;
 mod gradients;
+mod measurement;
 mod rows;
 mod visibility;

@@ -18,7 +18,7 @@ fn distances(points: &[DVec3]) -> Vec<Option<f64>> {
     s.observation = Some(compared(CostKind::SparseSurface));
     let seen = points.iter().map(|&position| ObservedPoint { position, camera: 0 }).collect();
     let observation = Observation {
-        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 5.0) }],
+        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 5.0), axis: -DVec3::Z }],
         frames: vec![Frame { time: 0.005, points: seen, ..Frame::default() }],
         depth_noise: 2e-4,
         marker_noise: 1e-3,

@@ -3,9 +3,9 @@
 use crate::linear::vector::Nodes;
 use crate::newton;
 use crate::passes::cells::zeros;
-use crate::passes::frames::{self, Instant};
+use crate::passes::frames::{self, Along, Instant};
 use crate::simulate;
-use crate::world::{Adjoint, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
+use crate::world::{Adjoint, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
 use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch, Rows};
 use palpate_model::effects;
@@ -39,24 +39,23 @@ fn displacement(at: &Instant, now: &MemberState, next: &MemberState) -> Vec<DVec
 }
 
 /// Derivatives of a frame's displacement along the tangent directions, `[Q][N]`.
-fn derivatives(
-    at: &Instant,
-    keys: &[ParamKey],
-    directions: &[usize],
-    s: [&MemberState; 2],
-    d: [&MemberTangent; 2],
-) -> Vec<Nodes> {
+fn derivatives(at: &Instant, shifts: &[usize], directions: &[usize], s: [&MemberState; 2], d: [&MemberTangent; 2]) -> Vec<Nodes> {
     (0..directions.len())
         .map(|q| {
             let mut du = frames::blend(&at.value, [&d[0].du[q], &d[0].dv[q], &d[1].du[q], &d[1].dv[q]]);
-            if keys[directions[q]] == ParamKey::TimeStart {
-                // A later start means an earlier place on the curve.
+            if shifts.contains(&directions[q]) {
+                // A later start, or stamps that are further ahead, mean an earlier place on the curve.
                 let rate = frames::blend(&at.rate, [&s[0].u, &s[0].v, &s[1].u, &s[1].v]);
                 crate::linear::vector::add_scaled(&mut du, -1.0, &rate);
             }
             du
         })
         .collect()
+}
+
+/// Places in θ of numbers that shift the simulation against the frames.
+fn shifts(plan: &Plan, m: &Member) -> Vec<usize> {
+    m.sensors.clocks().iter().copied().chain([plan.layout.index(ParamKey::TimeStart)]).collect()
 }
 
 impl Backend for CpuBackend {
@@ -141,9 +140,9 @@ impl Backend for CpuBackend {
             if t.failed() {
                 return;
             }
-            for at in frames::instants(&shared.plan, m.physics.start, k) {
+            for at in frames::instants(&shared.plan, m.first_stamp(), k) {
                 let u = displacement(&at, a, b);
-                let compared = frames::compare(&shared.plan, &shared.lookup, &shared.hashes[at.frame], at.frame, &u);
+                let compared = frames::compare(m.look(shared, at.frame), &shared.lookup, &shared.hashes[at.frame], &u);
                 let e = &mut t.evaluation;
                 e.cost += shared.scale * compared.cost;
                 e.matched += compared.matched;
@@ -165,19 +164,20 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let start = shared.plan.layout.index(ParamKey::TimeStart);
         (&world.members, &now.members, &next.members, &mut adj.members, &mut adj_now.members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, to_next, to_now, t)| {
                 if t.failed() {
                     return;
                 }
-                for at in frames::instants(&shared.plan, m.physics.start, k) {
+                let shifts = shifts(&shared.plan, m);
+                for at in frames::instants(&shared.plan, m.first_stamp(), k) {
                     let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
-                    let g = frames::gradient(&shared.plan, at.frame, &found.2, &found.1, shared.scale);
+                    let look = m.look(shared, at.frame);
+                    let g = frames::gradient(look, &found.2, &found.1, shared.scale, &mut t.evaluation.gradient);
                     let rate = frames::blend(&at.rate, [&a.u, &a.v, &b.u, &b.v]);
-                    // A later start means an earlier place on the curve.
-                    t.evaluation.gradient[start] -= crate::linear::vector::dot(&g, &rate);
+                    let later = crate::linear::vector::dot(&g, &rate);
+                    shifts.iter().for_each(|p| t.evaluation.gradient[*p] -= later);
                     for i in 0..g.len() {
                         to_now.u[i] += at.value[0] * g[i];
                         to_now.v[i] += at.value[1] * g[i];
@@ -278,23 +278,23 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let keys = &shared.plan.layout.keys;
         (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, d0, d1, t)| {
                 if t.failed() {
                     return;
                 }
-                for at in frames::instants(&shared.plan, m.physics.start, k) {
-                    let du = derivatives(&at, keys, &tangent.directions, [a, b], [d0, d1]);
+                let shifts = shifts(&shared.plan, m);
+                for at in frames::instants(&shared.plan, m.first_stamp(), k) {
+                    let directions = &tangent.directions[..];
+                    let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
                     let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
                     let c = t.evaluation.curvature.as_mut().expect("tangents go with a curvature");
                     frames::gauss_newton(
-                        &shared.plan,
-                        at.frame,
+                        m.look(shared, at.frame),
                         &found.2,
                         &found.1,
-                        &du,
+                        Along { directions, du: &du },
                         shared.scale,
                         &mut c.gradient,
                         &mut c.matrix,
@@ -313,14 +313,14 @@ impl Backend for CpuBackend {
         member: usize,
     ) -> Option<Rows> {
         let shared = &world.shared;
-        let t = &tally.members[member];
+        let (m, t) = (&world.members[member], &tally.members[member]);
+        let (directions, shifts) = (&tangents[0].directions[..], shifts(&shared.plan, m));
         let mut out = Rows::default();
-        for at in frames::instants(&shared.plan, world.members[member].physics.start, k) {
-            let keys = &shared.plan.layout.keys;
+        for at in frames::instants(&shared.plan, m.first_stamp(), k) {
             let s = states.map(|s| &s.members[member]);
-            let du = derivatives(&at, keys, &tangents[0].directions, s, tangents.map(|t| &t.members[member]));
+            let du = derivatives(&at, &shifts, directions, s, tangents.map(|t| &t.members[member]));
             let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
-            let rows = frames::all_rows(&shared.plan, at.frame, &found.2, &found.1, &du);
+            let rows = frames::all_rows(m.look(shared, at.frame), &found.2, &found.1, Along { directions, du: &du });
             out.residuals.extend(rows.residuals);
             out.sensitivity.extend(rows.sensitivity);
         }
@@ -352,13 +352,13 @@ impl Backend for CpuBackend {
 
     fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
         let shared = &world.shared;
-        let (a, b) = (&now.members[member], &next.members[member]);
-        frames::instants(&shared.plan, world.members[member].physics.start, k)
+        let (m, a, b) = (&world.members[member], &now.members[member], &next.members[member]);
+        frames::instants(&shared.plan, m.first_stamp(), k)
             .iter()
             .map(|at| {
                 let u = displacement(at, a, b);
-                let compared = frames::compare(&shared.plan, &shared.lookup, &shared.hashes[at.frame], at.frame, &u);
-                frames::residuals(&shared.plan, at.frame, &compared, &u)
+                let compared = frames::compare(m.look(shared, at.frame), &shared.lookup, &shared.hashes[at.frame], &u);
+                frames::residuals(m.look(shared, at.frame), &compared, &u)
             })
             .collect()
     }

@@ -4,11 +4,12 @@ use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::passes::altered::Altered;
-use crate::passes::frames::Compared;
+use crate::passes::frames::{Compared, Look};
 use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::points::{self, Acting};
 use crate::passes::supports::{self, PlaneNow};
 use palpate_engine::{Evaluation, Failure, ParamBatch};
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::elements::{Classes, Elements};
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
@@ -42,9 +43,22 @@ pub struct Member {
     pub(crate) physics: Physics,
     pub(crate) planes: Vec<PlaneNow>,
     pub(crate) effects: Vec<Acting>,
+    pub(crate) sensors: Sensors,
     pub(crate) altered: Altered,
     pub(crate) elements: Arc<Elements>,
     pub(crate) matrix: Matrix,
+}
+
+impl Member {
+    /// Time of the initial state as the stamps of frames have it [s].
+    pub(crate) fn first_stamp(&self) -> f64 {
+        self.physics.start + self.sensors.ahead()
+    }
+
+    /// A frame as this member understands it.
+    pub(crate) fn look<'a>(&'a self, shared: &'a Shared, frame: usize) -> Look<'a> {
+        Look { plan: &shared.plan, sensors: &self.sensors, frame }
+    }
 }
 
 impl World {
@@ -82,6 +96,7 @@ impl World {
                 physics,
                 planes,
                 effects,
+                sensors: Sensors::new(&shared.plan.layout, row),
                 altered,
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),

@@ -1,5 +1,6 @@
 //! What was measured, ready to be compared: frames of points and markers.
 
+use crate::effects::reading::Seen;
 use glam::{DMat3, DVec3};
 
 /// Everything observed in one recording, in world coordinates and SI units.
@@ -30,11 +31,20 @@ impl Observation {
     }
 }
 
-/// A camera's place, as visibility needs it.
-#[derive(Clone, Debug)]
+/// A camera's place and direction.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Centre of projection in the world [m].
     pub center: DVec3,
+    /// Unit vector along which depth counts.
+    pub axis: DVec3,
+}
+
+impl Camera {
+    /// A reading of this camera at a world point [m].
+    pub fn sees(&self, point: DVec3) -> Seen<f64> {
+        Seen { point: point.to_array(), center: self.center.to_array(), axis: self.axis.to_array() }
+    }
 }
 
 /// What was seen at one time.

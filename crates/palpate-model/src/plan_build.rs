@@ -2,6 +2,7 @@
 
 use crate::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
 use crate::cut::{ClipBox, HeldMoments, Lattice, POINTS27, held_moments};
+use crate::effects::check_choices;
 use crate::extension::{NodeLookup, active_cell, affine_weights};
 use crate::grid::{shape_functions, shape_gradients};
 use crate::observation::{MarkerRest, MarkerSite, Observation};
@@ -74,6 +75,10 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     let lookup = NodeLookup::new(&body);
     observation.markers =
         marker_rest.iter().map(|m| marker_site(m, &body, &lookup, shape.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    // A scene that is only simulated concerns no camera.
+    if !observation.frames.is_empty() {
+        check_choices(&scene.effects, observation.cameras.len(), observation.markers.len()).map_err(|(k, m)| error(k, m))?;
+    }
     let planes = scene
         .planes
         .iter()
@@ -203,6 +208,15 @@ fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<MassSite, PlanError
             ),
         )),
     }
+}
+
+/// Where markers sit on a body, for a recording that is to be made.
+///
+/// # Errors
+/// A marker that lies far from the surface.
+pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
+    let lookup = NodeLookup::new(body);
+    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
 }
 
 fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {

@@ -27,7 +27,13 @@ fn title(family: Family) -> (&'static str, &'static str) {
         Family::Load => ("Loads", "Forces on the body."),
         Family::Material => ("Material", "What the body is made of."),
         Family::Shape => ("Shape and supports", "Rest shape, state at the start, clamps."),
-        Family::Measurement => ("Measurement", "How it was measured: what is compared changes, the motion does not."),
+        Family::Measurement => (
+            "Measurement",
+            "How it was measured: what is compared changes, the motion does not. The sign of all: *reading = truth + effect*. A depth bias of
++0.02 m means that readings are 2 cm too large, an offset of a camera that the recording states it so far off its true pose, a
+time offset that the recording's clock is ahead by it, an offset of a marker that it sits so far from its stated place. A fit undoes
+the effect before it compares (in reverse order of the scene); `palpate observe` applies it to the recording that it makes.",
+        ),
         Family::Slack => ("Slack", "A free force field: a bound on what any load could explain, never an explanation."),
     }
 }
@@ -58,6 +64,7 @@ fn allowed(p: &EffectParam) -> String {
 fn default(p: &EffectParam) -> String {
     match p.default {
         Unstated::Absent(v) => format!("{} (absent)", short(v)),
+        Unstated::Choice(_) => "0 (a choice, not fitted)".to_string(),
         _ => p.default.value().map_or("centre of mass".to_string(), short),
     }
 }

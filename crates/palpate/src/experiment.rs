@@ -9,6 +9,7 @@ use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::recording::Recording;
 use palpate_io::{check_overlap, parse_scene, read_recording, read_scene};
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
@@ -20,11 +21,11 @@ use std::sync::Arc;
 /// One scene, its recording where it names one, and the plan made of both.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    scene: Scene,
+    pub(crate) scene: Scene,
     text: String,
     recording: Option<Arc<Recording>>,
     shape: Arc<dyn Shape>,
-    plan: Plan,
+    pub(crate) plan: Plan,
     warnings: Vec<String>,
 }
 
@@ -108,7 +109,8 @@ impl Experiment {
         if self.plan.clock.steps == 0 {
             return;
         }
-        let (from, to) = (self.scene.time.start, self.end_time());
+        let ahead = Sensors::new(&self.plan.layout, &self.plan.theta).ahead();
+        let (from, to) = (self.scene.time.start + ahead, self.end_time() + ahead);
         // Times in files are rounded to microseconds.
         let slack = 1e-6 * (1.0 + to.abs());
         let outside = frames.iter().filter(|f| f.time < from - slack || f.time > to + slack).count();

@@ -16,6 +16,7 @@ use crate::render::{DepthImage, Pinhole, rasterise};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Snapshot};
 use palpate_io::recording::RecordedCamera;
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::collections::BTreeMap;
@@ -128,7 +129,7 @@ pub(crate) fn visit_frames(
     theta: &[f64],
     mut visit: impl FnMut(usize, &dyn Fn() -> Vec<DVec3>, &FrameResiduals),
 ) -> Result<f64, Error> {
-    let start = theta[plan.layout.index(ParamKey::TimeStart)];
+    let start = theta[plan.layout.index(ParamKey::TimeStart)] + Sensors::new(&plan.layout, theta).ahead();
     let mut last: Option<Snapshot> = None;
     let evaluation = backend.visit(plan, theta, |_, state, residuals| {
         for r in &residuals {

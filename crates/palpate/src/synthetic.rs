@@ -8,7 +8,12 @@ use crate::render::{Pinhole, Sensor, rasterise};
 use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::recording::{DepthImage, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
-use palpate_model::observation::MarkerRest;
+use palpate_model::effects::check_choices;
+use palpate_model::effects::sensors::Sensors;
+use palpate_model::observation::{Camera, MarkerRest, MarkerSite};
+use palpate_model::plan::Plan;
+use palpate_model::plan_build::marker_sites;
+use palpate_model::rotation::Polar;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -32,7 +37,9 @@ pub struct Observers {
     pub sensor: Sensor,
 }
 
-/// Simulates an experiment with its own values and records it. Depth images without a single pixel of the body are left out.
+/// Simulates an experiment with its own values and records it. The scene's measurement effects act on the recording: cameras stand where
+/// `observers` has them and the recording states them elsewhere, frames are taken at `observers.times` and stamped with others. Depth images
+/// without a single pixel of the body are left out.
 /// `progress` hears the share of the simulation that is done. The same seed gives the same recording.
 ///
 /// # Errors
@@ -51,6 +58,9 @@ pub fn observe(
     if let Some(t) = observers.times.iter().find(|t| !is_static && !(start - slack..=end + slack).contains(*t)) {
         return Err(Error::Input(format!("{t} s is not simulated: the scene runs from {start} s to {end} s")));
     }
+    check_choices(&experiment.scene().effects, observers.cameras.len(), observers.markers.len())
+        .map_err(|(key, message)| Error::Input(format!("{}: {key}: {message}", experiment.scene().path.display())))?;
+    let errors = Errors::new(experiment, observers)?;
     let (surface, triangles) = experiment.surface(0.25 * plan.body.grid.h);
     let tracked = Embedding::new(&plan.body, observers.markers.iter().map(|m| m.1).collect());
     let mut waiting = observers.times.iter().copied().enumerate().peekable();
@@ -61,8 +71,9 @@ pub fn observe(
     backend.visit(plan, &plan.theta, |k, state, _| {
         while let Some((number, time)) = waiting.next_if(|(_, t)| is_static || t - start <= state.time + slack) {
             let u = last.as_ref().map_or_else(|| state.displacement.clone(), |a| between(a, &state, time - start));
-            frames.extend(images(observers, number, time, &surface.deform(&u), &triangles));
-            samples.extend(marker_samples(observers, number, time, &tracked.deform(&u)));
+            let stamp = time + errors.sensors.ahead();
+            frames.extend(images(observers, &errors.sensors, (number, stamp), &surface.deform(&u), &triangles));
+            samples.extend(marker_samples(observers, number, stamp, &errors.markers(tracked.deform(&u), &u)));
         }
         last = Some(state);
         let flow = progress(k as f64 / steps);
@@ -81,18 +92,68 @@ pub fn observe(
         path: PathBuf::from("recording.toml"),
         title: format!("Synthetic: {}", experiment.scene().title),
         source: "Simulated by palpate".into(),
-        cameras: observers.cameras.iter().map(|c| recorded_camera(c, &observers.sensor)).collect(),
+        cameras: (observers.cameras.iter().enumerate())
+            .map(|(i, c)| RecordedCamera {
+                world_from_camera: errors.sensors.stated_pose(i as u32, c.world_from_camera),
+                ..recorded_camera(c, &observers.sensor)
+            })
+            .collect(),
         frames,
         markers: (!observers.markers.is_empty()).then(|| recorded_markers(observers, samples)),
         warnings: Vec::new(),
     })
 }
 
-fn images(observers: &Observers, number: usize, time: f64, vertices: &[DVec3], triangles: &[[u32; 3]]) -> Vec<RecordedFrame> {
+/// The scene's measurement effects.
+struct Errors<'a> {
+    plan: &'a Plan,
+    sensors: Sensors,
+    /// Attachments of markers; empty where none sits elsewhere than stated.
+    sites: Vec<MarkerSite>,
+}
+
+impl Errors<'_> {
+    fn new<'a>(experiment: &'a Experiment, observers: &Observers) -> Result<Errors<'a>, Error> {
+        let plan = experiment.plan();
+        let sensors = Sensors::new(&plan.layout, &plan.theta);
+        let mut sites = Vec::new();
+        if (0..observers.markers.len()).any(|m| sensors.marker_offset(m as u32) != DVec3::ZERO) {
+            sites = marker_sites(&marker_rest(observers), &plan.body, experiment.shape())
+                .map_err(|e| Error::Input(format!("{}: {e}", experiment.scene().path.display())))?;
+        }
+        Ok(Errors { plan, sensors, sites })
+    }
+
+    /// Moves markers from where they are stated to sit on the deformed body to where they do.
+    fn markers(&self, mut positions: Vec<DVec3>, u: &[DVec3]) -> Vec<DVec3> {
+        for ((number, site), p) in self.sites.iter().enumerate().zip(&mut positions) {
+            let (_, f) = site.carry(|i| self.plan.body.nodes[i] + u[i]);
+            *p += Polar::new(f).r * self.sensors.marker_offset(number as u32);
+        }
+        positions
+    }
+}
+
+fn images(
+    observers: &Observers,
+    sensors: &Sensors,
+    (number, time): (usize, f64),
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+) -> Vec<RecordedFrame> {
     let one = |camera: usize| {
-        let exact = rasterise(&observers.cameras[camera], vertices, triangles);
+        let pinhole = &observers.cameras[camera];
+        let mut exact = rasterise(pinhole, vertices, triangles);
         if exact.covered() == 0 {
             return None;
+        }
+        if !sensors.exact_points() {
+            let pose = pinhole.world_from_camera;
+            let truly = Camera { center: pose.translation, axis: pose.matrix3.z_axis };
+            let width = exact.width;
+            for (i, z) in exact.depth.iter_mut().enumerate().filter(|(_, z)| z.is_finite()) {
+                *z = sensors.read(&truly, camera as u32, pinhole.unproject((i % width) as f64, (i / width) as f64, *z));
+            }
         }
         // Every image has its own random numbers; frames × cameras never meet.
         let image_number = (number * observers.cameras.len() + camera) as u64;
@@ -136,13 +197,17 @@ fn recorded_camera(c: &Pinhole, sensor: &Sensor) -> RecordedCamera {
 }
 
 fn recorded_markers(observers: &Observers, samples: Vec<MarkerSample>) -> RecordedMarkers {
-    let rest = observers.markers.iter().map(|(name, p)| MarkerRest { name: name.clone(), position: *p, surface: Some(*p) });
     RecordedMarkers {
         file: PathBuf::from("markers.csv"),
         names: observers.markers.iter().map(|m| m.0.clone()).collect(),
         samples,
         noise_sigma: Some(observers.sensor.noise.max(LEAST_MARKER_NOISE)),
         noise_systematic: 0.0,
-        rest: rest.collect(),
+        rest: marker_rest(observers),
     }
+}
+
+/// Where the recording states the markers to sit.
+fn marker_rest(observers: &Observers) -> Vec<MarkerRest> {
+    observers.markers.iter().map(|(name, p)| MarkerRest { name: name.clone(), position: *p, surface: Some(*p) }).collect()
 }

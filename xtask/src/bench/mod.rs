@@ -114,7 +114,7 @@ fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
         facing.iter().step_by(stride).map(|p| ObservedPoint { position: p.point, camera: 0 }).collect();
     let frame = |k: usize| Frame { time: 0.01 * k as f64, points: points.clone(), ..Frame::default() };
     let observation = Observation {
-        cameras: vec![Camera { center: camera }],
+        cameras: vec![Camera { center: camera, axis: DVec3::Y }],
         frames: (1..=steps).map(frame).collect(),
         depth_noise: 1e-3,
         marker_noise: 1e-3,

@@ -8,55 +8,10 @@ use crate::passes::markers::Carried;
 use crate::passes::matching::{BandLookup, Match, PointHash, extend, extend_transposed, match_points};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, ResidualRow, Rows, Source};
+use palpate_model::effects::sensors::Sensors;
+pub use palpate_model::instant::{Instant, instants};
 use palpate_model::kernel;
 use palpate_model::plan::Plan;
-
-/// Place of a frame inside a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instant {
-    /// Number of the frame.
-    pub frame: usize,
-    /// Factors of u₀, v₀, u₁, v₁.
-    pub value: [f64; 4],
-    /// Derivatives of the factors by time [1/s]; zero where the state is held.
-    pub rate: [f64; 4],
-}
-
-/// Frames that belong to step k of a simulation that starts at `start` on the recording's clock.
-pub fn instants(plan: &Plan, start: f64, k: usize) -> Vec<Instant> {
-    let frames = &plan.observation.frames;
-    let (dt, steps) = (plan.clock.step, plan.clock.steps);
-    if steps == 0 {
-        let hold = |frame| Instant { frame, value: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 4] };
-        return (0..frames.len()).map(hold).collect();
-    }
-    let place = |time: f64| {
-        let x = (time - start) / dt;
-        // A frame on a step boundary belongs to the step that ends there, also after rounding.
-        let x = if (x - x.round()).abs() < 1e-9 { x.round() } else { x };
-        let step = (x.ceil() - 1.0).clamp(0.0, steps as f64 - 1.0);
-        (step as usize, x - step)
-    };
-    let first = frames.partition_point(|f| place(f.time).0 < k);
-    let last = frames.partition_point(|f| place(f.time).0 <= k);
-    (first..last)
-        .map(|frame| {
-            let s = place(frames[frame].time).1;
-            if s < 0.0 {
-                return Instant { frame, value: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 4] };
-            }
-            if s > 1.0 {
-                return Instant { frame, value: [0.0, 0.0, 1.0, 0.0], rate: [0.0; 4] };
-            }
-            let (s2, s3) = (s * s, s * s * s);
-            Instant {
-                frame,
-                value: [2.0 * s3 - 3.0 * s2 + 1.0, (s3 - 2.0 * s2 + s) * dt, -2.0 * s3 + 3.0 * s2, (s3 - s2) * dt],
-                rate: [(6.0 * s2 - 6.0 * s) / dt, 3.0 * s2 - 4.0 * s + 1.0, (-6.0 * s2 + 6.0 * s) / dt, 3.0 * s2 - 2.0 * s],
-            }
-        })
-        .collect()
-}
 
 /// Σ factor · vector over u₀, v₀, u₁, v₁.
 pub fn blend(factors: &[f64; 4], vectors: [&[DVec3]; 4]) -> Nodes {
@@ -78,12 +33,27 @@ pub struct Compared {
     pub sum_signed: f64,
 }
 
-/// Compares a frame with displacement `u`.
-pub fn compare(plan: &Plan, lookup: &BandLookup, hash: &PointHash, frame: usize, u: &[DVec3]) -> Compared {
+/// A frame of the recording as the measurement effects of one member understand it.
+#[derive(Clone, Copy, Debug)]
+pub struct Look<'a> {
+    /// Body and recording.
+    pub plan: &'a Plan,
+    /// The member's measurement effects.
+    pub sensors: &'a Sensors,
+    /// Number of the frame.
+    pub frame: usize,
+}
+
+/// Compares a frame with displacement `u`; `hash` holds its points as the recording has them.
+pub fn compare(look: Look, lookup: &BandLookup, hash: &PointHash, u: &[DVec3]) -> Compared {
+    let Look { plan, sensors, frame } = look;
     let (body, obs) = (&*plan.body, &*plan.observation);
     let f = &obs.frames[frame];
     let matches = if f.points.is_empty() {
         Vec::new()
+    } else if let Some(points) = sensors.points(&obs.cameras, &f.points) {
+        let hash = PointHash::new(&points, body.grid.h);
+        match_points(body, &extend(body, u), &hash, &points, &sensors.cameras(&obs.cameras), lookup, obs.depth_noise)
     } else {
         match_points(body, &extend(body, u), hash, &f.points, &obs.cameras, lookup, obs.depth_noise)
     };
@@ -103,16 +73,16 @@ pub fn compare(plan: &Plan, lookup: &BandLookup, hash: &PointHash, frame: usize,
             matched += 3;
         }
     };
-    let marker = |m: &palpate_model::observation::ObservedMarker| {
-        Carried::new(body, &obs.markers[m.site as usize], u).position - m.position
-    };
+    let marker =
+        |m: &palpate_model::observation::ObservedMarker| Carried::new(body, &sensors.site(obs, m.site), u).position - m.position;
     vectors(&mut f.markers.iter().map(marker), obs.marker_noise);
     vectors(&mut f.displacements.iter().zip(u).map(|(d, u)| *u - *d), obs.displacement_noise);
     Compared { matches, cost, matched, sum_squares, sum_signed }
 }
 
-/// dJ/du of a compared frame, `[N]`; `scale` is 1/n.
-pub fn gradient(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], scale: f64) -> Nodes {
+/// dJ/du of a compared frame, `[N]`; `scale` is 1/n. What measurement effects change besides is added to dJ/dθ, `theta` `[P]`.
+pub fn gradient(look: Look, compared: &Compared, u: &[DVec3], scale: f64, theta: &mut [f64]) -> Nodes {
+    let Look { plan, sensors, frame } = look;
     let (body, obs) = (&*plan.body, &*plan.observation);
     let f = &obs.frames[frame];
     let mut out = if compared.matches.is_empty() {
@@ -126,14 +96,21 @@ pub fn gradient(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], sca
             for i in 0..8 {
                 extended[nodes[i] as usize] += weights[i] * g;
             }
+            let seen = &f.points[m.point as usize];
+            let camera = &obs.cameras[seen.camera as usize];
+            sensors.point_slopes(camera, seen, |_| true, |at, d| theta[at] -= g.dot(d));
         }
         extend_transposed(body, &extended)
     };
     let factor = scale / (obs.marker_noise * obs.marker_noise);
     for m in &f.markers {
-        let site = &obs.markers[m.site as usize];
-        let carried = Carried::new(body, site, u);
-        carried.adjoint(site, factor * (carried.position - m.position), &mut out);
+        let site = sensors.site(obs, m.site);
+        let carried = Carried::new(body, &site, u);
+        let adj = factor * (carried.position - m.position);
+        carried.adjoint(&site, adj, &mut out);
+        for at in sensors.marker_places(m.site) {
+            (0..3).for_each(|a| theta[at + a] += adj.dot(carried.by_stalk(a)));
+        }
     }
     let factor = scale / (obs.displacement_noise * obs.displacement_noise);
     for (i, d) in f.displacements.iter().enumerate() {
@@ -142,17 +119,22 @@ pub fn gradient(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], sca
     out
 }
 
-/// Hands every scalar residual of a frame to `visit`, with its derivatives along the displacement derivatives `du[q]` `[Q]`.
+/// Tangents at a frame: places in θ and the displacement's derivatives by them.
+#[derive(Clone, Copy, Debug)]
+pub struct Along<'a> {
+    /// Places in θ `[Q]`.
+    pub directions: &'a [usize],
+    /// Derivatives of the displacement `[Q][N]`.
+    pub du: &'a [Nodes],
+}
+
+/// Hands every scalar residual of a frame to `visit`, with its derivatives `[Q]`.
 /// Matched points come in their order; points that met nothing are left out.
-pub fn rows(
-    plan: &Plan,
-    frame: usize,
-    compared: &Compared,
-    u: &[DVec3],
-    du: &[Nodes],
-    mut visit: impl FnMut(ResidualRow, &[f64]),
-) {
+pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visit: impl FnMut(ResidualRow, &[f64])) {
+    let Look { plan, sensors, frame } = look;
+    let Along { directions, du } = along;
     let (body, obs) = (&*plan.body, &*plan.observation);
+    let column = |at: usize| directions.iter().position(|d| *d == at);
     let f = &obs.frames[frame];
     let mut d = vec![0.0; du.len()];
     if !compared.matches.is_empty() {
@@ -163,7 +145,14 @@ pub fn rows(
                 *r = -m.place.gradient.dot((0..8).map(|i| weights[i] * d[nodes[i] as usize]).sum());
             }
             let seen = &f.points[m.point as usize];
-            let sight = (seen.position - obs.cameras[seen.camera as usize].center).normalize_or_zero();
+            let camera = &obs.cameras[seen.camera as usize];
+            sensors.point_slopes(
+                camera,
+                seen,
+                |at| directions.contains(&at),
+                |at, by| column(at).into_iter().for_each(|q| d[q] += m.place.gradient.dot(by)),
+            );
+            let sight = DVec3::from_array(sensors.truth(camera, seen).ray()).normalize_or_zero();
             let row = ResidualRow {
                 frame,
                 source: Source::Point { point: m.point, camera: seen.camera },
@@ -176,8 +165,8 @@ pub fn rows(
             visit(row, &d);
         }
     }
-    let mut vector = |noise: f64, rest: DVec3, r: DVec3, source: &dyn Fn(u8) -> Source, change: &dyn Fn(&Nodes) -> DVec3| {
-        let changes: Vec<DVec3> = du.iter().map(change).collect();
+    let mut vector = |noise: f64, rest: DVec3, r: DVec3, source: &dyn Fn(u8) -> Source, change: &dyn Fn(usize) -> DVec3| {
+        let changes: Vec<DVec3> = (0..du.len()).map(change).collect();
         for a in 0..3u8 {
             for (d, c) in d.iter_mut().zip(&changes) {
                 *d = c[usize::from(a)];
@@ -187,24 +176,28 @@ pub fn rows(
         }
     };
     for m in &f.markers {
-        let site = &obs.markers[m.site as usize];
-        let carried = Carried::new(body, site, u);
+        let site = sensors.site(obs, m.site);
+        let carried = Carried::new(body, &site, u);
+        let own = |q: usize| {
+            let axis = |at: usize| (at..at + 3).position(|p| p == directions[q]);
+            sensors.marker_places(m.site).filter_map(axis).map(|a| carried.by_stalk(a)).sum::<DVec3>()
+        };
         let rest = site.carry(|i| body.nodes[i]).0;
         let source = |axis| Source::Marker { site: m.site, axis };
-        vector(obs.marker_noise, rest, carried.position - m.position, &source, &|d| carried.tangent(site, d));
+        vector(obs.marker_noise, rest, carried.position - m.position, &source, &|q| carried.tangent(&site, &du[q]) + own(q));
     }
     for (i, d) in f.displacements.iter().enumerate() {
         let source = |axis| Source::Node { node: i as u32, axis };
-        vector(obs.displacement_noise, body.nodes[i], u[i] - *d, &source, &|d| d[i]);
+        vector(obs.displacement_noise, body.nodes[i], u[i] - *d, &source, &|q| du[q][i]);
     }
 }
 
 /// As [`rows`], all together: points that met nothing stand in their place, without value and with derivatives of zero.
-pub fn all_rows(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], du: &[Nodes]) -> Rows {
-    let obs = &*plan.observation;
+pub fn all_rows(look: Look, compared: &Compared, u: &[DVec3], along: Along) -> Rows {
+    let (obs, frame) = (&*look.plan.observation, look.frame);
     let points = &obs.frames[frame].points;
     let mut out = Rows::default();
-    let zero = vec![0.0; du.len()];
+    let zero = vec![0.0; along.du.len()];
     let mut seen = 0;
     let unmatched = |n: usize| ResidualRow {
         frame,
@@ -219,7 +212,7 @@ pub fn all_rows(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], du:
         out.residuals.push(row);
         out.sensitivity.extend_from_slice(d);
     };
-    rows(plan, frame, compared, u, du, |row, d| {
+    rows(look, compared, u, along, |row, d| {
         let upto = if let Source::Point { point, .. } = row.source { point as usize } else { points.len() };
         (seen..upto).for_each(|n| add(unmatched(n), &zero));
         seen = if matches!(row.source, Source::Point { .. }) { upto + 1 } else { upto };
@@ -229,19 +222,18 @@ pub fn all_rows(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3], du:
     out
 }
 
-/// Adds a frame's Gauss–Newton gradient `[Q]` and matrix `[Q, Q]` for the displacement derivatives `du[q]`.
+/// Adds a frame's Gauss–Newton gradient `[Q]` and matrix `[Q, Q]`.
 pub fn gauss_newton(
-    plan: &Plan,
-    frame: usize,
+    look: Look,
     compared: &Compared,
     u: &[DVec3],
-    du: &[Nodes],
+    along: Along,
     scale: f64,
     gradient: &mut [f64],
     matrix: &mut [f64],
 ) {
-    let q = du.len();
-    rows(plan, frame, compared, u, du, |row, d| {
+    let q = along.du.len();
+    rows(look, compared, u, along, |row, d| {
         let weight = scale * row.weight / (row.noise * row.noise);
         let residual = row.value.unwrap_or(0.0);
         for a in 0..q {
@@ -254,7 +246,8 @@ pub fn gauss_newton(
 }
 
 /// Every residual of a frame, for reports.
-pub fn residuals(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3]) -> FrameResiduals {
+pub fn residuals(look: Look, compared: &Compared, u: &[DVec3]) -> FrameResiduals {
+    let Look { plan, sensors, frame } = look;
     let obs = &*plan.observation;
     let f = &obs.frames[frame];
     let mut points = vec![None; f.points.len()];
@@ -262,6 +255,6 @@ pub fn residuals(plan: &Plan, frame: usize, compared: &Compared, u: &[DVec3]) ->
         points[m.point as usize] = Some(m.place.phi);
     }
     let markers =
-        f.markers.iter().map(|m| Carried::new(&plan.body, &obs.markers[m.site as usize], u).position - m.position).collect();
+        f.markers.iter().map(|m| Carried::new(&plan.body, &sensors.site(obs, m.site), u).position - m.position).collect();
     FrameResiduals { frame, points, markers }
 }

@@ -26,6 +26,11 @@ impl Carried {
         dp + self.polar.r * self.polar.spin(df).cross(site.stalk)
     }
 
+    /// Change of the position per metre that the stalk grows along rest axis `a`.
+    pub fn by_stalk(&self, a: usize) -> DVec3 {
+        self.polar.r.col(a)
+    }
+
     /// Adds the gradient by the displacement, given that by the position.
     pub fn adjoint(&self, site: &MarkerSite, adj: DVec3, out: &mut [DVec3]) {
         // adj·R(ω×s) = ω·(s × Rᵀadj), and w·ax(RᵀdF) = (R [w]×):dF with w = G⁻¹ (s × Rᵀadj).

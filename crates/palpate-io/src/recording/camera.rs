@@ -94,6 +94,11 @@ impl RecordedCamera {
         self.world_from_camera.translation
     }
 
+    /// Unit vector in the world along which depth counts.
+    pub fn axis(&self) -> DVec3 {
+        self.world_from_camera.matrix3.z_axis
+    }
+
     /// Normalised image coordinates (x/z, y/z) of a pixel, distortion removed; `None` where it cannot be inverted.
     ///
     /// OpenCV's model x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²) (y likewise) is inverted by fixed-point iteration.

@@ -30,7 +30,7 @@ impl Recording {
         warnings: &mut Vec<String>,
     ) -> Result<(Observation, Vec<MarkerRest>), InputError> {
         let mut o = Observation {
-            cameras: self.cameras.iter().map(|c| Camera { center: c.position() }).collect(),
+            cameras: self.cameras.iter().map(|c| Camera { center: c.position(), axis: c.axis() }).collect(),
             depth_noise: DEPTH_NOISE,
             marker_noise: MARKER_NOISE,
             // Displacements come from other simulators, not from recordings; one metre keeps the weight neutral.

@@ -3,7 +3,7 @@
 use crate::document::Table;
 use crate::error::InputError;
 use crate::keys::suggest;
-use palpate_model::effects::{self, Effect, EffectParam};
+use palpate_model::effects::{self, Effect, EffectParam, Unstated};
 
 /// Every effect of a scene, in the order of the file.
 pub(super) fn effects(root: &Table) -> Result<Vec<Effect>, InputError> {
@@ -36,6 +36,9 @@ fn stated(t: &Table, p: &EffectParam) -> Result<Option<f64>, InputError> {
         Some(a) => t.optional_vec3(p.key)?.map(|v| v[usize::from(a)]),
     };
     match value {
+        Some(v) if matches!(p.default, Unstated::Choice(_)) && !(v.fract() == 0.0 && (p.lower..=p.upper).contains(&v)) => {
+            Err(t.error(p.key, format!("{v} is not allowed: {} is a whole number from 0", p.doc)))
+        }
         Some(v) if !(p.lower..=p.upper).contains(&v) => {
             Err(t.error(p.key, format!("{v} is not allowed: {} must lie in [{}, {}] {}", p.doc, p.lower, p.upper, p.unit)))
         }

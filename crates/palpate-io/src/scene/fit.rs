@@ -3,6 +3,7 @@
 use crate::document::Table;
 use crate::error::InputError;
 use crate::keys::suggest;
+use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::{ParamKey, Transform};
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene};
@@ -19,7 +20,7 @@ struct Target {
 /// The numbers of this scene that can be fitted, in the order of its layout.
 fn targets(scene: &Scene) -> Vec<Target> {
     let mut out = Vec::new();
-    for key in scene.layout().keys {
+    for key in scene.layout().keys.into_iter().filter(|k| !is_choice(*k)) {
         let spec = key.spec();
         let (path, value, lower, upper) = match (key, scene.material.inertia) {
             (ParamKey::Density, Inertia::Mass(m)) => ("material.mass".to_string(), m, 1e-9, 1e6),
@@ -28,6 +29,12 @@ fn targets(scene: &Scene) -> Vec<Target> {
         out.push(Target { path, value, lower, upper, positive: spec.transform == Transform::Log });
     }
     out
+}
+
+/// True for numbers that choose one thing among several.
+fn is_choice(key: ParamKey) -> bool {
+    let ParamKey::Effect { law, slot, .. } = key else { return false };
+    matches!(ALL[usize::from(law)].params[usize::from(slot)].default, Unstated::Choice(_))
 }
 
 /// A parameter's value as the scene states it.
@@ -70,6 +77,11 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
     let known = targets(scene);
     let mut parameters: Vec<FitParameter> = Vec::new();
     for p in t.tables("parameter")? {
+        if let Some(path) = p.optional_str("path")?
+            && scene.layout().keys.iter().any(|k| is_choice(*k) && k.spec().path == path)
+        {
+            return Err(p.error("path", format!("{path} chooses one thing among several and cannot be fitted; state it")));
+        }
         for parameter in parameter(&p, &known)? {
             if parameters.iter().any(|o| o.path == parameter.path) {
                 return Err(p.error("path", format!("{} is given twice", parameter.path)));

@@ -135,6 +135,13 @@ fn numbers_out_of_range_say_what_is_allowed() {
         ("[time]", "[[effect]]\nkind = \"coulomb-friction\"\ncoeficient = 0.3\n[time]", "did you mean \"coefficient\""),
         ("[time]", "[[effect]]\nkind = \"coulomb-friction\"\ncoefficient = -1\n[time]", "must lie in [0, 10]"),
         ("[time]", "[[effect]]\nkind = \"uniform-force\"\nforce = 3\n[time]", "array of 3 numbers"),
+        ("[time]", "[[effect]]\nkind = \"camera-pose\"\ncamera = 0.5\n[time]", "0.5 is not allowed: number of the camera"),
+        ("[time]", "[[effect]]\nkind = \"marker-offset\"\nmarker = -1\n[time]", "is a whole number from 0"),
+        (
+            "[time]",
+            "[[effect]]\nkind = \"camera-pose\"\n[fit]\n[[fit.parameter]]\npath = \"effect.0.camera\"\n[time]",
+            "effect.0.camera chooses one thing among several and cannot be fitted",
+        ),
         ("[time]", "[[clamp]]\nbox = { min = [0, 0, 0], max = [1, -1, 1] }\n[time]", "y: -1 must be larger than min = 0"),
         ("[time]", "[fit]\noptimizer = \"adam\"\n[time]", "\"adam\" is not known; allowed: \"rprop\", \"gradient-descent\""),
         ("[time]", "[observation]\nrecording = \"r\"\ncost = \"silhouette\"\n[time]", "not available in this version"),

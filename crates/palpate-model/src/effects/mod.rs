@@ -7,16 +7,25 @@
 pub mod cell;
 pub mod field;
 pub mod law;
+pub mod reading;
+pub mod sensors;
 
 mod adhesion;
 mod air_drag;
+mod camera_pose;
 mod contact_dissipation;
 mod contact_stiffness;
 mod coulomb_friction;
+mod depth_along_ray;
+mod depth_bias;
+mod depth_bias_part;
+mod depth_scale;
+mod marker_offset;
 mod point_mass;
 mod second_plane;
 mod slack;
 mod tether;
+mod time_offset;
 mod uniform_force;
 
 mod clamp_slip;
@@ -39,6 +48,7 @@ use crate::params::Transform;
 use cell::Cell;
 use field::Field;
 use law::Point;
+use reading::Reading;
 
 /// An effect: what it is called, what it needs, where it acts.
 pub struct Law {
@@ -107,6 +117,17 @@ pub enum Unstated {
     Center,
     /// Must be stated (a diagnosis starts it at this value).
     Stated(f64),
+    /// The number, counted from 0, of one thing among several; 0 where it is not stated. It cannot be fitted.
+    Choice(Numbered),
+}
+
+/// What an effect can choose one of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Numbered {
+    /// A camera of the recording.
+    Camera,
+    /// A marker of the recording.
+    Marker,
 }
 
 /// How a diagnosis tries an effect.
@@ -128,6 +149,12 @@ pub enum Site {
     Surface(&'static dyn Point),
     /// Every surface patch and every plane of the scene.
     Contact(&'static dyn Point),
+    /// Every reading of a depth camera.
+    Readings(&'static dyn Reading),
+    /// The times of frames: they are ahead by parameter 0.
+    Clock,
+    /// One marker, parameter 0: parameters 1 to 3 add to its stalk.
+    Marker,
     /// Every cell's Young's modulus: a factor.
     Modulus(&'static dyn Field<1>),
     /// Every node's density: a factor.
@@ -167,6 +194,13 @@ pub static ALL: &[Law] = &[
     point_mass::LAW,
     tether::LAW,
     air_drag::LAW,
+    camera_pose::LAW,
+    time_offset::LAW,
+    depth_bias::LAW,
+    depth_scale::LAW,
+    depth_bias_part::LAW,
+    depth_along_ray::LAW,
+    marker_offset::LAW,
     slack::LAW,
 ];
 
@@ -239,15 +273,44 @@ impl Effect {
     }
 }
 
+/// Checks that everything that effects choose by number exists among so many cameras and markers.
+///
+/// # Errors
+/// Key in the scene (`effect.0.camera`) and what is allowed.
+pub fn check_choices(effects: &[Effect], cameras: usize, markers: usize) -> Result<(), (String, String)> {
+    for (i, effect) in effects.iter().enumerate() {
+        for (p, value) in effect.law().params.iter().zip(&effect.values) {
+            let Unstated::Choice(of) = p.default else { continue };
+            let (count, noun) = match of {
+                Numbered::Camera => (cameras, "camera"),
+                Numbered::Marker => (markers, "marker"),
+            };
+            let number = value.unwrap_or(0.0);
+            if number >= count as f64 {
+                let message = match count {
+                    0 => format!("there is no {noun} that the effect could concern"),
+                    1 => format!("there is no {noun} number {number}; the only one is 0"),
+                    _ => format!("there is no {noun} number {number}; they are 0 to {}", count - 1),
+                };
+                return Err((format!("effect.{i}.{}", p.key), message));
+            }
+        }
+    }
+    Ok(())
+}
+
 impl Unstated {
     /// The value, unless it is the body's centre.
     pub fn value(self) -> Option<f64> {
         match self {
             Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Stated(v) => Some(v),
+            Unstated::Choice(_) => Some(0.0),
             Unstated::Center => None,
         }
     }
 }
 
+#[cfg(test)]
+mod sensor_tests;
 #[cfg(test)]
 mod tests;
