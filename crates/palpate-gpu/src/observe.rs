@@ -6,10 +6,10 @@
 
 mod looks;
 mod results;
-mod shots;
-mod tables;
 #[cfg(test)]
 mod rollout_tests;
+mod shots;
+mod tables;
 #[cfg(test)]
 mod tests;
 

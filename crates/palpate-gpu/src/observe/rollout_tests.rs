@@ -52,7 +52,8 @@ fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<Stri
     let mut out = Vec::new();
     let mut check = |name: String, x: f64, y: f64, size: f64| {
         let d = (x - y).abs() / size;
-        if !(d <= AGREEMENT) {
+        // Not a number is a difference as well.
+        if d.is_nan() || d > AGREEMENT {
             out.push(format!("{name}: {x} is not {y} ({d:.1e})"));
         }
     };

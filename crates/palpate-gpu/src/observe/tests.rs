@@ -145,8 +145,10 @@ fn ball_plan() -> Plan {
     observed(&scene(Analytic::Ball { radius: 0.05, center }, 0.021), &rest, 3)
 }
 
-/// Everything that is compared, by name.
-type Outcome = Vec<(&'static str, Vec<f64>)>;
+/// Numbers that are compared, and their name.
+type Part = (&'static str, Vec<f64>);
+/// Everything that is compared.
+type Outcome = Vec<Part>;
 
 fn flat(v: &[DVec3]) -> impl Iterator<Item = f64> + '_ {
     v.iter().flat_map(|v| v.to_array())
@@ -305,7 +307,7 @@ fn found(backend: &GpuBackend, plan: &Plan, members: usize, room: Option<Room>) 
 
 /// What differs by more than the agreed part of its size, with that part.
 fn differences(a: &Outcome, b: &Outcome) -> Vec<(&'static str, f64)> {
-    let off = |(x, y): (&(&'static str, Vec<f64>), &(&'static str, Vec<f64>))| {
+    let off = |(x, y): (&Part, &Part)| {
         assert_eq!((x.0, x.1.len()), (y.0, y.1.len()));
         let size = y.1.iter().fold(1e-30, |s: f64, v| s.max(v.abs()));
         let worst =
@@ -314,8 +316,8 @@ fn differences(a: &Outcome, b: &Outcome) -> Vec<(&'static str, f64)> {
     };
     let all: Vec<_> = a.iter().zip(b).map(off).collect();
     println!("{}", all.iter().map(|(name, d)| format!("{name} {d:.1e}")).collect::<Vec<_>>().join(", "));
-    // Not `>`: a number that is none must not pass.
-    all.into_iter().filter(|d| !(d.1 <= AGREEMENT)).collect()
+    // Not a number is a difference as well.
+    all.into_iter().filter(|d| d.1.is_nan() || d.1 > AGREEMENT).collect()
 }
 
 #[test]

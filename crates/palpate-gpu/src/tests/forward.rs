@@ -78,7 +78,7 @@ fn one_percent_of_stiffness_stands_out() {
     let mut wrong = plan.theta.clone();
     wrong[0] *= 1.01;
     let found = states(&GpuBackend::on(gpu), &plan, &[wrong]).0;
-    let exact = states(&CpuBackend, &plan, &[plan.theta.clone()]).0;
+    let exact = states(&CpuBackend, &plan, std::slice::from_ref(&plan.theta)).0;
     let last = plan.clock.steps;
     let d = [off(&found[last][0].0, &exact[last][0].0), off(&found[last][0].1, &exact[last][0].1)];
     assert!(d[0] > 3.0 * CLOSE[0] && d[1] > 3.0 * CLOSE[1], "the comparison compares nothing: {d:?}");
