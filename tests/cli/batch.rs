@@ -77,6 +77,29 @@ fn an_interrupted_batch_goes_on_where_it_was() {
     }
 }
 
+/// What `.ci/batch-lavapipe` runs, on one of its scenes: the same answer as on the CPU.
+#[test]
+fn a_batch_on_the_gpu_backend_finds_what_the_cpu_finds() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/batch/soft.toml");
+    let found = |backend: &str| {
+        let out = folder.path().join(backend);
+        let a = palpate(&["batch", arg(&scene), "--out", arg(&out), "--backend", backend]);
+        assert_eq!(a.code, 0, "{}", a.err);
+        let row = json(out.join("summary.json"))["scenes"][0].clone();
+        assert_eq!((&row["status"], &row["backend"]), (&"complete".into(), &backend.into()));
+        row["parameters"][0]["value"].as_f64().unwrap()
+    };
+    let (cpu, gpu) = (found("cpu"), found("gpu"));
+    // Gauss–Newton ends where the gradient in single precision does: 1e-3 of the standard error's 0.2 % and less.
+    assert!((gpu / cpu - 1.0).abs() < 1e-4, "{gpu} against {cpu}");
+    // The recording is synthetic, from a finer grid and step: 10 kPa up to the error of this one.
+    assert!((cpu / 1e4 - 1.0).abs() < 0.05, "{cpu}");
+}
+
 #[test]
 fn nothing_to_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 pub mod command;
 pub mod data;
 pub mod energy;
+pub mod gpu;
 pub mod measured;
 pub mod run;
 pub mod scenes;

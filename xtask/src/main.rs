@@ -42,6 +42,12 @@ enum Verb {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         more: Vec<String>,
     },
+    /// Say which graphics adapter would be used
+    Adapter {
+        /// Install Mesa's software adapter where there is none and it may be installed
+        #[arg(long)]
+        install: bool,
+    },
     /// Check rooms, imports, sizes of files
     Tidy,
 }
@@ -63,6 +69,7 @@ fn run(verb: Verb) -> Result<(), String> {
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }
         Verb::Test { more } => test::run(&table::root(), &more)?,
+        Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Tidy => {
             let found = tidy::check(&table::root());
             found.iter().for_each(|f| println!("{f}"));

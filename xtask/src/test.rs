@@ -41,25 +41,36 @@ fn install(before: &[&'static str]) -> bool {
     run(&package) || (run(&["update"]) && run(&package))
 }
 
+/// Name of a usable adapter; where there is none and `may_install`, Mesa's software one is installed first.
+///
+/// # Errors
+/// There is none, and what to install.
+pub fn find_adapter(may_install: bool) -> Result<String, String> {
+    if let Some(name) = adapter() {
+        return Ok(name);
+    }
+    if may_install && let Some(before) = privileged() {
+        println!("no graphics adapter: installing Mesa's software adapter (lavapipe)");
+        if install(&before)
+            && let Some(name) = adapter()
+        {
+            return Ok(name);
+        }
+    }
+    Err(format!("there is no usable graphics adapter. Install one:\n{ADVICE}"))
+}
+
 /// Runs all tests of the workspace at `root`, with `more` arguments for cargo.
 ///
 /// # Errors
 /// No adapter although `PALPATE_GPU=require`, or a test fails.
 pub fn run(root: &Path, more: &[String]) -> Result<(), String> {
-    let mut found = adapter();
-    if found.is_none()
-        && let Some(before) = privileged()
-    {
-        println!("no graphics adapter: installing Mesa's software adapter (lavapipe)");
-        if install(&before) {
-            found = adapter();
-        }
-    }
+    let found = find_adapter(true);
     let required = std::env::var("PALPATE_GPU").is_ok_and(|v| v == "require");
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(root).args(["test", "--release", "--workspace"]).args(more);
     match &found {
-        Some(name) => {
+        Ok(name) => {
             println!("GPU tests run on {name}");
             cargo.env("PALPATE_GPU", "require");
             // Lavapipe's own threads cost more per dispatch than small problems compute; the tests run side by side instead.
@@ -67,17 +78,15 @@ pub fn run(root: &Path, more: &[String]) -> Result<(), String> {
                 cargo.env("LP_NUM_THREADS", "0");
             }
         }
-        None if required => {
-            return Err(format!("PALPATE_GPU=require, but there is no usable graphics adapter. Install one:\n{ADVICE}"));
-        }
-        None => println!("no graphics adapter: GPU tests are skipped. To run them, install one:\n{ADVICE}"),
+        Err(e) if required => return Err(format!("PALPATE_GPU=require, but {e}")),
+        Err(e) => println!("GPU tests are skipped: {e}"),
     }
     let status = cargo.status().map_err(|e| format!("cargo cannot be started: {e}"))?;
     if !status.success() {
         return Err("some tests failed".into());
     }
-    if found.is_none() {
-        println!("all tests passed except those of the GPU, which were skipped. To run them, install an adapter:\n{ADVICE}");
+    if let Err(e) = found {
+        println!("all tests passed except those of the GPU, which were skipped: {e}");
     }
     Ok(())
 }

@@ -62,6 +62,13 @@ fn gpu() -> Result<GpuBackend, GpuError> {
     Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
 }
 
+/// False where the system has no device file of a graphics processor: drivers need not be asked then, which takes time and makes
+/// some of them write to the terminal.
+fn may_have_processor() -> bool {
+    !cfg!(target_os = "linux")
+        || ["/dev/dri", "/dev/nvidia0", "/dev/kfd", "/dev/dxg"].iter().any(|f| std::path::Path::new(f).exists())
+}
+
 fn refused(e: &GpuError) -> Error {
     Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
 }
@@ -98,7 +105,7 @@ impl Backend {
             return (self, "asked for".into());
         }
         let named = Choice::from_env() != Choice::Auto;
-        if !named && !palpate_gpu::adapters().iter().any(|a| a.refusal.is_none() && !a.is_software()) {
+        if !named && (!may_have_processor() || !palpate_gpu::adapters().iter().any(|a| a.refusal.is_none() && !a.is_software())) {
             return (Backend::Cpu, "there is no graphics processor".into());
         }
         let device = match gpu() {
