@@ -2,12 +2,15 @@
 //! of the scene that laws depend on.
 
 use super::gradients::{ball, observed};
+use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
 use palpate_model::effects::{self, ALL, Family};
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::params::Transform;
 use palpate_model::plan::Plan;
+use palpate_model::scene::InitialShape;
+use support::scenes;
 
 /// The ball with one effect, every amplitude at a size that matters.
 pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
@@ -19,6 +22,11 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         }
     }
     scene.effects = vec![effect];
+    if matches!(ALL[law].site, effects::Site::Clamps(_)) {
+        // They need a clamp, and a start that it does not jerk.
+        scene.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+        scene.initial.state = InitialShape::StaticEquilibrium;
+    }
     scene
 }
 
@@ -91,6 +99,16 @@ fn contact() {
 #[test]
 fn loads() {
     check_family(Family::Load);
+}
+
+#[test]
+fn materials() {
+    check_family(Family::Material);
+}
+
+#[test]
+fn shapes() {
+    check_family(Family::Shape);
 }
 
 #[test]
