@@ -2,6 +2,7 @@
 
 use crate::error::GpuError;
 use crate::pipelines::Pipelines;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Which adapter to use.
@@ -137,6 +138,10 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) pipelines: Pipelines,
+    /// Largest buffer that a kernel can bind [B].
+    pub(crate) largest: u64,
+    /// Bytes of all buffers made so far.
+    made: AtomicU64,
     trouble: Arc<Mutex<Option<GpuError>>>,
 }
 
@@ -197,6 +202,8 @@ impl Gpu {
             device: device.clone(),
             queue: queue.clone(),
             pipelines: Pipelines::new(lanes),
+            largest: device.limits().max_storage_buffer_binding_size,
+            made: AtomicU64::new(0),
             trouble: trouble.clone(),
         };
         let gpu = match lanes {
@@ -244,11 +251,8 @@ impl Gpu {
     /// # Errors
     /// It is larger than a limit of the device.
     pub(crate) fn buffer(&self, label: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
-        let limits = self.device.limits();
-        for (limit, available) in [
-            ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size),
-            ("max_buffer_size", limits.max_buffer_size),
-        ] {
+        let most = self.device.limits().max_buffer_size;
+        for (limit, available) in [("max_storage_buffer_binding_size", self.largest), ("max_buffer_size", most)] {
             if bytes > available {
                 return Err(GpuError::Limit { limit, available, needed: bytes, what: format!("the buffer `{label}`") });
             }
@@ -258,9 +262,14 @@ impl Gpu {
             | wgpu::BufferUsages::COPY_DST
             | if label == "arguments" { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
             | if label == "shape" { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::empty() };
-        // Empty lists still need something to bind: one element of the largest struct.
-        let size = bytes.max(256).next_multiple_of(16);
+        let size = whole(bytes);
+        self.made.fetch_add(size, Ordering::Relaxed);
         Ok(self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }))
+    }
+
+    /// Bytes of all buffers made so far, those included that are gone since.
+    pub fn made(&self) -> u64 {
+        self.made.load(Ordering::Relaxed)
     }
 
     /// The smallest buffer: something to bind where a large one could not be had.
@@ -313,6 +322,11 @@ impl Gpu {
     }
 }
 
+/// Size of the buffer that holds so many bytes: empty lists still need something to bind, one element of the largest struct.
+pub(crate) fn whole(bytes: u64) -> u64 {
+    bytes.max(256).next_multiple_of(16)
+}
+
 fn keep(slot: &Mutex<Option<GpuError>>, error: GpuError) {
     slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
@@ -321,6 +335,10 @@ fn keep(slot: &Mutex<Option<GpuError>>, error: GpuError) {
 pub(crate) fn translate(e: wgpu::Error) -> GpuError {
     match e {
         wgpu::Error::OutOfMemory { source } => GpuError::OutOfMemory { what: source.to_string() },
+        // Whatever is asked of a device that is gone is refused so.
+        wgpu::Error::Validation { description, .. } if description.contains("device is lost") => {
+            GpuError::Lost { reason: description }
+        }
         wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
             GpuError::Refused { message: description }
         }

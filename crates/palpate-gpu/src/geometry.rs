@@ -15,11 +15,62 @@ const WORLD_SIZE: f64 = 1000.0;
 /// solution is better than its last but one residual.
 const FINEST: f64 = 2e-6;
 /// Loop iterations that one invocation may use up in one dispatch: lavapipe silently stops at 65,535.
-pub(crate) const LOOPS: usize = 32_000;
+pub(crate) const LOOPS: u64 = 32_000;
 /// Most CG iterations of one solve; a solve that needs more is a symptom.
 const MOST_ITERATIONS: usize = 2000;
 /// Most CG iterations of one dispatch: the rest of a long chunk is lost when a member converges early in it.
-const LONGEST_CHUNK: usize = 512;
+const LONGEST_CHUNK: u64 = 512;
+
+/// What the loops of the kernels of a step run over, at most.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Most {
+    pub(crate) members: u64,
+    pub(crate) nodes: u64,
+    /// Blocks of a row of the matrix.
+    pub(crate) row: u64,
+    /// Patches and clamp cells of a cell.
+    pub(crate) supports: u64,
+    pub(crate) planes: u64,
+    pub(crate) masses: u64,
+    /// Iterations of conjugate gradients in one dispatch.
+    pub(crate) chunk: u64,
+}
+
+impl Most {
+    /// Nodes that a lane of a workgroup of 256 goes through.
+    pub(crate) fn share(&self) -> u64 {
+        self.nodes.div_ceil(256)
+    }
+
+    /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums.
+    fn of_iteration(&self) -> u64 {
+        1 + self.share() * (self.row + 4 + 17 * self.masses) + 20
+    }
+
+    /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 5] {
+        // 600: rotations by Jacobi's method, and sums over the corners of a cell.
+        let cell = 600 + self.supports;
+        [
+            ("list_members", self.members + 16),
+            ("iterate_cg", self.chunk * self.of_iteration() + self.share()),
+            ("begin_solve", self.share() * (3 + 9 * self.masses) + 300),
+            ("gather_matrix", 8 * (1 + 2 * self.supports) + 12),
+            ("gather_column", cell + self.row + 20 * self.masses + self.planes),
+        ]
+    }
+}
+
+/// Refuses sizes at which an invocation of some kernel could loop longer than every adapter allows.
+fn check_loops(most: &Most) -> Result<(), GpuError> {
+    match most.loops().into_iter().find(|l| l.1 > LOOPS) {
+        None => Ok(()),
+        Some((what, needed)) => {
+            let limit = "loop iterations of one invocation";
+            Err(GpuError::Limit { limit, available: LOOPS, needed, what: format!("the kernel `{what}`") })
+        }
+    }
+}
 
 /// Host side of a plan's geometry.
 #[derive(Debug)]
@@ -39,7 +90,12 @@ impl Geometry {
     ///
     /// # Errors
     /// The plan needs something this backend lacks, or more than the device has.
-    pub(crate) fn new(gpu: &Gpu, plan: &Plan, buffers: &mut HashMap<&'static str, wgpu::Buffer>) -> Result<Geometry, GpuError> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        plan: &Plan,
+        members: usize,
+        buffers: &mut HashMap<&'static str, wgpu::Buffer>,
+    ) -> Result<Geometry, GpuError> {
         let body = &plan.body;
         let n = body.nodes.len();
         let pattern = Pattern::new(body);
@@ -100,15 +156,22 @@ impl Geometry {
         let to_u32 = |v: &[usize]| -> Vec<u32> { v.iter().map(|x| *x as u32).collect() };
         let hold_sites: Vec<[u32; 2]> = holds.iter().map(|h| [cell_of(h), h.0 as u32]).collect();
 
-        let widest = (0..n).map(|a| pattern.blocks.rows[a + 1] - pattern.blocks.rows[a]).max().unwrap_or(0);
-        // Per iteration and lane: rows of its nodes with their blocks (and point masses), three sweeps, two sums.
-        let loops = n.div_ceil(256) * (widest + 4 + 17 * masses.len()) + 20;
-        let chunk = (LOOPS / loops).clamp(1, LONGEST_CHUNK);
-        if loops > LOOPS {
-            let limit = "loop iterations of one invocation";
-            let what = format!("a body of {n} nodes");
-            return Err(GpuError::Limit { limit, available: LOOPS as u64, needed: loops as u64, what });
-        }
+        let most = Most {
+            members: members as u64,
+            nodes: n as u64,
+            row: (0..n).map(|a| pattern.blocks.rows[a + 1] - pattern.blocks.rows[a]).max().unwrap_or(0) as u64,
+            supports: cells
+                .iter()
+                .map(|c| c.hold_end - c.hold_start + c.patch_end.saturating_sub(c.patch_start))
+                .max()
+                .unwrap_or(0)
+                .into(),
+            planes: plan.planes.len() as u64,
+            masses: masses.len() as u64,
+            chunk: 1,
+        };
+        check_loops(&most)?;
+        let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
         let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
         let shape = Shape {
             members: 0,

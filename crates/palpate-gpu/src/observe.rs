@@ -4,10 +4,12 @@
 //! tangents as `[2][B][N]`; results are added to buffers of the tally. Frames of a step are worked on in rounds ([`looks`]); matches
 //! are found again on the way back, which costs less memory than keeping them for every frame and member.
 
+#[cfg(test)]
+mod fault_tests;
 mod looks;
 mod results;
 #[cfg(test)]
-mod rollout_tests;
+pub(crate) mod rollout_tests;
 mod shots;
 mod tables;
 #[cfg(test)]
@@ -106,7 +108,7 @@ impl Observer {
             ..Sight::default()
         };
         check_loops(&sight, &shots, &band, &sites)?;
-        let largest = gpu.device.limits().max_storage_buffer_binding_size;
+        let largest = gpu.largest;
         let each = scratch(&sight);
         let widest = each.iter().map(|s| s.1).max().unwrap_or(1).max(1);
         let whole = each.iter().map(|s| s.1).sum::<u64>().max(1);

@@ -75,7 +75,7 @@ impl World {
         if plan.layout.effects().next().is_some() {
             return Err(GpuError::Plan { what: "[[effect]] tables".into() });
         }
-        let geometry = Geometry::new(&gpu, plan, &mut buffers)?;
+        let geometry = Geometry::new(&gpu, plan, capacity, &mut buffers)?;
         for (name, items, bytes) in WORK {
             let size = u64::from(items(&geometry.shape)) * bytes * capacity as u64;
             buffers.insert(name, gpu.buffer(name, size)?);

@@ -18,8 +18,13 @@ use std::ops::ControlFlow;
 /// thousandth of what they could be at most.
 const AGREEMENT: f64 = 1e-3;
 
+/// How the surface is compared.
+pub(crate) fn watched() -> Option<palpate_model::scene::ObservationSpec> {
+    scene(Analytic::Ball { radius: 0.05, center: DVec3::ZERO }, 0.03).observation
+}
+
 /// The plan of a scene that was seen from two sides, a little after each of its states.
-fn seen(scene: &Scene) -> Plan {
+pub(crate) fn seen(scene: &Scene) -> Plan {
     let bare = build_plan(scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"));
     let body = bare.body.clone();
     let (mut frames, mut noise) = (Vec::new(), Noise(11));
@@ -46,7 +51,7 @@ fn seen(scene: &Scene) -> Plan {
 }
 
 /// What differs of two evaluations. |dJ/dp| is at most √(2 J H_pp), and H_pq at most √(H_pp H_qq).
-fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
+pub(crate) fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
     let (Some(x), Some(y)) = (&a.curvature, &b.curvature) else { return vec!["no curvature".into()] };
     let q = directions.len();
     let mut out = Vec::new();
@@ -113,6 +118,6 @@ fn evaluations_of_a_falling_ball_agree() {
 fn evaluations_of_a_static_problem_agree() {
     let mut s = held(0.03);
     s.time.steps = 0;
-    s.observation = scene(Analytic::Ball { radius: 0.05, center: DVec3::ZERO }, 0.03).observation;
+    s.observation = watched();
     compare(&seen(&s), &[ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density], &[&[1.2, 0.97, 1.0]]);
 }

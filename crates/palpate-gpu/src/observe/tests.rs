@@ -133,7 +133,7 @@ pub(super) fn scene(source: Analytic, h: f64) -> Scene {
 }
 
 /// A ball with three markers, two of them on stalks, one surface point twice.
-fn ball_plan() -> Plan {
+pub(super) fn ball_plan() -> Plan {
     let center = DVec3::new(0.003, 0.001, 0.051);
     let marker = |name: &str, way: DVec3, length: f64| {
         let way = way.normalize();
@@ -146,9 +146,9 @@ fn ball_plan() -> Plan {
 }
 
 /// Numbers that are compared, and their name.
-type Part = (&'static str, Vec<f64>);
+pub(super) type Part = (&'static str, Vec<f64>);
 /// Everything that is compared.
-type Outcome = Vec<Part>;
+pub(super) type Outcome = Vec<Part>;
 
 fn flat(v: &[DVec3]) -> impl Iterator<Item = f64> + '_ {
     v.iter().flat_map(|v| v.to_array())
@@ -180,7 +180,7 @@ fn outcome(plan: &Plan, e: &Evaluation, adjoint: Vec<f64>) -> Outcome {
 }
 
 /// The CPU's answer for one member.
-fn expected(plan: &Plan, member: usize) -> Outcome {
+pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
     let (start, size) = MEMBERS[member];
     let nodes = &plan.body.nodes;
     let obs = &plan.observation;
@@ -258,7 +258,7 @@ fn upload(world: &World, k: usize) -> State {
 }
 
 /// The device's answer for `members` members.
-fn found(backend: &GpuBackend, plan: &Plan, members: usize, room: Option<Room>) -> Vec<Outcome> {
+pub(super) fn found(backend: &GpuBackend, plan: &Plan, members: usize, room: Option<Room>) -> Vec<Outcome> {
     let mut world = backend.build(plan, members).unwrap_or_else(|e| panic!("{e}"));
     if let Some(room) = room {
         world.observer = Observer::within(&world.gpu, plan, members, room).unwrap_or_else(|e| panic!("{e}"));
@@ -306,7 +306,7 @@ fn found(backend: &GpuBackend, plan: &Plan, members: usize, room: Option<Room>) 
 }
 
 /// What differs by more than the agreed part of its size, with that part.
-fn differences(a: &Outcome, b: &Outcome) -> Vec<(&'static str, f64)> {
+pub(super) fn differences(a: &Outcome, b: &Outcome) -> Vec<(&'static str, f64)> {
     let off = |(x, y): (&Part, &Part)| {
         assert_eq!((x.0, x.1.len()), (y.0, y.1.len()));
         let size = y.1.iter().fold(1e-30, |s: f64, v| s.max(v.abs()));

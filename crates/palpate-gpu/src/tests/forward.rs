@@ -11,10 +11,10 @@ use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource, RotationUpdate, Scene};
 use std::sync::Arc;
 
-type Moment = (Vec<DVec3>, Vec<DVec3>);
+pub(super) type Moment = (Vec<DVec3>, Vec<DVec3>);
 
 /// States of every member at every time, `[steps + 1][B]`, and what `read` says.
-fn states<B: Backend>(backend: &B, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<Moment>>, Vec<Evaluation>) {
+pub(super) fn states<B: Backend>(backend: &B, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<Moment>>, Vec<Evaluation>) {
     let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(theta));
     let mut tally = backend.new_tally(&world, &[]);
@@ -32,12 +32,12 @@ fn states<B: Backend>(backend: &B, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<
     (found, evaluations)
 }
 
-fn off(a: &[DVec3], b: &[DVec3]) -> f64 {
+pub(super) fn off(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max)
 }
 
 /// Largest differences of u [m] and v [m/s] from the CPU's.
-fn difference(gpu: &Arc<Gpu>, scene: &Scene, theta: &[Vec<f64>]) -> [f64; 2] {
+pub(super) fn difference(gpu: &Arc<Gpu>, scene: &Scene, theta: &[Vec<f64>]) -> [f64; 2] {
     let plan = plan(scene);
     let (found, evaluations) = states(&GpuBackend::on(gpu.clone()), &plan, theta);
     let (exact, _) = states(&CpuBackend, &plan, theta);
@@ -55,7 +55,7 @@ fn difference(gpu: &Arc<Gpu>, scene: &Scene, theta: &[Vec<f64>]) -> [f64; 2] {
 
 // Displacements: a Newton solve to 2e-6 of the forces, which strain the body by some 10 % of its 0.1 m, leaves up to 2e-8 m a
 // step, rounding of u and v another 1e-8 m; six steps. Velocities: the same divided by the step of 0.01 s.
-const CLOSE: [f64; 2] = [5e-7, 1e-4];
+pub(super) const CLOSE: [f64; 2] = [5e-7, 1e-4];
 
 #[test]
 fn steps_agree_with_the_cpu() {
@@ -68,20 +68,6 @@ fn steps_agree_with_the_cpu() {
             assert!(d[0] < CLOSE[0] && d[1] < CLOSE[1], "{rotation:?}: {:.1e} m {:.1e} m/s", d[0], d[1]);
         }
     }
-}
-
-#[test]
-fn one_percent_of_stiffness_stands_out() {
-    let Some(gpu) = device(None) else { return };
-    let scene = ball(0.03);
-    let plan = plan(&scene);
-    let mut wrong = plan.theta.clone();
-    wrong[0] *= 1.01;
-    let found = states(&GpuBackend::on(gpu), &plan, &[wrong]).0;
-    let exact = states(&CpuBackend, &plan, std::slice::from_ref(&plan.theta)).0;
-    let last = plan.clock.steps;
-    let d = [off(&found[last][0].0, &exact[last][0].0), off(&found[last][0].1, &exact[last][0].1)];
-    assert!(d[0] > 3.0 * CLOSE[0] && d[1] > 3.0 * CLOSE[1], "the comparison compares nothing: {d:?}");
 }
 
 #[test]

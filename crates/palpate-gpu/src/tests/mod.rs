@@ -1,5 +1,10 @@
 //! Kernels against the CPU backend on small bodies.
 
 mod derivatives;
+mod extremes;
+mod faults;
 mod forward;
+mod limits;
+mod loops;
 pub(crate) mod scenes;
+mod sizes;

@@ -1,6 +1,7 @@
 //! Small scenes that hold every term of the balance, and the device that tests run on.
 
 use crate::device::{Choice, Gpu, Lanes};
+use crate::error::GpuError;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::motion::RigidMotion;
 use palpate_model::observation::Observation;
@@ -8,11 +9,11 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
 use palpate_model::scene::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-/// The device, or `None` with a printed word where there is none and none is required (`PALPATE_GPU=require`).
-pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
-    match Gpu::open_with(&Choice::from_env(), lanes) {
+/// What opening a device gave; `None` with a printed word where there is none and none is required (`PALPATE_GPU=require`).
+fn opened(result: Result<Arc<Gpu>, GpuError>) -> Option<Arc<Gpu>> {
+    match result {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             assert!(std::env::var("PALPATE_GPU").as_deref() != Ok("require"), "{e} (hint: {})", e.hint());
@@ -20,6 +21,22 @@ pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
             None
         }
     }
+}
+
+/// The device that tests share, so that every kernel is compiled once; with a given way for lanes to talk if asked for.
+pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
+    static OPEN: [OnceLock<Result<Arc<Gpu>, GpuError>>; 2] = [const { OnceLock::new() }; 2];
+    let open = |place: usize, lanes| OPEN[place].get_or_init(|| Gpu::open_with(&Choice::from_env(), lanes)).clone();
+    let usual = opened(open(0, None))?;
+    match lanes {
+        Some(lanes) if lanes != usual.pipelines.lanes => opened(open(1, Some(lanes))),
+        _ => Some(usual),
+    }
+}
+
+/// A device for one test alone: one that breaks it, or counts what is made on it.
+pub fn own_device() -> Option<Arc<Gpu>> {
+    opened(Gpu::open(&Choice::from_env()))
 }
 
 /// A ball of radius 5 cm in cells of `h`.

@@ -1,0 +1,117 @@
+//! Every comparison with the CPU sees one percent: the device is given a plan that is wrong in one place, and must be caught.
+
+use super::forward::{CLOSE, off, states};
+use super::scenes::{ball, device, held, plan};
+use crate::GpuBackend;
+use crate::observe::rollout_tests::{differences, seen};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::Scene;
+use std::sync::Arc;
+
+/// Where the fault is, and what makes it.
+type Fault = (&'static str, fn(&mut Plan));
+
+fn scale(plan: &mut Plan, key: ParamKey) {
+    let place = plan.layout.index(key);
+    plan.theta[place] *= 1.01;
+}
+
+/// Faults of the balance.
+const BALANCE: [Fault; 8] = [
+    ("Young's modulus", |p| scale(p, ParamKey::YoungsModulus)),
+    ("Poisson's ratio", |p| scale(p, ParamKey::PoissonRatio)),
+    ("density", |p| scale(p, ParamKey::Density)),
+    ("mass damping", |p| scale(p, ParamKey::MassDamping)),
+    ("stiffness damping", |p| scale(p, ParamKey::StiffnessDamping)),
+    ("point mass", |p| scale(p, ParamKey::PointMass(0))),
+    ("ghost penalty", |p| p.solver.ghost *= 1.01),
+    ("contact stiffness", |p| p.planes.iter_mut().for_each(|q| q.stiffness = q.stiffness.map(|s| 1.01 * s))),
+];
+
+/// A fault of the comparison with what was measured; `observe/fault_tests.rs` has more.
+const OBSERVATION: [Fault; 1] = [("noise of depth", |p| Arc::make_mut(&mut p.observation).depth_noise *= 1.01)];
+
+/// A ball that every term pushes about: it lands hard, slips off its ghosts, and is damped in both ways.
+fn busy(mut scene: Scene) -> Scene {
+    scene.material.mass_damping = 5.0;
+    scene.material.stiffness_damping = 0.02;
+    scene.solver.ghost = 0.5;
+    scene.masses.iter_mut().for_each(|m| m.mass = 0.1);
+    scene.planes.iter_mut().for_each(|p| p.stiffness = Some(3e5));
+    scene
+}
+
+#[test]
+fn comparisons_of_states_see_one_percent() {
+    let Some(gpu) = device(None) else { return };
+    let backend = GpuBackend::on(gpu);
+    let mut falling = busy(ball(0.03));
+    falling.initial.velocity.z = -1.5;
+    let falling = plan(&falling);
+    let exact = states(&CpuBackend, &falling, std::slice::from_ref(&falling.theta)).0;
+    let apart = |plan: &Plan| {
+        let found = states(&backend, plan, std::slice::from_ref(&plan.theta)).0;
+        let pairs = || found.iter().zip(&exact).map(|(a, b)| (&a[0], &b[0]));
+        [pairs().map(|(a, b)| off(&a.0, &b.0)).fold(0.0, f64::max), pairs().map(|(a, b)| off(&a.1, &b.1)).fold(0.0, f64::max)]
+    };
+    let right = apart(&falling);
+    assert!(right[0] < CLOSE[0] && right[1] < CLOSE[1], "{right:?}");
+    for (name, fault) in BALANCE {
+        let mut wrong = falling.clone();
+        fault(&mut wrong);
+        let d = apart(&wrong);
+        println!("{name}: {:.1e} m {:.1e} m/s", d[0], d[1]);
+        assert!(d[0] > CLOSE[0] || d[1] > CLOSE[1], "1 % of {name} was not seen: {d:?}");
+    }
+}
+
+#[test]
+fn comparisons_of_a_clamped_body_see_one_percent_of_its_motion() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = held(0.03);
+    scene.time.steps = 2;
+    let right = plan(&scene);
+    let mut wrong = right.clone();
+    for clamp in &mut wrong.clamps {
+        clamp.motion.iter_mut().flat_map(|m| &mut m.translations).for_each(|t| *t *= 1.01);
+    }
+    let exact = states(&CpuBackend, &right, std::slice::from_ref(&right.theta)).0;
+    let found = states(&GpuBackend::on(gpu), &wrong, std::slice::from_ref(&wrong.theta)).0;
+    let d = off(&found[2][0].0, &exact[2][0].0);
+    assert!(d > CLOSE[0], "{d:.1e} m");
+}
+
+#[test]
+fn comparisons_of_evaluations_see_one_percent() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = busy(ball(0.03));
+    scene.time.steps = 3;
+    scene.observation = crate::observe::rollout_tests::watched();
+    let right = seen(&scene);
+    let directions: Vec<usize> =
+        [ParamKey::YoungsModulus, ParamKey::Density, ParamKey::Gravity(2)].map(|k| right.layout.index(k)).to_vec();
+    let request = Request { gradient: true, sensitivities: directions.clone() };
+    // Away from the parameters that were measured with, so that there is something to explain.
+    let moved = |plan: &Plan| {
+        let mut row = plan.theta.clone();
+        row[directions[0]] *= 1.2;
+        ParamBatch::from_rows(&[row])
+    };
+    let mut cpu = Rollout::new(CpuBackend, &right, 1).unwrap_or_else(|e| panic!("{e}"));
+    let exact = cpu.evaluate(&moved(&right), &request).remove(0);
+    let apart = |plan: &Plan| {
+        let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, 1).unwrap_or_else(|e| panic!("{e}"));
+        differences(&rollout.evaluate(&moved(plan), &request).remove(0), &exact, &directions)
+    };
+    assert!(apart(&right).is_empty(), "{:?}", apart(&right));
+    for (name, fault) in OBSERVATION.iter().chain(&BALANCE[..5]) {
+        let mut wrong = right.clone();
+        fault(&mut wrong);
+        let seen = apart(&wrong);
+        println!("{name}: {} numbers differ", seen.len());
+        assert!(!seen.is_empty(), "1 % of {name} was not seen");
+    }
+}

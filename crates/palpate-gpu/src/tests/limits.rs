@@ -1,0 +1,131 @@
+//! What is too large, lost or out of memory is an error with a name, a size and a way out.
+
+use super::scenes::{ball, device, own_device, plan, spread};
+use crate::error::GpuError;
+use crate::geometry::LOOPS;
+use crate::layout::{Health, Newton, Shape};
+use crate::pipelines::pass;
+use crate::recorder::{Args, Recorder, Size};
+use crate::world::{KINDS, SECTIONS, World};
+use crate::{GpuBackend, device::Gpu};
+use palpate_engine::{Backend, Evaluate, FailureKind, ParamBatch, Request, Rollout};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+#[test]
+fn a_batch_beyond_a_buffer_names_limit_and_size() {
+    let Some(gpu) = own_device() else { return };
+    let plan = plan(&ball(0.05));
+    let available = gpu.device.limits().max_storage_buffer_binding_size;
+    // A matrix has at least one number for each node: this many members need more than one binding.
+    let members = (available / (36 * plan.body.nodes.len() as u64) + 1) as usize;
+    match World::new(gpu.clone(), &plan, members) {
+        Err(GpuError::Limit { needed, available, .. }) => assert!(needed > available),
+        other => panic!("{:?}", other.map(|w| w.bytes())),
+    }
+    let error = GpuBackend::on(gpu).build(&plan, members).map(|_| ()).unwrap_err();
+    assert!(error.hint.contains("smaller batch") && error.hint.contains("--backend cpu"), "{error}");
+}
+
+#[test]
+fn a_body_beyond_a_binding_names_limit_and_size() {
+    let Some(mut gpu) = own_device() else { return };
+    let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
+    own.largest = 20_000;
+    let e = World::new(gpu, &plan(&ball(0.02)), 1).map(|w| w.bytes()).unwrap_err();
+    let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
+    assert_eq!((*limit, *available), ("max_storage_buffer_binding_size", 20_000));
+    assert!(*needed > 20_000 && what.contains('`'), "{e}");
+}
+
+#[test]
+fn more_members_than_built_for_fail_as_evaluations() {
+    let Some(gpu) = own_device() else { return };
+    let plan = plan(&ball(0.05));
+    let backend = GpuBackend::on(gpu);
+    let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(&spread(&plan, 3)));
+    let tally = backend.new_tally(&world, &[]);
+    let all = backend.read(&world, &tally);
+    assert!(all.len() == 3 && all.iter().all(|e| e.failure.as_ref().is_some_and(|f| f.kind == FailureKind::Device)));
+}
+
+fn evaluate(rollout: &mut Rollout<GpuBackend>, theta: &[f64]) -> palpate_engine::Evaluation {
+    let request = Request { gradient: true, sensitivities: vec![0] };
+    rollout.evaluate(&ParamBatch::from_rows(&[theta.to_vec()]), &request).remove(0)
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_stays_one() {
+    let Some(gpu) = own_device() else { return };
+    let mut scene = ball(0.05);
+    scene.time.steps = 2;
+    let plan = plan(&scene);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(evaluate(&mut rollout, &plan.theta).failure, None);
+    gpu.device.destroy();
+    for _ in 0..2 {
+        let failed = evaluate(&mut rollout, &plan.theta);
+        let failure = failed.failure.unwrap_or_else(|| panic!("a lost device gave cost {}", failed.cost));
+        assert_eq!(failure.kind, FailureKind::Device);
+        assert!(failed.cost.is_infinite() && failure.detail.contains("hint"), "{}", failure.detail);
+    }
+    assert!(GpuBackend::on(gpu).build(&plan, 1).is_err());
+}
+
+#[test]
+fn memory_that_runs_out_fails_one_evaluation_with_a_way_out() {
+    let Some(gpu) = own_device() else { return };
+    let mut scene = ball(0.05);
+    scene.time.steps = 2;
+    let plan = plan(&scene);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let well = evaluate(&mut rollout, &plan.theta);
+    // What wgpu reports of a buffer that no driver could make comes from here.
+    let source: Box<dyn std::error::Error + Send + Sync> = "a buffer of a tape".into();
+    gpu.keep(crate::device::translate(wgpu::Error::OutOfMemory { source }));
+    let failed = evaluate(&mut rollout, &plan.theta);
+    let failure = failed.failure.unwrap_or_else(|| panic!("nothing failed"));
+    assert_eq!(failure.kind, FailureKind::Device);
+    assert!(failure.detail.contains("out of memory") && failure.detail.contains("smaller batch"), "{}", failure.detail);
+    // Memory may be there again: the next evaluation is none the worse.
+    assert_eq!(evaluate(&mut rollout, &plan.theta), well);
+}
+
+/// Members that `list_members` counts as wanting a trial, of so many.
+fn listed(gpu: &Gpu, members: usize) -> u32 {
+    let fail = |e: GpuError| -> wgpu::Buffer { panic!("{e}") };
+    let shape = Shape { members: members as u32, nodes: 1, cells: 1, blocks: 1, ..Shape::default() };
+    let newton = vec![Newton { stage: 3, ..Newton::default() }; members];
+    let size = 4 * (SECTIONS * (members + 1)) as u64;
+    let buffers = [
+        ("shape", gpu.upload("shape", &[shape]).unwrap_or_else(fail)),
+        ("roster", gpu.buffer("roster", size).unwrap_or_else(fail)),
+        ("arguments", gpu.buffer("arguments", (12 * SECTIONS * KINDS) as u64).unwrap_or_else(fail)),
+        ("newton", gpu.upload("newton", &newton).unwrap_or_else(fail)),
+        ("health", gpu.upload("health", &vec![Health::default(); members]).unwrap_or_else(fail)),
+    ];
+    let world: HashMap<&'static str, wgpu::Buffer> = buffers.into_iter().collect();
+    let (mut groups, mut times) = (HashMap::new(), HashMap::new());
+    let mut r = Recorder::new(gpu, &world, &mut groups, false);
+    r.run(pass::LIST_MEMBERS, &[], Size::All { members: 1, groups: 1 }, Args::default());
+    r.submit(&mut times);
+    let roster: Vec<u32> = gpu.download(&world["roster"], SECTIONS * (members + 1)).unwrap_or_else(|e| panic!("{e}"));
+    roster[3 * (members + 1)]
+}
+
+#[test]
+fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
+    let Some(gpu) = device(None) else { return };
+    // One invocation goes through all members: the most that a build accepts.
+    let most = LOOPS - 64;
+    assert_eq!(u64::from(listed(&gpu, most as usize)), most);
+}
+
+#[test]
+fn more_members_than_an_invocation_may_visit_are_refused() {
+    let Some(gpu) = own_device() else { return };
+    let e = World::new(gpu, &plan(&ball(0.05)), LOOPS as usize).map(|w| w.bytes()).unwrap_err();
+    let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
+    assert!(limit.contains("loop iterations") && needed > available && what.contains("list_members"), "{e}");
+}

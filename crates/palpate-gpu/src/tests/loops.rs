@@ -1,0 +1,160 @@
+//! No invocation loops longer than adapters allow: bounds are read off the shaders' own loops and evaluated at the largest sizes
+//! that a build accepts. A loop whose header is not known here fails the test.
+
+use crate::geometry::{LOOPS, Most};
+use crate::observe::MOST_LOOPS;
+use crate::pipelines::PASSES;
+use std::collections::HashMap;
+
+/// Sizes of the observation's loops, as `observe::check_loops` accepts them at most.
+struct Seen {
+    rows_of_cubes: u64,
+    layers: u64,
+    points: u64,
+    stripes: u64,
+    extension: u64,
+    rows: u64,
+}
+
+/// Iterations of a loop by its header (variable names and indices left out), or `None` for a loop that nobody knows.
+fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
+    let condition = header.split(';').nth(1).unwrap_or(header).trim();
+    if let Some(number) = condition.split("< ").nth(1).and_then(|n| n.trim_end_matches(['u', ')', ' ']).parse().ok()) {
+        return Some(number);
+    }
+    let has = |part: &str| header.contains(part);
+    Some(match () {
+        () if has("> 0u; s /= 2u") || has("> 0u; step >>= 1u") => 8,
+        () if has("block_rows[") => most.row,
+        () if has("node_rows[") && !has("band_") => 8,
+        () if has("place_rows[") => 8,
+        () if has("hold_start") || has("patch_start") => most.supports,
+        () if has("shape.planes") => most.planes,
+        () if has("shape.masses") => most.masses,
+        () if has("shape.members") => most.members,
+        () if has("< KINDS") => 10,
+        () if has("shape.chunk") => most.chunk,
+        () if has("i < shape.nodes; i += 256u") => most.share(),
+        () if has("c.low.z") => seen.layers,
+        () if has("c.low.y") => seen.rows_of_cubes.div_ceil(seen.layers),
+        () if has("row.x + 8u * stripe") => 1 + seen.points.div_ceil(8 * seen.stripes * seen.rows_of_cubes),
+        () if has("row.x + stripe") => 1 + seen.points.div_ceil(seen.stripes * seen.rows_of_cubes),
+        () if has("sight.stripes") => seen.stripes,
+        () if has("band_node_rows[") => 8,
+        () if has("band_rows[") || has("fold_rows[") => seen.extension,
+        () if has("site_rows[") || has("mark_rows[") => 30,
+        // Sums that up to 256 workgroups of 64 share.
+        () if has("rows_of(shot); i += 64u * call.roster") => seen.rows.div_ceil(64 * 256),
+        () if has("sight.nodes; node += 64u * call.roster") => most.nodes.div_ceil(64 * 256),
+        () if has("i < call.mode; i += 64u") => 4,
+        () if has("rows_of(shots[s.look.frame])") => seen.rows.div_ceil(64),
+        () if has("while left > a") => 256,
+        () => return None,
+    })
+}
+
+/// Loops and calls of one function, each with the product of the loops around it.
+#[derive(Default)]
+struct Function {
+    loops: Vec<Vec<String>>,
+    calls: Vec<(Vec<String>, String)>,
+}
+
+/// Functions of a linked shader by name.
+fn functions(text: &str) -> HashMap<String, Function> {
+    let mut all: HashMap<String, Function> = HashMap::new();
+    let mut name = String::new();
+    // Loops around the current place, with the depth of braces that they opened at.
+    let (mut depth, mut around): (i32, Vec<(i32, String)>) = (0, Vec::new());
+    for line in text.lines().map(|l| l.split("//").next().unwrap_or("").trim()) {
+        if let Some(rest) = line.split("fn ").nth(1).filter(|_| depth == 0) {
+            name = rest.split('(').next().unwrap_or("").to_string();
+            all.entry(name.clone()).or_default();
+        }
+        let header = line.starts_with("for ") || line.starts_with("while ") || line.starts_with("loop");
+        let nest: Vec<String> = around.iter().map(|a| a.1.clone()).collect();
+        if let Some(f) = all.get_mut(&name) {
+            if header {
+                f.loops.push([nest.clone(), vec![line.to_string()]].concat());
+            }
+            let words = line.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '('));
+            let called = words.flat_map(|w| w.split_inclusive('(')).filter_map(|w| w.strip_suffix('(')).filter(|w| !w.is_empty());
+            f.calls.extend(
+                called
+                    .filter(|w| depth > 0 && !["for", "if", "while", "switch"].contains(w))
+                    .map(|w| (nest.clone(), w.to_string())),
+            );
+        }
+        for c in line.chars() {
+            match c {
+                '{' => {
+                    depth += 1;
+                    if header && !around.iter().any(|a| a.0 == depth) && around.last().is_none_or(|a| a.0 < depth) {
+                        around.push((depth, line.to_string()));
+                    }
+                }
+                '}' => {
+                    around.retain(|a| a.0 < depth);
+                    depth -= 1;
+                }
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
+fn iterations(all: &HashMap<String, Function>, name: &str, of: &dyn Fn(&str) -> u64) -> u64 {
+    let Some(f) = all.get(name) else { return 0 };
+    let times = |nest: &[String]| nest.iter().map(|h| of(h)).product::<u64>();
+    let own: u64 = f.loops.iter().map(|nest| times(nest)).sum();
+    own + f.calls.iter().filter(|c| c.1 != name).map(|(nest, callee)| times(nest) * iterations(all, callee, of)).sum::<u64>()
+}
+
+#[test]
+fn no_invocation_can_loop_longer_than_every_adapter_allows() {
+    // A large body with everything: 40 patches and clamp cells on a cell, ten planes, ten point masses; members, nodes and the
+    // length of a CG dispatch as large as a build accepts.
+    let base = Most { members: LOOPS - 16, nodes: 1000, row: 60, supports: 40, planes: 10, masses: 10, chunk: 1 };
+    let fits = |m: &Most| m.loops().iter().all(|l| l.1 <= LOOPS);
+    let with = |nodes: u64, masses: u64| Most { nodes, masses, ..base };
+    let largest = |masses: u64| (1..20_000).map(|k| with(256 * k, masses)).take_while(fits).last().unwrap_or(base);
+    for most in [largest(10), largest(0)] {
+        assert!(most.nodes > 30_000 && !fits(&with(most.nodes + 256, most.masses)), "{most:?}");
+        for most in [most, Most { nodes: 512, chunk: LOOPS / 600, masses: 0, ..most }] {
+            check(&most);
+        }
+    }
+}
+
+fn check(most: &Most) {
+    // 40 × 40 rows of cubes, a million points in stripes of 20,000.
+    let seen = Seen { rows_of_cubes: 1600, layers: 40, points: 1_000_000, stripes: 50, extension: 64, rows: 1_000_000 };
+    for pass in &PASSES {
+        for source in pass.sources {
+            let all = functions(source);
+            let of = |header: &str| {
+                bound(header, most, &seen).unwrap_or_else(|| panic!("{}: how long is the loop `{header}`?", pass.name))
+            };
+            let longest = iterations(&all, pass.name, &of);
+            assert!(longest <= MOST_LOOPS, "{}: {longest} iterations at {most:?}", pass.name);
+            if let Some((_, said)) = most.loops().iter().find(|l| l.0 == pass.name) {
+                assert!(longest <= *said, "{}: the host says {said}, the shader {longest} at {most:?}", pass.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_nested_loop_is_counted_as_often_as_it_runs() {
+    let text = "fn inner() {\n    for (var j = 0u; j < 7u; j++) {\n        x += 1;\n    }\n}\nfn outer() {\n    for (var i = 0u; i < 5u; i++) {\n        inner();\n        for (var k = 0u; k < 3u; k++) {\n        }\n    }\n}";
+    let number = |h: &str| {
+        bound(
+            h,
+            &Most { members: 0, nodes: 0, row: 0, supports: 0, planes: 0, masses: 0, chunk: 0 },
+            &Seen { rows_of_cubes: 1, layers: 1, points: 0, stripes: 1, extension: 0, rows: 0 },
+        )
+        .unwrap_or(0)
+    };
+    assert_eq!(iterations(&functions(text), "outer", &number), 5 + 5 * 7 + 5 * 3);
+}
