@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, fit, inspect, observe, simulate};
+use crate::commands::{batch, diagnose, fit, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -19,6 +19,7 @@ A first session:
   palpate simulate scene.toml --format png     pictures of the motion in out/scene/
   palpate fit      scene.toml --out found      parameters, errors and a report in found/
   palpate simulate found/model.toml            the scene with the found values
+  palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
 
 Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted (Ctrl-C; the best so far is written).";
 
@@ -37,6 +38,7 @@ enum Command {
     Observe(observe::Arguments),
     Fit(fit::Arguments),
     Batch(batch::Arguments),
+    Diagnose(diagnose::Arguments),
     Inspect(inspect::Arguments),
 }
 
@@ -118,6 +120,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),
         Command::Batch(a) => batch::run(a, &mut console),
+        Command::Diagnose(a) => diagnose::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {

@@ -302,7 +302,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
 }
 
 /// What the recordings say of errors that do not average out. Every camera, and every marker, has its own.
-fn errors(experiments: &[Experiment]) -> ErrorModel {
+pub(crate) fn errors(experiments: &[Experiment]) -> ErrorModel {
     let mut model = ErrorModel { systematic: 0.0, groups: 0 };
     for e in experiments {
         let o = &e.plan().observation;

@@ -35,6 +35,7 @@
 mod catalogue;
 pub mod cli;
 mod commands;
+mod diagnosing;
 mod embed;
 mod engine;
 mod error;
@@ -48,6 +49,7 @@ pub mod report;
 mod residuals;
 pub mod synthetic;
 
+pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
 pub use embed::Embedding;
 pub use engine::Backend;
 pub use error::Error;

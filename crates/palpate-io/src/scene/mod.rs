@@ -8,7 +8,7 @@ mod object;
 mod tests;
 mod write;
 
-pub use write::write_scene;
+pub use write::{append_effects, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded};

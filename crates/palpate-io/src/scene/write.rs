@@ -3,6 +3,7 @@
 
 use crate::error::InputError;
 use glam::DVec3;
+use palpate_model::effects::Effect;
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::Scene;
 use std::path::{Component, Path, PathBuf};
@@ -97,6 +98,35 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
     let before: DocumentMut = template.parse().expect("it was parsed above");
     note_changes(doc.as_table_mut(), before.as_table());
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    Ok(doc.to_string())
+}
+
+/// The text of a scene with effects appended to it, each with every value that it states.
+///
+/// # Errors
+/// A text that is no TOML, or one that gives its effects as an inline array.
+pub fn append_effects(text: &str, scene: &Scene, effects: &[Effect]) -> Result<String, InputError> {
+    let wrong = |message: String| InputError { key: "effect".into(), ..InputError::file(&scene.path, message) };
+    let mut doc: DocumentMut =
+        text.parse().map_err(|e: toml_edit::TomlError| wrong(format!("not valid TOML: {}", e.message())))?;
+    for effect in effects {
+        let mut table = Table::new();
+        table.insert("kind", toml_edit::value(effect.law().kind));
+        for (slot, p) in effect.law().params.iter().enumerate() {
+            match (effect.values[slot], p.axis) {
+                (Some(v), None) => drop(table.insert(p.key, toml_edit::value(v))),
+                (Some(x), Some(0)) => {
+                    if let (Some(y), Some(z)) = (effect.values[slot + 1], effect.values[slot + 2]) {
+                        table.insert(p.key, Item::Value(vector(DVec3::new(x, y, z))));
+                    }
+                }
+                _ => {}
+            }
+        }
+        let array = doc.as_table_mut().entry("effect").or_insert_with(|| Item::ArrayOfTables(Default::default()));
+        let array = array.as_array_of_tables_mut();
+        array.ok_or_else(|| wrong("must be written as [[effect]] tables to be extended".into()))?.push(table);
+    }
     Ok(doc.to_string())
 }
 

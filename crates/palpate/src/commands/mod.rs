@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod devices;
+pub mod diagnose;
 pub mod fit;
 pub mod inspect;
 pub mod observe;

@@ -22,7 +22,7 @@ pub struct ReportInput<'a> {
     pub command: String,
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#222;max-width:1020px;margin:2em auto;padding:0 1em}\
+pub(super) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#222;max-width:1020px;margin:2em auto;padding:0 1em}\
 h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em;border-bottom:1px solid #ddd}\
 table{border-collapse:collapse}td,th{padding:.25em .8em;text-align:left;border-bottom:1px solid #eee}\
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.w{background:#fff6e0;border-left:4px solid #e0a000;padding:.4em .8em;margin:.4em 0}\

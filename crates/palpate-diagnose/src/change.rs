@@ -1,0 +1,213 @@
+//! What a hypothesis changes in a scene: an effect added, or numbers freed that the scene holds fixed. Both compete on equal terms.
+
+use crate::laboratory::Setting;
+use glam::DVec3;
+use palpate_model::effects::{ALL, Effect, EffectParam, Family, Numbered, Trial, Unstated};
+use palpate_model::params::ParamKey;
+
+/// One change of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// An effect of the table, with the values that its numbers start from.
+    Effect(Effect),
+    /// Numbers of the scene that become free.
+    Freed {
+        /// Name in reports.
+        name: &'static str,
+        /// One plain sentence, without full stop.
+        sentence: &'static str,
+        /// Dotted paths of the numbers.
+        paths: Vec<String>,
+    },
+}
+
+impl Change {
+    /// Name: the effect's kind, or what is freed.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Change::Effect(e) => e.law().kind,
+            Change::Freed { name, .. } => name,
+        }
+    }
+
+    /// What it would mean, for reports.
+    pub fn sentence(&self) -> &'static str {
+        match self {
+            Change::Effect(e) => e.law().sentence,
+            Change::Freed { sentence, .. } => sentence,
+        }
+    }
+
+    /// True for errors of the measurement: physics predicts the same motion with and without them.
+    pub fn is_measurement(&self) -> bool {
+        matches!(self, Change::Effect(e) if e.law().family == Family::Measurement)
+    }
+
+    /// Places in the law's parameters of an effect that a fit may move, or 0 to n of freed numbers.
+    pub fn free_slots(&self) -> Vec<usize> {
+        match self {
+            Change::Effect(e) => {
+                let free = |p: &EffectParam| matches!(p.default, Unstated::Absent(_) | Unstated::Stated(_) | Unstated::Center);
+                (0..e.values.len()).filter(|s| free(&e.law().params[*s])).collect()
+            }
+            Change::Freed { paths, .. } => (0..paths.len()).collect(),
+        }
+    }
+
+    /// Which of [`Change::free_slots`] have a derivative at "absent": amplitudes, or all freed numbers.
+    pub fn amplitudes(&self) -> Vec<bool> {
+        match self {
+            Change::Effect(e) => {
+                let amplitude = |s: usize| matches!(e.law().params[s].default, Unstated::Absent(_));
+                self.free_slots().into_iter().map(amplitude).collect()
+            }
+            Change::Freed { paths, .. } => vec![true; paths.len()],
+        }
+    }
+}
+
+/// A hypothesis to be tried: one change, with the starts that it is tried from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The same effect from different places.
+    pub variants: Vec<Change>,
+}
+
+impl Candidate {
+    /// Name of its change.
+    pub fn kind(&self) -> &'static str {
+        self.variants[0].kind()
+    }
+}
+
+/// Numbers of a scene that are usually held fixed, by the name of their group.
+const FREED: [(&str, &str, &[&str]); 10] = [
+    ("poisson-ratio", "the material keeps its volume better or worse than assumed", &["material.poisson_ratio"]),
+    ("mass-damping", "slow motion is damped more or less than assumed", &["material.mass_damping"]),
+    ("stiffness-damping", "fast vibration is damped more or less than assumed", &["material.stiffness_damping"]),
+    ("stiffness", "the material is stiffer or softer than assumed", &["material.youngs_modulus"]),
+    ("density", "the body is heavier or lighter than assumed", &["material.density", "material.mass"]),
+    ("gravity", "gravity has another size or direction than assumed", &["world.gravity."]),
+    ("initial-velocity", "the body moves at the start in another way than assumed", &["initial.velocity."]),
+    ("initial-spin", "the body spins at the start in another way than assumed", &["initial.angular_velocity."]),
+    ("release-time", "the motion starts at another time than assumed", &["time.start"]),
+    ("plane-pose", "the ground lies higher, lower or more tilted than assumed", &["plane."]),
+];
+
+/// Every hypothesis for a scene: the table of effects, and what the scene holds fixed.
+pub fn candidates(setting: &Setting) -> Vec<Candidate> {
+    let mut out = Vec::new();
+    for (law, l) in ALL.iter().enumerate().filter(|(_, l)| l.trial != Trial::Never && l.family != Family::Slack) {
+        let choices = l.params.iter().find_map(|p| match p.default {
+            Unstated::Choice(Numbered::Camera) => Some(setting.cameras),
+            Unstated::Choice(Numbered::Marker) => Some(setting.markers),
+            _ => None,
+        });
+        for choice in 0..choices.unwrap_or(1) {
+            let mut effect = Effect::absent(law);
+            for (v, p) in effect.values.iter_mut().zip(l.params) {
+                match p.default {
+                    Unstated::Choice(_) => *v = Some(choice as f64),
+                    Unstated::Center => *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))]),
+                    _ => {}
+                }
+            }
+            let variants = if l.trial == Trial::Starts { spread(&effect, setting) } else { vec![effect] };
+            out.push(Candidate { variants: variants.into_iter().map(Change::Effect).collect() });
+        }
+    }
+    for (name, sentence, prefixes) in FREED {
+        let paths: Vec<String> = setting.held.iter().filter(|p| prefixes.iter().any(|x| p.starts_with(x))).cloned().collect();
+        if !paths.is_empty() {
+            out.push(Candidate { variants: vec![Change::Freed { name, sentence, paths }] });
+        }
+    }
+    for (i, path) in setting.held.iter().filter(|p| p.starts_with("mass.")).enumerate() {
+        let names = ["point-mass-value", "second-point-mass-value", "further-point-mass-value"];
+        let sentence = "a point mass is heavier or lighter than assumed";
+        let change = Change::Freed { name: names[i.min(2)], sentence, paths: vec![path.clone()] };
+        out.push(Candidate { variants: vec![change] });
+    }
+    out
+}
+
+/// Van der Corput's sequence in a base: point i of the unit interval, evenly spread for any number of points.
+fn radical_inverse(mut i: usize, base: usize) -> f64 {
+    let (mut value, mut digit) = (0.0, 1.0 / base as f64);
+    while i > 0 {
+        value += (i % base) as f64 * digit;
+        i /= base;
+        digit /= base as f64;
+    }
+    value
+}
+
+/// The same effect at spread values of the numbers that have no value at "absent": points on the body's surface for places, directions
+/// over the sphere, numbers over some typical sizes (a Halton sequence over all of them).
+fn spread(effect: &Effect, setting: &Setting) -> Vec<Effect> {
+    const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
+    let params = effect.law().params;
+    let open = |p: &EffectParam| matches!(p.default, Unstated::Stated(_) | Unstated::Center);
+    let vectors: Vec<usize> = (0..params.len()).filter(|s| open(&params[*s]) && params[*s].axis == Some(0)).collect();
+    let numbers: Vec<usize> = (0..params.len()).filter(|s| open(&params[*s]) && params[*s].axis.is_none()).collect();
+    let dimensions = 2 * vectors.len() + numbers.len();
+    let count = match dimensions {
+        0 => 1,
+        1 => 6,
+        2 => 12,
+        _ => 20,
+    };
+    let mut out = Vec::new();
+    for i in 0..count {
+        let mut e = effect.clone();
+        let unit = |d: usize| radical_inverse(i + 1, BASES[d % BASES.len()]);
+        for (k, &s) in vectors.iter().enumerate() {
+            let value = if params[s].unit == "m" {
+                let places = &setting.places;
+                // The first place walks through all of them; further ones lie anywhere around the body.
+                let at = if k == 0 { i * places.len() / count } else { (unit(2 * k) * places.len() as f64) as usize };
+                let at = places.get(at).copied().unwrap_or(setting.center);
+                if k == 0 { at } else { setting.center + (1.0 + unit(2 * k + 1)) * (at - setting.center) }
+            } else {
+                let (z, a) = (2.0 * unit(2 * k) - 1.0, std::f64::consts::TAU * unit(2 * k + 1));
+                let r = (1.0 - z * z).sqrt();
+                DVec3::new(r * a.cos(), r * a.sin(), z)
+            };
+            (0..3).for_each(|a| e.values[s + a] = Some(value[a]));
+        }
+        for (k, &s) in numbers.iter().enumerate() {
+            let p = &params[s];
+            let middle = p.default.value().unwrap_or(0.0);
+            // Six typical sizes either way: half a turn for angles of half a radian.
+            let (low, high) = ((middle - 6.0 * p.typical).max(p.lower), (middle + 6.0 * p.typical).min(p.upper));
+            e.values[s] = Some(low + (high - low) * unit(2 * vectors.len() + k));
+        }
+        out.push(e);
+    }
+    out
+}
+
+/// The slack effect over windows of time that add up to one: `windows` hats between `from` and `to` [s]; empty when the table has none.
+pub fn slack(setting: &Setting, from: f64, to: f64, windows: usize) -> Vec<Change> {
+    let Some(law) = ALL.iter().position(|l| l.family == Family::Slack) else { return Vec::new() };
+    let slot = |key: &str| ALL[law].params.iter().position(|p| p.key == key);
+    let spacing = (to - from) / (windows.max(2) - 1) as f64;
+    (0..windows)
+        .map(|w| {
+            let mut e = Effect::absent(law);
+            for (v, p) in e.values.iter_mut().zip(ALL[law].params) {
+                v.get_or_insert(setting.center[usize::from(p.axis.unwrap_or(0))]);
+            }
+            if let (Some(t), Some(width)) = (slot("time"), slot("width")) {
+                e.values[t] = Some(from + w as f64 * spacing);
+                e.values[width] = Some(spacing.max(1e-6));
+            }
+            Change::Effect(e)
+        })
+        .collect()
+}
+
+/// Paths of a scene's numbers by their keys that a diagnosis may free: everything but the effects.
+pub fn can_be_freed(key: ParamKey) -> bool {
+    !matches!(key, ParamKey::Effect { .. })
+}

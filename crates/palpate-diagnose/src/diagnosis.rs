@@ -1,0 +1,211 @@
+//! The answer of a diagnosis.
+
+use crate::laboratory::Model;
+use crate::locate::Place;
+
+/// What a diagnosis says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing is missing that the data could show.
+    Adequate,
+    /// Something is missing, and what was added explains it.
+    MissingEffect,
+    /// Something is missing that no known effect explains.
+    Unexplained,
+}
+
+impl Verdict {
+    /// As result files write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Adequate => "adequate",
+            Verdict::MissingEffect => "missing-effect",
+            Verdict::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// How far measurement and model are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Level {
+    /// Root mean square distance of single points [m].
+    pub rms: f64,
+    /// What noise and discretisation alone would leave [m].
+    pub noise: f64,
+}
+
+impl Level {
+    /// What noise does not explain [m²], not negative.
+    pub fn gap(&self) -> f64 {
+        (self.rms * self.rms - self.noise * self.noise).max(0.0)
+    }
+}
+
+/// A number of an effect: path in the changed scene, value, standard error, unit.
+pub type FoundNumber = (String, f64, Option<f64>, String);
+
+/// An effect that was fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Name of the effect, or of what was freed.
+    pub kind: String,
+    /// What it means.
+    pub sentence: String,
+    /// Its numbers.
+    pub parameters: Vec<FoundNumber>,
+    /// Probability of such an improvement by chance, times the number of candidates.
+    pub p_value: f64,
+    /// Share of the gap that it closed when it was added, on data left out.
+    pub held_out_gain: f64,
+    /// True when it is part of the corrected model.
+    pub accepted: bool,
+    /// Other candidates that predict data left out as well.
+    pub indistinguishable_from: Vec<String>,
+    /// Measurement that would tell them apart best, and by how much [m].
+    pub separated_by: Option<(String, f64)>,
+}
+
+/// A candidate's score where it is absent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tried {
+    /// Round of the search, from 1.
+    pub round: usize,
+    /// Name.
+    pub kind: String,
+    /// Share of the squared residual that it promised.
+    pub promised: f64,
+    /// Share of the gap that it closed on data left out; `None` when it was not fitted.
+    pub held_out_gain: Option<f64>,
+    /// Probability of the promise by chance.
+    pub p_value: f64,
+}
+
+/// One stretch of time of the slack force field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlackWindow {
+    /// Its middle [s].
+    pub time: f64,
+    /// Numbers of the slack effect in the order of its parameters.
+    pub values: Vec<f64>,
+}
+
+/// What any load could explain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slack {
+    /// Share of the squared residual beyond noise.
+    pub share: f64,
+    /// The force field.
+    pub windows: Vec<SlackWindow>,
+}
+
+/// One block of the residual map: a region of the rest surface during a stretch of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapEntry {
+    /// Scene.
+    pub scene: usize,
+    /// Number of the region.
+    pub region: usize,
+    /// Its middle on the rest shape [m].
+    pub place: glam::DVec3,
+    /// First and last frame's time [s].
+    pub time: (f64, f64),
+    /// Residual of the baseline in standard deviations of the null.
+    pub before: f64,
+    /// The same of the corrected model.
+    pub after: f64,
+}
+
+/// The whole answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnosis {
+    /// What it says.
+    pub verdict: Verdict,
+    /// Probability of the baseline's residual structure when nothing is missing.
+    pub p_value: f64,
+    /// The same for the corrected model.
+    pub p_value_after: f64,
+    /// The fitted model of the scene as it is.
+    pub baseline: Model,
+    /// Its distance from the measurement.
+    pub before: Level,
+    /// Where the baseline fails.
+    pub places: Vec<Place>,
+    /// Residual map, block by block.
+    pub map: Vec<MapEntry>,
+    /// Effects that were accepted, then those that came closest.
+    pub effects: Vec<Found>,
+    /// Every candidate's score.
+    pub tried: Vec<Tried>,
+    /// Candidates that there was no time for.
+    pub not_tried: Vec<String>,
+    /// The corrected model.
+    pub model: Model,
+    /// Its distance from the measurement.
+    pub after: Level,
+    /// Distance on data that no fit has seen, before and after.
+    pub held_out: Option<(Level, Level)>,
+    /// Distance of data left out block by block, predicted from the rest [m], before and after.
+    pub predicted: (f64, f64),
+    /// Share of the gap that is closed.
+    pub gap_closed: f64,
+    /// What any load could explain of what is left; only for unexplained residuals.
+    pub slack: Option<Slack>,
+    /// Noise of single readings over the stated one.
+    pub noise_ratio: f64,
+    /// Factor by which correlation between readings raises the variance of means.
+    pub design_effect: f64,
+    /// True when it was stopped before its end.
+    pub interrupted: bool,
+}
+
+impl Diagnosis {
+    /// The answer in one sentence, for a lab book.
+    pub fn sentence(&self) -> String {
+        let mm = |x: f64| format!("{:.3} mm", x * 1e3);
+        let apart =
+            format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
+        let p = |p: f64| if p <= 0.002 { "p ≤ 0.002".to_string() } else { format!("p = {p:.3}") };
+        let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
+        match self.verdict {
+            Verdict::Adequate => format!("Nothing is missing that these data could show: {apart} ({}).", p(self.p_value)),
+            Verdict::Unexplained => {
+                let close = self.effects.first().map_or("no known effect helps".to_string(), |e| {
+                    format!(
+                        "the known effect that helps most, {}, closes {:.0} % of the gap on data left out",
+                        e.kind,
+                        100.0 * e.held_out_gain
+                    )
+                });
+                format!("Something is missing ({}) that no known effect explains: {apart}{place}; {close}.", p(self.p_value))
+            }
+            Verdict::MissingEffect => {
+                let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();
+                let what: Vec<String> = accepted
+                    .iter()
+                    .map(|e| {
+                        let numbers = e.parameters.iter().map(|(path, v, se, unit)| {
+                            let name = path.splitn(3, '.').last().unwrap_or(path);
+                            let se = se.map_or(String::new(), |s| format!(" ± {s:.2e}"));
+                            format!("{name} {v:.4}{se}{}", if unit == "1" { String::new() } else { format!(" {unit}") })
+                        });
+                        let others = if e.indistinguishable_from.is_empty() {
+                            String::new()
+                        } else {
+                            format!("; these data cannot tell it from {}", e.indistinguishable_from.join(", "))
+                        };
+                        format!("{} ({}: {}{others})", e.sentence, e.kind, numbers.collect::<Vec<_>>().join(", "))
+                    })
+                    .collect();
+                format!(
+                    "The model lacks something{place}: {}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of \
+                     the gap on data left out.",
+                    what.join("; and "),
+                    mm(self.before.rms),
+                    mm(self.after.rms),
+                    mm(self.after.noise),
+                    100.0 * self.gap_closed
+                )
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! The laboratory: what a diagnosis asks of whoever simulates and fits.
+
+use crate::change::Change;
+use glam::DVec3;
+use palpate_engine::ResidualRow;
+
+/// Why the laboratory has no answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LabError {
+    /// This hypothesis cannot be computed; others may.
+    #[error("{0}")]
+    Failed(String),
+    /// Asked to stop.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// What a scene is like, as far as hypotheses are made from it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Centre of the body [m].
+    pub center: DVec3,
+    /// Lowest and highest corner of the rest shape [m].
+    pub bounds: (DVec3, DVec3),
+    /// Up in the world.
+    pub up: DVec3,
+    /// Points spread over the rest surface [m], where something may be attached.
+    pub places: Vec<DVec3>,
+    /// Number of cameras that saw the body.
+    pub cameras: usize,
+    /// Number of markers.
+    pub markers: usize,
+    /// Paths of numbers that the scene holds fixed.
+    pub held: Vec<String>,
+    /// Per scene: times [s] during which the baseline touches a plane.
+    pub contact: Vec<Vec<(f64, f64)>>,
+}
+
+/// One number of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Number {
+    /// Path in the scene file.
+    pub path: String,
+    /// SI unit, `1` for none.
+    pub unit: String,
+    /// Value where it starts: of a freed number the scene's, of an effect's what its change says.
+    pub start: f64,
+    /// Smallest and largest allowed value.
+    pub bounds: (f64, f64),
+    /// A change that matters.
+    pub scale: f64,
+}
+
+/// A fitted model: changes of the scene, and the value of every free number (the scene's own first, then change by change).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// What was changed.
+    pub changes: Vec<Change>,
+    /// Its free numbers.
+    pub numbers: Vec<Number>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Standard errors, where known.
+    pub errors: Vec<Option<f64>>,
+}
+
+/// One scalar residual in its scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Number of the scene.
+    pub scene: usize,
+    /// Time of its frame [s].
+    pub time: f64,
+    /// The residual.
+    pub row: ResidualRow,
+}
+
+/// All residuals of a model, in the same order for every model of the same scenes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Readings {
+    /// The residuals `[R]`.
+    pub rows: Vec<Reading>,
+    /// Number of columns Q.
+    pub columns: usize,
+    /// Derivatives by the model's numbers, `[R, Q]`.
+    pub sensitivity: Vec<f64>,
+}
+
+/// An error of the discretisation: what a finer computation would add to every residual, carried on to the limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// What was refined.
+    pub name: &'static str,
+    /// Change of every residual [m]; `None` where one of the two met nothing.
+    pub change: Vec<Option<f64>>,
+}
+
+/// Whoever simulates and fits.
+pub trait Laboratory {
+    /// The scene's character.
+    fn setting(&self) -> &Setting;
+    /// Free numbers of the scene with these changes.
+    fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError>;
+    /// Fits each set of changes, starting from these values; one answer each.
+    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Model, LabError>>;
+    /// Residuals and derivatives of each set of changes at these values.
+    fn linearise(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Readings, LabError>>;
+    /// As [`Laboratory::linearise`], with derivatives by the numbers from place `from` on alone.
+    fn linearise_new(&mut self, tries: &[(Vec<Change>, Vec<f64>)], from: usize) -> Vec<Result<Readings, LabError>>;
+    /// What finer computations would change.
+    fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError>;
+    /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none.
+    fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError>;
+    /// How far [m] two models are apart in other measurements: description and root mean square distance.
+    fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)>;
+    /// True when the time that was allowed is over.
+    fn out_of_time(&self) -> bool;
+    /// True when asked to stop.
+    fn interrupted(&self) -> bool;
+    /// Hears what is going on.
+    fn say(&mut self, what: &str);
+}

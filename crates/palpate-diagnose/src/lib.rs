@@ -1,0 +1,26 @@
+//! Finds what a fitted model lacks: residuals against their null, hypotheses from the table of effects, verdicts on data left out.
+//!
+//! Invariant: statistics and workflow only. This room knows the fit's numbers and the law table; what a hypothesis predicts it asks of a
+//! [`Laboratory`], and it never computes physics, nor names a backend, a file or an effect.
+
+mod cells;
+mod change;
+mod crossval;
+mod diagnosis;
+mod laboratory;
+mod linear;
+mod locate;
+mod noise;
+mod null;
+mod score;
+mod workflow;
+
+pub use cells::Regions;
+pub use change::{Candidate, Change, can_be_freed, candidates};
+pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
+pub use laboratory::{Field, LabError, Laboratory, Model, Number, Reading, Readings, Setting};
+pub use locate::Place;
+pub use workflow::{Options, diagnose};
+
+#[cfg(test)]
+mod tests;

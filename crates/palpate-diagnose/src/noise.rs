@@ -1,0 +1,139 @@
+//! How large the noise really is: of one reading, from neighbouring pixels, and of a region's mean, from its course over time.
+//!
+//! A region's mean over correlated pixels scatters more than σ/√n. Noise is new in every frame while what a model misses changes
+//! smoothly, so that second differences over time, of residuals without anything that any hypothesis could explain, show the noise alone.
+
+use crate::cells::Cells;
+use crate::laboratory::Readings;
+use crate::linear::quantile;
+use palpate_engine::Source;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::collections::BTreeMap;
+
+/// Median of χ² with one degree of freedom.
+const MEDIAN: f64 = 0.454_936;
+
+/// Noise of single depth readings over the stated one, from differences of neighbours in the same image; 1 where it is smaller.
+pub fn neighbour_ratio(readings: &Readings) -> f64 {
+    let mut squares = Vec::new();
+    let mut gaps = Vec::new();
+    for w in readings.rows.windows(2) {
+        let [a, b] = w else { continue };
+        let (Source::Point { point: p, camera: c }, Source::Point { point: q, camera: d }) = (a.row.source, b.row.source) else {
+            continue;
+        };
+        if a.scene != b.scene || a.row.frame != b.row.frame || c != d || q != p + 1 {
+            continue;
+        }
+        if let (Some(x), Some(y)) = (a.row.value, b.row.value) {
+            let variance = (a.row.noise * a.row.along_sight).powi(2) + (b.row.noise * b.row.along_sight).powi(2);
+            squares.push((x - y).powi(2) / variance);
+            gaps.push(a.row.rest.distance(b.row.rest));
+        }
+    }
+    if squares.len() < 50 {
+        return 1.0;
+    }
+    // The next pixel of the same row, not the first of the next one.
+    let near = 2.0 * quantile(&mut gaps.clone(), 0.5);
+    let mut close: Vec<f64> = squares.iter().zip(&gaps).filter(|(_, g)| **g <= near).map(|(s, _)| *s).collect();
+    (quantile(&mut close, 0.5) / MEDIAN).sqrt().max(1.0)
+}
+
+/// What noise alone looks like on the cells of one frame, from second differences over time.
+#[derive(Clone, Debug, Default)]
+pub struct Shapes {
+    /// Number of the sequence (sensor and region) of every cell `[m]`.
+    sequence: Vec<usize>,
+    /// One frame each: a value per sequence that was seen in it, of mean square one over all frames.
+    frames: Vec<Vec<Option<f64>>>,
+    /// Relative standard error of the variance that the factor stands for.
+    uncertainty: f64,
+}
+
+/// A sequence's own variance counts as much as so many recordings of the same length count for the mean of all sequences: a few dozen
+/// frames do not determine it.
+const POOLED: f64 = 2.0;
+
+/// Frames with a shape that a draw needs; with fewer, cells are drawn independently.
+const ENOUGH: usize = 6;
+
+impl Shapes {
+    /// A draw of noise on all cells, of variance one: every frame gets the shape of a random one with a random sign, so that
+    /// correlation between regions and cameras is kept.
+    pub fn draw(&self, cells: &Cells, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let mut chosen: BTreeMap<(usize, usize), (usize, f64)> = BTreeMap::new();
+        let mut out = Vec::with_capacity(cells.len());
+        // How large the noise is, is itself known only roughly.
+        let size: f64 = StandardNormal.sample(rng);
+        let size = (0.5 * self.uncertainty * size).exp();
+        for (i, k) in cells.keys.iter().enumerate() {
+            let gauss: f64 = StandardNormal.sample(rng);
+            if self.frames.len() < ENOUGH {
+                out.push(size * gauss);
+                continue;
+            }
+            let (frame, sign) = *chosen
+                .entry((k.scene, k.frame))
+                .or_insert_with(|| (rng.random_range(0..self.frames.len()), if rng.random::<bool>() { 1.0 } else { -1.0 }));
+            out.push(size * self.frames[frame][self.sequence[i]].map_or(gauss, |v| sign * v));
+        }
+        out
+    }
+}
+
+/// Factor on the variance of cells' means: how many times more they scatter from frame to frame than independent readings would; and the
+/// shapes that this noise takes. `y` are residuals in units of that noise with everything projected out, which has taken a share
+/// `leverage` of their variance. Without three frames in a row the factor is 1 and there are no shapes.
+pub fn design_effect(cells: &Cells, y: &[f64], leverage: impl Fn(usize) -> f64) -> (f64, Shapes) {
+    let sequences = cells.sequences();
+    let mut shapes = Shapes { sequence: vec![0; cells.len()], frames: Vec::new(), uncertainty: 0.0 };
+    let mut frames: BTreeMap<(usize, usize), Vec<Option<f64>>> = BTreeMap::new();
+    for (s, sequence) in sequences.iter().enumerate() {
+        sequence.iter().for_each(|i| shapes.sequence[*i] = s);
+        for w in sequence.windows(3) {
+            let [a, b, c] = w else { continue };
+            let keys = [a, b, c].map(|i| cells.keys[*i]);
+            if keys[1].frame != keys[0].frame + 1 || keys[2].frame != keys[1].frame + 1 {
+                continue;
+            }
+            let left = |i: usize| (1.0 - leverage(i)).max(0.05);
+            let difference = y[*b] - 0.5 * (y[*a] + y[*c]);
+            let scaled = difference / (left(*b) + 0.25 * (left(*a) + left(*c))).sqrt();
+            frames.entry((keys[1].scene, keys[1].frame)).or_insert_with(|| vec![None; sequences.len()])[s] = Some(scaled);
+        }
+    }
+    let square = |f: &Vec<Option<f64>>| {
+        let (sum, n) = f.iter().flatten().fold((0.0, 0), |(s, n), v| (s + v * v, n + 1));
+        sum / f64::from(n.max(1))
+    };
+    let mut squares: Vec<f64> = frames.values().map(square).collect();
+    if squares.len() < 3 {
+        return (1.0, shapes);
+    }
+    // Regions differ in how correlated their readings are, so squares are averaged over a frame. Frames with an impact, where what the
+    // model misses changes at once, are the largest: a quantile leaves them out. A little above the median, which lies below the mean.
+    let factor = quantile(&mut squares.clone(), 0.6);
+    let calm = quantile(&mut squares, 0.8);
+    shapes.frames = frames.into_values().filter(|f| square(f) <= calm).collect();
+    let n = shapes.frames.len().max(1) as f64;
+    let scale = (shapes.frames.iter().map(square).sum::<f64>() / n).sqrt().max(1e-12);
+    shapes.frames.iter_mut().flatten().flatten().for_each(|v| *v /= scale);
+    for s in 0..sequences.len() {
+        let mine = || shapes.frames.iter().filter_map(|f| f[s]);
+        let (sum, n) = mine().fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));
+        if sum > 0.0 {
+            let variance: f64 = sum / n;
+            let shrunk = (variance + POOLED) / (1.0 + POOLED);
+            let by = (shrunk / variance).sqrt();
+            shapes.frames.iter_mut().filter_map(|f| f[s].as_mut()).for_each(|v| *v *= by);
+        }
+    }
+    // Standard error of a median over frames, of which every three share readings.
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    let spread = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / squares.len() as f64).sqrt();
+    shapes.uncertainty = (1.25 * spread / (mean.max(1e-300) * (squares.len() as f64 / 2.0).sqrt())).min(0.7);
+    (factor.max(1.0), shapes)
+}

@@ -1,0 +1,140 @@
+//! Is something missing? Structure of residuals over body and time, against what noise and discretisation leave after a refit.
+//!
+//! In units of the noise a right model leaves r = Π (ε + Σ s_k d_k), ε noise, d_k the fields by which finer computations differ, Π what
+//! refitting leaves, drawn with the shapes that noise was seen to have. s_k is one number per field with prior N(0, 1), fitted along; a field is itself known only roughly, so a
+//! share of it, with a random sign for every block, counts as noise. The statistics are calibrated by drawing such residuals.
+
+use crate::cells::{Cells, Table};
+use crate::linear::Basis;
+use crate::noise::Shapes;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::collections::BTreeMap;
+
+/// Share of the discretisation's error that its estimate from one refinement misses.
+const ROUGHNESS: f64 = 0.3;
+/// Recordings drawn from the null.
+pub const DRAWS: usize = 499;
+
+/// A linearised model in its cells, extended by one pseudo-reading per field of discretisation.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Residuals `[m + fields]`.
+    pub y: Vec<f64>,
+    /// What a refit absorbs: free numbers and fields.
+    pub absorbed: Basis,
+    /// Fields of discretisation in units of the noise `[fields][m]`.
+    pub fields: Vec<Vec<f64>>,
+}
+
+/// A vector over cells with zeros for the pseudo-readings.
+pub fn extended(v: &[f64], fields: usize) -> Vec<f64> {
+    v.iter().copied().chain(std::iter::repeat_n(0.0, fields)).collect()
+}
+
+impl Frame {
+    /// A model's table with fields of discretisation.
+    pub fn new(table: &Table, fields: Vec<Vec<f64>>) -> Frame {
+        let n = fields.len();
+        let mut absorbed = Basis::default();
+        table.columns.iter().for_each(|c| absorbed.add(&extended(c, n)));
+        for (k, f) in fields.iter().enumerate() {
+            let mut column = extended(f, n);
+            column[f.len() + k] = 1.0;
+            absorbed.add(&column);
+        }
+        Frame { y: extended(&table.y, n), absorbed, fields }
+    }
+
+    /// Residuals after the refit `[m + fields]`.
+    pub fn left(&self) -> Vec<f64> {
+        self.absorbed.without(&self.y)
+    }
+}
+
+/// A block: one sensor, one region, some neighbouring frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Scene.
+    pub scene: usize,
+    /// Sensor as in the cells' keys.
+    pub sensor: u32,
+    /// Region.
+    pub region: usize,
+    /// Number of its stretch of time.
+    pub time: usize,
+    /// Its cells.
+    pub cells: Vec<usize>,
+    /// Sum of its residuals in units of its standard deviation under the null.
+    pub z: f64,
+}
+
+/// Answer of the test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adequacy {
+    /// Probability of such structure, or more, when nothing is missing.
+    pub p_value: f64,
+    /// The blocks.
+    pub blocks: Vec<Block>,
+}
+
+/// Blocks of cells: `bins` stretches of time.
+pub fn blocks(cells: &Cells, bins: usize) -> Vec<Block> {
+    let bin = cells.time_blocks(bins);
+    let mut groups: BTreeMap<(usize, u32, usize, usize), Vec<usize>> = BTreeMap::new();
+    for (i, k) in cells.keys.iter().enumerate() {
+        groups.entry((k.scene, k.sensor, k.region, bin[i])).or_default().push(i);
+    }
+    let block = |((scene, sensor, region, time), cells)| Block { scene, sensor, region, time, cells, z: 0.0 };
+    groups.into_iter().map(block).collect()
+}
+
+/// Mean over a block of its residuals in units of their noise, times √n.
+fn sum(block: &Block, y: &[f64]) -> f64 {
+    block.cells.iter().map(|i| y[*i]).sum::<f64>() / (block.cells.len() as f64).sqrt()
+}
+
+/// One draw of residuals that a right model would leave.
+fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, blocks: &[Block], rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut y = noise.draw(cells, rng);
+    let mut gauss = || -> f64 { StandardNormal.sample(rng) };
+    for f in &frame.fields {
+        let s = gauss();
+        y.iter_mut().zip(f).for_each(|(y, f)| *y += s * f);
+        for b in blocks {
+            let rough = ROUGHNESS * gauss();
+            b.cells.iter().for_each(|i| y[*i] += rough * f[*i]);
+        }
+    }
+    let mut left = frame.absorbed.without(&extended(&y, frame.fields.len()));
+    left.truncate(cells.len());
+    left
+}
+
+/// Tests a model's residuals; the same seed gives the same answer.
+pub fn test(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64) -> Adequacy {
+    let mut blocks = blocks(cells, bins);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let draws: Vec<Vec<f64>> = (0..DRAWS)
+        .map(|_| {
+            let y = draw(cells, frame, noise, &blocks, &mut rng);
+            blocks.iter().map(|b| sum(b, &y)).collect()
+        })
+        .collect();
+    let left = frame.left();
+    let sd: Vec<f64> =
+        (0..blocks.len()).map(|b| (draws.iter().map(|d| d[b] * d[b]).sum::<f64>() / DRAWS as f64).sqrt().max(1e-6)).collect();
+    for (b, sd) in blocks.iter_mut().zip(&sd) {
+        b.z = sum(b, &left) / sd;
+    }
+    // Two questions at once: structure spread over many blocks, and structure in one.
+    let both = |z: &mut dyn Iterator<Item = f64>| z.fold([0.0f64, 0.0], |[s, m], z| [s + z * z, m.max(z.abs())]);
+    let observed = both(&mut blocks.iter().map(|b| b.z));
+    let drawn: Vec<[f64; 2]> = draws.iter().map(|d| both(&mut d.iter().zip(&sd).map(|(z, s)| z / s))).collect();
+    let share = |k: usize, value: f64| (1 + drawn.iter().filter(|d| d[k] >= value).count()) as f64 / (DRAWS + 1) as f64;
+    let least = |v: &[f64; 2]| share(0, v[0]).min(share(1, v[1]));
+    let mine = least(&observed);
+    let as_small = drawn.iter().filter(|d| least(d) <= mine).count();
+    Adequacy { p_value: (1 + as_small) as f64 / (DRAWS + 1) as f64, blocks }
+}

@@ -1,0 +1,68 @@
+//! What a candidate could explain, from sensitivities where it is absent: a generalised score (partial F) test.
+//!
+//! With the fitted numbers and the discretisation projected out of residuals y and of the candidate's columns C, the sum of squares falls by
+//! |P_C y|² when the candidate's amplitudes are set free (Rao, *Proc. Camb. Phil. Soc.* 44, 1948, for small changes).
+
+use crate::linear::{Basis, dot, least_squares};
+use crate::null::Frame;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+/// Ridge on columns of unit length: directions that the fitted numbers absorb up to a thousandth are not told apart from them.
+const RIDGE: f64 = 1e-6;
+
+/// A candidate's score.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Score {
+    /// Decrease of the sum of squares.
+    pub gain: f64,
+    /// The same over the whole sum of squares.
+    pub share: f64,
+    /// Free amplitudes that it takes.
+    pub freedom: usize,
+    /// Probability of so large a decrease by chance.
+    pub p_value: f64,
+    /// Best change of each number `[columns]`.
+    pub step: Vec<f64>,
+}
+
+/// Scores columns `[k][m + fields]` whose changes must stay within `bounds` (smallest and largest change).
+pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Score {
+    let y = frame.left();
+    let total = dot(&y, &y);
+    let bent: Vec<Vec<f64>> = columns.iter().map(|c| frame.absorbed.without(c)).collect();
+    // A column that the fitted numbers absorb up to rounding says nothing of its own.
+    let own = |k: usize| dot(&bent[k], &bent[k]) > 1e-8 * dot(&columns[k], &columns[k]);
+    let mut active: Vec<usize> = (0..columns.len()).filter(|k| own(*k)).collect();
+    let mut out = Score { step: vec![0.0; columns.len()], p_value: 1.0, ..Score::default() };
+    while !active.is_empty() {
+        let chosen: Vec<&[f64]> = active.iter().map(|k| bent[*k].as_slice()).collect();
+        let Some(x) = least_squares(&chosen, &y, RIDGE) else { return out };
+        // A change beyond its bound is taken back, and the others are fitted again.
+        let outside = |i: usize| x[i] < bounds[active[i]].0 || x[i] > bounds[active[i]].1;
+        if let Some(worst) = (0..active.len()).find(|i| outside(*i)) {
+            active.remove(worst);
+            continue;
+        }
+        let mut left = y.clone();
+        for (x, c) in x.iter().zip(&chosen) {
+            left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c);
+        }
+        out.gain = (total - dot(&left, &left)).max(0.0);
+        active.iter().zip(&x).for_each(|(k, x)| out.step[*k] = *x);
+        out.freedom = Basis::new(active.iter().map(|k| &bent[*k])).rank();
+        break;
+    }
+    out.share = if total > 0.0 { out.gain / total } else { 0.0 };
+    let rest = y.len() as f64 - (frame.absorbed.rank() + out.freedom) as f64;
+    out.p_value = f_tail(out.gain, out.freedom, total - out.gain, rest);
+    out
+}
+
+/// Probability that chance alone takes `gain` from a sum of squares with `freedom` numbers when `left` remains with `rest` degrees.
+pub fn f_tail(gain: f64, freedom: usize, left: f64, rest: f64) -> f64 {
+    if freedom == 0 || rest < 1.0 {
+        return 1.0;
+    }
+    let f = (gain / freedom as f64) / (left / rest).max(1e-300);
+    FisherSnedecor::new(freedom as f64, rest).map_or(1.0, |d| d.sf(f.max(0.0)))
+}

@@ -1,0 +1,214 @@
+//! A linear laboratory: residuals are smooth patterns over a ball's surface and time, one per number, plus noise.
+
+use crate::change::Change;
+use crate::laboratory::*;
+use crate::linear::least_squares;
+use glam::DVec3;
+use palpate_engine::{ResidualRow, Source};
+use palpate_model::effects::{Effect, find};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+pub const FRAMES: usize = 24;
+const POINTS: usize = 240;
+pub const NOISE: f64 = 1e-3;
+
+/// A laboratory with a hidden truth.
+pub struct Bench {
+    setting: Setting,
+    rest: Vec<DVec3>,
+    /// Noise and what no number explains `[R]` [m].
+    rough: Vec<f64>,
+    /// Hidden numbers: pattern's name and size.
+    hidden: Vec<(String, f64)>,
+    held: Vec<String>,
+}
+
+/// A smooth pattern over place and time that a name stands for; a magnet pulls at one spot only.
+pub fn pattern(name: &str, p: DVec3, t: f64) -> f64 {
+    if name == "magnet" {
+        let away = p.distance(DVec3::new(0.03, 0.0, 0.04)) / 0.02;
+        return 4.0 * (-away * away).exp() * (20.0 * t).sin();
+    }
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    name.bytes().for_each(|b| hash = (hash ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
+    let mut sum = 0.0;
+    for _ in 0..3 {
+        let mut next = || {
+            hash = hash.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (hash >> 40) as f64 / (1u64 << 24) as f64 * 2.0 - 1.0
+        };
+        let k = 25.0 * DVec3::new(next(), next(), next());
+        sum += (k.dot(p) + 8.0 * next() * t + 6.0 * next()).sin();
+    }
+    sum
+}
+
+/// Patterns' names of a change's numbers.
+fn names(change: &Change) -> Vec<String> {
+    match change {
+        Change::Effect(e) => {
+            let name =
+                |s: usize| format!("{} {s} {:?}", e.law().kind, if change.free_slots().len() > 9 { &e.values[..] } else { &[] });
+            change.free_slots().into_iter().map(name).collect()
+        }
+        Change::Freed { paths, .. } => paths.clone(),
+    }
+}
+
+impl Bench {
+    /// `correlated`: pixels share their noise in patches of ten.
+    pub fn new(seed: u64, hidden: &[(&str, f64)], correlated: bool) -> Bench {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut gauss = || -> f64 { StandardNormal.sample(&mut rng) };
+        // A spiral of ten turns: neighbours in the list are neighbours on the sphere.
+        let rest: Vec<DVec3> = (0..POINTS)
+            .map(|i| {
+                let z = 1.0 - 2.0 * (i as f64 + 0.5) / POINTS as f64;
+                let a = i as f64 * 20.0 * std::f64::consts::PI / POINTS as f64;
+                0.05 * DVec3::new((1.0 - z * z).sqrt() * a.cos(), (1.0 - z * z).sqrt() * a.sin(), z)
+            })
+            .collect();
+        let mut rough = Vec::new();
+        for _ in 0..FRAMES {
+            let mut shared = 0.0;
+            for i in 0..POINTS {
+                if i % 10 == 0 {
+                    shared = gauss();
+                }
+                rough.push(NOISE * if correlated { shared } else { gauss() });
+            }
+        }
+        let held = vec![
+            "material.poisson_ratio".to_string(),
+            "world.gravity.x".into(),
+            "world.gravity.y".into(),
+            "world.gravity.z".into(),
+        ];
+        let setting = Setting {
+            center: DVec3::ZERO,
+            bounds: (DVec3::splat(-0.05), DVec3::splat(0.05)),
+            up: DVec3::Z,
+            places: rest.iter().step_by(30).copied().collect(),
+            cameras: 1,
+            markers: 0,
+            held: held.clone(),
+            contact: vec![vec![(0.5, 0.8)]],
+        };
+        Bench { setting, rest, rough, hidden: hidden.iter().map(|h| (h.0.to_string(), h.1)).collect(), held }
+    }
+
+    /// Name of the pattern of the first number of an effect.
+    pub fn first_pattern(kind: &str) -> String {
+        names(&Change::Effect(Effect::absent(find(kind).unwrap()))).remove(0)
+    }
+
+    pub fn baseline(&mut self) -> Model {
+        let start = self.numbers(&[]).unwrap().iter().map(|n| n.start).collect();
+        self.fit(&[(Vec::new(), start)]).remove(0).unwrap()
+    }
+
+    fn all_names(&self, changes: &[Change]) -> Vec<String> {
+        ["stiffness".to_string(), "damping".to_string()].into_iter().chain(changes.iter().flat_map(names)).collect()
+    }
+
+    fn readings(&self, changes: &[Change], values: &[f64], from: usize) -> Readings {
+        let names = self.all_names(changes);
+        let q = names.len() - from;
+        let mut out = Readings { columns: q, ..Readings::default() };
+        let offsets: Vec<f64> = self.numbers(changes).unwrap().iter().map(|n| n.start).collect();
+        for frame in 0..FRAMES {
+            let time = frame as f64 / FRAMES as f64;
+            for (i, p) in self.rest.iter().enumerate() {
+                let d: Vec<f64> = names.iter().map(|n| pattern(n, *p, time)).collect();
+                let mut value = self.rough[frame * POINTS + i];
+                value += self.hidden.iter().map(|(n, x)| x * pattern(n, *p, time)).sum::<f64>();
+                value += d.iter().zip(values).zip(&offsets).map(|((d, v), o)| d * (v - o)).sum::<f64>();
+                let row = ResidualRow {
+                    frame,
+                    source: Source::Point { point: i as u32, camera: 0 },
+                    value: Some(value),
+                    noise: NOISE,
+                    weight: 1.0,
+                    rest: *p,
+                    along_sight: 1.0,
+                };
+                out.rows.push(Reading { scene: 0, time, row });
+                out.sensitivity.extend(&d[from..]);
+            }
+        }
+        out
+    }
+}
+
+impl Laboratory for Bench {
+    fn setting(&self) -> &Setting {
+        &self.setting
+    }
+
+    fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError> {
+        let number = |path: String, start: f64, bounds: (f64, f64)| Number { path, unit: "1".into(), start, bounds, scale: 1e-3 };
+        let free = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut out = vec![number("stiffness".into(), 0.0, free), number("damping".into(), 0.0, free)];
+        for c in changes {
+            for s in c.free_slots() {
+                out.push(match c {
+                    Change::Effect(e) => {
+                        let p = &e.law().params[s];
+                        number(p.key.into(), e.values[s].unwrap_or(0.0), (p.lower, p.upper))
+                    }
+                    Change::Freed { paths, .. } => number(paths[s].clone(), 0.3, free),
+                });
+            }
+        }
+        assert!(self.held.len() == 4);
+        Ok(out)
+    }
+
+    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Model, LabError>> {
+        let one = |(changes, values): &(Vec<Change>, Vec<f64>)| {
+            let r = self.readings(changes, values, 0);
+            let columns: Vec<Vec<f64>> =
+                (0..r.columns).map(|k| r.sensitivity.iter().skip(k).step_by(r.columns).copied().collect()).collect();
+            let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let y: Vec<f64> = r.rows.iter().map(|r| r.row.value.unwrap()).collect();
+            let step = least_squares(&chosen, &y, 0.0).unwrap();
+            let values = values.iter().zip(&step).map(|(v, s)| v + s).collect::<Vec<f64>>();
+            Ok(Model { changes: changes.clone(), numbers: self.numbers(changes)?, errors: vec![None; values.len()], values })
+        };
+        tries.iter().map(one).collect()
+    }
+
+    fn linearise(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Readings, LabError>> {
+        self.linearise_new(tries, 0)
+    }
+
+    fn linearise_new(&mut self, tries: &[(Vec<Change>, Vec<f64>)], from: usize) -> Vec<Result<Readings, LabError>> {
+        tries.iter().map(|(c, v)| Ok(self.readings(c, v, from))).collect()
+    }
+
+    fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
+        let at = |i: usize| pattern("grid", self.rest[i % POINTS], (i / POINTS) as f64 / FRAMES as f64);
+        let change = (0..FRAMES * POINTS).map(|i| Some(2e-4 * at(i))).collect();
+        Ok(vec![Field { name: "grid", change }])
+    }
+
+    fn held_out(&mut self, _: &Model) -> Result<Option<Readings>, LabError> {
+        Ok(None)
+    }
+
+    fn separations(&mut self, _: &Model, _: &Model) -> Vec<(String, f64)> {
+        vec![("from twice the height".into(), 0.002)]
+    }
+
+    fn out_of_time(&self) -> bool {
+        false
+    }
+
+    fn interrupted(&self) -> bool {
+        false
+    }
+
+    fn say(&mut self, _: &str) {}
+}

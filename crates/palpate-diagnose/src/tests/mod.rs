@@ -1,0 +1,4 @@
+//! The workflow on a laboratory whose physics is linear and known.
+
+mod bench;
+mod workflow;

@@ -1,0 +1,87 @@
+//! Right names, honest silence, and a false-alarm rate that is the stated one.
+
+use super::bench::{Bench, NOISE};
+use crate::cells::Cells;
+use crate::diagnosis::Verdict;
+use crate::laboratory::Laboratory;
+use crate::noise::design_effect;
+use crate::null::{Frame, test};
+use crate::{Options, diagnose};
+
+#[test]
+fn hidden_effects_are_named_and_the_gap_closes() {
+    for kind in ["coulomb-friction", "uniform-force", "air-drag"] {
+        let pattern = Bench::first_pattern(kind);
+        // Upwards: the amplitudes of friction and drag may not be negative, and residuals are model minus truth.
+        let mut bench = Bench::new(5, &[(&pattern, -1.5 * NOISE)], false);
+        let baseline = bench.baseline();
+        let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+        assert_eq!(d.verdict, Verdict::MissingEffect, "{kind}: {}", d.sentence());
+        let first = &d.effects[0];
+        assert_eq!(first.kind, kind, "{}", d.sentence());
+        // Noise leaves 1/√5760 of 1 mm on the amplitude.
+        assert!((first.parameters[0].1 / (1.5 * NOISE) - 1.0).abs() < 0.05, "{:?}", first.parameters);
+        assert!(d.gap_closed > 0.9 && first.held_out_gain > 0.9, "{} {}", d.gap_closed, first.held_out_gain);
+        assert!(d.places.iter().map(|p| p.share).sum::<f64>() > 0.5 && d.p_value < 0.01);
+        assert!(d.effects.iter().filter(|e| e.accepted).count() == 1);
+    }
+}
+
+#[test]
+fn two_hidden_effects_are_both_named() {
+    let (a, b) = (Bench::first_pattern("coulomb-friction"), Bench::first_pattern("depth-bias"));
+    let mut bench = Bench::new(8, &[(&a, -2.0 * NOISE), (&b, 1.5 * NOISE)], false);
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    let kinds: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.kind.as_str()).collect();
+    assert!(kinds.contains(&"coulomb-friction") && kinds.contains(&"depth-bias"), "{}", d.sentence());
+}
+
+#[test]
+fn what_no_effect_explains_is_called_unexplained() {
+    let mut bench = Bench::new(6, &[("magnet", 2.0 * NOISE)], false);
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!(d.verdict, Verdict::Unexplained, "{}", d.sentence());
+    assert!(d.effects.iter().all(|e| !e.accepted) && d.slack.is_some());
+    assert_eq!(d.model, d.baseline);
+}
+
+#[test]
+fn nothing_hidden_is_adequate() {
+    // A part of the discretisation's field is no discrepancy.
+    let mut bench = Bench::new(7, &[("grid", 2e-4)], false);
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!(d.verdict, Verdict::Adequate, "{}", d.sentence());
+    assert!(d.effects.is_empty() && d.places.is_empty());
+    assert!((d.before.rms / d.before.noise - 1.0).abs() < 0.05, "{:?}", d.before);
+}
+
+#[test]
+fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
+    let (mut alarms, mut factors) = (0, Vec::new());
+    const RECORDINGS: u64 = 120;
+    const STATED: f64 = 0.05;
+    for seed in 0..RECORDINGS {
+        let mut bench = Bench::new(1000 + seed, &[], true);
+        let model = bench.baseline();
+        let readings = bench.linearise(&[(Vec::new(), model.values.clone())]).remove(0).unwrap();
+        let fields = bench.finer(&[], &model.values).unwrap();
+        let mut cells = Cells::new(&readings);
+        let frame = |cells: &Cells| Frame::new(&cells.table(&readings, None), vec![cells.means(&fields[0].change)]);
+        let first = frame(&cells);
+        let (factor, noise) = design_effect(&cells, &first.left(), |i| first.absorbed.leverage(i));
+        factors.push(factor);
+        cells.sd.iter_mut().for_each(|s| *s *= factor.sqrt());
+        let p = test(&cells, &frame(&cells), &noise, 8, seed).p_value;
+        alarms += usize::from(p < STATED);
+    }
+    let rate = alarms as f64 / RECORDINGS as f64;
+    let factor = factors.iter().sum::<f64>() / factors.len() as f64;
+    println!("stated {STATED}, found {rate}; variance of means {factor:.2} times that of independent pixels");
+    // Independent pixels would leave a factor 1; patches of ten, cut by regions, most of ten.
+    assert!(factor > 1.5, "{factor}");
+    // Three standard deviations of a binomial of 120.
+    assert!(rate < STATED + 3.0 * (STATED * (1.0 - STATED) / RECORDINGS as f64).sqrt(), "{rate}");
+}

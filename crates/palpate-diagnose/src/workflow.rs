@@ -1,0 +1,277 @@
+//! The order of questions: is something missing, where, what is it called, how sure, what else, how much of the gap closes; and again.
+
+mod conclude;
+mod rounds;
+
+use crate::cells::{Cells, Table};
+use crate::change::{Change, candidates};
+use crate::crossval::{Predicted, foldings, predict};
+use crate::diagnosis::{Diagnosis, Found, Tried};
+use crate::laboratory::{Field, LabError, Laboratory, Model, Readings};
+use crate::locate::{Place, locate};
+use crate::noise::{Shapes, design_effect, neighbour_ratio};
+use crate::null::{Block, Frame, extended, test};
+use crate::score::{Score, score};
+
+/// How to diagnose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// False-alarm rate of the question whether something is missing.
+    pub significance: f64,
+    /// Smallest share of the gap that an effect must close on data left out.
+    pub least_gain: f64,
+    /// Share of the gap that all accepted effects together must close, unless nothing remains.
+    pub enough: f64,
+    /// Most effects added.
+    pub rounds: usize,
+    /// Candidates fitted in a round.
+    pub fits: usize,
+    /// Stretches of time that residuals are looked at in.
+    pub bins: usize,
+    /// Windows of time of the slack force.
+    pub windows: usize,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { significance: 0.01, least_gain: 0.3, enough: 0.7, rounds: 3, fits: 8, bins: 8, windows: 5, seed: 1 }
+    }
+}
+
+/// A model with everything that is known about its residuals.
+struct State {
+    model: Model,
+    readings: Readings,
+    table: Table,
+    fields: Vec<Field>,
+    frame: Frame,
+    predicted: Vec<Predicted>,
+}
+
+/// A variant of a candidate with its columns where it is absent.
+struct Variant {
+    candidate: usize,
+    change: Change,
+    /// Of every free number of the change, `[k][m]`.
+    columns: Vec<Vec<f64>>,
+    /// Which of them count at "absent".
+    amplitudes: Vec<bool>,
+    start: Vec<f64>,
+    bounds: Vec<(f64, f64)>,
+    score: Score,
+}
+
+/// A fitted candidate.
+struct Fitted {
+    candidate: usize,
+    state: State,
+    p_value: f64,
+    gain: f64,
+    freedom: usize,
+}
+
+/// What stays the same during a diagnosis.
+struct Session<'a> {
+    lab: &'a mut dyn Laboratory,
+    options: &'a Options,
+    cells: Cells,
+    folds: Vec<Vec<usize>>,
+    noise_ratio: f64,
+    design_effect: f64,
+    noise: Shapes,
+    tried: Vec<Tried>,
+    not_tried: Vec<String>,
+}
+
+/// Diagnoses a scene from its fitted baseline.
+///
+/// # Errors
+/// The baseline cannot be computed, or it was interrupted before anything was known.
+pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) -> Result<Diagnosis, LabError> {
+    lab.say("residuals of the baseline");
+    let readings = one(lab.linearise(&[(baseline.changes.clone(), baseline.values.clone())]))?;
+    let mut cells = Cells::new(&readings);
+    if cells.is_empty() {
+        return Err(LabError::Failed("no part of the recording meets the simulated body: nothing can be diagnosed".into()));
+    }
+    let noise_ratio = neighbour_ratio(&readings);
+    for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
+        *sd *= if k.sensor < 1000 { noise_ratio } else { 1.0 };
+    }
+    let folds = foldings(&cells);
+    let mut s = Session {
+        lab,
+        options,
+        cells,
+        folds,
+        noise_ratio,
+        design_effect: 1.0,
+        noise: Shapes::default(),
+        tried: Vec::new(),
+        not_tried: Vec::new(),
+    };
+    let mut state = s.state(baseline.clone(), readings, None)?;
+    s.correlate(&mut state)?;
+    let before = s.level(&state);
+    let mut out = Progress::default();
+    let mut adequacy;
+    let base_predicted = state.predicted[0].rms;
+    loop {
+        adequacy = test(&s.cells, &state.frame, &s.noise, options.bins, options.seed);
+        if out.places.is_none() {
+            out.places = Some(locate(&s.cells, &adequacy, s.lab.setting()));
+            out.p_value = adequacy.p_value;
+            out.blocks.clone_from(&adequacy.blocks);
+        }
+        if adequacy.p_value > options.significance || out.accepted.len() >= options.rounds || s.lab.out_of_time() {
+            break;
+        }
+        match s.round(&state, out.accepted.len() + 1) {
+            Ok((Some((found, next)), _)) => {
+                out.accepted.push(found);
+                state = next;
+            }
+            Ok((None, close)) => {
+                out.close = close;
+                break;
+            }
+            Err(LabError::Interrupted) => {
+                out.interrupted = true;
+                break;
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    s.conclude(baseline, before, base_predicted, state, &adequacy, out)
+}
+
+/// What the rounds have brought so far.
+#[derive(Default)]
+struct Progress {
+    accepted: Vec<Found>,
+    close: Vec<Found>,
+    places: Option<Vec<Place>>,
+    /// The baseline's residuals in blocks.
+    blocks: Vec<Block>,
+    p_value: f64,
+    interrupted: bool,
+}
+
+fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
+    answers.into_iter().next().unwrap_or_else(|| Err(LabError::Failed("the laboratory gave no answer".into())))
+}
+
+impl Session<'_> {
+    /// Everything known about a model; discretisation errors of another model are taken over where given.
+    fn state(&mut self, model: Model, readings: Readings, fields: Option<Vec<Field>>) -> Result<State, LabError> {
+        let fields = match fields {
+            Some(f) => f,
+            None => {
+                self.lab.say("discretisation error: finer grid, half step");
+                // A scene that is too large to be refined, or fails there, has no estimate.
+                match self.lab.finer(&model.changes, &model.values) {
+                    Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+                    other => other.unwrap_or_default(),
+                }
+            }
+        };
+        let table = self.cells.table(&readings, None);
+        let frame = self.frame(&table, &fields);
+        let predicted = self.predict(&readings, &table, &frame);
+        Ok(State { model, readings, table, fields, frame, predicted })
+    }
+
+    fn frame(&self, table: &Table, fields: &[Field]) -> Frame {
+        Frame::new(table, fields.iter().map(|f| self.cells.means(&f.change)).collect())
+    }
+
+    fn predict(&self, readings: &Readings, table: &Table, frame: &Frame) -> Vec<Predicted> {
+        self.folds.iter().map(|f| predict(&self.cells, readings, table, &frame.fields, f)).collect()
+    }
+
+    /// Finds how much more cells scatter than independent readings would, and rescales everything by it.
+    fn correlate(&mut self, state: &mut State) -> Result<(), LabError> {
+        let variants = self.variants(state)?;
+        let mut saturated = state.frame.absorbed.clone();
+        let mut best: Vec<&Variant> = variants.iter().collect();
+        best.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        for c in best.iter().flat_map(|v| &v.columns) {
+            // A third of the cells stays free to show the noise.
+            if saturated.rank() * 3 < self.cells.len() {
+                saturated.add(&extended(c, state.frame.fields.len()));
+            }
+        }
+        let y = saturated.without(&state.frame.y);
+        let (factor, noise) = design_effect(&self.cells, &y, |i| saturated.leverage(i));
+        (self.design_effect, self.noise) = (factor, noise);
+        self.cells.sd.iter_mut().for_each(|s| *s *= factor.sqrt());
+        state.table = self.cells.table(&state.readings, None);
+        state.frame = self.frame(&state.table, &state.fields);
+        state.predicted = self.predict(&state.readings, &state.table, &state.frame);
+        Ok(())
+    }
+
+    /// Every variant of every candidate, scored where it is absent.
+    fn variants(&mut self, state: &State) -> Result<Vec<Variant>, LabError> {
+        self.lab.say("scoring candidates");
+        let all = candidates(self.lab.setting());
+        let mut tries = Vec::new();
+        let mut out: Vec<Variant> = Vec::new();
+        let own = state.model.values.len();
+        for (candidate, c) in all.iter().enumerate() {
+            for change in &c.variants {
+                if state
+                    .model
+                    .changes
+                    .iter()
+                    .any(|x| matches!((x, change), (Change::Freed { name: a, .. }, Change::Freed { name: b, .. }) if a == b))
+                {
+                    continue;
+                }
+                let mut changes = state.model.changes.clone();
+                changes.push(change.clone());
+                let numbers = self.lab.numbers(&changes)?;
+                let mut values = state.model.values.clone();
+                values.extend(numbers[own..].iter().map(|n| n.start));
+                out.push(Variant {
+                    candidate,
+                    change: change.clone(),
+                    columns: Vec::new(),
+                    amplitudes: change.amplitudes(),
+                    start: values[own..].to_vec(),
+                    bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
+                    score: Score::default(),
+                });
+                tries.push((changes, values));
+            }
+        }
+        let answers = self.lab.linearise_new(&tries, own);
+        let mut kept = Vec::new();
+        for (mut v, answer) in out.into_iter().zip(answers) {
+            match answer {
+                Ok(readings) => {
+                    v.columns = self.cells.table(&readings, None).columns;
+                    v.score = self.score(state, &v);
+                    kept.push(v);
+                }
+                Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+                Err(LabError::Failed(_)) => {}
+            }
+        }
+        Ok(kept)
+    }
+
+    fn score(&self, state: &State, v: &Variant) -> Score {
+        let n = state.frame.fields.len();
+        let chosen: Vec<usize> = (0..v.columns.len()).filter(|k| v.amplitudes[*k]).collect();
+        let columns: Vec<Vec<f64>> = chosen.iter().map(|k| extended(&v.columns[*k], n)).collect();
+        let bounds: Vec<(f64, f64)> = chosen.iter().map(|k| v.bounds[*k]).collect();
+        let mut s = score(&state.frame, &columns, &bounds);
+        let mut step = vec![0.0; v.columns.len()];
+        chosen.iter().zip(&s.step).for_each(|(k, x)| step[*k] = *x);
+        s.step = step;
+        s
+    }
+}

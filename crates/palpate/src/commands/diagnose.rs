@@ -1,0 +1,126 @@
+//! `palpate diagnose`: what a model lacks.
+
+use crate::cli::{Console, INTERRUPTED};
+use crate::diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::options::{BackendName, out_folder};
+use crate::report::{DiagnosisInput, diagnosis_html, diagnosis_json, pictures};
+use clap::Args;
+use palpate_io::output::{make_folder, write_file};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate diagnose ball.toml                          result in out/ball-diagnosis/
+  palpate diagnose ball.toml --held-out ball-2.toml   decide on a second recording of the same body
+  palpate diagnose ball.toml --budget 10 --out why    stop the search after ten minutes and say what was not tried
+  palpate diagnose ball.toml --out why --resume       go on with an interrupted diagnosis
+
+The scene's [fit] says what is free in the baseline. The folder gets diagnosis.json (format diagnosis/1), model.toml (the scene with
+the effects that were found, readable by simulate, fit and diagnose), report.html, and checkpoints. Ctrl-C stops after the current
+stage, writes what is known, and exits with 130.";
+
+/// Find out whether a model lacks something, where, and what
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene files; several are diagnosed together
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// Output folder [default: out/SCENE-diagnosis]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What computes
+    #[arg(long, value_enum, default_value = "auto")]
+    backend: BackendName,
+    /// A scene with another recording of the same body, that no fit sees
+    #[arg(long, value_name = "SCENE2")]
+    held_out: Option<PathBuf>,
+    /// Minutes that the search may take [default: no limit]
+    #[arg(long, value_name = "MIN", allow_negative_numbers = true)]
+    budget: Option<f64>,
+    /// Go on with the checkpoints in the output folder
+    #[arg(long)]
+    resume: bool,
+    /// Pictures per scene in the report
+    #[arg(long, value_name = "N", default_value_t = 4, hide_short_help = true)]
+    pictures: usize,
+}
+
+fn command(a: &Arguments) -> String {
+    let scenes = a.scenes.iter().map(|s| s.display().to_string()).collect::<Vec<_>>().join(" ");
+    let held_out = a.held_out.as_ref().map_or(String::new(), |h| format!(" --held-out {}", h.display()));
+    let budget = a.budget.map_or(String::new(), |b| format!(" --budget {b}"));
+    format!("palpate diagnose {scenes}{held_out}{budget}")
+}
+
+fn write_all(a: &Arguments, folder: &Path, experiments: &[Experiment], done: &Diagnosed) -> Result<serde_json::Value, Error> {
+    let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
+    let result = diagnosis_json(done);
+    // Results first: a report that fails must not cost them.
+    text("diagnosis.json", &(serde_json::to_string_pretty(&result).map_err(|e| Error::write(folder, e))? + "\n"))?;
+    for (s, e) in experiments.iter().enumerate() {
+        let changed = palpate_io::append_effects(e.text(), e.scene(), &done.added)?;
+        let model = palpate_io::write_scene(&changed, done.experiments[s].scene(), &done.values[s], folder)?;
+        let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
+        text(&name, &model)?;
+    }
+    let (backend, _) = a.backend.choose(experiments[0].plan(), 1)?;
+    let (mut residuals, mut both) = (Vec::new(), Vec::new());
+    let d = &done.diagnosis;
+    let scale = 2.0 * d.before.rms.max(d.before.noise).max(1e-9);
+    // Whoever interrupts does not want to wait for pictures.
+    let count = if d.interrupted { 0 } else { a.pictures };
+    for (s, e) in experiments.iter().enumerate() {
+        let after = &done.experiments[s];
+        residuals.push((e.residuals(backend, &done.theta_before[s])?, after.residuals(backend, &after.plan().theta)?));
+        both.push((
+            pictures(e, backend, &done.theta_before[s], count, scale)?,
+            pictures(after, backend, &after.plan().theta, count, scale)?,
+        ));
+    }
+    text("report.html", &diagnosis_html(&DiagnosisInput { done, residuals, pictures: both, command: command(a) }))?;
+    Ok(result)
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    if let Some(b) = a.budget
+        && !(b > 0.0 && b < 1e6)
+    {
+        return Err(Error::Input(format!("--budget {b}: must be > 0 and below 1000000 (minutes)")));
+    }
+    let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
+    let (backend, note) = a.backend.choose(experiments[0].plan(), 1)?;
+    let held_out = a.held_out.as_ref().map(Experiment::open).transpose()?;
+    experiments.iter().chain(&held_out).for_each(|e| console.warn(e.warnings()));
+    note.iter().for_each(|n| console.note(n));
+    let folder = out_folder(&a.out, &a.scenes[0], "-diagnosis");
+    make_folder(&folder)?;
+    let bar = console.progress(0, "diagnosing");
+    let mut hear = |what: &str| {
+        bar.tick();
+        bar.set_message(what.to_string());
+    };
+    let done = diagnose(
+        &experiments,
+        held_out.as_ref(),
+        DiagnoseOptions {
+            backend,
+            budget: a.budget.map(|m| Duration::from_secs_f64(60.0 * m)),
+            interrupt: console.interrupt.clone(),
+            checkpoints: Some((folder.clone(), a.resume)),
+            on_progress: Some(&mut hear),
+            ..DiagnoseOptions::default()
+        },
+    )?;
+    bar.finish_and_clear();
+    let result = write_all(a, &folder, &experiments, &done)?;
+    if console.json() {
+        console.print(&result.to_string());
+    } else {
+        console.print(&format!("{}\n  report: {}", done.diagnosis.sentence(), folder.join("report.html").display()));
+    }
+    Ok(if done.diagnosis.interrupted { INTERRUPTED } else { 0 })
+}

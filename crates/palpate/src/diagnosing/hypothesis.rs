@@ -1,0 +1,144 @@
+//! Experiments changed as a hypothesis says: effects appended, numbers freed, without cutting the body again.
+
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::fitting::{FreeNumber, free_parameters};
+use palpate_diagnose::{Change, LabError, Number};
+use palpate_fit::{FreeParameter, Slot};
+use palpate_model::params::{ParamKey, Transform};
+use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer};
+
+/// Changed experiments and their free numbers: those of the scenes first, then change by change.
+pub(super) struct Prepared {
+    pub experiments: Vec<Experiment>,
+    pub names: Vec<FreeNumber>,
+    pub free: Vec<FreeParameter>,
+}
+
+/// A number that belongs to one recording, never to the body.
+pub(super) fn is_own(path: &str) -> bool {
+    path.starts_with("initial.") || path.starts_with("time.") || path.starts_with("mass.")
+}
+
+/// Path in the scene file of a key.
+pub(super) fn path_of(e: &Experiment, key: ParamKey) -> String {
+    match (key, e.scene.material.inertia) {
+        (ParamKey::Density, Inertia::Mass(_)) => "material.mass".into(),
+        _ => key.spec().path,
+    }
+}
+
+/// Paths that a diagnosis may free: held by every scene. Numbers of single scenes carry the scene's name when there are several.
+pub(super) fn held(experiments: &[Experiment]) -> Vec<String> {
+    let is_free = |e: &Experiment, path: &str| e.scene.fit.iter().flat_map(|f| &f.parameters).any(|p| p.path == path);
+    let has = |e: &Experiment, path: &str| e.plan.layout.keys.iter().any(|k| path_of(e, *k) == path);
+    let mut out = Vec::new();
+    for key in experiments[0].plan.layout.keys.iter().filter(|k| palpate_diagnose::can_be_freed(**k)) {
+        let path = path_of(&experiments[0], *key);
+        if experiments.iter().any(|e| is_free(e, &path) || !has(e, &path)) {
+            continue;
+        }
+        if experiments.len() > 1 && is_own(&path) {
+            let label = |s| FreeNumber { path: path.clone(), scene: Some(s) }.label();
+            out.extend((0..experiments.len()).map(label));
+        } else {
+            out.push(path);
+        }
+    }
+    out
+}
+
+/// Makes the experiments of a hypothesis.
+pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepared, Error> {
+    let several = base.len() > 1;
+    let mut experiments = base.to_vec();
+    let (known, _, _) = free_parameters(base)?;
+    let mut order: Vec<String> = known.iter().map(FreeNumber::label).collect();
+    for change in changes {
+        match change {
+            Change::Effect(effect) => {
+                for (s, e) in experiments.iter_mut().enumerate() {
+                    let number = e.scene.effects.len();
+                    e.scene.effects.push(effect.clone());
+                    e.plan.layout = e.scene.layout();
+                    let center = e.plan.body.center;
+                    e.plan.theta.extend((0..effect.values.len()).map(|slot| effect.value(slot, center)));
+                    for slot in change.free_slots() {
+                        let key = ParamKey::Effect { effect: number as u16, law: effect.law as u16, slot: slot as u16 };
+                        let path = key.spec().path;
+                        if s == 0 {
+                            order.push(path.clone());
+                        }
+                        set_free(e, path, false);
+                    }
+                }
+            }
+            Change::Freed { paths, .. } => {
+                order.extend(paths.iter().cloned());
+                for (s, e) in experiments.iter_mut().enumerate() {
+                    for label in paths {
+                        let path = label.split(" [scene").next().unwrap_or(label);
+                        let own = several && is_own(path);
+                        if !own || (FreeNumber { path: path.into(), scene: Some(s) }).label() == *label {
+                            set_free(e, path.to_string(), own);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    // Starts are set by whoever fits; here they only must not contradict each other between scenes.
+    let (names, free, _) = free_parameters(&experiments)?;
+    let mut both: Vec<(FreeNumber, FreeParameter)> = names.into_iter().zip(free).collect();
+    both.sort_by_key(|(n, _)| order.iter().position(|o| *o == n.label()).unwrap_or(usize::MAX));
+    let (names, free) = both.into_iter().unzip();
+    Ok(Prepared { experiments, names, free })
+}
+
+fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
+    let key = e.plan.layout.keys.iter().find(|k| path_of(e, **k) == path);
+    let Some(spec) = key.map(|k| k.spec()) else { return };
+    let bounds = if path == "material.mass" { (1e-9, 1e6) } else { (spec.lower, spec.upper) };
+    let middle = 0.0f64.clamp(bounds.0, bounds.1);
+    let parameter = FitParameter { path, start: (middle, middle), bounds, per_scene };
+    let empty =
+        || FitSpec { optimizer: Optimizer::GaussNewton, iterations: 50, starts: 1, seed: 1, threads: 0, parameters: Vec::new() };
+    e.scene.fit.get_or_insert_with(empty).parameters.push(parameter);
+}
+
+impl Prepared {
+    /// The free numbers.
+    pub fn numbers(&self) -> Vec<Number> {
+        let own = |s: &Slot| self.experiments[s.scene].plan.theta[s.place] / s.factor;
+        let number = |(n, f): (&FreeNumber, &FreeParameter)| {
+            let start = own(&f.slots[0]);
+            let scale = if f.transform == Transform::Log && start > 0.0 { start } else { f.typical };
+            Number { path: n.label(), unit: f.unit.clone(), start, bounds: f.bounds, scale }
+        };
+        self.names.iter().zip(&self.free).map(number).collect()
+    }
+
+    /// θ of a scene at values of the free numbers.
+    pub fn theta(&self, scene: usize, values: &[f64]) -> Vec<f64> {
+        let mut theta = self.experiments[scene].plan.theta.clone();
+        for (f, v) in self.free.iter().zip(values) {
+            f.slots.iter().filter(|s| s.scene == scene).for_each(|s| theta[s.place] = v * s.factor);
+        }
+        theta
+    }
+
+    /// Values of a scene's free numbers by path.
+    pub fn values_of(&self, scene: usize, values: &[f64]) -> Vec<(String, f64)> {
+        let acts = |f: &FreeParameter| f.slots.iter().any(|s| s.scene == scene);
+        let all = self.names.iter().zip(&self.free).zip(values);
+        all.filter(|((_, f), _)| acts(f)).map(|((n, _), v)| (n.path.clone(), *v)).collect()
+    }
+}
+
+/// An error of preparation as the laboratory's.
+pub(super) fn lab_error(e: Error) -> LabError {
+    match e {
+        Error::Interrupted => LabError::Interrupted,
+        other => LabError::Failed(other.to_string()),
+    }
+}

@@ -1,0 +1,303 @@
+//! The laboratory over experiments: fits and linearises hypotheses, several side by side.
+
+use super::DiagnoseOptions;
+use super::checkpoint::Checkpoint;
+use super::hypothesis::{Prepared, held, lab_error, prepare};
+use super::others::{contact_times, held_out, separations};
+use crate::engine::Backend;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::fitting::{errors, fingerprint};
+use crate::interrupt::Interrupt;
+use palpate_cpu::CpuBackend;
+use palpate_diagnose::{Change, Field, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting};
+use palpate_engine::Rollout;
+use palpate_fit::{FitScene, Hooks, Problem, Settings, Tolerance};
+use palpate_model::scene::Optimizer;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Cells of the finer grid per cell along an edge: the cheapest that shows the error well.
+const FINER: f64 = 1.5;
+/// Iterations of a hypothesis' fit: it starts from a linear estimate.
+const ITERATIONS: usize = 16;
+/// Hypotheses whose sensitivities are computed in one simulation.
+const TOGETHER: usize = 10;
+
+/// A set of changes with values of all free numbers.
+type Try = (Vec<Change>, Vec<f64>);
+
+pub(super) struct Lab<'a> {
+    base: Vec<Experiment>,
+    held_out: Option<&'a Experiment>,
+    backend: Backend,
+    setting: Setting,
+    deadline: Option<Instant>,
+    interrupt: Interrupt,
+    checkpoint: Checkpoint,
+    finer: Option<Vec<Experiment>>,
+    say: &'a mut (dyn FnMut(&str) + Send),
+}
+
+impl<'a> Lab<'a> {
+    pub fn new(
+        base: &[Experiment],
+        held_out: Option<&'a Experiment>,
+        options: &DiagnoseOptions,
+        deadline: Option<Instant>,
+        say: &'a mut (dyn FnMut(&str) + Send),
+    ) -> Result<Lab<'a>, Error> {
+        let first = &base[0];
+        let body = &first.plan.body;
+        let points: Vec<_> = body.patches.iter().map(|p| p.point).collect();
+        let regions = Regions::new(&points, 4);
+        let nearest = |c: &glam::DVec3| points.iter().copied().min_by(|a, b| a.distance(*c).total_cmp(&b.distance(*c)));
+        let contact = base.iter().map(|e| contact_times(e, options.backend)).collect::<Result<_, _>>()?;
+        let most = |f: fn(&Experiment) -> usize| base.iter().map(f).max().unwrap_or(0);
+        let setting = Setting {
+            center: body.center,
+            bounds: first.shape().bounds(),
+            up: first.up(),
+            places: regions.centers.iter().filter_map(nearest).collect(),
+            cameras: most(|e| e.plan.observation.cameras.len()),
+            markers: most(|e| e.plan.observation.markers.len()),
+            held: held(base),
+            contact,
+        };
+        let checkpoint = Checkpoint::open(options.checkpoints.as_ref().map(|(f, r)| (f.as_path(), *r)))?;
+        Ok(Lab {
+            base: base.to_vec(),
+            held_out,
+            backend: options.backend,
+            setting,
+            deadline,
+            interrupt: options.interrupt.clone(),
+            checkpoint,
+            finer: None,
+            say,
+        })
+    }
+
+    fn key(&self, changes: &[Change], start: &[f64]) -> String {
+        let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
+        let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
+        format!("{prints:?} {theta:?} {changes:?} {start:?}")
+    }
+}
+
+/// Fits one hypothesis.
+fn fit(base: &[Experiment], backend: Backend, interrupt: &Interrupt, (changes, start): &Try) -> Result<Model, LabError> {
+    let mut ready = prepare(base, changes).map_err(lab_error)?;
+    let numbers = ready.numbers();
+    for ((f, v), n) in ready.free.iter_mut().zip(start).zip(&numbers) {
+        // Numbers fitted as logarithms start above zero, where a scene leaves them at zero.
+        let low = if f.transform == palpate_model::params::Transform::Log { f.bounds.0.max(1e-2 * n.scale) } else { f.bounds.0 };
+        let v = v.clamp(low, f.bounds.1);
+        f.start = (v, v);
+    }
+    let mut scenes = Vec::new();
+    for e in &ready.experiments {
+        scenes.push(FitScene {
+            name: e.scene.path.display().to_string(),
+            fingerprint: String::new(),
+            base: e.plan.theta.clone(),
+            evaluate: backend.evaluator(&e.plan, 1).map_err(lab_error)?,
+        });
+    }
+    if ready.free.is_empty() {
+        return Ok(Model { changes: changes.clone(), numbers, values: Vec::new(), errors: Vec::new() });
+    }
+    let mut problem = Problem::new(scenes, ready.free).map_err(LabError::Failed)?;
+    let settings = Settings {
+        iterations: ITERATIONS,
+        // Cheaper than the baseline: what is compared are candidates, and differences far below the noise decide nothing.
+        tolerance: Tolerance { cost: 1e-6, gradient: 1e-6, step: 1e-5 },
+        errors: errors(base),
+        ..Settings::new(Optimizer::GaussNewton)
+    };
+    let hooks = Hooks { interrupt: Some(interrupt.flag()), ..Hooks::default() };
+    let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| LabError::Failed(e.to_string()))?;
+    if interrupt.is_raised() {
+        return Err(LabError::Interrupted);
+    }
+    Ok(Model {
+        changes: changes.clone(),
+        numbers,
+        values: result.parameters.iter().map(|p| p.value).collect(),
+        errors: result.parameters.iter().map(|p| p.standard_error).collect(),
+    })
+}
+
+/// Residuals of every scene, with derivatives by the numbers from `from` on. Always the reference backend: statistics want its precision.
+pub(super) fn linearise(ready: &Prepared, values: &[f64], from: usize) -> Result<Readings, LabError> {
+    let columns = ready.free.len() - from;
+    let mut out = Readings { columns, ..Readings::default() };
+    for (scene, e) in ready.experiments.iter().enumerate() {
+        let mut directions = Vec::new();
+        let mut columns_of = Vec::new();
+        for (k, f) in ready.free[from..].iter().enumerate() {
+            for s in f.slots.iter().filter(|s| s.scene == scene) {
+                directions.push(s.place);
+                columns_of.push((k, s.factor));
+            }
+        }
+        let mut rollout = Rollout::new(CpuBackend, &e.plan, 1).map_err(|e| lab_error(e.into()))?;
+        let l = rollout.linearise(&ready.theta(scene, values), &directions).map_err(|e| lab_error(e.into()))?;
+        let q = directions.len();
+        for (i, row) in l.rows.residuals.iter().enumerate() {
+            let time = e.plan.observation.frames[row.frame].time;
+            out.rows.push(Reading { scene, time, row: *row });
+            let at = out.sensitivity.len();
+            out.sensitivity.resize(at + columns, 0.0);
+            for ((k, factor), d) in columns_of.iter().zip(&l.rows.sensitivity[i * q..(i + 1) * q]) {
+                out.sensitivity[at + k] += factor * d;
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Several hypotheses that differ in their last change only, in one simulation: what is absent changes nothing.
+fn together(base: &[Experiment], tries: &[Try], from: usize) -> Result<Vec<Readings>, LabError> {
+    let (common, values) = (&tries[0].0[..tries[0].0.len() - 1], &tries[0].1[..from]);
+    let mut changes = common.to_vec();
+    let mut all = values.to_vec();
+    let mut counts = Vec::new();
+    for (c, v) in tries {
+        changes.extend(c.last().cloned());
+        all.extend(&v[from..]);
+        counts.push(v.len() - from);
+    }
+    let ready = prepare(base, &changes).map_err(lab_error)?;
+    if ready.free.len() != all.len() {
+        return Err(LabError::Failed("hypotheses share a number".into()));
+    }
+    let r = linearise(&ready, &all, from)?;
+    let mut at = 0;
+    let part = |n: usize| {
+        let sensitivity = r.sensitivity.chunks(r.columns.max(1)).flat_map(|row| row[at..at + n].to_vec()).collect();
+        at += n;
+        Readings { rows: r.rows.clone(), columns: n, sensitivity }
+    };
+    Ok(counts.into_iter().map(part).collect())
+}
+
+impl Laboratory for Lab<'_> {
+    fn setting(&self) -> &Setting {
+        &self.setting
+    }
+
+    fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError> {
+        Ok(prepare(&self.base, changes).map_err(lab_error)?.numbers())
+    }
+
+    fn fit(&mut self, tries: &[Try]) -> Vec<Result<Model, LabError>> {
+        let known: Vec<Option<Result<Model, LabError>>> = tries
+            .iter()
+            .map(|(c, start)| {
+                let done = self.checkpoint.find(&self.key(c, start))?;
+                let (values, errors) = (done.values.clone(), done.errors.clone());
+                Some(self.numbers(c).map(|numbers| Model { changes: c.clone(), numbers, values, errors }))
+            })
+            .collect();
+        let (base, backend, interrupt, deadline) = (&self.base, self.backend, &self.interrupt, self.deadline);
+        let answers: Vec<Result<Model, LabError>> = tries
+            .par_iter()
+            .zip(known)
+            .map(|(t, known)| {
+                known.unwrap_or_else(|| {
+                    if interrupt.is_raised() {
+                        return Err(LabError::Interrupted);
+                    }
+                    if deadline.is_some_and(|d| Instant::now() > d) {
+                        return Err(LabError::Failed("no time left".into()));
+                    }
+                    fit(base, backend, interrupt, t)
+                })
+            })
+            .collect();
+        for (t, a) in tries.iter().zip(&answers) {
+            if let Ok(m) = a {
+                let key = self.key(&t.0, &t.1);
+                self.checkpoint.keep(key, &m.values, &m.errors);
+            }
+        }
+        answers
+    }
+
+    fn linearise(&mut self, tries: &[Try]) -> Vec<Result<Readings, LabError>> {
+        let one = |(c, v): &Try| linearise(&prepare(&self.base, c).map_err(lab_error)?, v, 0);
+        tries.iter().map(one).collect()
+    }
+
+    fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
+        let (base, interrupt) = (&self.base, &self.interrupt);
+        let one = |t: &Try| linearise(&prepare(base, &t.0).map_err(lab_error)?, &t.1, from);
+        tries
+            .par_chunks(TOGETHER)
+            .flat_map_iter(|chunk| {
+                if interrupt.is_raised() {
+                    return chunk.iter().map(|_| Err(LabError::Interrupted)).collect::<Vec<_>>();
+                }
+                match together(base, chunk, from) {
+                    Ok(all) => all.into_iter().map(Ok).collect(),
+                    // One of them cannot be computed: find out which.
+                    Err(_) => chunk.iter().map(one).collect(),
+                }
+            })
+            .collect()
+    }
+
+    fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
+        let ready = prepare(&self.base, changes).map_err(lab_error)?;
+        let none = ready.free.len();
+        let coarse = linearise(&ready, values, none)?;
+        if self.finer.is_none() {
+            let finer = |e: &Experiment| {
+                let mut f = e.finer(FINER)?;
+                // The grid alone; the step is halved by itself.
+                f.plan.clock = e.plan.clock;
+                f.plan.theta.clone_from(&e.plan.theta);
+                f.scene.fit.clone_from(&e.scene.fit);
+                Ok(f)
+            };
+            self.finer = Some(self.base.iter().map(finer).collect::<Result<_, Error>>().map_err(lab_error)?);
+        }
+        let fine = prepare(self.finer.as_deref().unwrap_or(&[]), changes).map_err(lab_error)?;
+        let mut halved = prepare(&self.base, changes).map_err(lab_error)?;
+        for e in &mut halved.experiments {
+            e.plan.clock.step *= 0.5;
+            e.plan.clock.steps *= 2;
+        }
+        let difference = |name: &'static str, ready: &Prepared, factor: f64| -> Result<Field, LabError> {
+            let r = linearise(ready, values, none)?;
+            let change = r.rows.iter().zip(&coarse.rows).map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
+            Ok(Field { name, change })
+        };
+        // Errors fall with the square of the cell and with the step: what is left after the refinement follows from what it changed.
+        let (grid, step) =
+            rayon::join(|| difference("grid", &fine, 1.0 / (1.0 - 1.0 / (FINER * FINER))), || difference("step", &halved, 2.0));
+        let is_static = self.base.iter().all(|e| e.plan.clock.steps == 0);
+        Ok(if is_static { vec![grid?] } else { vec![grid?, step?] })
+    }
+
+    fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError> {
+        self.held_out.map(|e| held_out(e, &self.base, self.backend, model)).transpose()
+    }
+
+    fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)> {
+        separations(&self.base, self.backend, a, b)
+    }
+
+    fn out_of_time(&self) -> bool {
+        self.deadline.is_some_and(|d| Instant::now() > d)
+    }
+
+    fn interrupted(&self) -> bool {
+        self.interrupt.is_raised()
+    }
+
+    fn say(&mut self, what: &str) {
+        (self.say)(what);
+    }
+}

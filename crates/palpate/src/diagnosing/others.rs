@@ -1,0 +1,152 @@
+//! Other data and other experiments: a second recording of the same body, measurements that would tell hypotheses apart, contact.
+
+use super::hypothesis::{Prepared, is_own, lab_error, prepare};
+use super::lab::linearise;
+use crate::engine::Backend;
+use crate::error::Error;
+use crate::experiment::Experiment;
+use glam::DVec3;
+use palpate_diagnose::{Change, LabError, Model, Readings};
+use palpate_fit::{FitScene, Hooks, Problem, Settings};
+use palpate_model::params::ParamKey;
+use palpate_model::scene::Optimizer;
+use std::ops::ControlFlow;
+
+/// Times [s] between which a simulation touches a plane, with its own values.
+pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64, f64)>, Error> {
+    let mut out: Vec<(f64, f64)> = Vec::new();
+    if e.plan.planes.is_empty() {
+        return Ok(out);
+    }
+    let theta = &e.plan.theta;
+    let physics = palpate_model::plan::Physics::new(&e.plan.layout, theta);
+    let planes: Vec<(DVec3, f64)> =
+        e.plan.planes.iter().zip(&physics.planes).map(|(site, p)| (site.normal(p[1], p[2])[0], p[0])).collect();
+    let (surface, _) = e.surface(0.5 * e.plan.body.grid.h);
+    let step = e.plan.clock.step;
+    // Where contact forces begin to act.
+    let reach = 0.05 * e.plan.body.grid.h;
+    backend.visit(&e.plan, theta, |_, s, _| {
+        let x = surface.deform(&s.displacement);
+        let time = physics.start + s.time;
+        if planes.iter().any(|(n, d)| x.iter().any(|x| n.dot(*x) - d < reach)) {
+            match out.last_mut() {
+                Some(last) if time - last.1 < 1.5 * step => last.1 = time,
+                _ => out.push((time, time)),
+            }
+        }
+        ControlFlow::Continue(())
+    })?;
+    Ok(out)
+}
+
+/// Residuals of a recording that no fit has seen: what describes the body comes from the model, what belongs to the recording (how the
+/// motion starts) keeps its scene's values, or is fitted where that scene or the model leaves it free.
+pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, model: &Model) -> Result<Readings, LabError> {
+    let trained = prepare(base, &model.changes).map_err(lab_error)?;
+    // A label of another scene's number means nothing here.
+    let changes: Vec<Change> = model
+        .changes
+        .iter()
+        .map(|c| match c {
+            Change::Freed { name, sentence, paths } => {
+                let mut own: Vec<String> = paths.iter().map(|p| p.split(" [scene").next().unwrap_or(p).to_string()).collect();
+                own.dedup();
+                let free = |p: &String| e.scene.fit.iter().flat_map(|f| &f.parameters).any(|x| x.path == *p);
+                own.retain(|p| !free(p));
+                Change::Freed { name, sentence, paths: own }
+            }
+            effect => effect.clone(),
+        })
+        .collect();
+    let mut ready: Prepared = prepare(std::slice::from_ref(e), &changes).map_err(lab_error)?;
+    let start: Vec<f64> = ready.numbers().iter().map(|n| n.start).collect();
+    let mut values = start.clone();
+    let mut open = Vec::new();
+    for (k, n) in ready.names.iter().enumerate() {
+        let shared = trained.names.iter().position(|t| t.path == n.path).filter(|_| !is_own(&n.path));
+        match shared {
+            Some(t) => values[k] = model.values[t],
+            None => open.push(k),
+        }
+    }
+    // Numbers of the body that the held-out scene does not name.
+    for (t, n) in trained.names.iter().enumerate() {
+        let experiment = &mut ready.experiments[0];
+        let place = |k: &ParamKey| super::hypothesis::path_of(experiment, *k) == n.path;
+        if !is_own(&n.path)
+            && !ready.names.iter().any(|m| m.path == n.path)
+            && let Some(p) = experiment.plan.layout.keys.iter().position(place)
+        {
+            experiment.plan.theta[p] = model.values[t] * trained.free[t].slots[0].factor;
+        }
+    }
+    if !open.is_empty() {
+        let plan = &ready.experiments[0].plan;
+        let scene = FitScene {
+            name: e.scene.path.display().to_string(),
+            fingerprint: String::new(),
+            base: ready.theta(0, &values),
+            evaluate: backend.evaluator(plan, 1).map_err(lab_error)?,
+        };
+        let free = open.iter().map(|k| {
+            let mut f = ready.free[*k].clone();
+            let v = values[*k].clamp(f.bounds.0, f.bounds.1);
+            f.start = (v, v);
+            f
+        });
+        let mut problem = Problem::new(vec![scene], free.collect()).map_err(LabError::Failed)?;
+        let settings = Settings { iterations: 12, ..Settings::new(Optimizer::GaussNewton) };
+        let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(|e| LabError::Failed(e.to_string()))?;
+        open.iter().zip(&found.parameters).for_each(|(k, p)| values[*k] = p.value);
+    }
+    let none = ready.free.len();
+    linearise(&ready, &values, none)
+}
+
+/// How far two models are apart in motions that could be measured next: root mean square distance of nodes [m].
+pub(super) fn separations(base: &[Experiment], backend: Backend, a: &Model, b: &Model) -> Vec<(String, f64)> {
+    let first = &base[0];
+    let (low, high) = first.shape().bounds();
+    let size = (high - low).max_element();
+    let up = first.up();
+    let side = up.any_orthonormal_vector();
+    let g = first.scene.gravity.length().max(1.0);
+    let faster = (2.0 * g * size).sqrt();
+    let held = !first.plan.clamps.is_empty();
+    let mut scenarios: Vec<(String, DVec3, DVec3)> = vec![
+        (format!("a push of {:.2} m/s sideways at the start", 0.5 * faster), 0.5 * faster * side, DVec3::ZERO),
+        (format!("a spin of {:.1} rad/s about the vertical at the start", faster / size), DVec3::ZERO, faster / size * up),
+        (format!("a spin of {:.1} rad/s about a horizontal axis at the start", faster / size), DVec3::ZERO, faster / size * side),
+    ];
+    if !held {
+        scenarios.push((format!("a drop from {size:.2} m higher"), -faster * up, DVec3::ZERO));
+    }
+    let measurement = |m: &Model| m.changes.iter().any(Change::is_measurement);
+    if measurement(a) != measurement(b) {
+        // Another camera sees the motion itself.
+        scenarios.push(("the same motion seen by another camera".into(), DVec3::ZERO, DVec3::ZERO));
+    }
+    let motion = |m: &Model, v: DVec3, w: DVec3| -> Result<Vec<Vec<DVec3>>, Error> {
+        let ready = prepare(base, &m.changes)?;
+        let plan = &ready.experiments[0].plan;
+        let mut theta = ready.theta(0, &m.values);
+        for axis in 0..3u8 {
+            theta[plan.layout.index(ParamKey::Velocity(axis))] += v[usize::from(axis)];
+            theta[plan.layout.index(ParamKey::AngularVelocity(axis))] += w[usize::from(axis)];
+        }
+        let mut states = Vec::new();
+        backend.visit(plan, &theta, |_, s, _| {
+            states.push(s.displacement);
+            ControlFlow::Continue(())
+        })?;
+        Ok(states)
+    };
+    let apart = |(name, v, w): (String, DVec3, DVec3)| {
+        let (x, y) = (motion(a, v, w).ok()?, motion(b, v, w).ok()?);
+        let squares = x.iter().zip(&y).flat_map(|(x, y)| x.iter().zip(y)).map(|(x, y)| x.distance_squared(*y));
+        let (sum, n) = squares.fold((0.0, 0usize), |(s, n), d| (s + d, n + 1));
+        Some((name, (sum / n.max(1) as f64).sqrt()))
+    };
+    scenarios.into_iter().filter_map(apart).collect()
+}

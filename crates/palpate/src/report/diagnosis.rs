@@ -1,0 +1,321 @@
+//! What a diagnosis leaves behind: `diagnosis.json` (`diagnosis/1`), its report, and a few lines for the terminal.
+
+use super::html::{STYLE, base64, escape};
+use super::pictures::FramePicture;
+use super::plots::{Curve, curves};
+use super::result::number;
+use crate::diagnosing::Diagnosed;
+use crate::residuals::ResidualSummary;
+use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Verdict};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+fn finite(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
+}
+
+fn level(l: &Level) -> Value {
+    json!({ "rms": finite(l.rms), "noise": finite(l.noise) })
+}
+
+/// Key of a number inside its effect: `effect.2.force.x` is `force.x`.
+fn short(path: &str) -> &str {
+    if path.starts_with("effect.") { path.splitn(3, '.').last().unwrap_or(path) } else { path }
+}
+
+fn effect(f: &Found) -> Value {
+    let map = |value: &dyn Fn(&FoundNumber) -> Value| -> Value {
+        Value::Object(f.parameters.iter().map(|p| (short(&p.0).to_string(), value(p))).collect::<Map<_, _>>())
+    };
+    json!({
+        "kind": f.kind,
+        "sentence": f.sentence,
+        "parameters": map(&|p| finite(p.1)),
+        "standard_error": map(&|p| p.2.map_or(Value::Null, finite)),
+        "p_value": f.p_value,
+        "held_out_gain": finite(f.held_out_gain),
+        "accepted": f.accepted,
+        "indistinguishable_from": f.indistinguishable_from,
+        "separated_by": f.separated_by.as_ref().map(|(what, by)| json!({ "measurement": what, "difference": by })),
+    })
+}
+
+/// `diagnosis.json`. Beyond the format's keys it holds what was tried, the baseline's and the corrected model's values, the noise found,
+/// the residual map, and the slack force where nothing explains the residual.
+pub fn diagnosis_json(done: &Diagnosed) -> Value {
+    let d = &done.diagnosis;
+    let values = |m: &palpate_diagnose::Model| -> Value {
+        let one = |(k, n): (usize, &palpate_diagnose::Number)| json!({ "path": n.path, "value": finite(m.values[k]), "standard_error": m.errors[k].map_or(Value::Null, finite), "unit": n.unit });
+        m.numbers.iter().enumerate().map(one).collect()
+    };
+    let held_out = match &d.held_out {
+        Some((b, a)) => {
+            json!({ "before": finite(b.rms), "after": finite(a.rms), "noise": finite(b.noise), "data": "second recording" })
+        }
+        None => json!({ "before": finite(d.predicted.0), "after": finite(d.predicted.1), "noise": finite(d.before.noise),
+                        "data": "blocks of time left out" }),
+    };
+    json!({
+        "format": "diagnosis/1",
+        "backend": done.backend,
+        "verdict": d.verdict.name(),
+        "sentence": d.sentence(),
+        "p_value": d.p_value,
+        "p_value_after": d.p_value_after,
+        "baseline": level(&d.before),
+        "where": d.places.iter().map(|p| json!({
+            "scene": p.scene, "time": [p.time.0, p.time.1], "region": p.region, "share": finite(p.share), "p_value": p.p_value,
+        })).collect::<Vec<_>>(),
+        "effects": d.effects.iter().map(effect).collect::<Vec<_>>(),
+        "after": level(&d.after),
+        "held_out": held_out,
+        "gap_closed": finite(d.gap_closed),
+        "parameters": { "before": values(&d.baseline), "after": values(&d.model) },
+        "noise": { "readings_over_stated": finite(d.noise_ratio), "variance_of_means": finite(d.design_effect) },
+        "tried": d.tried.iter().map(|t| json!({
+            "round": t.round, "kind": t.kind, "promised": finite(t.promised), "p_value": finite(t.p_value),
+            "held_out_gain": t.held_out_gain.map_or(Value::Null, finite),
+        })).collect::<Vec<_>>(),
+        "not_tried": d.not_tried,
+        "slack": d.slack.as_ref().map(|s| json!({
+            "share": finite(s.share),
+            "windows": s.windows.iter().map(|w| json!({ "time": w.time, "values": w.values })).collect::<Vec<_>>(),
+        })),
+        "map": d.map.iter().map(|m| json!({
+            "scene": m.scene, "region": m.place.to_array(), "time": [m.time.0, m.time.1], "before": finite(m.before), "after": finite(m.after),
+        })).collect::<Vec<_>>(),
+        "interrupted": d.interrupted,
+        "seconds": done.seconds,
+    })
+}
+
+/// What a report of a diagnosis is made of, scene by scene.
+pub struct DiagnosisInput<'a> {
+    /// The diagnosis.
+    pub done: &'a Diagnosed,
+    /// Residuals before and after.
+    pub residuals: Vec<(ResidualSummary, ResidualSummary)>,
+    /// Pictures before and after.
+    pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
+    /// The command that reproduces it.
+    pub command: String,
+}
+
+/// The whole page.
+pub fn diagnosis_html(input: &DiagnosisInput) -> String {
+    let mut page = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_page(&mut page, input);
+    page
+}
+
+fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
+    let d = &input.done.diagnosis;
+    let title = match d.verdict {
+        Verdict::Adequate => "Diagnosis: nothing is missing",
+        Verdict::MissingEffect => "Diagnosis: an effect is missing",
+        Verdict::Unexplained => "Diagnosis: something is missing that no known effect explains",
+    };
+    writeln!(
+        p,
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head><body>\
+         <h1>{title}</h1><p>{}</p>",
+        escape(&d.sentence())
+    )?;
+    if d.interrupted {
+        writeln!(p, "<p class=\"w\">The diagnosis was interrupted; this is what was known until then.</p>")?;
+    }
+    let mm = |x: f64| format!("{:.3} mm", x * 1e3);
+    let noise = |l: &Level| l.rms / l.noise;
+    writeln!(
+        p,
+        "<h2>Before and after</h2><table><tr><th>data<th class=\"n\">before<th class=\"n\">after<th class=\"n\">noise and grid\
+         <th class=\"n\">before / noise<th class=\"n\">after / noise</tr>"
+    )?;
+    let mut row = |name: &str, b: Level, a: Level| {
+        writeln!(
+            p,
+            "<tr><td>{name}<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{:.2}<td class=\"n\">{:.2}</tr>",
+            mm(b.rms),
+            mm(a.rms),
+            mm(a.noise),
+            noise(&b),
+            noise(&a)
+        )
+    };
+    row("fitted", d.before, d.after)?;
+    let left_out = |rms: f64| Level { rms, noise: d.before.noise };
+    row("blocks of time left out", left_out(d.predicted.0), left_out(d.predicted.1))?;
+    if let Some((b, a)) = d.held_out {
+        row("second recording", b, a)?;
+    }
+    writeln!(p, "</table>")?;
+    effects(p, input)?;
+    values(p, input)?;
+    if !d.places.is_empty() {
+        writeln!(
+            p,
+            "<h2>Where the baseline fails</h2><table><tr><th>time<th>where<th class=\"n\">share<th class=\"n\">p-value</tr>"
+        )?;
+        for w in &d.places {
+            writeln!(
+                p,
+                "<tr><td>{:.3} to {:.3} s<td>{}<td class=\"n\">{:.0} %<td class=\"n\">{:.1e}</tr>",
+                w.time.0,
+                w.time.1,
+                escape(&w.region),
+                100.0 * w.share,
+                w.p_value
+            )?;
+        }
+        writeln!(p, "</table>")?;
+    }
+    map(p, &d.map)?;
+    for (s, (before, after)) in input.residuals.iter().enumerate() {
+        let curve = |label: &str, r: &ResidualSummary| Curve {
+            label: label.into(),
+            points: r.frames.iter().map(|f| (f.time, f.rms * 1e3)).collect(),
+        };
+        if let Some(svg) = curves(&[curve("after", after), curve("before", before)], "time [s]", "rms distance [mm]", false) {
+            writeln!(p, "<h2>Residual over time, scene {}</h2>{svg}", s + 1)?;
+        }
+        let Some((before, after)) = input.pictures.get(s) else { continue };
+        for (b, a) in before.iter().zip(after) {
+            writeln!(p, "<figure class=\"pair\">")?;
+            for x in [b, a] {
+                writeln!(p, "<img alt=\"\" src=\"data:image/png;base64,{}\">", base64(&x.picture.png()))?;
+            }
+            writeln!(p, "<figcaption>t = {:.4} s, before and after</figcaption></figure>", a.time)?;
+        }
+    }
+    if let Some(slack) = &d.slack {
+        writeln!(
+            p,
+            "<h2>What any load could explain</h2><p>A free force field, affine over the body and smooth in time, would explain {:.0} % of \
+             what is left. Its force per volume at the body's centre:</p><table><tr><th>time<th class=\"n\">x [N/m³]<th class=\"n\">y\
+             <th class=\"n\">z</tr>",
+            100.0 * slack.share
+        )?;
+        for w in slack.windows.iter().filter(|w| w.values.len() >= 3) {
+            let [x, y, z] = [0, 1, 2].map(|a| number(w.values[a]));
+            writeln!(p, "<tr><td>{:.3} s<td class=\"n\">{x}<td class=\"n\">{y}<td class=\"n\">{z}</tr>", w.time)?;
+        }
+        writeln!(p, "</table>")?;
+    }
+    tried(p, input)?;
+    writeln!(
+        p,
+        "<h2>Reproduce</h2><pre>{}</pre><p>palpate {}, backend {}, {:.1} s.</p></body></html>",
+        escape(&input.command),
+        env!("CARGO_PKG_VERSION"),
+        input.done.backend,
+        input.done.seconds
+    )
+}
+
+fn effects(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
+    for f in &input.done.diagnosis.effects {
+        let mark = if f.accepted { "added" } else { "not accepted" };
+        writeln!(p, "<h2>{} ({mark})</h2><p>{}.", escape(&f.kind), escape(&f.sentence))?;
+        writeln!(p, " Closes {:.0} % of the gap on data left out; p = {:.1e}.", 100.0 * f.held_out_gain, f.p_value)?;
+        if !f.indistinguishable_from.is_empty() {
+            writeln!(p, " These data cannot tell it from <b>{}</b>.", escape(&f.indistinguishable_from.join(", ")))?;
+        }
+        if let Some((what, by)) = &f.separated_by {
+            writeln!(p, " They would differ most in {}: by {:.3} mm.", escape(what), by * 1e3)?;
+        }
+        writeln!(p, "</p><table>")?;
+        for (path, value, error, unit) in &f.parameters {
+            let error = error.map_or("–".into(), number);
+            writeln!(p, "<tr><td><code>{}</code><td class=\"n\">{}<td>± {error}<td>{unit}</tr>", escape(path), number(*value))?;
+        }
+        writeln!(p, "</table>")?;
+    }
+    Ok(())
+}
+
+fn values(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
+    let d = &input.done.diagnosis;
+    if d.baseline.numbers.is_empty() || d.model == d.baseline {
+        return Ok(());
+    }
+    writeln!(
+        p,
+        "<h2>Fitted values before and after</h2><p>A missing effect pulls the other values along.</p><table><tr><th>number\
+         <th class=\"n\">before<th class=\"n\">after<th class=\"n\">± standard error<th>unit</tr>"
+    )?;
+    for (k, n) in d.baseline.numbers.iter().enumerate() {
+        let (b, a) = (number(d.baseline.values[k]), number(d.model.values[k]));
+        let error = d.model.errors[k].map_or("–".into(), number);
+        writeln!(
+            p,
+            "<tr><td><code>{}</code><td class=\"n\">{b}<td class=\"n\">{a}<td class=\"n\">{error}<td>{}</tr>",
+            escape(&n.path),
+            n.unit
+        )?;
+    }
+    writeln!(p, "</table>")
+}
+
+/// Regions of the rest surface against time: blue where the measurement lies inside the model, red outside, full colour at six standard
+/// deviations.
+fn map(p: &mut String, entries: &[MapEntry]) -> std::fmt::Result {
+    if entries.is_empty() {
+        return Ok(());
+    }
+    let colour = |z: f64| {
+        let s = (z.abs() / 6.0).min(1.0);
+        let (r, b) = if z > 0.0 { (178, 43) } else { (33, 172) };
+        format!("rgba({r},60,{b},{s:.2})")
+    };
+    let mut regions: Vec<(usize, usize)> = entries.iter().map(|e| (e.scene, e.region)).collect();
+    regions.sort_unstable();
+    regions.dedup();
+    writeln!(
+        p,
+        "<h2>Residual map</h2><p>Rows: regions of the rest surface; columns: stretches of time, before | after. Blue: measured inside the \
+         model, red: outside; full colour at six standard deviations of what noise and grid leave.</p><table>"
+    )?;
+    for (scene, region) in regions {
+        let mine: Vec<&MapEntry> = entries.iter().filter(|e| (e.scene, e.region) == (scene, region)).collect();
+        let c = mine[0].place;
+        writeln!(p, "<tr><td>scene {}, ({:.3}, {:.3}, {:.3}) m", scene + 1, c.x, c.y, c.z)?;
+        for e in &mine {
+            writeln!(p, "<td style=\"background:{}\" title=\"{:.3} s: {:.1}\">&nbsp;", colour(e.before), e.time.0, e.before)?;
+        }
+        writeln!(p, "<td>|")?;
+        for e in &mine {
+            writeln!(p, "<td style=\"background:{}\" title=\"{:.3} s: {:.1}\">&nbsp;", colour(e.after), e.time.0, e.after)?;
+        }
+        writeln!(p, "</tr>")?;
+    }
+    writeln!(p, "</table>")
+}
+
+fn tried(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
+    let d = &input.done.diagnosis;
+    if d.tried.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        p,
+        "<h2>What was tried</h2><table><tr><th>round<th>candidate<th class=\"n\">promised share of the residual<th class=\"n\">p-value\
+         <th class=\"n\">gap closed on data left out</tr>"
+    )?;
+    for t in &d.tried {
+        let gain = t.held_out_gain.map_or("not fitted".into(), |g| format!("{:.0} %", 100.0 * g));
+        writeln!(
+            p,
+            "<tr><td>{}<td>{}<td class=\"n\">{:.1} %<td class=\"n\">{:.1e}<td class=\"n\">{gain}</tr>",
+            t.round,
+            escape(&t.kind),
+            100.0 * t.promised,
+            t.p_value
+        )?;
+    }
+    writeln!(p, "</table>")?;
+    for n in &d.not_tried {
+        writeln!(p, "<p class=\"w\">Not tried: {}</p>", escape(n))?;
+    }
+    Ok(())
+}
