@@ -40,6 +40,38 @@ impl Altered {
 }
 
 impl<'a> Balance<'a> {
+    /// The clamps.
+    pub(super) fn held(&self) -> clamps::Clamps<'a> {
+        clamps::Clamps {
+            plan: self.plan,
+            physics: self.physics,
+            elements: self.elements,
+            changes: &self.altered.changes,
+            grips: self.altered.grips.as_deref(),
+        }
+    }
+
+    /// Young's modulus [Pa] at the time that the step's forces are taken at.
+    pub(super) fn young(&self) -> f64 {
+        self.physics.youngs_modulus * self.aging()
+    }
+
+    /// Factor on Young's modulus from creep.
+    pub(super) fn aging(&self) -> f64 {
+        if self.effects.is_empty() { 1.0 } else { changes::aging(self.plan, self.physics, self.elapsed()) }
+    }
+
+    /// Time from the start of the simulation to the instant between the states that the scheme weights them for [s].
+    pub(super) fn elapsed(&self) -> f64 {
+        let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
+        self.time - self.physics.start - (1.0 - self.mix.new) * dt
+    }
+
+    /// Density [kg/m³] around a node.
+    pub(super) fn density(&self, node: usize) -> f64 {
+        self.physics.density * self.altered.changes.density.as_ref().map_or(1.0, |d| d[node])
+    }
+
     /// Adds the part of ∂r/∂p that comes through the body itself, for number `slot` of effect `effect`.
     pub(super) fn add_altered_column(&self, effect: usize, slot: usize, s: States<'a>, out: &mut Nodes) {
         let (plan, physics) = (self.plan, self.physics);

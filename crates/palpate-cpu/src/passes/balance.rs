@@ -10,11 +10,9 @@ use crate::linear::vector::{Nodes, dot};
 use crate::passes::altered::Altered;
 use crate::passes::assembly::{self, block};
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
-use crate::passes::clamps::Clamps;
 use crate::passes::points::Acting;
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
-use palpate_model::changes;
 use palpate_model::contact;
 use palpate_model::elements::Elements;
 use palpate_model::params::ParamKey;
@@ -81,37 +79,6 @@ impl<'a> Balance<'a> {
             modulus: self.altered.changes.modulus.as_deref(),
             rest: self.altered.rest.as_deref(),
         }
-    }
-
-    /// The clamps.
-    pub(super) fn held(&self) -> Clamps<'a> {
-        Clamps {
-            plan: self.plan,
-            physics: self.physics,
-            elements: self.elements,
-            changes: &self.altered.changes,
-            grips: self.altered.grips.as_deref(),
-        }
-    }
-
-    /// Young's modulus [Pa] at the time that the step's forces are taken at.
-    pub(super) fn young(&self) -> f64 {
-        self.physics.youngs_modulus * self.aging()
-    }
-
-    fn aging(&self) -> f64 {
-        if self.effects.is_empty() { 1.0 } else { changes::aging(self.plan, self.physics, self.elapsed()) }
-    }
-
-    /// Time from the start of the simulation to the instant between the states that the scheme weights them for [s].
-    pub(super) fn elapsed(&self) -> f64 {
-        let dt = self.inertia.map_or(0.0, |t| 1.0 / t.rate);
-        self.time - self.physics.start - (1.0 - self.mix.new) * dt
-    }
-
-    /// Density [kg/m³] around a node.
-    fn density(&self, node: usize) -> f64 {
-        self.physics.density * self.altered.changes.density.as_ref().map_or(1.0, |d| d[node])
     }
 
     pub(super) fn ghost_scale(&self, shear: f64) -> f64 {
