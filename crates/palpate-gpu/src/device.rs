@@ -1,6 +1,7 @@
 //! Adapters and the device: what there is, what it can do, and a place where its errors are kept until somebody reads.
 
 use crate::error::GpuError;
+use crate::memory::Maker;
 use crate::pipelines::Pipelines;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -250,7 +251,7 @@ impl Gpu {
     ///
     /// # Errors
     /// It is larger than a limit of the device.
-    pub(crate) fn buffer(&self, label: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
+    fn make(&self, label: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
         let most = self.device.limits().max_buffer_size;
         for (limit, available) in [("max_storage_buffer_binding_size", self.largest), ("max_buffer_size", most)] {
             if bytes > available {
@@ -276,16 +277,6 @@ impl Gpu {
     pub(crate) fn small(&self) -> wgpu::Buffer {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         self.device.create_buffer(&wgpu::BufferDescriptor { label: Some("nothing"), size: 256, usage, mapped_at_creation: false })
-    }
-
-    /// A storage buffer that holds `data`.
-    ///
-    /// # Errors
-    /// As [`Gpu::buffer`].
-    pub(crate) fn upload<T: bytemuck::NoUninit>(&self, label: &str, data: &[T]) -> Result<wgpu::Buffer, GpuError> {
-        let buffer = self.buffer(label, size_of_val(data) as u64)?;
-        self.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(data));
-        Ok(buffer)
     }
 
     /// Waits for everything submitted, and returns what a buffer holds.
@@ -319,6 +310,24 @@ impl Gpu {
         }
         let view = staging.get_mapped_range(..).map_err(|e| GpuError::Lost { reason: e.to_string() })?;
         Ok(bytemuck::pod_collect_to_vec(&view[..bytes as usize]))
+    }
+}
+
+impl Maker for Gpu {
+    type Buffer = wgpu::Buffer;
+
+    fn buffer(&self, label: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
+        self.make(label, bytes)
+    }
+
+    fn upload<T: bytemuck::NoUninit>(&self, label: &str, data: &[T]) -> Result<wgpu::Buffer, GpuError> {
+        let buffer = self.make(label, size_of_val(data) as u64)?;
+        self.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(data));
+        Ok(buffer)
+    }
+
+    fn largest(&self) -> u64 {
+        self.largest
     }
 }
 

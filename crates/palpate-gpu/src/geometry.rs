@@ -1,8 +1,8 @@
 //! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
 
-use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::{Cell, Mass, Patch, Shape};
+use crate::memory::Maker;
 use palpate_model::elements::Classes;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::Plan;
@@ -90,12 +90,15 @@ impl Geometry {
     ///
     /// # Errors
     /// The plan needs something this backend lacks, or more than the device has.
-    pub(crate) fn new(
-        gpu: &Gpu,
+    pub(crate) fn new<M: Maker>(
+        gpu: &M,
         plan: &Plan,
         members: usize,
-        buffers: &mut HashMap<&'static str, wgpu::Buffer>,
+        buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<Geometry, GpuError> {
+        if plan.layout.effects().next().is_some() {
+            return Err(GpuError::Plan { what: "[[effect]] tables".into() });
+        }
         let body = &plan.body;
         let n = body.nodes.len();
         let pattern = Pattern::new(body);

@@ -4,6 +4,7 @@ use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::geometry::Geometry;
 use crate::layout::{ClampPose, Member, Plane};
+use crate::memory::Maker as _;
 use glam::{DMat3, DVec3};
 use palpate_engine::ParamBatch;
 use palpate_model::corotation::M24;

@@ -15,9 +15,10 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use crate::device::Gpu;
+use crate::device::{Gpu, whole};
 use crate::error::GpuError;
 use crate::layout::{Look, Sight};
+use crate::memory::Maker;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
@@ -27,6 +28,7 @@ use palpate_model::plan::Plan;
 use palpate_model::pullback::{NOISE_REACH, TURNED_AWAY};
 pub(crate) use results::residuals;
 use shots::Shots;
+use std::collections::HashMap;
 use tables::{BandTables, SiteTables};
 
 /// Most loop iterations of one invocation: software adapters silently leave every loop beyond.
@@ -78,80 +80,8 @@ impl Observer {
     }
 
     fn within(gpu: &Gpu, plan: &Plan, members: usize, room: Room) -> Result<Observer, GpuError> {
-        let (body, obs) = (&*plan.body, &*plan.observation);
-        let shots = Shots::new(plan);
-        let band = BandTables::new(plan);
-        let sites = SiteTables::new(plan);
-        let most = |f: fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
-        let residuals = obs.residuals();
-        let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
-        let per = |noise: f64| (scale / (noise * noise)) as f32;
-        let points = most(|f| f.points.len());
-        let mut sight = Sight {
-            nodes: body.nodes.len() as u32,
-            extended: (body.nodes.len() + body.band.nodes.len()) as u32,
-            cells: band.cells.len() as u32,
-            points: points as u32,
-            rows: most(|f| f.residuals()) as u32,
-            markers: most(|f| f.markers.len()) as u32,
-            stripes: points.div_ceil(room.points).max(1) as u32,
-            sites: sites.sites.len() as u32,
-            frames: obs.frames.len() as u32,
-            lattice: body.grid.size.map(|n| n as u32),
-            h: body.grid.h as f32,
-            band: plan.band as f32,
-            reach: (NOISE_REACH * obs.depth_noise) as f32,
-            turned_away: TURNED_AWAY as f32,
-            depth: per(obs.depth_noise),
-            marker: per(obs.marker_noise),
-            displacement: per(obs.displacement_noise),
-            ..Sight::default()
-        };
-        check_loops(&sight, &shots, &band, &sites)?;
-        let largest = gpu.largest;
-        let each = scratch(&sight);
-        let widest = each.iter().map(|s| s.1).max().unwrap_or(1).max(1);
-        let whole = each.iter().map(|s| s.1).sum::<u64>().max(1);
-        let fit = (largest / widest).min(room.scratch / whole).max(1);
-        sight.slots = fit.min(members.max(1) as u64) as u32;
-
-        let mut buffers = Buffers::new();
-        if !obs.frames.is_empty() {
-            for (name, bytes) in each {
-                buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
-            }
-            let cameras: Vec<_> = obs.cameras.iter().map(|c| shots::split(c.center - body.center)[0]).collect();
-            let node_sites: Vec<[u32; 2]> =
-                sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
-            let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
-            buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
-            buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
-            buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
-            buffers.insert("points", gpu.upload("points", &shots.points)?);
-            buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
-            buffers.insert("marks", gpu.upload("marks", &shots.marks)?);
-            buffers.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
-            buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
-            buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
-            buffers.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
-            buffers.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
-            buffers.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
-            buffers.insert("band_rows", gpu.upload("band_rows", &band.extend.starts)?);
-            buffers.insert("band_columns", gpu.upload("band_columns", &band.extend.columns)?);
-            buffers.insert("band_values", gpu.upload("band_values", &band.extend.values)?);
-            buffers.insert("fold_rows", gpu.upload("fold_rows", &band.fold.starts)?);
-            buffers.insert("fold_columns", gpu.upload("fold_columns", &band.fold.columns)?);
-            buffers.insert("fold_values", gpu.upload("fold_values", &band.fold.values)?);
-            buffers.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
-            buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
-            buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
-            buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
-            buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
-            buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);
-            buffers.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
-            buffers.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
-        }
-        Ok(Observer { plan: plan.clone(), shots, sight, agenda: Agenda::default(), buffers, largest, room })
+        let (shots, sight, buffers) = tables(gpu, plan, members, room)?;
+        Ok(Observer { plan: plan.clone(), shots, sight, agenda: Agenda::default(), buffers, largest: gpu.largest, room })
     }
 
     /// Device memory of tables and scratch [B].
@@ -174,23 +104,13 @@ impl Observer {
 
     /// Looks that are worked on together along `directions` directions.
     fn tangent_slots(&self, directions: usize) -> usize {
-        let each = directions.max(1) as u64 * (VECTOR * u64::from(self.sight.extended)).max(4 * u64::from(self.sight.rows));
-        (self.largest.min(self.room.scratch) / each.max(1)).clamp(1, u64::from(self.sight.slots)) as usize
+        tangent_slots(&self.sight, self.room, self.largest, directions)
     }
 
     /// Adds to a tally's buffers what observations write. What the device refuses is kept as its error.
     pub(crate) fn extend_tally(&self, gpu: &Gpu, directions: &[usize], tally: &mut Buffers) {
-        let looks = u64::from(self.sight.members) * u64::from(self.sight.frames);
-        let q = directions.len() as u64;
-        let together = if q == 0 || looks == 0 { 0 } else { self.tangent_slots(directions.len()) as u64 };
-        for (name, bytes) in [
-            ("frame_sums", VECTOR * looks),
-            ("start_sums", VECTOR * looks),
-            ("curvature", 4 * u64::from(self.sight.members) * (q + q * q)),
-            ("changes", VECTOR * together * q * u64::from(self.sight.extended)),
-            ("slopes", 4 * together * q * u64::from(self.sight.rows)),
-            ("shifts", 4 * q),
-        ] {
+        let together = tangent_slots(&self.sight, self.room, self.largest, directions.len());
+        for (name, bytes) in tally_sizes(&self.sight, directions.len() as u64, together as u64) {
             let made = gpu.buffer(name, bytes).unwrap_or_else(|e| {
                 gpu.keep(e);
                 gpu.small()
@@ -274,6 +194,116 @@ impl Observer {
             run(r, pass::WEIGH_ROWS, &own, round, q + q * (q + 1) / 2, q);
         }
     }
+}
+
+/// Looks that are worked on together along `directions` directions.
+fn tangent_slots(s: &Sight, room: Room, largest: u64, directions: usize) -> usize {
+    let each = directions.max(1) as u64 * (VECTOR * u64::from(s.extended)).max(4 * u64::from(s.rows));
+    (largest.min(room.scratch) / each.max(1)).clamp(1, u64::from(s.slots)) as usize
+}
+
+/// What observations add to a tally along q directions, in bytes.
+fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 6] {
+    let looks = u64::from(s.members) * u64::from(s.frames);
+    let together = if q == 0 || looks == 0 { 0 } else { together };
+    [
+        ("frame_sums", VECTOR * looks),
+        ("start_sums", VECTOR * looks),
+        ("curvature", 4 * u64::from(s.members) * (q + q * q)),
+        ("changes", VECTOR * together * q * u64::from(s.extended)),
+        ("slopes", 4 * together * q * u64::from(s.rows)),
+        ("shifts", 4 * q),
+    ]
+}
+
+/// Device memory that comparing a plan's frames takes, by buffer [B].
+pub(crate) fn memory<M: Maker<Buffer = u64>>(maker: &M, plan: &Plan, members: usize, directions: usize) -> Result<u64, GpuError> {
+    let room = Room { points: POINTS_OF_STRIPE, scratch: SCRATCH };
+    let (_, mut sight, buffers) = tables(maker, plan, members, room)?;
+    sight.members = members as u32;
+    let together = tangent_slots(&sight, room, maker.largest(), directions) as u64;
+    let tally = tally_sizes(&sight, directions as u64, together);
+    Ok(buffers.values().sum::<u64>() + tally.iter().map(|t| whole(t.1)).sum::<u64>())
+}
+
+/// What [`tables`] makes.
+type Made<B> = (Shots, Sight, HashMap<&'static str, B>);
+
+/// Tables, and scratch.
+fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<Made<M::Buffer>, GpuError> {
+    let (body, obs) = (&*plan.body, &*plan.observation);
+    let shots = Shots::new(plan);
+    let band = BandTables::new(plan);
+    let sites = SiteTables::new(plan);
+    let most = |f: fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
+    let residuals = obs.residuals();
+    let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
+    let per = |noise: f64| (scale / (noise * noise)) as f32;
+    let points = most(|f| f.points.len());
+    let mut sight = Sight {
+        nodes: body.nodes.len() as u32,
+        extended: (body.nodes.len() + body.band.nodes.len()) as u32,
+        cells: band.cells.len() as u32,
+        points: points as u32,
+        rows: most(|f| f.residuals()) as u32,
+        markers: most(|f| f.markers.len()) as u32,
+        stripes: points.div_ceil(room.points).max(1) as u32,
+        sites: sites.sites.len() as u32,
+        frames: obs.frames.len() as u32,
+        lattice: body.grid.size.map(|n| n as u32),
+        h: body.grid.h as f32,
+        band: plan.band as f32,
+        reach: (NOISE_REACH * obs.depth_noise) as f32,
+        turned_away: TURNED_AWAY as f32,
+        depth: per(obs.depth_noise),
+        marker: per(obs.marker_noise),
+        displacement: per(obs.displacement_noise),
+        ..Sight::default()
+    };
+    check_loops(&sight, &shots, &band, &sites)?;
+    let largest = gpu.largest();
+    let each = scratch(&sight);
+    let widest = each.iter().map(|s| s.1).max().unwrap_or(1).max(1);
+    let whole = each.iter().map(|s| s.1).sum::<u64>().max(1);
+    let fit = (largest / widest).min(room.scratch / whole).max(1);
+    sight.slots = fit.min(members.max(1) as u64) as u32;
+
+    let mut buffers = HashMap::new();
+    if !obs.frames.is_empty() {
+        for (name, bytes) in each {
+            buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
+        }
+        let cameras: Vec<_> = obs.cameras.iter().map(|c| shots::split(c.center - body.center)[0]).collect();
+        let node_sites: Vec<[u32; 2]> = sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
+        let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
+        buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
+        buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
+        buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
+        buffers.insert("points", gpu.upload("points", &shots.points)?);
+        buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
+        buffers.insert("marks", gpu.upload("marks", &shots.marks)?);
+        buffers.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
+        buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
+        buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
+        buffers.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
+        buffers.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
+        buffers.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
+        buffers.insert("band_rows", gpu.upload("band_rows", &band.extend.starts)?);
+        buffers.insert("band_columns", gpu.upload("band_columns", &band.extend.columns)?);
+        buffers.insert("band_values", gpu.upload("band_values", &band.extend.values)?);
+        buffers.insert("fold_rows", gpu.upload("fold_rows", &band.fold.starts)?);
+        buffers.insert("fold_columns", gpu.upload("fold_columns", &band.fold.columns)?);
+        buffers.insert("fold_values", gpu.upload("fold_values", &band.fold.values)?);
+        buffers.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
+        buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
+        buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
+        buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
+        buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
+        buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);
+        buffers.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
+        buffers.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
+    }
+    Ok((shots, sight, buffers))
 }
 
 /// Bytes of every scratch buffer for one look.

@@ -2,6 +2,7 @@
 
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::memory::Maker as _;
 use crate::pipelines::{PASSES, pass};
 use crate::recorder::{Args, Recorder, Size};
 use std::collections::HashMap;

@@ -5,6 +5,7 @@ use crate::error::GpuError;
 use crate::geometry::Geometry;
 use crate::layout::{Health, Newton, Shape};
 use crate::members::Batch;
+use crate::memory::Maker as _;
 use crate::observe::Observer;
 use crate::recorder::{Groups, PassTime, Recorder};
 use palpate_engine::ParamBatch;
@@ -68,21 +69,25 @@ const WORK: [Work; 21] = [
 pub(crate) const SECTIONS: usize = 4;
 pub(crate) const KINDS: usize = 6;
 
+/// Work buffers of a batch, with their bytes.
+pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
+    let own = WORK.iter().map(|(name, items, bytes)| (*name, u64::from(items(shape)) * bytes * members as u64));
+    let shared = [
+        ("shape", size_of::<Shape>() as u64),
+        ("roster", 4 * (SECTIONS * (members + 1)) as u64),
+        ("arguments", 12 * (SECTIONS * KINDS) as u64),
+    ];
+    own.chain(shared).collect()
+}
+
 impl World {
     pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize) -> Result<World, GpuError> {
         let mut buffers = Buffers::new();
         let capacity = members.max(1);
-        if plan.layout.effects().next().is_some() {
-            return Err(GpuError::Plan { what: "[[effect]] tables".into() });
+        let geometry = Geometry::new(&*gpu, plan, capacity, &mut buffers)?;
+        for (name, bytes) in work(&geometry.shape, capacity) {
+            buffers.insert(name, gpu.buffer(name, bytes)?);
         }
-        let geometry = Geometry::new(&gpu, plan, capacity, &mut buffers)?;
-        for (name, items, bytes) in WORK {
-            let size = u64::from(items(&geometry.shape)) * bytes * capacity as u64;
-            buffers.insert(name, gpu.buffer(name, size)?);
-        }
-        buffers.insert("shape", gpu.buffer("shape", size_of::<Shape>() as u64)?);
-        buffers.insert("roster", gpu.buffer("roster", 4 * (SECTIONS * (capacity + 1)) as u64)?);
-        buffers.insert("arguments", gpu.buffer("arguments", 12 * (SECTIONS * KINDS) as u64)?);
         let observer = Observer::new(&gpu, plan, capacity)?;
         Ok(World {
             gpu,
@@ -207,11 +212,16 @@ pub struct Tally {
     pub(crate) buffers: Buffers,
 }
 
+/// What a tally of B members and P parameters holds beside observations, in bytes.
+pub(crate) fn tally_sizes(b: u64, p: u64) -> [(&'static str, u64); 2] {
+    [("health", b * size_of::<Health>() as u64), ("gradient", 4 * b * p)]
+}
+
 impl Tally {
     pub(crate) fn new(world: &World, directions: &[usize]) -> Tally {
         let (b, p) = (world.members() as u64, world.plan.layout.len() as u64);
         let mut buffers = Buffers::new();
-        for (name, bytes) in [("health", b * size_of::<Health>() as u64), ("gradient", 4 * b * p)] {
+        for (name, bytes) in tally_sizes(b, p) {
             let buffer = world.gpu.buffer(name, bytes).unwrap_or_else(|e| {
                 world.gpu.keep(e);
                 world.gpu.small()

@@ -4,6 +4,7 @@ use super::{FOUND, Observer, look};
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Health;
+use crate::memory::Maker as _;
 use crate::world::{Buffers, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, FrameResiduals};

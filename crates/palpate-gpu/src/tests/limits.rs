@@ -4,6 +4,7 @@ use super::scenes::{ball, device, own_device, plan, spread};
 use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
+use crate::memory::Maker as _;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Recorder, Size};
 use crate::world::{KINDS, SECTIONS, World};

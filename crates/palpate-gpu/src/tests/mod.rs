@@ -6,5 +6,6 @@ mod faults;
 mod forward;
 mod limits;
 mod loops;
+mod memory;
 pub(crate) mod scenes;
 mod sizes;

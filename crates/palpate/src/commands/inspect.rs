@@ -6,8 +6,9 @@ use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use clap::Args;
+use palpate_engine::Request;
 use palpate_io::recording::{Recording, read_recording};
-use palpate_model::plan::Physics;
+use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::{BodySource, Scene};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -105,6 +106,21 @@ fn megabytes(bytes: f64) -> String {
     if bytes < 1e6 { format!("{:.0} kB", bytes / 1e3) } else { format!("{:.1} MB", bytes / 1e6) }
 }
 
+/// What one gradient of one start takes on a graphics device; nothing where the GPU backend cannot run the scene.
+fn device_memory(plan: &Plan) -> Option<Line> {
+    let request = Request { gradient: true, sensitivities: Vec::new() };
+    let m = palpate_gpu::memory(plan, 1, &request).ok()?;
+    let total = m.total() as f64;
+    let parts = format!(
+        "{} with --backend gpu: body and frames {}, work space {}, states {}",
+        megabytes(total),
+        megabytes(m.constants as f64),
+        megabytes(m.work as f64),
+        megabytes(m.states as f64)
+    );
+    Some(line("device_memory", "device", json!(total), parts))
+}
+
 fn scene(e: &Experiment) -> Vec<Line> {
     let (scene, plan) = (e.scene(), e.plan());
     let body = &plan.body;
@@ -164,6 +180,7 @@ fn scene(e: &Experiment) -> Vec<Line> {
         ),
         line("memory", "tape", json!(tape), format!("{} for one gradient of one start", megabytes(tape))),
     ]);
+    lines.extend(device_memory(plan));
     lines.retain(|l| l.key != "title" || !l.text.is_empty());
     lines
 }

@@ -1,0 +1,43 @@
+//! Predicted device memory against what is really made.
+
+use super::scenes::{ball, held, own_device, plan};
+use crate::observe::rollout_tests::{seen, watched};
+use crate::{GpuBackend, memory};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+
+fn check(plan: &Plan, members: usize, request: &Request) {
+    let Some(gpu) = own_device() else { return };
+    let before = gpu.made();
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, members).unwrap_or_else(|e| panic!("{e}"));
+    let nu = plan.layout.index(ParamKey::PoissonRatio);
+    let rows: Vec<Vec<f64>> = (0..members)
+        .map(|m| {
+            let mut row = plan.theta.clone();
+            row[nu] -= 0.01 * m as f64;
+            row
+        })
+        .collect();
+    let all = rollout.evaluate(&ParamBatch::from_rows(&rows), request);
+    assert!(all.iter().all(|e| e.failure.is_none()), "{:?}", all[0].failure);
+    let made = gpu.made() - before;
+    let said = memory(plan, members, request).unwrap_or_else(|e| panic!("{e}"));
+    let off = said.total() as f64 / made as f64 - 1.0;
+    println!("{} members: {said:?}, {} predicted, {made} made: {:+.1} %", members, said.total(), 100.0 * off);
+    assert!(off.abs() < 0.1, "{said:?} is not {made}");
+}
+
+#[test]
+fn predicted_memory_is_within_a_tenth_of_what_is_made() {
+    let mut scene = ball(0.03);
+    scene.time.steps = 3;
+    scene.observation = watched();
+    let all = Request { gradient: true, sensitivities: vec![0, 1, 2] };
+    check(&seen(&scene), 3, &all);
+    scene.time.steps = 5;
+    check(&plan(&scene), 1, &Request { gradient: true, sensitivities: Vec::new() });
+    let mut held = held(0.03);
+    held.time.steps = 1;
+    check(&plan(&held), 2, &Request::default());
+}
