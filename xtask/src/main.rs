@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, paper, table, test, tidy};
+use studies::{bench, blind, paper, table, test, tidy};
 
 /// Developer verbs of palpate.
 #[derive(Parser)]
@@ -36,6 +36,33 @@ enum Verb {
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
     },
+    /// Hide every effect in recordings and see what the diagnosis says
+    Blind {
+        /// Only cases that hide this effect, or a group: null, pair, magnet; or one case by its name
+        #[arg(long, value_name = "EFFECT")]
+        only: Option<String>,
+        /// Only this scene: beam, torus, ball, blob or plate
+        #[arg(long, value_name = "NAME")]
+        scene: Option<String>,
+        /// Recordings with nothing hidden
+        #[arg(long, value_name = "N", default_value_t = 20)]
+        nulls: usize,
+        /// A fixed small subset
+        #[arg(long)]
+        quick: bool,
+        /// Time for the search of one case [s]
+        #[arg(long, value_name = "SECONDS", default_value_t = 180.0)]
+        budget: f64,
+        /// Do cases again that are known already
+        #[arg(long)]
+        fresh: bool,
+        /// Only print how strong each case is
+        #[arg(long)]
+        strengths: bool,
+        /// Say what is being computed
+        #[arg(long)]
+        verbose: bool,
+    },
     /// Run all tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
         /// Further arguments for `cargo test`
@@ -67,6 +94,9 @@ fn run(verb: Verb) -> Result<(), String> {
             let report = bench::all(large, "")?;
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
+        }
+        Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose } => {
+            blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose })?;
         }
         Verb::Test { more } => test::run(&table::root(), &more)?,
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),

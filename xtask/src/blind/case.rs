@@ -1,0 +1,267 @@
+//! One case: hide something, record it twice, diagnose the first recording with the second held out, and compare.
+
+use super::hidden::{Hidden, Number, TABLE, same};
+use super::magnet::Magnet;
+use super::record::{Maker, record, truth};
+use super::scenes::{Setup, setup};
+use super::strength::{Moved, Ruler, rms};
+use glam::DVec3;
+use palpate::{Backend, DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
+use palpate_io::write_recording;
+use palpate_model::scene::Scene;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Duration;
+
+/// What is hidden in which scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Name, unique in the suite: "coulomb-friction ball strong".
+    pub name: String,
+    /// Scene.
+    pub scene: &'static str,
+    /// Group of the report: weak, strong, null, pair, magnet.
+    pub group: &'static str,
+    /// Places in [`TABLE`] with the strength that is aimed at.
+    pub hidden: Vec<(usize, f64)>,
+    /// Where the magnet is and the strength that is aimed at.
+    pub magnet: Option<(DVec3, f64)>,
+    /// Seed of the recordings.
+    pub seed: u64,
+}
+
+/// What was hidden and what was found.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Name of the case.
+    pub name: String,
+    /// Its scene.
+    pub scene: String,
+    /// Its group.
+    pub group: String,
+    /// What was hidden.
+    pub hidden: Vec<String>,
+    /// Amplitudes over those of the table.
+    pub amplitudes: Vec<f64>,
+    /// How far it moves readings after refitting, in standard deviations (root mean square).
+    pub strength: f64,
+    /// Verdict; "failed" when there was none.
+    pub verdict: String,
+    /// Accepted effects in the order found.
+    pub named: Vec<String>,
+    /// What the first of them cannot be told from.
+    pub indistinguishable: Vec<String>,
+    /// What came closest without being accepted, and the share of the gap that it closes.
+    pub close: Vec<(String, f64)>,
+    /// Probability of the baseline's residuals by chance.
+    pub p_value: f64,
+    /// The same after what was added.
+    pub p_value_after: f64,
+    /// Share of the found excess that lies where the hidden thing really acts.
+    pub localisation: Option<f64>,
+    /// Relative error of the hidden numbers, where named.
+    pub parameter_error: Option<f64>,
+    /// Share of the gap closed on the held-out recording.
+    pub gap_closed: f64,
+    /// Cosine between the mean slack force and the direction to the magnet.
+    pub slack_points: Option<f64>,
+    /// Wall-clock time of the diagnosis [s].
+    pub seconds: f64,
+    /// The answer in words, or why there is none.
+    pub sentence: String,
+}
+
+impl Outcome {
+    /// 1 when the first (with several hidden: every) hidden thing is named first, ½ when it is honestly said to be as good.
+    pub fn score(&self) -> f64 {
+        let named = |h: &String| self.named.iter().take(self.hidden.len()).any(|n| n == h);
+        match self.group.as_str() {
+            "null" => f64::from(u8::from(self.verdict == "adequate")),
+            "magnet" => f64::from(u8::from(self.verdict == "unexplained")),
+            _ if self.hidden.iter().all(named) => 1.0,
+            "pair" => 0.0,
+            _ if self.hidden.iter().all(|h| self.indistinguishable.contains(h)) => 0.5,
+            _ => 0.0,
+        }
+    }
+
+    /// As [`Outcome::score`], with names of the same physics counted as right.
+    pub fn score_of_physics(&self) -> f64 {
+        let right = self.named.first().zip(self.hidden.first()).is_some_and(|(n, h)| same(n, h));
+        if self.hidden.len() == 1 && right { 1.0 } else { self.score() }
+    }
+}
+
+impl Case {
+    /// Puts everything into a true scene.
+    fn hide(&self, scene: &Scene, amplitudes: &[f64]) -> Result<(Scene, Vec<(String, Number)>), Error> {
+        let mut scene = scene.clone();
+        let mut numbers = Vec::new();
+        for ((k, _), a) in self.hidden.iter().zip(amplitudes) {
+            numbers.extend(TABLE[*k].apply(&mut scene, *a)?.into_iter().map(|n| (TABLE[*k].name.to_string(), n)));
+        }
+        if let Some((place, _)) = self.magnet {
+            scene = Magnet { place, force: amplitudes[0] * MAGNET }.apply(&scene)?;
+        }
+        Ok((scene, numbers))
+    }
+
+    /// Amplitudes that reach the strengths aimed at.
+    fn amplitudes(&self, ruler: &Ruler) -> Result<Vec<f64>, Error> {
+        let magnet = self.magnet.map(|(place, target)| {
+            let put = |s: &mut Scene, a: f64| {
+                s.effects = Magnet { place, force: a * MAGNET }.apply(s)?.effects;
+                Ok(())
+            };
+            Ok(ruler.amplitude(target, put)?.0)
+        });
+        let effect = |(k, target): &(usize, f64)| -> Result<f64, Error> {
+            let h: &Hidden = &TABLE[*k];
+            Ok(ruler.amplitude(*target, |s, a| h.apply(s, a).map(|_| ()))?.0)
+        };
+        self.hidden.iter().map(effect).chain(magnet).collect()
+    }
+
+    /// How strong it is, in one line.
+    ///
+    /// # Errors
+    /// The scene cannot be simulated with it.
+    pub fn strength(&self, folder: &Path) -> Result<String, Error> {
+        let setup = setup(self.scene).ok_or_else(|| Error::Input(format!("{}: no such scene", self.scene)))?;
+        let ruler = Ruler::new(setup, &folder.join("ruler"))?;
+        let amplitudes = self.amplitudes(&ruler)?;
+        let strength = rms(&self.moved(&ruler, &amplitudes)?);
+        let hidden = self.hide(&setup.truth(false)?, &amplitudes)?.1;
+        let numbers: Vec<String> = hidden.iter().map(|(_, n)| format!("{} {:.4}", n.path, n.truth)).collect();
+        Ok(format!("{strength:.2} σ, amplitude {amplitudes:.3?}: {}", numbers.join(", ")))
+    }
+
+    fn moved(&self, ruler: &Ruler, amplitudes: &[f64]) -> Result<Vec<Moved>, Error> {
+        ruler.moved(|s| {
+            let hidden = self.hide(s, amplitudes)?.0;
+            *s = Scene { observation: s.observation.clone(), fit: s.fit.clone(), ..hidden };
+            Ok(())
+        })
+    }
+
+    /// Runs the case in an empty folder; `budget` bounds the diagnosis. Failures are outcomes too.
+    pub fn run(&self, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Outcome {
+        let mut out = Outcome {
+            name: self.name.clone(),
+            scene: self.scene.into(),
+            group: self.group.into(),
+            hidden: self.hidden.iter().map(|h| TABLE[h.0].name.to_string()).collect(),
+            amplitudes: Vec::new(),
+            strength: 0.0,
+            verdict: "failed".into(),
+            named: Vec::new(),
+            indistinguishable: Vec::new(),
+            close: Vec::new(),
+            p_value: f64::NAN,
+            p_value_after: f64::NAN,
+            localisation: None,
+            parameter_error: None,
+            gap_closed: 0.0,
+            slack_points: None,
+            seconds: 0.0,
+            sentence: String::new(),
+        };
+        if let Err(e) = self.fill(&mut out, folder, budget, say) {
+            out.sentence = e.to_string();
+        }
+        out
+    }
+
+    fn fill(&self, out: &mut Outcome, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Result<(), Error> {
+        let setup = setup(self.scene).ok_or_else(|| Error::Input(format!("{}: no such scene", self.scene)))?;
+        say("strength");
+        let ruler = Ruler::new(setup, &folder.join("ruler"))?;
+        out.amplitudes = self.amplitudes(&ruler)?;
+        let moved = self.moved(&ruler, &out.amplitudes)?;
+        out.strength = rms(&moved);
+        say("recordings");
+        let numbers = self.hide(&setup.truth(false)?, &out.amplitudes)?.1;
+        let seen = self.recorded(setup, &out.amplitudes, folder, false)?;
+        let held_out = self.recorded(setup, &out.amplitudes, folder, true)?;
+        let options =
+            DiagnoseOptions { backend: Backend::Cpu, budget: Some(budget), on_progress: Some(say), ..DiagnoseOptions::default() };
+        let found = diagnose(&[seen], Some(&held_out), options)?;
+        out.compare(&found, &moved, &numbers);
+        if let (Some((place, _)), Some(slack)) = (self.magnet, &found.diagnosis.slack) {
+            let force = slack.windows.iter().map(|w| w.values.iter().take(3).copied().collect::<Vec<f64>>());
+            let force: DVec3 = force.filter(|f| f.len() == 3).map(|f| DVec3::new(f[0], f[1], f[2])).sum();
+            let center = found.experiments[0].plan().body.center;
+            out.slack_points = Some(force.normalize_or_zero().dot((place - center).normalize_or_zero()));
+        }
+        Ok(())
+    }
+
+    /// The experiment of the diagnosis with a recording of the truth.
+    fn recorded(&self, setup: &Setup, amplitudes: &[f64], folder: &Path, other: bool) -> Result<Experiment, Error> {
+        let (scene, _) = self.hide(&setup.truth(other)?, amplitudes)?;
+        let maker = Maker::other(2 * self.seed + u64::from(other));
+        let place = folder.join(if other { "other" } else { "seen" });
+        let recording = record(setup, &truth(&scene, &maker)?, &maker)?;
+        write_recording(&place, &recording).map_err(|e| Error::Failed(e.to_string()))?;
+        let text = setup.text(&place);
+        Experiment::new(setup.parse(&text, other)?, text, Vec::new())
+    }
+}
+
+/// Force per volume of a magnet of amplitude one at its unit distance [N/m³], a tenth of the weight of water.
+const MAGNET: f64 = 1e3;
+
+impl Outcome {
+    fn compare(&mut self, found: &Diagnosed, moved: &[Moved], numbers: &[(String, Number)]) {
+        let d = &found.diagnosis;
+        self.verdict = d.verdict.name().into();
+        self.sentence = d.sentence();
+        self.seconds = found.seconds;
+        self.gap_closed = d.gap_closed;
+        (self.p_value, self.p_value_after) = (d.p_value, d.p_value_after);
+        let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();
+        self.named = accepted.iter().map(|e| e.kind.clone()).collect();
+        self.indistinguishable = accepted.first().map(|e| e.indistinguishable_from.clone()).unwrap_or_default();
+        self.close = d.effects.iter().filter(|e| !e.accepted).map(|e| (e.kind.clone(), e.held_out_gain)).collect();
+        // Of everything that belongs to what was named; a number that the answer does not state is as wrong as it can be.
+        let mut off = (0.0, 0.0);
+        for (_, n) in numbers.iter().filter(|(kind, _)| self.named.contains(kind)) {
+            let kind = accepted.iter().flat_map(|e| &e.parameters);
+            let value = kind.filter(|p| p.0 == n.path || p.0.splitn(3, '.').last() == Some(n.path.as_str())).map(|p| p.1).next();
+            off.0 += ((value.unwrap_or(n.absent) - n.truth) / n.scale).powi(2);
+            off.1 += ((n.truth - n.absent) / n.scale).powi(2);
+        }
+        self.parameter_error = (off.1 > 0.0).then(|| (off.0 / off.1).sqrt());
+        self.localisation = localisation(d.map.iter().map(|m| (m.place, m.time, m.before)), moved);
+    }
+}
+
+/// Share of the squared excess of a residual map (place, time, z) in those blocks that hold 90 % of what really moved.
+fn localisation(map: impl Iterator<Item = (DVec3, (f64, f64), f64)>, moved: &[Moved]) -> Option<f64> {
+    let map: Vec<_> = map.collect();
+    // What really moved in every block: the square of the sum over its readings, over their number, as the null counts it.
+    let mut real = vec![(0.0, 0.0); map.len()];
+    for m in moved {
+        let near = |b: &usize| (map[*b].0.distance(m.rest), b.to_owned());
+        let blocks = (0..map.len()).filter(|b| (map[*b].1.0 - 1e-9..=map[*b].1.1 + 1e-9).contains(&m.time));
+        if let Some((_, b)) = blocks.map(|b| near(&b)).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            real[b].0 += m.change;
+            real[b].1 += 1.0;
+        }
+    }
+    let real: Vec<f64> = real.iter().map(|(sum, n)| sum * sum / f64::max(*n, 1.0)).collect();
+    let mut order: Vec<usize> = (0..map.len()).collect();
+    order.sort_by(|a, b| real[*b].total_cmp(&real[*a]));
+    let total: f64 = real.iter().sum();
+    let excess = |b: usize| (map[b].2 * map[b].2 - 1.0).max(0.0);
+    let all: f64 = (0..map.len()).map(excess).sum();
+    let (mut held, mut inside) = (0.0, 0.0);
+    for b in order {
+        if held >= 0.9 * total {
+            break;
+        }
+        held += real[b];
+        inside += excess(b);
+    }
+    (total > 0.0 && all > 0.0).then(|| inside / all)
+}

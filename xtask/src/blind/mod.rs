@@ -1,0 +1,214 @@
+//! The blind suite: every effect of the library hidden in recordings that another grid, time step and element made, recordings with nothing
+//! hidden, with two things at once, and with a load that nobody knows; what the diagnosis says about each, and how often it is right.
+
+pub mod case;
+pub mod hidden;
+pub mod magnet;
+pub mod record;
+pub mod report;
+pub mod scenes;
+pub mod strength;
+
+use crate::table;
+use case::{Case, Outcome};
+use glam::DVec3;
+use hidden::{STRONG, TABLE, WEAK};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Which cases run, and how long each may take.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Only cases that hide this; "magnet", "pair" and "null" name groups.
+    pub only: Option<String>,
+    /// Only cases of this scene.
+    pub scene: Option<String>,
+    /// Recordings with nothing hidden.
+    pub nulls: usize,
+    /// A fixed small subset.
+    pub quick: bool,
+    /// Time for the search of a case [s].
+    pub budget: f64,
+    /// Forget earlier outcomes of the cases that run.
+    pub fresh: bool,
+    /// Only say how strong each case is; nothing is diagnosed.
+    pub strengths: bool,
+    /// Say what is being computed.
+    pub verbose: bool,
+}
+
+/// Cases of the quick subset, beside two nulls.
+const QUICK: [&str; 13] = [
+    "coulomb-friction ball strong",
+    "contact-dissipation ball strong",
+    "point-mass beam strong",
+    "uniform-force beam strong",
+    "air-drag blob strong",
+    "two-part-stiffness beam strong",
+    "structural-damping beam strong",
+    "poisson-ratio ball strong",
+    "rest-shape beam strong",
+    "camera-pose blob strong",
+    "depth-bias ball weak",
+    "time-offset ball weak",
+    "magnet blob",
+];
+
+/// Two things at once: names, scene.
+const PAIRS: [([&str; 2], &str); 4] = [
+    (["coulomb-friction", "air-drag"], "ball"),
+    (["coulomb-friction", "initial-spin"], "torus"),
+    (["two-part-stiffness", "marker-offset"], "beam"),
+    (["two-part-stiffness", "depth-along-ray"], "plate"),
+];
+
+/// Where the magnet is [m].
+const MAGNETS: [(&str, [f64; 3]); 3] =
+    [("blob", [0.12, 0.05, 0.22]), ("beam", [0.24, 0.08, 0.05]), ("plate", [0.06, 0.14, -0.03])];
+
+/// Every case of the suite, with so many nulls.
+pub fn cases(nulls: usize) -> Vec<Case> {
+    let mut out = Vec::new();
+    for (k, h) in TABLE.iter().enumerate() {
+        for (strength, target) in [("strong", STRONG), ("weak", WEAK)] {
+            out.push(Case {
+                name: format!("{} {} {strength}", h.name, h.scene),
+                scene: h.scene,
+                group: strength,
+                hidden: vec![(k, target)],
+                magnet: None,
+                seed: 1000 + 2 * k as u64 + u64::from(strength == "weak"),
+            });
+        }
+    }
+    for (i, (names, scene)) in PAIRS.iter().enumerate() {
+        let place = |name: &&str| TABLE.iter().position(|h| h.name == *name && h.scene == *scene).map(|k| (k, STRONG));
+        let name = format!("{} {} {scene}", names[0], names[1]);
+        let hidden = names.iter().filter_map(place).collect();
+        out.push(Case { name, scene, group: "pair", hidden, magnet: None, seed: 3000 + i as u64 });
+    }
+    for (i, (scene, place)) in MAGNETS.iter().enumerate() {
+        let magnet = Some((DVec3::from(*place), STRONG));
+        out.push(Case {
+            name: format!("magnet {scene}"),
+            scene,
+            group: "magnet",
+            hidden: Vec::new(),
+            magnet,
+            seed: 4000 + i as u64,
+        });
+    }
+    for i in 0..nulls {
+        let scene = scenes::NAMES[i % scenes::NAMES.len()];
+        let name = format!("null {scene} {i}");
+        out.push(Case { name, scene, group: "null", hidden: Vec::new(), magnet: None, seed: 5000 + i as u64 });
+    }
+    out
+}
+
+impl Options {
+    fn wants(&self, c: &Case) -> bool {
+        let hides = |name: &str| c.group == name || c.hidden.iter().any(|h| TABLE[h.0].name == name) || c.name == name;
+        self.only.as_deref().is_none_or(hides)
+            && self.scene.as_deref().is_none_or(|s| c.scene == s)
+            && (!self.quick
+                || QUICK.contains(&c.name.as_str())
+                || c.group == "null" && (c.name.ends_with(" 2") || c.name.ends_with(" 0")))
+    }
+}
+
+/// Runs what is asked for and not known yet, saves after every case, and prints the report over all cases asked for.
+///
+/// # Errors
+/// Nothing fits the options, or a file cannot be read or written.
+pub fn run(options: &Options) -> Result<(), String> {
+    let name = if options.quick { "blind-quick" } else { "blind" };
+    let path = table::root().join("bench").join(format!("{name}.json"));
+    let wanted: Vec<Case> = cases(options.nulls).into_iter().filter(|c| options.wants(c)).collect();
+    if wanted.is_empty() {
+        return Err("no case fits these options".into());
+    }
+    let mut known: Vec<Outcome> = match std::fs::read_to_string(&path) {
+        Ok(text) => serde_json::from_str(&text).map_err(|e| format!("{}: {e}; remove it to start again", path.display()))?,
+        Err(_) => Vec::new(),
+    };
+    if options.fresh {
+        known.retain(|o| !wanted.iter().any(|c| c.name == o.name));
+    }
+    for (i, c) in wanted.iter().enumerate() {
+        if known.iter().any(|o| o.name == c.name) {
+            continue;
+        }
+        println!("{}/{} {}", i + 1, wanted.len(), c.name);
+        let folder = Folder::new(&c.name)?;
+        if options.strengths {
+            println!("  {}", c.strength(&folder.0).map_err(|e| e.to_string())?);
+            continue;
+        }
+        let clock = Instant::now();
+        let mut say = |what: &str| {
+            if options.verbose {
+                println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
+            }
+        };
+        let outcome = c.run(&folder.0, Duration::from_secs_f64(options.budget), &mut say);
+        println!("  {}", report::line(&outcome));
+        known.push(outcome);
+        save(&path, &known)?;
+    }
+    if !options.strengths {
+        let chosen: Vec<&Outcome> = known.iter().filter(|o| wanted.iter().any(|c| c.name == o.name)).collect();
+        report::print(&chosen);
+        println!("\nwritten to {}", path.display());
+    }
+    Ok(())
+}
+
+/// Whole or not at all: a run may be stopped at any time.
+fn save(path: &std::path::Path, known: &[Outcome]) -> Result<(), String> {
+    let fail = |e: std::io::Error| format!("{}: {e}", path.display());
+    let text = serde_json::to_string_pretty(known).map_err(|e| e.to_string())?;
+    let new = path.with_extension("new");
+    std::fs::create_dir_all(path.parent().unwrap_or(path)).map_err(fail)?;
+    std::fs::write(&new, text + "\n").map_err(fail)?;
+    std::fs::rename(&new, path).map_err(fail)
+}
+
+/// A folder of its own that goes when the case is done.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Result<Folder, String> {
+        let path = std::env::temp_dir().join(format!("palpate-blind-{}-{}", std::process::id(), name.replace(' ', "-")));
+        std::fs::create_dir_all(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(Folder(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // Nothing depends on it any more.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::effects::{ALL, Family};
+
+    #[test]
+    fn every_effect_is_hidden_in_two_scenes_and_names_are_unique() {
+        for law in ALL.iter().filter(|l| l.family != Family::Slack) {
+            let scenes: Vec<&str> = TABLE.iter().filter(|h| h.name == law.kind).map(|h| h.scene).collect();
+            assert!(scenes.len() >= 2 && scenes[0] != scenes[1], "{}: {scenes:?}", law.kind);
+        }
+        let all = cases(20);
+        let mut names: Vec<&str> = all.iter().map(|c| c.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), all.len());
+        assert!(QUICK.iter().all(|q| names.contains(q)));
+        assert!(all.iter().filter(|c| c.group == "pair").all(|c| c.hidden.len() == 2));
+    }
+}

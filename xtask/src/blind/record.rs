@@ -1,0 +1,78 @@
+//! Recordings of true scenes, made on another grid, with another time step, element and seed than the diagnosis uses.
+
+use super::scenes::{NOISE, Setup};
+use palpate::render::Sensor;
+use palpate::synthetic::{Observers, observe};
+use palpate::{Backend, Error, Experiment};
+use palpate_io::recording::Recording;
+use palpate_model::scene::{Element, Scene};
+use std::ops::ControlFlow;
+
+/// Metres per count: rounding stays far below the noise.
+const DEPTH_SCALE: f64 = 5e-5;
+
+/// How a recording is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Maker {
+    /// Cells and time step are those of the diagnosis divided by this.
+    pub refine: f64,
+    /// Element.
+    pub element: Element,
+    /// Noise [m].
+    pub noise: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Maker {
+    /// A finer grid that never falls onto the diagnosis' one, and plain trilinear elements: on it they bend 3 % stiffer than the enhanced ones,
+    /// which a free stiffness absorbs.
+    pub fn other(seed: u64) -> Maker {
+        Maker { refine: [1.4, 1.55, 1.7][(seed % 3) as usize], element: Element::Trilinear, noise: NOISE, seed }
+    }
+
+    /// The diagnosis' own grid without noise: what differs is the effect alone.
+    pub fn own() -> Maker {
+        Maker { refine: 1.0, element: Element::Enhanced, noise: 0.0, seed: 1 }
+    }
+}
+
+/// The experiment that is recorded.
+///
+/// # Errors
+/// The scene cannot be built.
+pub fn truth(scene: &Scene, maker: &Maker) -> Result<Experiment, Error> {
+    let mut scene = Scene { observation: None, fit: None, ..scene.clone() };
+    scene.solver.element = maker.element;
+    // A plane that states no stiffness gets one that follows the grid: the ground is the same for every grid.
+    let coarse = Experiment::new(scene.clone(), String::new(), Vec::new())?;
+    let default = palpate_model::contact::DEFAULT_STIFFNESS * scene.material.youngs_modulus / coarse.plan().body.grid.h;
+    scene.planes.iter_mut().for_each(|p| {
+        p.stiffness.get_or_insert(default);
+    });
+    let e = Experiment::new(scene, String::new(), Vec::new())?;
+    if maker.refine == 1.0 { Ok(e) } else { e.refined(maker.refine) }
+}
+
+/// Records a true experiment as the cameras and markers of its setup see it.
+///
+/// # Errors
+/// It cannot be simulated, or nothing is seen.
+pub fn record(setup: &Setup, e: &Experiment, maker: &Maker) -> Result<Recording, Error> {
+    let (start, end) = (e.scene().time.start, e.end_time());
+    let count = ((end - start) / setup.spacing + 1e-9).floor() as usize;
+    let observers = Observers {
+        cameras: setup.cameras()?,
+        markers: setup.markers(),
+        times: (1..=count).map(|k| start + k as f64 * setup.spacing).collect(),
+        sensor: Sensor { noise: maker.noise, dropout: 0.0, depth_scale: DEPTH_SCALE, seed: maker.seed },
+    };
+    let mut recording = observe(e, Backend::Cpu, &observers, |_| ControlFlow::Continue(()))?;
+    // The noise is stated as it is, also where none was added: readings are counted in its units.
+    let sigma = (NOISE * NOISE + DEPTH_SCALE * DEPTH_SCALE / 12.0).sqrt();
+    recording.cameras.iter_mut().for_each(|c| c.noise_sigma = Some(sigma));
+    if let Some(m) = &mut recording.markers {
+        m.noise_sigma = Some(NOISE);
+    }
+    Ok(recording)
+}

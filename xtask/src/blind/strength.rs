@@ -1,0 +1,158 @@
+//! How far a hidden effect moves readings, in standard deviations, once everything that is free has been fitted again; and the amplitude
+//! at which it moves them by so much.
+//!
+//! The diagnosis' own grid without noise: r(a) are the residuals of a recording with nothing hidden against the scene with amplitude a.
+//! The columns S of the free numbers are projected out of d = (r(a) − r(0))/σ, which is what refitting them absorbs to first order;
+//! the strength is the root mean square of what is left.
+
+use super::record::{Maker, record, truth};
+use super::scenes::Setup;
+use glam::DVec3;
+use palpate::{Error, Experiment};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Linearised, ResidualRow, Rollout};
+use palpate_io::write_recording;
+use palpate_model::scene::Scene;
+use std::path::Path;
+
+/// Most simulations of a search for an amplitude.
+const TRIES: usize = 10;
+/// Relative accuracy of the strength; strengths of 3 and 10 stay far apart.
+const NEAR: f64 = 0.12;
+
+/// The ruler of a scene: its residuals with nothing hidden, and what its free numbers absorb.
+pub struct Ruler {
+    scene: Scene,
+    rows: Vec<ResidualRow>,
+    times: Vec<f64>,
+    /// Orthonormal columns `[Q][R]`.
+    free: Vec<Vec<f64>>,
+}
+
+/// Change of one reading by an effect.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    /// Place on the rest shape [m].
+    pub rest: DVec3,
+    /// Time [s].
+    pub time: f64,
+    /// Change in standard deviations.
+    pub change: f64,
+}
+
+impl Ruler {
+    /// Makes the ruler of a setup; its recording is kept in `folder`.
+    ///
+    /// # Errors
+    /// The scene cannot be simulated.
+    pub fn new(setup: &Setup, folder: &Path) -> Result<Ruler, Error> {
+        let maker = Maker::own();
+        let recording = record(setup, &truth(&setup.truth(false)?, &maker)?, &maker)?;
+        write_recording(folder, &recording).map_err(|e| Error::Failed(e.to_string()))?;
+        let scene = setup.parse(&setup.text(folder), false)?;
+        let e = Experiment::new(scene.clone(), String::new(), Vec::new())?;
+        let paths = scene.fit.iter().flat_map(|f| &f.parameters);
+        let free: Vec<usize> = paths.flat_map(|p| e.plan().layout.resolve(&p.path)).collect();
+        let l = linearise(&e, &free)?;
+        let q = free.len();
+        let column = |k: usize| -> Vec<f64> {
+            let of = |(i, r): (usize, &ResidualRow)| r.value.map_or(0.0, |_| l.rows.sensitivity[i * q + k] / r.noise);
+            l.rows.residuals.iter().enumerate().map(of).collect()
+        };
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for k in 0..q {
+            let mut c = column(k);
+            project(&basis, &mut c);
+            let norm = c.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if norm > 0.0 {
+                c.iter_mut().for_each(|x| *x /= norm);
+                basis.push(c);
+            }
+        }
+        let times = l.rows.residuals.iter().map(|r| e.plan().observation.frames[r.frame].time).collect();
+        Ok(Ruler { scene, rows: l.rows.residuals, times, free: basis })
+    }
+
+    /// What a changed scene moves, with the free numbers fitted again.
+    ///
+    /// # Errors
+    /// It cannot be simulated.
+    pub fn moved(&self, change: impl FnOnce(&mut Scene) -> Result<(), Error>) -> Result<Vec<Moved>, Error> {
+        let mut scene = self.scene.clone();
+        change(&mut scene)?;
+        let e = Experiment::new(scene, String::new(), Vec::new())?;
+        let l = linearise(&e, &[])?;
+        let difference = |(a, b): (&ResidualRow, &ResidualRow)| match (a.value, b.value) {
+            (Some(a), Some(v)) => (a - v) / b.noise,
+            _ => 0.0,
+        };
+        let mut d: Vec<f64> = l.rows.residuals.iter().zip(&self.rows).map(difference).collect();
+        project(&self.free, &mut d);
+        let moved = |((change, r), time): ((f64, &ResidualRow), &f64)| Moved { rest: r.rest, time: *time, change };
+        Ok(d.into_iter().zip(&self.rows).zip(&self.times).map(moved).collect())
+    }
+
+    /// Amplitude at which an effect has a strength, and the strength that it really has there: the nearest that can be reached within
+    /// the allowed values.
+    ///
+    /// # Errors
+    /// No amplitude can be simulated.
+    pub fn amplitude(&self, target: f64, put: impl Fn(&mut Scene, f64) -> Result<(), Error>) -> Result<(f64, f64), Error> {
+        let mut a = 1.0;
+        let mut best: Option<(f64, f64)> = None;
+        // Smallest amplitude that was refused, largest that was too weak, smallest that was too strong.
+        let mut ceiling = f64::INFINITY;
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut last = None;
+        for _ in 0..TRIES {
+            match self.moved(|s| put(s, a)) {
+                Ok(m) => {
+                    let s = rms(&m);
+                    let off = |x: f64| (x / target).max(1e-9).ln().abs();
+                    if best.is_none_or(|b| off(s) < off(b.1)) {
+                        best = Some((a, s));
+                    }
+                    if (s / target - 1.0).abs() < NEAR {
+                        break;
+                    }
+                    if s < target {
+                        low = f64::max(low, a);
+                    } else {
+                        high = f64::min(high, a);
+                    }
+                    let next = a * (target / s.max(1e-6)).clamp(0.2, 5.0);
+                    let bracketed = low > 0.0 && low < high && high.is_finite();
+                    a = match next {
+                        // Of what sets in all at once, as a wall that is touched or not.
+                        _ if bracketed && !(low..high).contains(&next) => (low * high).sqrt(),
+                        _ if next >= ceiling => 0.5 * (a + ceiling),
+                        _ => next,
+                    };
+                }
+                Err(e) => {
+                    ceiling = ceiling.min(a);
+                    a = best.map_or(0.3 * a, |b| 0.5 * (b.0 + a));
+                    last = Some(e);
+                }
+            }
+        }
+        best.ok_or_else(|| last.unwrap_or_else(|| Error::Failed("no amplitude was tried".into())))
+    }
+}
+
+/// Residuals of an experiment with its own values, and their derivatives along some places in θ.
+fn linearise(e: &Experiment, directions: &[usize]) -> Result<Linearised, Error> {
+    Ok(Rollout::new(CpuBackend, e.plan(), 1)?.linearise(&e.plan().theta, directions)?)
+}
+
+fn project(basis: &[Vec<f64>], v: &mut [f64]) {
+    for b in basis {
+        let along: f64 = b.iter().zip(v.iter()).map(|(b, v)| b * v).sum();
+        v.iter_mut().zip(b).for_each(|(v, b)| *v -= along * b);
+    }
+}
+
+/// Root mean square change.
+pub fn rms(moved: &[Moved]) -> f64 {
+    (moved.iter().map(|m| m.change * m.change).sum::<f64>() / moved.len().max(1) as f64).sqrt()
+}
