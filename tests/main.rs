@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod cli;
+mod diagnose;
 mod physics;
 mod real_data;
 mod recovery;

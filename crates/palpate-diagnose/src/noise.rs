@@ -15,31 +15,47 @@ use std::collections::BTreeMap;
 /// Median of χ² with one degree of freedom.
 const MEDIAN: f64 = 0.454_936;
 
-/// Noise of single depth readings over the stated one, from differences of neighbours in the same image; 1 where it is smaller.
+/// Fewest differences of an image from which its noise is estimated.
+const FEWEST: usize = 30;
+
+/// Noise of single depth readings over the stated one; 1 where it is smaller.
+///
+/// From second differences of three neighbours in a row of an image, in which a misfit that changes evenly across the surface cancels. Where
+/// the model is far off even that leaves something, but not in every image: the images with the least noise decide.
 pub fn neighbour_ratio(readings: &Readings) -> f64 {
-    let mut squares = Vec::new();
-    let mut gaps = Vec::new();
-    for w in readings.rows.windows(2) {
-        let [a, b] = w else { continue };
-        let (Source::Point { point: p, camera: c }, Source::Point { point: q, camera: d }) = (a.row.source, b.row.source) else {
-            continue;
+    let mut images: BTreeMap<(usize, usize, u32), Vec<(f64, f64)>> = BTreeMap::new();
+    for w in readings.rows.windows(3) {
+        let [a, b, c] = w else { continue };
+        let place = |r: &crate::laboratory::Reading| match r.row.source {
+            Source::Point { point, camera } => Some((r.scene, r.row.frame, camera, point)),
+            _ => None,
         };
-        if a.scene != b.scene || a.row.frame != b.row.frame || c != d || q != p + 1 {
+        let (Some(p), Some(q), Some(r)) = (place(a), place(b), place(c)) else { continue };
+        if (p.0, p.1, p.2) != (q.0, q.1, q.2) || (q.0, q.1, q.2) != (r.0, r.1, r.2) || q.3 != p.3 + 1 || r.3 != q.3 + 1 {
             continue;
         }
-        if let (Some(x), Some(y)) = (a.row.value, b.row.value) {
-            let variance = (a.row.noise * a.row.along_sight).powi(2) + (b.row.noise * b.row.along_sight).powi(2);
-            squares.push((x - y).powi(2) / variance);
-            gaps.push(a.row.rest.distance(b.row.rest));
+        if let (Some(x), Some(y), Some(z)) = (a.row.value, b.row.value, c.row.value) {
+            let variance = |r: &crate::laboratory::Reading| (r.row.noise * r.row.along_sight).powi(2);
+            let square = (x - 2.0 * y + z).powi(2) / (variance(a) + 4.0 * variance(b) + variance(c));
+            let gap = a.row.rest.distance(b.row.rest).max(b.row.rest.distance(c.row.rest));
+            images.entry((p.0, p.1, p.2)).or_default().push((square, gap));
         }
     }
-    if squares.len() < 50 {
+    let mut gaps: Vec<f64> = images.values().flatten().map(|v| v.1).collect();
+    if gaps.len() < FEWEST {
         return 1.0;
     }
-    // The next pixel of the same row, not the first of the next one.
-    let near = 2.0 * quantile(&mut gaps.clone(), 0.5);
-    let mut close: Vec<f64> = squares.iter().zip(&gaps).filter(|(_, g)| **g <= near).map(|(s, _)| *s).collect();
-    (quantile(&mut close, 0.5) / MEDIAN).sqrt().max(1.0)
+    // The next pixels of the same row, not the first of the next one, and not across an edge.
+    let near = 2.0 * quantile(&mut gaps, 0.5);
+    let ratio = |v: &Vec<(f64, f64)>| {
+        let mut close: Vec<f64> = v.iter().filter(|v| v.1 <= near).map(|v| v.0).collect();
+        (close.len() >= FEWEST).then(|| quantile(&mut close, 0.5) / MEDIAN)
+    };
+    let mut ratios: Vec<f64> = images.values().filter_map(ratio).collect();
+    if ratios.is_empty() {
+        return 1.0;
+    }
+    quantile(&mut ratios, 0.25).sqrt().max(1.0)
 }
 
 /// What noise alone looks like on the cells of one frame, from second differences over time.

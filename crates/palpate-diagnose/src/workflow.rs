@@ -114,7 +114,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     };
     let mut state = s.state(baseline.clone(), readings, None)?;
     s.correlate(&mut state)?;
-    let before = s.level(&state);
+    let first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress::default();
     let mut adequacy;
     let base_predicted = state.predicted[0].rms;
@@ -132,6 +132,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             Ok((Some((found, next)), _)) => {
                 out.accepted.push(found);
                 state = next;
+                s.settle(&mut state);
             }
             Ok((None, close)) => {
                 out.close = close;
@@ -144,6 +145,8 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             Err(e) => return Err(e),
         }
     }
+    // Both levels in the noise as it is known at the end.
+    let before = s.level_of(&first.0, first.1);
     s.conclude(baseline, before, base_predicted, state, &adequacy, out)
 }
 
@@ -211,6 +214,29 @@ impl Session<'_> {
         state.frame = self.frame(&state.table, &state.fields);
         state.predicted = self.predict(&state.readings, &state.table, &state.frame);
         Ok(())
+    }
+
+    /// Looks at the noise again after an effect was added: what the model missed before may have passed for noise, so that only a
+    /// smaller estimate counts.
+    fn settle(&mut self, state: &mut State) {
+        let ratio = neighbour_ratio(&state.readings).min(self.noise_ratio);
+        let old = self.design_effect.sqrt();
+        for (sd, k) in self.cells.sd.iter_mut().zip(&self.cells.keys) {
+            *sd *= if k.sensor < 1000 { ratio / self.noise_ratio } else { 1.0 } / old;
+        }
+        self.noise_ratio = ratio;
+        state.table = self.cells.table(&state.readings, None);
+        state.frame = self.frame(&state.table, &state.fields);
+        let y = state.frame.left();
+        let (factor, noise) = design_effect(&self.cells, &y, |i| state.frame.absorbed.leverage(i));
+        if factor < self.design_effect {
+            (self.design_effect, self.noise) = (factor, noise);
+        }
+        let new = self.design_effect.sqrt();
+        self.cells.sd.iter_mut().for_each(|s| *s *= new);
+        state.table = self.cells.table(&state.readings, None);
+        state.frame = self.frame(&state.table, &state.fields);
+        state.predicted = self.predict(&state.readings, &state.table, &state.frame);
     }
 
     /// Every variant of every candidate, scored where it is absent.

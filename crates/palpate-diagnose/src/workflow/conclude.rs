@@ -12,16 +12,20 @@ use palpate_engine::Source;
 impl Session<'_> {
     /// Distance of a model from the measurement, and what noise and discretisation explain of it.
     pub(super) fn level(&self, state: &State) -> Level {
+        self.level_of(&state.readings, self.grid(state))
+    }
+
+    /// Mean square of the discretisation's error that refitting leaves, per residual [m²].
+    pub(super) fn grid(&self, state: &State) -> f64 {
         let free = Basis::new(state.table.columns.iter());
         let m = self.cells.len() as f64;
         // What free numbers absorb of a discretisation error does not show in residuals.
-        let grid: f64 = state
+        state
             .frame
             .fields
             .iter()
             .map(|f| free.without(f).iter().zip(&self.cells.sd).map(|(d, s)| (d * s).powi(2)).sum::<f64>() / m)
-            .sum();
-        self.level_of(&state.readings, grid)
+            .sum()
     }
 
     /// The same with a mean square of discretisation per residual [m²].

@@ -112,12 +112,12 @@ impl Session<'_> {
         let Some(best) = fitted.iter().position(passes) else {
             return Ok((None, fitted.iter().take(3).map(|f| self.found(f, false)).collect()));
         };
-        // Candidates that predict as well as the best, up to noise or up to a fiftieth of the gap.
+        // Candidates that predict as well as the best, up to noise or up to 0.3 % of the gap.
         let equal: Vec<usize> = (0..fitted.len())
             .filter(|i| passes(&fitted[*i]))
             .filter(|i| {
                 let (by, z) = worse_by(&self.cells, &fitted[best].state.predicted[0], &fitted[*i].state.predicted[0]);
-                z < 2.0 || by < 0.02 * whole
+                z < 2.0 || by < 0.003 * whole
             })
             .collect();
         let winner = equal.iter().copied().min_by_key(|i| (fitted[*i].freedom, *i)).unwrap_or(best);

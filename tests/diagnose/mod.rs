@@ -1,0 +1,110 @@
+//! Diagnosis from end to end: recordings made on another grid with another step, and a model that lacks one thing, or nothing.
+
+use serde_json::Value;
+use std::fs;
+use support::command::{arg, json, succeed};
+
+/// A soft block on a clamp, pushed sideways at the start: small enough for a diagnosis in seconds.
+const BLOCK: &str = r#"
+format = "scene/1"
+title = "Pushed block"
+
+[object]
+shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
+cell_size = 0.02
+
+[material]
+density = 1000.0
+youngs_modulus = 2.0e4
+poisson_ratio = 0.4
+mass_damping = 1.0
+
+[[clamp]]
+box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
+
+[initial]
+velocity = [0.6, 0.0, 0.0]
+
+[time]
+step = 0.01
+steps = 16
+"#;
+
+const SEEN: &str = r#"
+[observation]
+recording = "seen"
+cost = "sparse-surface"
+
+[fit]
+iterations = 12
+
+[[fit.parameter]]
+path = "material.youngs_modulus"
+start = 1.5e4
+"#;
+
+/// Records the block with `hidden` in its scene, on cells two thirds as large with a shorter step, and diagnoses it with a scene that
+/// does not know.
+fn diagnosed(hidden: &str) -> (tempfile::TempDir, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("truth.toml"), format!("{BLOCK}{hidden}")).unwrap();
+    fs::write(file("scene.toml"), format!("{BLOCK}{SEEN}")).unwrap();
+    let (truth, seen, scene, out) = (file("truth.toml"), file("seen"), file("scene.toml"), file("why"));
+    let camera = "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30";
+    let observe = ["observe", arg(&truth), "--camera", camera, "--noise", "0.0005", "--depth-scale", "0.0001"];
+    succeed(&[&observe[..], &["--refine", "1.5", "--seed", "5", "--out", arg(&seen)]].concat());
+    succeed(&["diagnose", arg(&scene), "--out", arg(&out), "--backend", "cpu"]);
+    let result = json(out.join("diagnosis.json"));
+    println!("{result:#}");
+    (folder, result)
+}
+
+/// Kinds that explain the recording equally well, the first named first.
+fn named(d: &Value) -> Vec<String> {
+    let best = &d["effects"][0];
+    let text = |v: &Value| v.as_str().unwrap_or_default().to_string();
+    let others = best["indistinguishable_from"].as_array().into_iter().flatten().map(text);
+    std::iter::once(text(&best["kind"])).chain(others).collect()
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_missing() {
+    let (folder, d) = diagnosed("");
+    assert_eq!((&d["format"], &d["verdict"]), (&"diagnosis/1".into(), &"adequate".into()));
+    assert!(d["effects"].as_array().is_none_or(|e| e.iter().all(|e| e["accepted"] != true)));
+    assert!(folder.path().join("why/report.html").exists());
+}
+
+#[test]
+fn a_sideways_force_is_named_with_its_size_and_its_twin() {
+    let (folder, d) = diagnosed("[[effect]]\nkind = \"uniform-force\"\nforce = [0.0, 2500.0, 0.0]\n");
+    assert_eq!(d["verdict"], "missing-effect");
+    let names = named(&d);
+    // In a body of even density a force per volume and another gravity are the same thing: both must be told.
+    assert!(["uniform-force", "gravity"].contains(&names[0].as_str()), "{names:?}");
+    assert!(names.contains(&"uniform-force".to_string()) && names.contains(&"gravity".to_string()), "{names:?}");
+    assert!(d["gap_closed"].as_f64().unwrap() > 0.9, "{}", d["gap_closed"]);
+    // The corrected scene can be read and explains the recording.
+    let model = palpate::Experiment::open(folder.path().join("why/model.toml")).unwrap();
+    let after = model.residuals(palpate::Backend::Cpu, &model.plan().theta).unwrap();
+    assert!((after.rms - d["after"]["rms"].as_f64().unwrap()).abs() < 1e-6);
+    let sideways = match model.scene().effects.first() {
+        Some(e) => e.values[1].unwrap(),
+        None => model.scene().gravity.y * 1000.0,
+    };
+    // The grid of two cells across is some ten per cent too stiff, and the force found makes up for it.
+    assert!((sideways / 2500.0 - 1.0).abs() < 0.15, "{sideways}");
+}
+
+#[test]
+fn a_sensor_that_reads_too_far_is_not_sold_as_physics() {
+    let (_, d) = diagnosed("[[effect]]\nkind = \"depth-bias\"\nbias = 0.004\n");
+    assert_eq!(d["verdict"], "missing-effect");
+    let names = named(&d);
+    assert_eq!(names[0], "depth-bias", "{names:?}");
+    let bias = d["effects"][0]["parameters"]["bias"].as_f64().unwrap();
+    // A tenth of the noise of one reading is what this coarse grid moves the mean surface.
+    assert!((bias / 0.004 - 1.0).abs() < 0.1, "{bias}");
+    assert!(d["gap_closed"].as_f64().unwrap() > 0.9, "{}", d["gap_closed"]);
+}
