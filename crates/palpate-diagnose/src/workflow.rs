@@ -81,6 +81,8 @@ struct Session<'a> {
     noise_ratio: f64,
     design_effect: f64,
     noise: Shapes,
+    /// Variants of the baseline, scored while the noise was being found out; the first round takes them over.
+    scored: Option<Vec<Variant>>,
     tried: Vec<Tried>,
     not_tried: Vec<String>,
 }
@@ -109,6 +111,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         noise_ratio,
         design_effect: 1.0,
         noise: Shapes::default(),
+        scored: None,
         tried: Vec::new(),
         not_tried: Vec::new(),
     };
@@ -213,6 +216,13 @@ impl Session<'_> {
         state.table = self.cells.table(&state.readings, None);
         state.frame = self.frame(&state.table, &state.fields);
         state.predicted = self.predict(&state.readings, &state.table, &state.frame);
+        // Columns are in units of the noise, which has just become larger.
+        let mut variants = variants;
+        for v in &mut variants {
+            v.columns.iter_mut().flatten().for_each(|c| *c /= factor.sqrt());
+            v.score = self.score(state, v);
+        }
+        self.scored = Some(variants);
         Ok(())
     }
 

@@ -12,7 +12,10 @@ impl Session<'_> {
     /// One round: the accepted effect with its state, or the candidates that came closest.
     #[expect(clippy::type_complexity, reason = "one caller, which takes it apart at once")]
     pub(super) fn round(&mut self, state: &State, round: usize) -> Result<(Option<(Found, State)>, Vec<Found>), LabError> {
-        let mut variants = self.variants(state)?;
+        let mut variants = match self.scored.take() {
+            Some(v) => v,
+            None => self.variants(state)?,
+        };
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
         let mut seen: Vec<usize> = Vec::new();

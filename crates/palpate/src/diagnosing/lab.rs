@@ -130,12 +130,17 @@ fn fit(base: &[Experiment], backend: Backend, interrupt: &Interrupt, (changes, s
 
 /// Residuals of every scene, with derivatives by the numbers from `from` on. Always the reference backend: statistics want its precision.
 pub(super) fn linearise(ready: &Prepared, values: &[f64], from: usize) -> Result<Readings, LabError> {
+    linearise_some(ready, values, from, |_| true)
+}
+
+/// The same, with zeros for derivatives by numbers (counted from `from`) that are not wanted: they cost nothing.
+fn linearise_some(ready: &Prepared, values: &[f64], from: usize, wanted: impl Fn(usize) -> bool) -> Result<Readings, LabError> {
     let columns = ready.free.len() - from;
     let mut out = Readings { columns, ..Readings::default() };
     for (scene, e) in ready.experiments.iter().enumerate() {
         let mut directions = Vec::new();
         let mut columns_of = Vec::new();
-        for (k, f) in ready.free[from..].iter().enumerate() {
+        for (k, f) in ready.free[from..].iter().enumerate().filter(|(k, _)| wanted(*k)) {
             for s in f.slots.iter().filter(|s| s.scene == scene) {
                 directions.push(s.place);
                 columns_of.push((k, s.factor));
@@ -163,7 +168,10 @@ fn together(base: &[Experiment], tries: &[Try], from: usize) -> Result<Vec<Readi
     let mut changes = common.to_vec();
     let mut all = values.to_vec();
     let mut counts = Vec::new();
+    // An effect that is absent does not depend on where it would act: only amplitudes have derivatives.
+    let mut wanted: Vec<bool> = Vec::new();
     for (c, v) in tries {
+        wanted.extend(c.last().into_iter().flat_map(Change::amplitudes));
         changes.extend(c.last().cloned());
         all.extend(&v[from..]);
         counts.push(v.len() - from);
@@ -172,7 +180,7 @@ fn together(base: &[Experiment], tries: &[Try], from: usize) -> Result<Vec<Readi
     if ready.free.len() != all.len() {
         return Err(LabError::Failed("hypotheses share a number".into()));
     }
-    let r = linearise(&ready, &all, from)?;
+    let r = linearise_some(&ready, &all, from, |k| wanted.get(k).copied().unwrap_or(true))?;
     let mut at = 0;
     let part = |n: usize| {
         let sensitivity = r.sensitivity.chunks(r.columns.max(1)).flat_map(|row| row[at..at + n].to_vec()).collect();
