@@ -2,6 +2,8 @@
 // use shared/grid
 // use shared/totals
 // use shared/precondition
+// use shared/iteration
+// use shared/first_cg
 
 var<storage, read> rhs: array<vec4<f32>>;
 var<storage, read_write> direction: array<vec4<f32>>;
@@ -31,6 +33,7 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         state += vec4(dot(r, z), inverses[2u * a + 1u].w, 0.0, 0.0);
     }
     let s = total(local, state);
+    first_cg(local, p.member, s.x);
     if local != 0u {
         return;
     }

@@ -4,6 +4,8 @@
 // use shared/inertia
 // use shared/totals
 // use shared/precondition
+// use shared/iteration
+// use shared/first_cg
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
@@ -98,6 +100,7 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if local == 0u {
         newton[p.member] = n;
     }
+    first_cg(local, p.member, n.rz);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
         let r = -residual[a].xyz;

@@ -5,20 +5,14 @@
 // use shared/inertia
 // use shared/totals
 // use shared/precondition
+// use shared/leave_cg
 
 var<storage, read> block_rows: array<u32>;
 var<storage, read> columns: array<u32>;
 var<storage, read> values: array<f32>;
-var<storage, read> residual: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
 var<storage, read_write> cg_rest: array<vec4<f32>>;
 var<storage, read_write> cg_along: array<vec4<f32>>;
 var<storage, read_write> cg_image: array<vec4<f32>>;
-var<storage, read_write> newton: array<Newton>;
-var<storage, read_write> health: array<Health>;
-
-// What rounding may leave of a derivative's right-hand side when the iterations run out.
-const ACCEPTABLE = 1e-4;
 
 @compute @workgroup_size(256)
 fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -91,37 +85,5 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             cg_along[a] = vec4(scaled(a, cg_rest[a].xyz), 0.0) + beta * cg_along[a];
         }
     }
-    var broken = 0u;
-    if negative {
-        n.total += n.cg;
-        n.stage = WANTS_MATRIX;
-        if call.extra == 1u || n.convex == 1u {
-            broken = INDEFINITE;
-        }
-        n.convex = 1u;
-    }
-    if ended {
-        n.total += n.cg;
-        n.stage = select(WANTS_TRIAL, IDLE, call.extra == 1u);
-        n.length = 1.0;
-        let relative = sqrt(max(n.rz, 0.0)) / n.norm;
-        // A poor Newton direction is the line search's business.
-        let enough = select(0.5, ACCEPTABLE, call.extra == 1u);
-        if !(relative <= enough) {
-            broken = UNSOLVED;
-        }
-        var slope = vec4(0.0);
-        for (var i = local; i < shape.nodes; i += 256u) {
-            let a = at_node(p.member, i);
-            slope.x += dot(residual[a].xyz, direction[a].xyz);
-        }
-        n.slope = total(local, slope).x;
-    }
-    if local == 0u {
-        if broken != 0u {
-            n.stage = IDLE;
-            health[p.member] = Health(broken, call.step + call.mode, vec2(sqrt(max(n.rz, 0.0)) / n.norm, f32(n.cg)));
-        }
-        newton[p.member] = n;
-    }
+    leave_cg(local, p.member, n, negative, ended, call.extra == 1u);
 }

@@ -1,24 +1,29 @@
 //! Lists who takes part in what comes next (section 0: all that are well; 1, 2, 3: those that want a matrix, a solve, a trial)
-//! and writes the sizes of the dispatches for each list, so that work that nobody wants shrinks to nothing.
+//! and writes the sizes of the dispatches for each list, so that work that nobody wants shrinks to nothing. `gate` is the size of
+//! later listings: nothing once nobody wants anything.
 // use shared/structs
 
 var<uniform> shape: Shape;
 var<storage, read_write> roster: array<u32>;
 var<storage, read_write> arguments: array<u32>;
+var<storage, read_write> gate: array<u32>;
 var<storage, read> newton: array<Newton>;
 var<storage, read> health: array<Health>;
 
 const SECTIONS = 4u;
-const KINDS = 6u;
+const KINDS = 8u;
 const WIDEST = 65535u;
 
-// Workgroups of one member, by what the items are: one, nodes, cells, blocks, patches, clamp cells.
+// Workgroups of one member, by what the items are: one, nodes, cells, blocks, patches, clamp cells, nodes of
+// wide workgroups, rows of eight lanes.
 fn groups_of(kind: u32) -> u32 {
     switch kind {
         case 1u: { return (shape.nodes + 63u) / 64u; }
         case 2u: { return (shape.cells + 7u) / 8u; }
         case 3u: { return (shape.blocks + 63u) / 64u; }
         case 4u: { return (shape.patches + 63u) / 64u; }
+        case 6u: { return (shape.nodes + 255u) / 256u; }
+        case 7u: { return (shape.nodes + 31u) / 32u; }
         case 5u: { return (shape.holds + 7u) / 8u; }
         default: { return 1u; }
     }
@@ -28,13 +33,20 @@ fn groups_of(kind: u32) -> u32 {
 fn list_members(@builtin(local_invocation_index) section: u32) {
     let start = section * (shape.members + 1u);
     var count = 0u;
+    var busy = 0u;
     for (var b = 0u; b < shape.members; b++) {
         if health[b].code == WELL && (section == 0u || newton[b].stage == section) {
             count += 1u;
             roster[start + count] = b;
+            busy |= newton[b].stage;
         }
     }
     roster[start] = count;
+    if section == 0u {
+        gate[0] = select(0u, 1u, busy != 0u);
+        gate[1] = 1u;
+        gate[2] = 1u;
+    }
     for (var kind = 0u; kind < KINDS; kind++) {
         let total = count * groups_of(kind);
         let at = (section * KINDS + kind) * 3u;

@@ -2,6 +2,7 @@
 
 use crate::device::{Choice, Gpu};
 use crate::error::GpuError;
+use crate::tuning::Tuning;
 use crate::world::{Adjoint, State, Tally, Tangent, World};
 use crate::{backward, forward, observe, read};
 use glam::DVec3;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct GpuBackend {
     gpu: Arc<Gpu>,
+    tuning: Option<Tuning>,
 }
 
 impl GpuBackend {
@@ -21,12 +23,17 @@ impl GpuBackend {
     /// # Errors
     /// There is none, or it cannot run the kernels.
     pub fn new(choice: &Choice) -> Result<GpuBackend, GpuError> {
-        Ok(GpuBackend { gpu: Gpu::open(choice)? })
+        Ok(GpuBackend::on(Gpu::open(choice)?))
     }
 
     /// On an open device.
     pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
-        GpuBackend { gpu }
+        GpuBackend { gpu, tuning: None }
+    }
+
+    /// The same with given ways to solve, instead of those that the environment or a measurement chooses.
+    pub fn tuned(self, tuning: Tuning) -> GpuBackend {
+        GpuBackend { tuning: Some(tuning), ..self }
     }
 
     /// The device.
@@ -47,7 +54,7 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        let world = World::new(self.gpu.clone(), plan, members)?;
+        let world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
         match self.gpu.take_trouble() {
             Some(e) => Err(e.into()),
             None => Ok(world),

@@ -261,7 +261,7 @@ impl Gpu {
         let usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST
-            | if label == "arguments" { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
+            | if ["arguments", "gate"].contains(&label) { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
             | if label == "shape" { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::empty() };
         let size = whole(bytes);
         self.made.fetch_add(size, Ordering::Relaxed);

@@ -59,6 +59,16 @@ pub enum GpuError {
         /// The driver's words.
         message: String,
     },
+    /// An environment variable says something else than it may.
+    #[error("{name} = {value:?}; allowed: {allowed}")]
+    Setting {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// The plan holds something that this backend cannot compute.
     #[error("the GPU backend does not support {what}")]
     Plan {
@@ -79,6 +89,7 @@ impl GpuError {
             GpuError::Unsupported { .. } | GpuError::Shader { .. } | GpuError::Refused { .. } | GpuError::Plan { .. } => {
                 "use --backend cpu, or another adapter"
             }
+            GpuError::Setting { .. } => "unset the variable, and what is faster is chosen",
             GpuError::Limit { .. } | GpuError::OutOfMemory { .. } => "use coarser cells, a smaller batch, or --backend cpu",
             GpuError::Lost { .. } => "run again; results so far are kept; or use --backend cpu",
         }

@@ -34,6 +34,8 @@ pub(crate) struct Most {
     pub(crate) masses: u64,
     /// Iterations of conjugate gradients in one dispatch.
     pub(crate) chunk: u64,
+    /// Many workgroups share the solve of a member.
+    pub(crate) many: bool,
 }
 
 impl Most {
@@ -53,8 +55,8 @@ impl Most {
         let cell = 600 + self.supports;
         [
             ("list_members", self.members + 16),
-            ("iterate_cg", self.chunk * self.of_iteration() + self.share()),
-            ("begin_solve", self.share() * (3 + 9 * self.masses) + 300),
+            ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
+            ("begin_solve", self.share() * (4 + 9 * self.masses) + 300),
             ("gather_matrix", 8 * (1 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]
@@ -94,6 +96,7 @@ impl Geometry {
         gpu: &M,
         plan: &Plan,
         members: usize,
+        many: bool,
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<Geometry, GpuError> {
         if plan.layout.effects().next().is_some() {
@@ -172,6 +175,7 @@ impl Geometry {
             planes: plan.planes.len() as u64,
             masses: masses.len() as u64,
             chunk: 1,
+            many,
         };
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);

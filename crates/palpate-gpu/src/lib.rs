@@ -14,6 +14,7 @@ pub mod error;
 mod forward;
 mod geometry;
 pub mod layout;
+mod measure;
 mod members;
 mod memory;
 mod observe;
@@ -24,10 +25,13 @@ pub mod recorder;
 mod solve;
 #[cfg(test)]
 mod tests;
+mod tuning;
 mod world;
 
 pub use backend::GpuBackend;
 pub use device::{AdapterReport, Choice, Gpu, Lanes, adapters};
 pub use error::GpuError;
+pub use measure::ProductSpeed;
 pub use memory::{Memory, memory};
+pub use tuning::{Product, Tuning};
 pub use world::{Adjoint, State, Tally, Tangent, World};

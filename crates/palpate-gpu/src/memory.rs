@@ -5,6 +5,7 @@ use crate::error::GpuError;
 use crate::geometry::Geometry;
 use crate::layout::{ClampPose, Member, Plane};
 use crate::observe;
+use crate::tuning::MANY;
 use crate::world::{VECTOR, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
@@ -79,7 +80,7 @@ pub fn memory(plan: &Plan, members: usize, request: &Request) -> Result<Memory, 
     let members = members.max(1);
     let (b, q) = (members as u64, request.sensitivities.len());
     let mut buffers = HashMap::new();
-    let geometry = Geometry::new(&Counter, plan, members, &mut buffers)?;
+    let geometry = Geometry::new(&Counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
     let shape = &geometry.shape;
     let matrices = |count: u32| whole(b * 2 * u64::from(count) * 576 * 4);
     let batch = whole(b * size_of::<Member>() as u64)

@@ -24,6 +24,8 @@ pub enum Size {
     },
     /// As the device wrote it at this byte of the buffer `arguments`.
     Indirect(u64),
+    /// As the device wrote it in the buffer `gate`.
+    Gate,
 }
 
 /// Timed passes need this many queries at most per submission.
@@ -147,11 +149,12 @@ impl<'a> Recorder<'a> {
                 let (x, y) = (total.min(MOST_GROUPS), total.div_ceil(MOST_GROUPS));
                 compute.dispatch_workgroups(x as u32, y as u32, 1);
             }
-            Size::Indirect(offset) => {
-                let Some(arguments) = self.world.get("arguments") else {
-                    return Err(GpuError::Refused { message: "no buffer called arguments".into() });
+            Size::Indirect(_) | Size::Gate => {
+                let (name, offset) = if let Size::Indirect(offset) = size { ("arguments", offset) } else { ("gate", 0) };
+                let Some(sizes) = self.world.get(name) else {
+                    return Err(GpuError::Refused { message: format!("no buffer called {name}") });
                 };
-                compute.dispatch_workgroups_indirect(arguments, offset);
+                compute.dispatch_workgroups_indirect(sizes, offset);
             }
         }
         Ok(())

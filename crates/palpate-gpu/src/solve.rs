@@ -3,6 +3,7 @@
 
 use crate::pipelines::pass;
 use crate::recorder::{Args, Named, Recorder, Size};
+use crate::tuning::Product;
 use crate::world::{KINDS, State, Tally, World};
 
 /// Sections of the roster.
@@ -20,10 +21,24 @@ pub(crate) enum Per {
     Block,
     Patch,
     Hold,
+    /// Nodes, in workgroups of 256.
+    Wide,
+    /// Nodes with eight lanes each, in workgroups of 256.
+    Row,
 }
 
 /// Rounds beyond the allowed Newton iterations, for convex retries and halved steps.
 const SPARE_ROUNDS: usize = 8;
+
+/// CG iterations between two looks at who has converged (an even number: scalars alternate between two places).
+const BLOCK: u32 = 16;
+/// Blocks between two listings that can close the gate.
+const GATED: u32 = 8;
+/// CG iterations of the first [`EARLY`] Newton rounds and of the later ones, which hardly anyone needs; a solve that wants more
+/// goes on in the next round.
+const ROUND: u32 = 256;
+const LATE_ROUND: u32 = 64;
+const EARLY: usize = 8;
 
 /// One balance on the way to the device: a step, or the static problem.
 pub(crate) struct Solve<'a, 'r> {
@@ -77,11 +92,17 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.recorder.run(pass, &named, Size::Indirect(offset), args);
     }
 
-    /// Lists anew who takes part in what.
+    /// Lists anew who takes part in what, and whether [`Solve::relist`] has anything to do from here on.
     pub(crate) fn list(&mut self) {
-        let args = Args::default();
         let own = self.own.clone();
-        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, args);
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, Args::default());
+    }
+
+    /// Lists anew, unless the last [`Solve::list`] found nobody who wants anything. (A dispatch may not write its own size, so
+    /// these leave the gate as it is.)
+    fn relist(&mut self) {
+        let own: Vec<_> = [("gate", &self.world.buffers["no_gate"])].into_iter().chain(self.own.iter().copied()).collect();
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::Gate, Args::default());
     }
 
     /// What the old state leaves for the whole solve.
@@ -108,7 +129,7 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.prepare();
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.list();
-        for _ in 0..iterations + SPARE_ROUNDS {
+        for round in 0..iterations + SPARE_ROUNDS {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
             self.run(pass::TOUCH_PATCHES, TRIAL, Per::Patch, 0);
             self.run(pass::HOLD_CELLS, TRIAL, Per::Hold, 0);
@@ -118,17 +139,46 @@ impl<'a, 'r> Solve<'a, 'r> {
             self.list();
             self.assemble(MATRIX);
             self.run(pass::BEGIN_SOLVE, MATRIX, Per::Member, 0);
-            self.list();
-            self.conjugate_gradients(0);
+            self.relist();
+            self.conjugate_gradients(0, if round < EARLY { ROUND } else { LATE_ROUND });
         }
         self.run(pass::FINISH_STEP, ALL, Per::Node, 0);
         self.run(pass::CHECK_STATE, ALL, Per::Member, 0);
     }
 
-    fn conjugate_gradients(&mut self, exact: u32) {
-        for _ in 0..self.world.geometry.chunks() {
-            self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
-            self.list();
+    /// Solves of all members that want one. Where many workgroups share a solve at most `budget` iterations of it: the rest comes
+    /// in the next round.
+    fn conjugate_gradients(&mut self, exact: u32, budget: u32) {
+        if !self.world.many {
+            for _ in 0..self.world.geometry.chunks() {
+                self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
+                self.relist();
+            }
+            return;
+        }
+        for block in 1..=budget.div_ceil(BLOCK) {
+            for i in 0..BLOCK {
+                self.run(pass::TURN_CG, SOLVE, Per::Wide, i % 2);
+                let width = self.multiply(self.world.product, i % 2);
+                self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, i % 2 + width);
+            }
+            self.run(pass::CLOSE_CG, SOLVE, Per::Member, 4 * exact);
+            if block % GATED == 0 { self.list() } else { self.relist() }
+        }
+    }
+
+    /// A times `cg_along` → `cg_image`; returns how the parts of pᵀ A p lie, for `advance_cg`.
+    pub(crate) fn multiply(&mut self, product: Product, parity: u32) -> u32 {
+        match product {
+            Product::Matrix => {
+                self.run(pass::MULTIPLY_ROWS, SOLVE, Per::Row, parity);
+                0
+            }
+            Product::Free => {
+                self.run(pass::MULTIPLY_CELLS, SOLVE, Per::Cell, parity);
+                self.run(pass::GATHER_PRODUCT, SOLVE, Per::Wide, parity);
+                2
+            }
         }
     }
 
@@ -145,6 +195,6 @@ impl<'a, 'r> Solve<'a, 'r> {
     pub(crate) fn solve(&mut self) {
         self.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
         self.list();
-        self.conjugate_gradients(1);
+        self.conjugate_gradients(1, self.world.geometry.shape.most);
     }
 }

@@ -8,6 +8,7 @@ use crate::members::Batch;
 use crate::memory::Maker as _;
 use crate::observe::Observer;
 use crate::recorder::{Groups, PassTime, Recorder};
+use crate::tuning::{self, Product, Tuning};
 use palpate_engine::ParamBatch;
 use palpate_model::plan::Plan;
 use std::cell::RefCell;
@@ -35,13 +36,16 @@ pub struct World {
     /// Time on the device per pass, when asked for.
     pub(crate) times: RefCell<HashMap<&'static str, PassTime>>,
     pub(crate) timed: bool,
+    /// True when many workgroups share the solve of a member.
+    pub(crate) many: bool,
+    pub(crate) product: Product,
 }
 
 /// One work buffer: name, items per member as a function of the shape, bytes per item.
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 21] = [
+const WORK: [Work; 23] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -62,34 +66,40 @@ const WORK: [Work; 21] = [
     ("old_turn", |s| s.cells, VECTOR),
     ("touches", |s| 3 * s.patches, VECTOR),
     ("hold_forces", |s| 8 * s.holds, VECTOR),
+    ("cg_scalars", |_| 4, VECTOR),
+    ("cg_parts", |s| 2 * s.nodes.div_ceil(32), 4),
     ("newton", |_| 1, size_of::<Newton>() as u64),
 ];
 
 /// Sections of the roster, and kinds of items, of `list_members`.
 pub(crate) const SECTIONS: usize = 4;
-pub(crate) const KINDS: usize = 6;
+pub(crate) const KINDS: usize = 8;
 
 /// Work buffers of a batch, with their bytes.
 pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
     let own = WORK.iter().map(|(name, items, bytes)| (*name, u64::from(items(shape)) * bytes * members as u64));
-    let shared = [
+    let shared: [(&'static str, u64); 5] = [
         ("shape", size_of::<Shape>() as u64),
         ("roster", 4 * (SECTIONS * (members + 1)) as u64),
         ("arguments", 12 * (SECTIONS * KINDS) as u64),
+        ("gate", 12),
+        // Where listings that may not change `gate` write instead.
+        ("no_gate", 12),
     ];
     own.chain(shared).collect()
 }
 
 impl World {
-    pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize) -> Result<World, GpuError> {
+    pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
         let mut buffers = Buffers::new();
         let capacity = members.max(1);
-        let geometry = Geometry::new(&*gpu, plan, capacity, &mut buffers)?;
+        let many = plan.body.nodes.len() >= tuning.many_from;
+        let geometry = Geometry::new(&*gpu, plan, capacity, many, &mut buffers)?;
         for (name, bytes) in work(&geometry.shape, capacity) {
             buffers.insert(name, gpu.buffer(name, bytes)?);
         }
         let observer = Observer::new(&gpu, plan, capacity)?;
-        Ok(World {
+        let mut world = World {
             gpu,
             plan: plan.clone(),
             geometry,
@@ -101,7 +111,13 @@ impl World {
             groups: RefCell::default(),
             times: RefCell::default(),
             timed: false,
-        })
+            many,
+            product: tuning.product.unwrap_or(Product::Matrix),
+        };
+        if many && tuning.product.is_none() {
+            world.product = tuning::faster(&mut world)?;
+        }
+        Ok(world)
     }
 
     /// Members of the current batch.

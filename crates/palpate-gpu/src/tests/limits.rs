@@ -7,6 +7,7 @@ use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Recorder, Size};
+use crate::tuning::Tuning;
 use crate::world::{KINDS, SECTIONS, World};
 use crate::{GpuBackend, device::Gpu};
 use palpate_engine::{Backend, Evaluate, FailureKind, ParamBatch, Request, Rollout};
@@ -20,7 +21,7 @@ fn a_batch_beyond_a_buffer_names_limit_and_size() {
     let available = gpu.device.limits().max_storage_buffer_binding_size;
     // A matrix has at least one number for each node: this many members need more than one binding.
     let members = (available / (36 * plan.body.nodes.len() as u64) + 1) as usize;
-    match World::new(gpu.clone(), &plan, members) {
+    match World::new(gpu.clone(), &plan, members, Tuning::default()) {
         Err(GpuError::Limit { needed, available, .. }) => assert!(needed > available),
         other => panic!("{:?}", other.map(|w| w.bytes())),
     }
@@ -33,7 +34,7 @@ fn a_body_beyond_a_binding_names_limit_and_size() {
     let Some(mut gpu) = own_device() else { return };
     let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
     own.largest = 20_000;
-    let e = World::new(gpu, &plan(&ball(0.02)), 1).map(|w| w.bytes()).unwrap_err();
+    let e = World::new(gpu, &plan(&ball(0.02)), 1, Tuning::default()).map(|w| w.bytes()).unwrap_err();
     let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
     assert_eq!((*limit, *available), ("max_storage_buffer_binding_size", 20_000));
     assert!(*needed > 20_000 && what.contains('`'), "{e}");
@@ -57,31 +58,14 @@ fn evaluate(rollout: &mut Rollout<GpuBackend>, theta: &[f64]) -> palpate_engine:
 }
 
 #[test]
-fn a_lost_device_is_an_error_and_stays_one() {
-    let Some(gpu) = own_device() else { return };
-    let mut scene = ball(0.05);
-    scene.time.steps = 2;
-    let plan = plan(&scene);
-    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(evaluate(&mut rollout, &plan.theta).failure, None);
-    gpu.device.destroy();
-    for _ in 0..2 {
-        let failed = evaluate(&mut rollout, &plan.theta);
-        let failure = failed.failure.unwrap_or_else(|| panic!("a lost device gave cost {}", failed.cost));
-        assert_eq!(failure.kind, FailureKind::Device);
-        assert!(failed.cost.is_infinite() && failure.detail.contains("hint"), "{}", failure.detail);
-    }
-    assert!(GpuBackend::on(gpu).build(&plan, 1).is_err());
-}
-
-#[test]
-fn memory_that_runs_out_fails_one_evaluation_with_a_way_out() {
+fn memory_that_runs_out_and_a_lost_device_are_errors_with_a_way_out() {
     let Some(gpu) = own_device() else { return };
     let mut scene = ball(0.05);
     scene.time.steps = 2;
     let plan = plan(&scene);
     let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
     let well = evaluate(&mut rollout, &plan.theta);
+    assert_eq!(well.failure, None);
     // What wgpu reports of a buffer that no driver could make comes from here.
     let source: Box<dyn std::error::Error + Send + Sync> = "a buffer of a tape".into();
     gpu.keep(crate::device::translate(wgpu::Error::OutOfMemory { source }));
@@ -91,6 +75,16 @@ fn memory_that_runs_out_fails_one_evaluation_with_a_way_out() {
     assert!(failure.detail.contains("out of memory") && failure.detail.contains("smaller batch"), "{}", failure.detail);
     // Memory may be there again: the next evaluation is none the worse.
     assert_eq!(evaluate(&mut rollout, &plan.theta), well);
+
+    // A lost device stays lost.
+    gpu.device.destroy();
+    for _ in 0..2 {
+        let failed = evaluate(&mut rollout, &plan.theta);
+        let failure = failed.failure.unwrap_or_else(|| panic!("a lost device gave cost {}", failed.cost));
+        assert_eq!(failure.kind, FailureKind::Device);
+        assert!(failed.cost.is_infinite() && failure.detail.contains("hint"), "{}", failure.detail);
+    }
+    assert!(GpuBackend::on(gpu).build(&plan, 1).is_err());
 }
 
 /// Members that `list_members` counts as wanting a trial, of so many.
@@ -103,6 +97,7 @@ fn listed(gpu: &Gpu, members: usize) -> u32 {
         ("shape", gpu.upload("shape", &[shape]).unwrap_or_else(fail)),
         ("roster", gpu.buffer("roster", size).unwrap_or_else(fail)),
         ("arguments", gpu.buffer("arguments", (12 * SECTIONS * KINDS) as u64).unwrap_or_else(fail)),
+        ("gate", gpu.buffer("gate", 12).unwrap_or_else(fail)),
         ("newton", gpu.upload("newton", &newton).unwrap_or_else(fail)),
         ("health", gpu.upload("health", &vec![Health::default(); members]).unwrap_or_else(fail)),
     ];
@@ -126,7 +121,7 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
 #[test]
 fn more_members_than_an_invocation_may_visit_are_refused() {
     let Some(gpu) = own_device() else { return };
-    let e = World::new(gpu, &plan(&ball(0.05)), LOOPS as usize).map(|w| w.bytes()).unwrap_err();
+    let e = World::new(gpu, &plan(&ball(0.05)), LOOPS as usize, Tuning::default()).map(|w| w.bytes()).unwrap_err();
     let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
     assert!(limit.contains("loop iterations") && needed > available && what.contains("list_members"), "{e}");
 }

@@ -7,5 +7,6 @@ mod forward;
 mod limits;
 mod loops;
 mod memory;
+mod products;
 pub(crate) mod scenes;
 mod sizes;

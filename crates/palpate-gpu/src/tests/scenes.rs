@@ -9,10 +9,21 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::build_plan;
 use palpate_model::scene::*;
-use std::sync::{Arc, OnceLock};
+use std::cell::RefCell;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// What opening a device gave; `None` with a printed word where there is none and none is required (`PALPATE_GPU=require`).
+///
+/// From then on the test has all devices to itself until its thread ends: with lavapipe, threads that submit at the same time have
+/// been seen to change each other's last bits, and tests here compare bits.
 fn opened(result: Result<Arc<Gpu>, GpuError>) -> Option<Arc<Gpu>> {
+    static TURN: Mutex<()> = Mutex::new(());
+    thread_local! {
+        static ALONE: RefCell<Option<MutexGuard<'static, ()>>> = const { RefCell::new(None) };
+    }
+    ALONE.with_borrow_mut(|own| {
+        own.get_or_insert_with(|| TURN.lock().unwrap_or_else(PoisonError::into_inner));
+    });
     match result {
         Ok(gpu) => Some(gpu),
         Err(e) => {

@@ -1,0 +1,145 @@
+//! Conjugate gradients by many workgroups, with a matrix and without, against one workgroup's and against the CPU.
+
+use super::forward::{CLOSE, off, states};
+use super::scenes::{ball, device, held, plan, spread};
+use crate::observe::rollout_tests::{differences, seen, watched};
+use crate::pipelines::pass;
+use crate::solve::{ALL, Per, Solve};
+use crate::world::World;
+use crate::{GpuBackend, Product, Tuning};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use palpate_model::scene::{Plane, Scene};
+
+const BOTH: [Product; 2] = [Product::Matrix, Product::Free];
+
+fn many(product: Product) -> Tuning {
+    Tuning { many_from: 0, product: Some(product) }
+}
+
+/// Everything at once: a clamp, two planes that press, a point mass, a ghost penalty.
+fn crowded() -> Scene {
+    let mut scene = held(0.03);
+    scene.solver.ghost = 0.5;
+    scene.planes[0].point.z = 0.004;
+    scene.planes.push(Plane { point: glam::DVec3::new(-0.04, 0.0, 0.0), normal: glam::DVec3::X, stiffness: Some(1e6) });
+    scene.time.steps = 2;
+    scene
+}
+
+/// A p of every node, by a product, with p what the preconditioner makes of a wave; after one step with these parameters.
+fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product: Product) -> Vec<f64> {
+    backend.set_params(world, &ParamBatch::from_rows(theta));
+    let mut tally = backend.new_tally(world, &[]);
+    let (mut now, mut next) = (backend.new_state(world), backend.new_state(world));
+    backend.start(world, &mut now, &mut tally);
+    backend.step(world, 0, &now, &mut next, &mut tally);
+    let count = world.plan.body.nodes.len() * world.members();
+    let wave: Vec<[f32; 4]> =
+        (0..count).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), (3.0 * i as f32).sin(), 0.0]).collect();
+    world.gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));
+    let world = &*world;
+    world.record(|r| {
+        let mut s = Solve::new(world, r, Some(0), &now, &next, &tally);
+        s.linearise();
+        s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        s.list();
+        s.multiply(product, 0);
+    });
+    let image: Vec<[f32; 4]> = world.gpu.download(&world.buffers["cg_image"], count).unwrap_or_else(|e| panic!("{e}"));
+    image.iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+}
+
+/// Difference of two vectors over the size of the second.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied())
+}
+
+#[test]
+fn products_with_and_without_a_matrix_agree_and_one_percent_shows() {
+    let Some(gpu) = device(None) else { return };
+    let backend = GpuBackend::on(gpu).tuned(many(Product::Matrix));
+    let plan = plan(&crowded());
+    let theta = spread(&plan, 2);
+    let mut world = backend.build(&plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let right = product(&backend, &mut world, &theta, Product::Matrix);
+    assert!(right.iter().all(|x| x.is_finite()) && right.iter().any(|x| *x != 0.0));
+    let free = product(&backend, &mut world, &theta, Product::Free);
+    // Sums of some hundred terms of both signs in another order: 1e-6 of their size.
+    let d = apart(&free, &right);
+    println!("products differ by {d:.1e}");
+    assert!(d < 1e-5, "{d:.1e}");
+    for key in 0..plan.layout.len() {
+        let name = plan.layout.keys[key].spec().path;
+        // What enters the matrix.
+        if ["material.youngs_modulus", "material.density", "material.stiffness_damping"].contains(&name.as_str()) {
+            let mut wrong = theta.clone();
+            wrong.iter_mut().for_each(|row| row[key] *= 1.01);
+            let d = apart(&product(&backend, &mut world, &wrong, Product::Free), &right);
+            assert!(d > 1e-4, "1 % of {name} makes {d:.1e}");
+        }
+    }
+}
+
+#[test]
+fn steps_by_many_workgroups_are_as_close_to_the_cpu_as_those_by_one() {
+    let Some(gpu) = device(None) else { return };
+    for scene in [ball(0.03), crowded()] {
+        let plan = plan(&scene);
+        let theta = spread(&plan, 2);
+        let exact = states(&CpuBackend, &plan, &theta).0;
+        let worst = |tuning: Tuning| {
+            let backend = GpuBackend::on(gpu.clone()).tuned(tuning);
+            let (found, evaluations) = states(&backend, &plan, &theta);
+            assert!(evaluations.iter().all(|e| e.failure.is_none()), "{tuning:?}: {:?}", evaluations[0].failure);
+            assert!(found == states(&backend, &plan, &theta).0, "{tuning:?}: two runs differ");
+            found
+                .iter()
+                .flatten()
+                .zip(exact.iter().flatten())
+                .fold([0.0f64; 2], |w, (a, b)| [w[0].max(off(&a.0, &b.0)), w[1].max(off(&a.1, &b.1))])
+        };
+        let one = worst(Tuning { many_from: usize::MAX, product: None });
+        for product in BOTH {
+            let d = worst(many(product));
+            println!("{product:?}: {d:?}, one workgroup {one:?}");
+            // Both end at Newton's accuracy; where in it is chance.
+            assert!(d[0] < CLOSE[0].max(3.0 * one[0]) && d[1] < CLOSE[1].max(3.0 * one[1]), "{product:?}: {d:?}, one: {one:?}");
+            // In no case more than a thirtieth of what a percent of stiffness makes (3e-4 m, 9e-3 m/s in `faults`).
+            assert!(d[0] < 2e-6 && d[1] < 3e-4, "{product:?}: {d:?}");
+        }
+    }
+}
+
+#[test]
+fn gradients_by_many_workgroups_agree_with_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = ball(0.03);
+    scene.time.steps = 3;
+    scene.observation = watched();
+    let plan = seen(&scene);
+    let request = Request { gradient: true, sensitivities: vec![0, 1, 2] };
+    let rows = ParamBatch::from_rows(&spread(&plan, 2)[1..]);
+    let mut cpu = Rollout::new(CpuBackend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let right = cpu.evaluate(&rows, &request).remove(0);
+    for product in BOTH {
+        let backend = GpuBackend::on(gpu.clone()).tuned(many(product));
+        let mut rollout = Rollout::new(backend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+        let found = rollout.evaluate(&rows, &request).remove(0);
+        let off = differences(&found, &right, &request.sensitivities);
+        assert!(off.is_empty(), "{product:?}: {off:?}");
+    }
+}
+
+#[test]
+fn a_measurement_chooses_the_same_product_twice() {
+    let Some(gpu) = device(None) else { return };
+    let plan = plan(&ball(0.03));
+    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: None });
+    let [a, b] = [0, 1].map(|_| backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}")).product);
+    assert_eq!(a, b);
+    let world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let small = GpuBackend::on(world.gpu.clone()).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    assert!(world.many && !small.many);
+}

@@ -1,0 +1,23 @@
+//! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next.
+// use shared/grid
+// use shared/totals
+// use shared/iteration
+// use shared/leave_cg
+
+@compute @workgroup_size(256)
+fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+            @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, 0u, 1u, 1u);
+    if !p.runs {
+        return;
+    }
+    var n = newton[p.member];
+    let s = cg_scalars[4u * p.member + 1u];
+    let bad = cg_scalars[4u * p.member + 3u].x;
+    let rz = sum_parts(local, p.member, 1u, WIDE);
+    let negative = s.z == 2.0 || (s.z == 0.0 && bad != 0.0);
+    let ended = !negative && (s.z == 1.0 || !(sqrt(max(rz, 0.0)) > n.goal) || s.y >= f32(shape.most));
+    n.rz = rz;
+    n.cg = u32(s.y);
+    leave_cg(local, p.member, n, negative, ended, (call.extra & 4u) != 0u);
+}

@@ -1,0 +1,79 @@
+//! Elastic part of q = A p without a matrix: every cell applies R (s K + …) Rᵀ of its class (see tangent_cells), its clamps and its
+//! patches to its corners, for gather_product.
+// use shared/cells
+
+var<storage, read> tangents: array<vec4<f32>>;
+var<storage, read> patches: array<Patch>;
+var<storage, read> touches: array<vec4<f32>>;
+var<storage, read> holds: array<vec2<u32>>;
+var<storage, read> hold_elements: array<f32>;
+var<storage, read> poses: array<ClampPose>;
+var<storage, read> cg_scalars: array<vec4<f32>>;
+var<storage, read> cg_along: array<vec4<f32>>;
+var<storage, read_write> cell_force: array<vec4<f32>>;
+
+fn three(at: u32) -> mat3x3<f32> {
+    return mat3x3(tangents[at].xyz, tangents[at + 1u].xyz, tangents[at + 2u].xyz);
+}
+
+fn hold_block(start: u32, i: u32, j: u32) -> mat3x3<f32> {
+    let a = start + 72u * j + 3u * i;
+    return mat3x3(
+        vec3(hold_elements[a], hold_elements[a + 1u], hold_elements[a + 2u]),
+        vec3(hold_elements[a + 24u], hold_elements[a + 25u], hold_elements[a + 26u]),
+        vec3(hold_elements[a + 48u], hold_elements[a + 49u], hold_elements[a + 50u]),
+    );
+}
+
+@compute @workgroup_size(64)
+fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                  @builtin(local_invocation_index) local: u32) {
+    lanes_start(local);
+    let p = find_place(group, groups, local / 8u, shape.cells, 8u);
+    if !p.runs || cg_scalars[4u * p.member + (call.extra & 1u)].z != 0.0 {
+        return;
+    }
+    let e = min(p.item, shape.cells - 1u);
+    let corner = local % 8u;
+    let cell = cells[e];
+    let m = members[p.member];
+    let mix = mix_of(m);
+    let at = (p.member * shape.cells + e) * 30u;
+    let r = three(at);
+    let d = three(at + 6u + 3u * corner);
+    // R Ω_i = −R [b_i]× G⁻¹.
+    let omega = r * (cross_matrix(sign_of(corner) * (-0.25 / shape.h)) * three(at + 3u));
+    let x = cg_along[at_node(p.member, cell.nodes[corner])].xyz;
+    var y = (mix.on_new * m.young) * (r * stiff(matrix_at(m.slot, 0u, cell.kind), corner, transpose(r) * x));
+    let along_d = sum8(transpose(d) * x);
+    let along_omega = sum8(transpose(omega) * x);
+    y += omega * along_d + d * along_omega;
+    for (var k = cell.hold_start; k < cell.hold_end; k++) {
+        var instant = 0u;
+        if call.mode != 0u {
+            instant = call.step + 1u;
+        }
+        let turn = poses[(p.member * (shape.steps + 1u) + instant) * shape.clamps + holds[k].y].turn;
+        var f = vec3(0.0);
+        for (var j = 0u; j < 8u; j++) {
+            f += hold_block((m.slot * 2u * shape.holds + k) * 576u, corner, j)
+                * (transpose(turn) * cg_along[at_node(p.member, cell.nodes[j])].xyz);
+        }
+        y += (mix.fresh * m.young) * (turn * f);
+    }
+    if shape.planes != 0u {
+        for (var k = cell.patch_start; k < cell.patch_end; k++) {
+            var there = vec3(0.0);
+            for (var j = 0u; j < 8u; j++) {
+                there += patches[k].weights[j] * cg_along[at_node(p.member, cell.nodes[j])].xyz;
+            }
+            let s = 3u * (p.member * shape.patches + k);
+            let g = touches[s + 1u].xyz;
+            let o = touches[s + 2u].xyz;
+            y += patches[k].weights[corner] * (mat3x3(vec3(g.x, o.x, o.y), vec3(o.x, g.y, o.z), vec3(o.y, o.z, g.z)) * there);
+        }
+    }
+    if p.live {
+        cell_force[(p.member * shape.cells + e) * 8u + corner] = vec4(y, 0.0);
+    }
+}

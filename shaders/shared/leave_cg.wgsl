@@ -1,0 +1,47 @@
+//! Where a member goes from conjugate gradients: to the line search, to the convex tangent, to an error, or on with iterations.
+
+var<storage, read> residual: array<vec4<f32>>;
+var<storage, read_write> direction: array<vec4<f32>>;
+var<storage, read_write> newton: array<Newton>;
+var<storage, read_write> health: array<Health>;
+
+// What rounding may leave of a derivative's right-hand side when the iterations run out.
+const ACCEPTABLE = 1e-4;
+
+// `exact`: the solve is for a derivative; then a negative curvature is an error, and no line search follows.
+fn leave_cg(local: u32, member: u32, found: Newton, negative: bool, ended: bool, exact: bool) {
+    var n = found;
+    var broken = 0u;
+    if negative {
+        n.total += n.cg;
+        n.stage = WANTS_MATRIX;
+        if exact || n.convex == 1u {
+            broken = INDEFINITE;
+        }
+        n.convex = 1u;
+    }
+    if ended {
+        n.total += n.cg;
+        n.stage = select(WANTS_TRIAL, IDLE, exact);
+        n.length = 1.0;
+        let relative = sqrt(max(n.rz, 0.0)) / n.norm;
+        // A poor Newton direction is the line search's business.
+        let enough = select(0.5, ACCEPTABLE, exact);
+        if !(relative <= enough) {
+            broken = UNSOLVED;
+        }
+        var slope = vec4(0.0);
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(member, i);
+            slope.x += dot(residual[a].xyz, direction[a].xyz);
+        }
+        n.slope = total(local, slope).x;
+    }
+    if local == 0u {
+        if broken != 0u {
+            n.stage = IDLE;
+            health[member] = Health(broken, call.step + call.mode, vec2(sqrt(max(n.rz, 0.0)) / n.norm, f32(n.cg)));
+        }
+        newton[member] = n;
+    }
+}
