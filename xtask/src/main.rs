@@ -32,6 +32,12 @@ enum Verb {
         /// Only bodies whose name begins so, e.g. dragon or "ball 30k"; nothing is written
         #[arg(long, value_name = "NAME")]
         only: Option<String>,
+        /// The GPU backend beside the CPU's, in batches, with times per pass
+        #[arg(long)]
+        gpu: bool,
+        /// With --gpu: the small bodies alone, for software adapters
+        #[arg(long, requires = "gpu")]
+        quick: bool,
         /// Only compare two results of earlier runs
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
@@ -89,6 +95,14 @@ fn run(verb: Verb) -> Result<(), String> {
             println!("\nwritten to {}", table::save(&name, &report)?.display());
         }
         Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
+        Verb::Bench { large, gpu: true, quick, only, .. } => {
+            let report = bench::gpu::all(large, quick, only.as_deref().unwrap_or(""))?;
+            report.print();
+            if only.is_none() {
+                let name = format!("bench-gpu{}-{}", if quick { "-quick" } else { "" }, report.date);
+                println!("\nwritten to {}", table::save(&name, &report)?.display());
+            }
+        }
         Verb::Bench { large, only: Some(name), .. } => bench::all(large, &name)?.print(),
         Verb::Bench { large, only: None, .. } => {
             let report = bench::all(large, "")?;

@@ -1,5 +1,6 @@
 //! Time and memory of one step, forward and back, of the CPU backend: the paper's dragon, and balls and blocks of growing size.
 
+pub mod gpu;
 pub mod report;
 
 use crate::table;
@@ -24,16 +25,17 @@ const BIG: usize = 20_000;
 /// Points of a frame, about what a 50 × 50 camera sees of a body.
 const POINTS: usize = 1000;
 /// Width of the band in cells, as for the paper's dragon.
-const BAND: f64 = 4.0;
+pub(super) const BAND: f64 = 4.0;
 /// The paper's table 2 for the dragon: forward, cost, adjoint of one step [ms].
-const PAPER_DRAGON: [f64; 3] = [318.0, 172.0, 462.0];
+pub(super) const PAPER_DRAGON: [f64; 3] = [318.0, 172.0, 462.0];
 
 /// Runs everything whose name begins with `only`; `large` adds a body of 100 000 nodes.
 ///
 /// # Errors
 /// A body cannot be built.
 pub fn all(large: bool, only: &str) -> Result<Report, String> {
-    let mut report = Report { date: table::today(), threads: rayon::current_num_threads(), lines: Vec::new() };
+    let mut report =
+        Report { date: table::today(), threads: rayon::current_num_threads(), adapter: None, copy: None, lines: Vec::new() };
     let mut add = |line: Line| {
         println!("{}: {} nodes, forward {:.1} ms", line.name, line.nodes, 1e3 * line.forward.median);
         report.lines.push(line);
@@ -72,12 +74,12 @@ pub fn all(large: bool, only: &str) -> Result<Report, String> {
 /// Names of the sizes.
 const SIZES: [&str; 5] = ["1k", "3k", "10k", "30k", "100k"];
 
-fn placed(body: Analytic) -> Placed {
+pub(super) fn placed(body: Analytic) -> Placed {
     Placed::new(body, DAffine3::IDENTITY)
 }
 
 /// Folder of the recordings: `PALPATE_DATA`, or `shared/data` beside the workspace.
-fn data() -> Option<std::path::PathBuf> {
+pub(super) fn data() -> Option<std::path::PathBuf> {
     let folder = std::env::var_os("PALPATE_DATA").map_or_else(|| table::root().join("../shared/data"), Into::into);
     folder.is_dir().then_some(folder)
 }
@@ -90,7 +92,7 @@ fn resident() -> usize {
 }
 
 /// A body that is dropped from just above the ground and watched in every step.
-fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
+pub(super) fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
     let layout = Layout::new(1, 0, &[]);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
@@ -138,7 +140,7 @@ fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
 }
 
 /// Blocks of the stiffness matrix: pairs of nodes that share a cell or a ghost line.
-fn blocks(body: &Body) -> usize {
+pub(super) fn blocks(body: &Body) -> usize {
     let mut pairs = BTreeSet::new();
     let mut add = |nodes: &[u32]| nodes.iter().for_each(|a| pairs.extend(nodes.iter().map(|b| (*a, *b))));
     body.cells.iter().for_each(|c| add(&c.nodes));
@@ -146,7 +148,7 @@ fn blocks(body: &Body) -> usize {
     pairs.len()
 }
 
-fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
+pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
     let before = resident();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
@@ -198,5 +200,6 @@ fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_m
         matrix: 72 * blocks(body),
         resident,
         failure,
+        gpu: None,
     })
 }

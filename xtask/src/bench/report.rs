@@ -53,6 +53,9 @@ pub struct Line {
     pub resident: usize,
     /// Why it stopped, if it did.
     pub failure: Option<String>,
+    /// What only a graphics device has; its times are per member of a batch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gpu: Option<super::gpu::Device>,
 }
 
 /// A run.
@@ -62,6 +65,12 @@ pub struct Report {
     pub date: String,
     /// Threads.
     pub threads: usize,
+    /// Graphics adapter, if one took part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
+    /// Its measured bandwidth of copies [bytes/s].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copy: Option<f64>,
     /// Bodies.
     pub lines: Vec<Line>,
 }
@@ -105,6 +114,9 @@ impl Report {
                     ratio(p[1], &l.cost),
                     ratio(p[2], &l.adjoint)
                 );
+            }
+            if let Some(g) = &l.gpu {
+                g.print(&l.name, self.copy);
             }
             if let Some(f) = &l.failure {
                 println!("  {}: {f}", l.name);

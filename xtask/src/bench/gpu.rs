@@ -1,0 +1,215 @@
+//! Time of a step of the GPU backend beside the CPU's: batches, passes by the device's own clock, traffic of conjugate gradients.
+
+use super::report::{Line, Report, Times};
+use super::{BAND, PAPER_DRAGON, blocks, data, one, placed, plan};
+use crate::table;
+use glam::DVec3;
+use palpate_engine::{Backend, ParamBatch};
+use palpate_gpu::{Choice, Gpu, GpuBackend, World};
+use palpate_model::body::{Body, SUBDIVISIONS};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::{Analytic, RotationUpdate};
+use palpate_model::shape::Shape;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Simulations that run together.
+const BATCHES: [usize; 3] = [1, 8, 64];
+/// Steps that are timed.
+const STEPS: usize = 4;
+/// Passes that are printed.
+const SHOWN: usize = 8;
+
+/// What only a graphics device has.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Device {
+    /// Simulations that ran together.
+    pub batch: usize,
+    /// Times faster than the CPU's step: forward, cost, adjoint; of one member.
+    pub over_cpu: [f64; 3],
+    /// How conjugate gradients multiply, and with how many workgroups a member.
+    pub product: String,
+    /// Time of one such product of the whole batch [s].
+    pub product_seconds: f64,
+    /// What it moves [bytes].
+    pub product_bytes: f64,
+    /// Passes of one step forward and back: name, dispatches, milliseconds on the device; the longest first.
+    pub passes: Vec<(String, u64, f64)>,
+}
+
+impl Device {
+    /// Prints what the table has no room for.
+    pub fn print(&self, name: &str, copy: Option<f64>) {
+        let gigabytes = self.product_bytes / self.product_seconds.max(1e-12) / 1e9;
+        let part = copy.map_or_else(String::new, |c| format!(" = {:.0} % of a copy", 1e11 * gigabytes / c));
+        let [f, c, a] = self.over_cpu.map(|x| format!("{x:.2}"));
+        println!("  {name}: times faster than the CPU: forward {f}, cost {c}, adjoint {a}");
+        println!(
+            "    CG ({}): {:.2} MB an iteration in {:.3} ms, {gigabytes:.1} GB/s{part}",
+            self.product,
+            self.product_bytes / 1e6,
+            1e3 * self.product_seconds
+        );
+        let shown: Vec<String> = self.passes.iter().take(SHOWN).map(|(p, n, ms)| format!("{p} {ms:.2} ({n}×)")).collect();
+        if !shown.is_empty() {
+            println!("    passes of a step and its adjoint [ms]: {}", shown.join(", "));
+        }
+    }
+}
+
+/// A body by name, with the edge of its cells and its Young's modulus.
+struct Subject {
+    name: &'static str,
+    shape: Box<dyn Shape>,
+    h: f64,
+    dragon: bool,
+}
+
+fn subjects(large: bool, quick: bool) -> Result<Vec<Subject>, String> {
+    let center = DVec3::new(0.001, 0.002, 0.103);
+    let torus = Analytic::Torus { major: 0.08, minor: 0.03, center, axis: DVec3::Z };
+    let ball = Analytic::Ball { radius: 0.1, center };
+    let of = |name, body, across: f64| Subject { name, shape: Box::new(placed(body)), h: 0.2 / across, dragon: false };
+    let mut all = vec![of("torus", torus, if quick { 9.0 } else { 14.0 }), of("ball", ball.clone(), 6.0)];
+    if !quick {
+        if let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
+            let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
+            all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, dragon: true });
+        } else {
+            println!("no dragon: set PALPATE_DATA to the folder of recordings");
+        }
+        all.extend([of("ball 1k", ball.clone(), 10.0), of("ball 10k", ball.clone(), 24.0)]);
+        if large {
+            all.extend([of("ball 30k", ball.clone(), 36.0), of("ball 100k", ball, 55.0)]);
+        }
+    }
+    Ok(all)
+}
+
+/// Every body whose name begins with `only`, on the CPU and in batches on the device.
+///
+/// # Errors
+/// There is no device, or a body cannot be built.
+pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
+    let gpu = Gpu::open(&Choice::from_env()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
+    let copy = gpu.copy_bandwidth().map_err(|e| e.to_string())?;
+    println!("{}: copies {:.1} GB/s", gpu.name, copy / 1e9);
+    let mut report = Report {
+        date: table::today(),
+        threads: rayon::current_num_threads(),
+        adapter: Some(gpu.name.clone()),
+        copy: Some(copy),
+        lines: Vec::new(),
+    };
+    for s in subjects(large, quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
+        let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, 5e4)?;
+        cpu.paper = s.dragon.then(|| PAPER_DRAGON.map(|ms| 1e-3 * ms));
+        println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
+        let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
+        let mut plan = plan(body, RotationUpdate::Converged, 5e4);
+        plan.clock.steps = plan.clock.steps.min(STEPS);
+        report.lines.push(cpu.clone());
+        for batch in BATCHES.into_iter().filter(|b| !quick || *b < 64) {
+            match on_device(&gpu, &plan, batch, &cpu) {
+                Ok(line) => {
+                    println!("  {}: forward {:.2} ms a member", line.name, 1e3 * line.forward.median);
+                    report.lines.push(line);
+                }
+                // Too large for the device is an answer as well.
+                Err(e) => println!("  {} × {batch}: {e}", s.name),
+            }
+        }
+    }
+    Ok(report)
+}
+
+/// Seconds of forward, cost and adjoint of every step, and bytes of the device.
+struct Run {
+    seconds: [Vec<f64>; 3],
+    failure: Option<String>,
+}
+
+fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, String> {
+    let wait = || backend.gpu().wait().map_err(|e| e.to_string());
+    let mut seconds = [Vec::new(), Vec::new(), Vec::new()];
+    let mut tally = backend.new_tally(world, &[]);
+    let mut tape = vec![backend.new_state(world)];
+    backend.start(world, &mut tape[0], &mut tally);
+    wait()?;
+    for k in 0..steps {
+        let mut next = backend.new_state(world);
+        let clock = Instant::now();
+        backend.step(world, k, &tape[k], &mut next, &mut tally);
+        wait()?;
+        seconds[0].push(clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        backend.observe(world, k, &tape[k], &next, &mut tally);
+        wait()?;
+        seconds[1].push(clock.elapsed().as_secs_f64());
+        tape.push(next);
+    }
+    let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
+    wait()?;
+    for k in (0..steps).rev() {
+        let clock = Instant::now();
+        backend.observe_adjoint(world, k, &tape[k], &tape[k + 1], &mut adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(world, k, &tape[k], &tape[k + 1], &adj, &mut adj_now, &mut tally);
+        wait()?;
+        seconds[2].push(clock.elapsed().as_secs_f64());
+        std::mem::swap(&mut adj, &mut adj_now);
+        backend.clear_adjoint(&mut adj_now);
+    }
+    let failure = backend.read(world, &tally).into_iter().find_map(|e| e.failure).map(|f| f.to_string());
+    Ok(Run { seconds, failure })
+}
+
+fn on_device(gpu: &Arc<Gpu>, plan: &Plan, batch: usize, cpu: &Line) -> Result<Line, String> {
+    let backend = GpuBackend::on(gpu.clone());
+    let before = gpu.made();
+    let clock = Instant::now();
+    let mut world = backend.build(plan, batch).map_err(|e| format!("{e} (hint: {})", e.hint))?;
+    let build = clock.elapsed().as_secs_f64();
+    // Members differ, as the starts of a fit do.
+    let at = plan.layout.index(ParamKey::YoungsModulus);
+    let rows: Vec<Vec<f64>> = (0..batch)
+        .map(|m| {
+            let mut row = plan.theta.clone();
+            row[at] *= 1.0 + 0.01 * m as f64;
+            row
+        })
+        .collect();
+    backend.set_params(&mut world, &ParamBatch::from_rows(&rows));
+    // Once with the clock of the passes, which also compiles them; then as fits run.
+    world.time_passes(true);
+    let steps = plan.clock.steps;
+    run(&backend, &mut world, 1)?;
+    let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
+    world.time_passes(false);
+    let run = run(&backend, &mut world, steps)?;
+    let speed = world.product_speed().map_err(|e| e.to_string())?;
+    let [forward, cost, adjoint] = run.seconds.map(|s| Times::of(s.into_iter().map(|x| x / batch as f64).collect()));
+    let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
+    Ok(Line {
+        name: format!("gpu {} × {batch}", cpu.name),
+        build,
+        forward,
+        cost,
+        adjoint,
+        tape: 48 * plan.body.nodes.len(),
+        matrix: 36 * blocks(&plan.body),
+        resident: (gpu.made() - before) as usize,
+        failure: run.failure,
+        gpu: Some(Device {
+            batch,
+            over_cpu: [ratio(&cpu.forward, &forward), ratio(&cpu.cost, &cost), ratio(&cpu.adjoint, &adjoint)],
+            product: format!("{:?}, {}", speed.product, if speed.many { "many workgroups" } else { "one workgroup" })
+                .to_lowercase(),
+            product_seconds: speed.seconds,
+            product_bytes: speed.bytes,
+            passes,
+        }),
+        ..cpu.clone()
+    })
+}
