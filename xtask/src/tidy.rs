@@ -17,7 +17,7 @@ const ARROWS: [(&str, &[&str]); 8] = [
     ("palpate-gpu", &["model", "engine"]),
     ("palpate-fit", &["model", "engine"]),
     ("palpate-diagnose", &["model", "engine"]),
-    ("palpate", &["model", "io", "engine", "cpu", "fit", "diagnose"]),
+    ("palpate", &["model", "io", "engine", "cpu", "gpu", "fit", "diagnose"]),
 ];
 
 /// Checks the workspace at `root`; one line per finding.
