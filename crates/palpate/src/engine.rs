@@ -69,6 +69,24 @@ fn may_have_processor() -> bool {
         || ["/dev/dri", "/dev/nvidia0", "/dev/kfd", "/dev/dxg"].iter().any(|f| std::path::Path::new(f).exists())
 }
 
+/// Held while the device works for one caller: two threads that submit to one device side by side were seen to get different last
+/// bits on a software adapter, and would only wait for each other on a real one.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// A rollout on the shared device that takes turns with others.
+struct InTurn(Rollout<GpuBackend>);
+
+impl Evaluate for InTurn {
+    fn parameters(&self) -> usize {
+        self.0.parameters()
+    }
+
+    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        self.0.evaluate(theta, request)
+    }
+}
+
 fn refused(e: &GpuError) -> Error {
     Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
 }
@@ -114,7 +132,10 @@ impl Backend {
         };
         let name = device.name();
         let cpu = time_step(CpuBackend, plan, members);
-        let gpu = time_step(device, plan, members);
+        let gpu = {
+            let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+            time_step(device, plan, members)
+        };
         let ms = |s: f64| format!("{:.2} ms", s * 1e3);
         match (cpu, gpu) {
             (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("a step takes {} on {name}, {} on the CPU", ms(g), ms(c))),
@@ -129,7 +150,11 @@ impl Backend {
     /// There is no usable adapter, or the backend refuses the plan.
     pub fn evaluator(self, plan: &Plan, members: usize) -> Result<Box<dyn Evaluate>, Error> {
         match self.resolve(plan, members).0 {
-            Backend::Gpu => Ok(Box::new(Rollout::new(gpu().map_err(|e| refused(&e))?, plan, members)?)),
+            Backend::Gpu => {
+                let device = gpu().map_err(|e| refused(&e))?;
+                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+                Ok(Box::new(InTurn(Rollout::new(device, plan, members)?)))
+            }
             _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?)),
         }
     }
@@ -146,7 +171,11 @@ impl Backend {
         visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
-            Backend::Gpu => Ok(Rollout::new(gpu().map_err(|e| refused(&e))?, plan, 1)?.visit(theta, visit)?),
+            Backend::Gpu => {
+                let device = gpu().map_err(|e| refused(&e))?;
+                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+                Ok(Rollout::new(device, plan, 1)?.visit(theta, visit)?)
+            }
             _ => Ok(Rollout::new(CpuBackend, plan, 1)?.visit(theta, visit)?),
         }
     }
