@@ -30,7 +30,7 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         (&["simulte", s], &["simulate"]),
         (&["simulate", "no-such.toml"], &["no-such.toml", "no such file"]),
         (&["simulate", arg(&typo)], &["typo.toml:11", "young_modulus", "youngs_modulus"]),
-        (&["simulate", s, "--backend", "gpu"], &["gpu", "only the cpu backend"]),
+        (&["simulate", s, "--backend", "tpu"], &["tpu", "--backend", "gpu"]),
         (&["simulate", s, "--format", "stl"], &["stl", "obj"]),
         (&["simulate", s, "--every", "0"], &["--every"]),
         (&["observe", s, "--out", o], &["--camera", "--markers"]),

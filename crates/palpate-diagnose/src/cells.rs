@@ -8,6 +8,8 @@ use glam::DVec3;
 use palpate_engine::Source;
 use std::collections::BTreeMap;
 
+/// Frames below which regions are made smaller.
+const FEW: usize = 6;
 /// Fewest matched points of a cell: fewer say nothing and come and go at silhouettes.
 const FEWEST: usize = 4;
 /// Points of a frame that a region should have on average.
@@ -107,7 +109,9 @@ impl Cells {
         let (sample, depth) = if points.is_empty() {
             (&others, 3)
         } else {
-            (&points, (points.len() as f64 / frames as f64 / PER_REGION).log2().floor().clamp(2.0, 5.0) as u32)
+            // Few instants leave only the body to be divided.
+            let finest = if frames < FEW { 8.0 } else { 5.0 };
+            (&points, (points.len() as f64 / frames as f64 / PER_REGION).log2().floor().clamp(2.0, finest) as u32)
         };
         let regions = Regions::new(sample, depth);
         let key = |r: &crate::laboratory::Reading| {
@@ -147,6 +151,11 @@ impl Cells {
         let floor = 0.1 * crate::linear::quantile(&mut cells.sd.clone(), 0.5);
         cells.sd.iter_mut().for_each(|s| *s = s.max(floor));
         cells
+    }
+
+    /// True when there are so few instants that candidates can hardly be told apart by linear estimates, and fits are cheap.
+    pub fn few_instants(&self) -> bool {
+        self.keys.iter().map(|k| (k.scene, k.frame)).collect::<std::collections::BTreeSet<_>>().len() < FEW
     }
 
     /// Number of cells m.

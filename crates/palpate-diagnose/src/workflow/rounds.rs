@@ -8,6 +8,11 @@ use crate::laboratory::{LabError, Model, Readings};
 use crate::linear::dot;
 use crate::score::f_tail;
 
+/// Share of the gap by which candidates may differ and still count as equal.
+const TIE: f64 = 0.003;
+/// Share of the gap that an effect with fewer parameters may leave open and still be preferred.
+const SIMPLER: f64 = 0.03;
+
 impl Session<'_> {
     /// One round: the accepted effect with its state, or the candidates that came closest.
     #[expect(clippy::type_complexity, reason = "one caller, which takes it apart at once")]
@@ -20,6 +25,7 @@ impl Session<'_> {
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
         let mut seen: Vec<usize> = Vec::new();
         let mut tries = Vec::new();
+        let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
         for v in &variants {
             let before = seen.iter().filter(|c| **c == v.candidate).count();
             seen.push(v.candidate);
@@ -29,7 +35,7 @@ impl Session<'_> {
             }
             // The best start of a candidate, and a second one where it acts at an unknown place.
             let starts = if v.amplitudes.iter().all(|a| *a) { 1 } else { 2 };
-            if before < starts && v.score.p_value * count < 0.05 && tries.len() < self.options.fits + self.options.fits / 2 {
+            if before < starts && v.score.p_value * count < 0.05 && tries.len() < fits + fits / 2 {
                 tries.push(v);
             }
         }
@@ -115,15 +121,15 @@ impl Session<'_> {
         let Some(best) = fitted.iter().position(passes) else {
             return Ok((None, fitted.iter().take(3).map(|f| self.found(f, false)).collect()));
         };
-        // Candidates that predict as well as the best, up to noise or up to 0.3 % of the gap.
-        let equal: Vec<usize> = (0..fitted.len())
-            .filter(|i| passes(&fitted[*i]))
-            .filter(|i| {
-                let (by, z) = worse_by(&self.cells, &fitted[best].state.predicted[0], &fitted[*i].state.predicted[0]);
-                z < 2.0 || by < 0.003 * whole
-            })
-            .collect();
-        let winner = equal.iter().copied().min_by_key(|i| (fitted[*i].freedom, *i)).unwrap_or(best);
+        // Candidates that predict as well as the best, up to noise or up to a share of the gap.
+        let near = |i: usize, share: f64| {
+            let (by, z) = worse_by(&self.cells, &fitted[best].state.predicted[0], &fitted[i].state.predicted[0]);
+            passes(&fitted[i]) && (z < 2.0 || by < share * whole)
+        };
+        let equal: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, TIE)).collect();
+        // The simplest explanation wins unless it is clearly worse: a freer one also fits what no model gets right.
+        let simplest = (0..fitted.len()).filter(|i| near(*i, SIMPLER)).min_by_key(|i| (fitted[*i].freedom, *i));
+        let winner = simplest.unwrap_or(best);
         let mut found = self.found(&fitted[winner], true);
         for &other in equal.iter().filter(|i| **i != winner) {
             let change = fitted[other].state.model.changes.last();
