@@ -1,34 +1,9 @@
 //! Diagnosis from end to end: recordings made on another grid with another step, and a model that lacks one thing, or nothing.
 
+use crate::cli::BLOCK;
 use serde_json::Value;
 use std::fs;
 use support::command::{arg, json, succeed};
-
-/// A soft block on a clamp, pushed sideways at the start: small enough for a diagnosis in seconds.
-const BLOCK: &str = r#"
-format = "scene/1"
-title = "Pushed block"
-
-[object]
-shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
-cell_size = 0.02
-
-[material]
-density = 1000.0
-youngs_modulus = 2.0e4
-poisson_ratio = 0.4
-mass_damping = 1.0
-
-[[clamp]]
-box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
-
-[initial]
-velocity = [0.6, 0.0, 0.0]
-
-[time]
-step = 0.01
-steps = 16
-"#;
 
 const SEEN: &str = r#"
 [observation]

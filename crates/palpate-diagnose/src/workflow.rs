@@ -115,7 +115,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         tried: Vec::new(),
         not_tried: Vec::new(),
     };
-    let mut state = s.state(baseline.clone(), readings, None)?;
+    let mut state = s.state(baseline.clone(), readings, None, None)?;
     s.correlate(&mut state)?;
     let first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress::default();
@@ -170,8 +170,15 @@ fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
 }
 
 impl Session<'_> {
-    /// Everything known about a model; discretisation errors of another model are taken over where given.
-    fn state(&mut self, model: Model, readings: Readings, fields: Option<Vec<Field>>) -> Result<State, LabError> {
+    /// Everything known about a model; discretisation errors of another model are taken over where given, and so are its means of
+    /// cells that this one lost.
+    fn state(
+        &mut self,
+        model: Model,
+        readings: Readings,
+        fields: Option<Vec<Field>>,
+        fallback: Option<&Table>,
+    ) -> Result<State, LabError> {
         let fields = match fields {
             Some(f) => f,
             None => {
@@ -183,7 +190,7 @@ impl Session<'_> {
                 }
             }
         };
-        let table = self.cells.table(&readings, None);
+        let table = self.cells.table(&readings, fallback);
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
         Ok(State { model, readings, table, fields, frame, predicted })
@@ -195,6 +202,13 @@ impl Session<'_> {
 
     fn predict(&self, readings: &Readings, table: &Table, frame: &Frame) -> Vec<Predicted> {
         self.folds.iter().map(|f| predict(&self.cells, readings, table, &frame.fields, f)).collect()
+    }
+
+    /// Brings a state up to date after the size of the noise changed.
+    fn remeasure(&self, state: &mut State) {
+        state.table = self.cells.table(&state.readings, None);
+        state.frame = self.frame(&state.table, &state.fields);
+        state.predicted = self.predict(&state.readings, &state.table, &state.frame);
     }
 
     /// Finds how much more cells scatter than independent readings would, and rescales everything by it.
@@ -213,9 +227,7 @@ impl Session<'_> {
         let (factor, noise) = design_effect(&self.cells, &y, |i| saturated.leverage(i));
         (self.design_effect, self.noise) = (factor, noise);
         self.cells.sd.iter_mut().for_each(|s| *s *= factor.sqrt());
-        state.table = self.cells.table(&state.readings, None);
-        state.frame = self.frame(&state.table, &state.fields);
-        state.predicted = self.predict(&state.readings, &state.table, &state.frame);
+        self.remeasure(state);
         // Columns are in units of the noise, which has just become larger.
         let mut variants = variants;
         for v in &mut variants {
@@ -235,18 +247,14 @@ impl Session<'_> {
             *sd *= if k.sensor < 1000 { ratio / self.noise_ratio } else { 1.0 } / old;
         }
         self.noise_ratio = ratio;
-        state.table = self.cells.table(&state.readings, None);
-        state.frame = self.frame(&state.table, &state.fields);
-        let y = state.frame.left();
-        let (factor, noise) = design_effect(&self.cells, &y, |i| state.frame.absorbed.leverage(i));
+        let frame = self.frame(&self.cells.table(&state.readings, None), &state.fields);
+        let (factor, noise) = design_effect(&self.cells, &frame.left(), |i| frame.absorbed.leverage(i));
         if factor < self.design_effect {
             (self.design_effect, self.noise) = (factor, noise);
         }
         let new = self.design_effect.sqrt();
         self.cells.sd.iter_mut().for_each(|s| *s *= new);
-        state.table = self.cells.table(&state.readings, None);
-        state.frame = self.frame(&state.table, &state.fields);
-        state.predicted = self.predict(&state.readings, &state.table, &state.frame);
+        self.remeasure(state);
     }
 
     /// Every variant of every candidate, scored where it is absent.

@@ -333,14 +333,18 @@ fn batch(plan: &Plan, starts: usize, free: usize) -> usize {
     ((BATCH_MEMORY / member) as usize).clamp(1, starts.max(1))
 }
 
+/// Where [`fnv1a`] begins.
+pub(crate) const FNV_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// FNV-1a of some more bytes.
+pub(crate) fn fnv1a(hash: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
 /// Identifies what a plan compares with what, up to the values of θ: FNV-1a over everything that enters the cost.
 pub(crate) fn fingerprint(plan: &Plan) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut eat = |x: u64| {
-        for b in x.to_le_bytes() {
-            hash = (hash ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    };
+    let mut hash = FNV_START;
+    let mut eat = |x: u64| hash = fnv1a(hash, &x.to_le_bytes());
     let o = &plan.observation;
     let numbers =
         [o.depth_noise, o.marker_noise, plan.band, plan.clock.step, plan.clock.theta, plan.body.grid.h, plan.body.volume];

@@ -83,10 +83,7 @@ impl Session<'_> {
 
     /// What a fitted candidate is worth.
     fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
-        let mut new = self.state(model, readings, Some(state.fields.clone()))?;
-        new.table = self.cells.table(&new.readings, Some(&state.table));
-        new.frame = self.frame(&new.table, &new.fields);
-        new.predicted = self.predict(&new.readings, &new.table, &new.frame);
+        let new = self.state(model, readings, Some(state.fields.clone()), Some(&state.table))?;
         let squares = |s: &State| {
             let left = s.frame.left();
             dot(&left, &left)
@@ -143,7 +140,7 @@ impl Session<'_> {
         }
         let mut fitted = fitted;
         let won = fitted.swap_remove(winner).state;
-        let next = self.state(won.model, won.readings, None)?;
+        let next = self.state(won.model, won.readings, None, None)?;
         Ok((Some((found, next)), Vec::new()))
     }
 

@@ -4,7 +4,7 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::commands::fit::{Choices, choose, rounds, run_in};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::fingerprint;
+use crate::fitting::{FNV_START, fingerprint, fnv1a};
 use crate::options::stem;
 use clap::Args;
 use palpate_io::output::{make_folder, write_file};
@@ -151,7 +151,8 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
     let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<Value>, Error> {
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices, experiment.scene().fit);
-        row.fingerprint = format!("{} {:016x}", fingerprint(experiment.plan()), hash(&(asked + experiment.text())));
+        row.fingerprint =
+            format!("{} {:016x}", fingerprint(experiment.plan()), fnv1a(FNV_START, (asked + experiment.text()).as_bytes()));
         if a.resume
             && let Some(result) = finished(&a.out, name, &row.fingerprint)
         {
@@ -209,11 +210,6 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         console.warn(&[format!("{}: {e}", folder.join("fit.log").display())]);
     }
     row
-}
-
-/// FNV-1a of a text.
-fn hash(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 /// `summary.json`.

@@ -2,6 +2,7 @@
 
 use crate::cli::{Console, INTERRUPTED};
 use crate::diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
+use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, out_folder};
@@ -56,7 +57,13 @@ fn command(a: &Arguments) -> String {
     format!("palpate diagnose {scenes}{held_out}{budget}")
 }
 
-fn write_all(a: &Arguments, folder: &Path, experiments: &[Experiment], done: &Diagnosed) -> Result<serde_json::Value, Error> {
+fn write_all(
+    a: &Arguments,
+    folder: &Path,
+    experiments: &[Experiment],
+    done: &Diagnosed,
+    backend: Backend,
+) -> Result<serde_json::Value, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
     let result = diagnosis_json(done);
     // Results first: a report that fails must not cost them.
@@ -67,7 +74,6 @@ fn write_all(a: &Arguments, folder: &Path, experiments: &[Experiment], done: &Di
         let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
         text(&name, &model)?;
     }
-    let (backend, _) = a.backend.choose(experiments[0].plan(), 1)?;
     let (mut residuals, mut both) = (Vec::new(), Vec::new());
     let d = &done.diagnosis;
     let scale = 2.0 * d.before.rms.max(d.before.noise).max(1e-9);
@@ -116,7 +122,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         },
     )?;
     bar.finish_and_clear();
-    let result = write_all(a, &folder, &experiments, &done)?;
+    let result = write_all(a, &folder, &experiments, &done, backend)?;
     if console.json() {
         console.print(&result.to_string());
     } else {
