@@ -3,9 +3,12 @@
 //!
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
+//! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
+use palpate_model::contact::DEFAULT_STIFFNESS;
+use palpate_model::effects::{self, Site, law};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -85,6 +88,9 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
     if !done.insert(file.to_string()) {
         return;
     }
+    if file == "effects/points" {
+        return include_points(shaders, variant, done, out);
+    }
     let path = shaders.join(format!("{file}.wgsl"));
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     for line in text.lines() {
@@ -97,6 +103,39 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
         out.push_str(line);
         out.push('\n');
     }
+}
+
+/// All laws of points, the function `potential` that calls the one of a number in the table of effects, and where the input holds
+/// what.
+fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    include(shaders, "shared/points", variant, done, out);
+    let mut cases = String::new();
+    for (number, law) in effects::ALL.iter().enumerate() {
+        if matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_)) {
+            let name = law.kind.replace('-', "_");
+            include(shaders, &format!("effects/{name}"), variant, done, out);
+            writeln!(cases, "        case {number}u: {{ return {name}(); }}").expect("a String takes all");
+        }
+    }
+    let places = [
+        ("COMMON", law::COMMON),
+        ("MOST", law::MOST),
+        ("INPUTS", law::COMMON + law::MOST),
+        ("OLD_AT", law::OLD),
+        ("VELOCITY_AT", law::VELOCITY),
+        ("GRAVITY_AT", law::GRAVITY),
+        ("STIFFNESS_AT", law::STIFFNESS),
+        ("PLANE_AT", law::PLANE),
+        ("TIME_AT", law::TIME),
+    ];
+    for (name, place) in places {
+        writeln!(out, "const {name} = {place}u;").expect("a String takes all");
+    }
+    write!(
+        out,
+        "const DEFAULT_STIFFNESS = {DEFAULT_STIFFNESS:?};\nfn potential(law: u32) -> Dual {{\n    switch law {{\n{cases}        default: {{ return vec4(0.0); }}\n    }}\n}}\n"
+    )
+    .expect("a String takes all");
 }
 
 /// What Rust must know of a linked pass.

@@ -30,7 +30,7 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
         let r = residual[a].xyz;
-        var mass = node_mass(m, i);
+        var mass = node_mass(m, p.member, i);
         for (var s = 0u; s < shape.masses; s++) {
             let corner = mass_corner(s, i);
             if corner < 8u {

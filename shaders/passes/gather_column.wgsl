@@ -12,6 +12,8 @@ var<storage, read> node_list: array<u32>;
 var<storage, read> block_rows: array<u32>;
 var<storage, read> columns: array<u32>;
 var<storage, read> ghosts: array<f32>;
+// [B][rows][N]: derivatives of the nodes' factors on the density.
+var<storage, read> density_slopes: array<f32>;
 var<storage, read_write> column: array<vec4<f32>>;
 
 fn axis(k: u32) -> vec3<f32> {
@@ -76,19 +78,23 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let volume = rest[p.item].w;
     switch kind {
-        case DENSITY: {
-            f += volume * pull(p.member, p.item, m);
+        case DENSITY, DENSITY_SLOPE: {
+            var mass = node_mass(m, p.member, p.item) / m.density;
+            if kind == DENSITY_SLOPE {
+                mass = m.density * volume * density_slopes[(p.member * shape.slope_rows + index) * shape.nodes + p.item];
+            }
+            f += mass * pull(p.member, p.item, m);
             if call.mode != 0u {
-                f += (volume * m.mass_damping) * speed(p.member, p.item);
+                f += (mass * m.mass_damping) * speed(p.member, p.item);
             }
         }
         case MASS_DAMPING: {
             if call.mode != 0u {
-                f += (m.density * volume) * speed(p.member, p.item);
+                f += node_mass(m, p.member, p.item) * speed(p.member, p.item);
             }
         }
         case GRAVITY: {
-            var mass = node_mass(m, p.item);
+            var mass = node_mass(m, p.member, p.item);
             for (var s = 0u; s < shape.masses; s++) {
                 let corner = mass_corner(s, p.item);
                 if corner < 8u {

@@ -1,10 +1,11 @@
 //! Fills the blocked matrix by gathering: every 3 × 3 block sums what its cells, patches, clamps, ghost lines and mass damping
 //! give it, in a fixed order. Inertia is left out: products add it, so that a heavy body does not hide its stiffness.
 // use shared/mix
+// use shared/fields
+// use shared/inertia
 
 var<storage, read> cells: array<Cell>;
 var<storage, read> elements: array<f32>;
-var<storage, read> rest: array<vec4<f32>>;
 var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> holds: array<vec2<u32>>;
@@ -55,19 +56,19 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let m = members[p.member];
     let mix = mix_of(m);
-    let scale = mix.on_new * m.young;
     var sum = mat3x3<f32>();
     var diagonal = m.young * m.ghost.x * mix.on_ghost * ghosts[p.item];
     var damped = 0.0;
     for (var k = place_rows[p.item]; k < place_rows[p.item + 1u]; k++) {
         let e = places[k] / 64u;
+        let young = young_at(m, p.member, e);
         let i = (places[k] / 8u) % 8u;
         let j = places[k] % 8u;
         let at = (p.member * shape.cells + e) * 30u;
         let r = three(at);
         let g = three(at + 3u);
         let block = element_block((m.slot * 2u * shape.classes + cells[e].kind) * 576u, i, j);
-        sum += (r * block * transpose(r)) * scale;
+        sum += (r * block * transpose(r)) * (mix.on_new * young);
         sum += turned_omega(r, g, i) * transpose(three(at + 6u + 3u * j));
         sum += three(at + 6u + 3u * i) * transpose(turned_omega(r, g, j));
         for (var h = cells[e].hold_start; h < cells[e].hold_end; h++) {
@@ -76,9 +77,9 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 instant = call.step + 1u;
             }
             let turn = poses[(p.member * (shape.steps + 1u) + instant) * shape.clamps + holds[h].y].turn;
-            sum += (turn * hold_block((m.slot * 2u * shape.holds + h) * 576u, i, j) * transpose(turn)) * (mix.fresh * m.young);
+            sum += (turn * hold_block((m.slot * 2u * shape.holds + h) * 576u, i, j) * transpose(turn)) * (mix.fresh * young);
         }
-        if shape.planes != 0u {
+        if shape.patches != 0u {
             for (var t = cells[e].patch_start; t < cells[e].patch_end; t++) {
                 let w = patches[t].weights[i] * patches[t].weights[j];
                 let s = 3u * (p.member * shape.patches + t);
@@ -88,7 +89,7 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             }
         }
         if i == j {
-            damped = mix.drag * m.density * rest[cells[e].nodes[i]].w;
+            damped = mix.drag * node_mass(m, p.member, cells[e].nodes[i]);
         }
     }
     diagonal += damped;

@@ -36,7 +36,7 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
         elastic += cell_force[c];
         support += cell_support[c];
     }
-    let mass = node_mass(m, p.item);
+    let mass = node_mass(m, p.member, p.item);
     var body = vec4(0.0);
     if call.mode != 0u {
         let before = old_force[a].xyz;

@@ -16,7 +16,7 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     }
     let m = members[p.member];
     let mix = mix_of(m);
-    var mass = node_mass(m, p.item);
+    var mass = node_mass(m, p.member, p.item);
     for (var s = 0u; s < shape.masses; s++) {
         let corner = mass_corner(s, p.item);
         if corner < 8u {

@@ -34,7 +34,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         storageBarrier();
         var curvature = vec4(0.0);
         for (var i = local; i < shape.nodes; i += 256u) {
-            var q = (mix.inertia * node_mass(m, i)) * cg_along[at_node(p.member, i)].xyz;
+            var q = (mix.inertia * node_mass(m, p.member, i)) * cg_along[at_node(p.member, i)].xyz;
             for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
                 let x = cg_along[at_node(p.member, columns[k])].xyz;
                 let v = (p.member * shape.blocks + k) * 9u;

@@ -38,13 +38,14 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let cell = cells[e];
     let m = members[p.member];
     let mix = mix_of(m);
+    let young = young_at(m, p.member, e);
     let at = (p.member * shape.cells + e) * 30u;
     let r = three(at);
     let d = three(at + 6u + 3u * corner);
     // R Ω_i = −R [b_i]× G⁻¹.
     let omega = r * (cross_matrix(sign_of(corner) * (-0.25 / shape.h)) * three(at + 3u));
     let x = cg_along[at_node(p.member, cell.nodes[corner])].xyz;
-    var y = (mix.on_new * m.young) * (r * stiff(matrix_at(m.slot, 0u, cell.kind), corner, transpose(r) * x));
+    var y = (mix.on_new * young) * (r * stiff(matrix_at(m.slot, 0u, cell.kind), corner, transpose(r) * x));
     let along_d = sum8(transpose(d) * x);
     let along_omega = sum8(transpose(omega) * x);
     y += omega * along_d + d * along_omega;
@@ -59,9 +60,9 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             f += hold_block((m.slot * 2u * shape.holds + k) * 576u, corner, j)
                 * (transpose(turn) * cg_along[at_node(p.member, cell.nodes[j])].xyz);
         }
-        y += (mix.fresh * m.young) * (turn * f);
+        y += (mix.fresh * young) * (turn * f);
     }
-    if shape.planes != 0u {
+    if shape.patches != 0u {
         for (var k = cell.patch_start; k < cell.patch_end; k++) {
             var there = vec3(0.0);
             for (var j = 0u; j < 8u; j++) {

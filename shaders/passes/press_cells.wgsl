@@ -19,6 +19,7 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let cell = cells[e];
     let m = members[p.member];
     let mix = mix_of(m);
+    let young = young_at(m, p.member, e);
     let a = at_node(p.member, cell.nodes[corner]);
     let o = at_node(p.member, cell.nodes[0]);
     let d = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
@@ -34,7 +35,7 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if call.mode != 0u {
         before = mix.on_old * old_stress[at].xyz;
     }
-    let y = (mix.on_new * m.young) * stiff(matrix_at(m.slot, 0u, cell.kind), corner, pose.q) + before;
+    let y = (mix.on_new * young) * stiff(matrix_at(m.slot, 0u, cell.kind), corner, pose.q) + before;
     let f = force(pose, y, sign);
     let energy = 0.5 * dot(pose.q, y + before);
     let support = support_of(cell, p.member, corner);

@@ -18,10 +18,11 @@ fn press_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let cell = cells[e];
     let m = members[p.member];
     let mix = mix_of(m);
+    let young = young_at(m, p.member, e);
     let a = at_node(p.member, cell.nodes[corner]);
     let o = at_node(p.member, cell.nodes[0]);
     let pose = free_pose((now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz), sign);
-    let y = m.young * stiff(matrix_at(m.slot, 0u, cell.kind), corner, pose.q);
+    let y = young * stiff(matrix_at(m.slot, 0u, cell.kind), corner, pose.q);
     // With lagged rotation the old force goes through the new pose, which has the same rotation.
     var f = force(pose, mix.old * y, sign);
     if is_lagged() {

@@ -20,10 +20,11 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let cell = cells[e];
     let m = members[p.member];
     let mix = mix_of(m);
+    let young = young_at(m, p.member, e);
     let a = at_node(p.member, cell.nodes[corner]);
     let o = at_node(p.member, cell.nodes[0]);
     let d = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
-    let scale = mix.on_new * m.young;
+    let scale = mix.on_new * young;
     let matrix = matrix_at(m.slot, 0u, cell.kind);
     var pose: Pose;
     var half = mat3x3<f32>();

@@ -1,5 +1,6 @@
 //! Cells, their element matrices, and how their corners read a state.
 // use shared/pose
+// use shared/fields
 
 var<storage, read> cells: array<Cell>;
 var<storage, read> elements: array<f32>;

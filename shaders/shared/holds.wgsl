@@ -1,6 +1,7 @@
 //! Clamp cells: how far their corners are from where the clamp wants them, and the force and product of Nitsche's matrix.
 // use shared/lanes
 // use shared/mix
+// use shared/fields
 
 var<storage, read> cells: array<Cell>;
 // (cell, clamp) of each clamp cell, ordered by cell.

@@ -4,9 +4,14 @@ var<storage, read> rest: array<vec4<f32>>;
 var<storage, read> mass_sites: array<Mass>;
 // [B][masses] in kg.
 var<storage, read> mass_values: array<f32>;
+// [B][N], times the density; read only where effects vary it over the body.
+var<storage, read> densities: array<f32>;
 
 // Mass of the body's own node [kg]; the fourth component of a rest position is ∫ N.
-fn node_mass(m: Member, node: u32) -> f32 {
+fn node_mass(m: Member, member: u32, node: u32) -> f32 {
+    if (shape.fields & 2u) != 0u {
+        return m.density * rest[node].w * densities[at_node(member, node)];
+    }
     return m.density * rest[node].w;
 }
 

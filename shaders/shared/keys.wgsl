@@ -11,3 +11,6 @@ const ANGULAR_VELOCITY = 7u;
 const TIME_START = 8u;
 const PLANE = 9u;
 const POINT_MASS = 10u;
+const EFFECT = 11u;
+const MODULUS_SLOPE = 12u;
+const DENSITY_SLOPE = 13u;

@@ -21,5 +21,5 @@ fn old_row(member: u32, node: u32, m: Member, mix: Mix) -> vec3<f32> {
             f += (scale * ghosts[k]) * (probe[at_node(member, columns[k])].xyz - z);
         }
     }
-    return f - (mix.drag * node_mass(m, node)) * z;
+    return f - (mix.drag * node_mass(m, member, node)) * z;
 }

@@ -2,7 +2,7 @@
 // use shared/inertia
 
 fn heavy_row(m: Member, inertia: f32, member: u32, node: u32) -> vec3<f32> {
-    var q = (inertia * node_mass(m, node)) * cg_along[at_node(member, node)].xyz;
+    var q = (inertia * node_mass(m, member, node)) * cg_along[at_node(member, node)].xyz;
     for (var s = 0u; s < shape.masses; s++) {
         let corner = mass_corner(s, node);
         if corner < 8u {

@@ -33,7 +33,8 @@ struct Shape { // mirrored
     most: u32,
     quantum: f32,
     ghosts: u32,
-    pad: vec2<u32>,
+    fields: u32,
+    slope_rows: u32,
 }
 
 struct Member { // mirrored
@@ -43,7 +44,7 @@ struct Member { // mirrored
     stiffness_damping: f32,
     ghost: vec2<f32>,
     slot: u32,
-    pad: u32,
+    start: f32,
     gravity: vec4<f32>,
     velocity: vec4<f32>,
     spin: vec4<f32>,

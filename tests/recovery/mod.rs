@@ -1,5 +1,6 @@
 //! Synthetic recordings give their parameters back: a small part of `cargo xtask paper` that runs with every change.
 
+mod graphics;
 mod measurement;
 
 use glam::DVec3;

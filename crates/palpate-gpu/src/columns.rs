@@ -1,7 +1,9 @@
 //! ∂r/∂p on the device: which passes make the column of each parameter, for the adjoint (dotted with z) and for tangents.
 
+use crate::effects;
 use crate::pipelines::pass;
-use crate::solve::{ALL, Per, Solve};
+use crate::solve::{ALL, NO_TOUCH, Per, Solve};
+use palpate_model::effects::Site;
 use palpate_model::params::ParamKey;
 
 /// How a parameter enters the balance: numbers of `shared/keys.wgsl`.
@@ -11,13 +13,20 @@ pub(crate) struct Column {
     index: u32,
     /// What the passes of cells, patches and clamps are told; `None` = the parameter acts on nodes alone.
     cells: Option<[u32; 2]>,
+    /// The question to effects on points, and the effect that is asked where it is a single one.
+    press: Option<(u32, Option<usize>)>,
 }
 
-/// Patches and clamps that have no part in a column.
-const NO_TOUCH: u32 = 5;
+/// Clamps that have no part in a column.
 const NO_HOLD: u32 = 6;
 /// A kind that no kernel knows: the column is zero.
 const NOTHING: u32 = 15;
+/// Kinds of parameters of effects.
+const EFFECT: u32 = 11;
+const MODULUS_SLOPE: u32 = 12;
+const DENSITY_SLOPE: u32 = 13;
+/// What the clamps' pass is told for a field of stiffness, plus 256 times the row of its slopes.
+const HOLD_SLOPE: u32 = 7;
 /// Added to a node pass' argument: cells take part; added to the sum's argument: ∂v/∂p of the start.
 const FLAG: u32 = 1 << 16;
 
@@ -25,37 +34,64 @@ impl Solve<'_, '_> {
     /// How a parameter enters this balance, or `None`.
     pub(crate) fn column_of(&self, key: ParamKey) -> Option<Column> {
         let dynamic = self.step.is_some();
-        let nodes = |kind, index: u32| Some(Column { kind, index, cells: None });
-        let plane = |what: u32, i: u16| Some(Column { kind: 9, index: 0, cells: Some([8 * u32::from(i) + what, NO_HOLD]) });
+        let column = |kind, index: u32, cells| Some(Column { kind, index, cells, press: None });
+        let plane = |what: u32, i: u16| {
+            let index = 8 * u32::from(i) + what;
+            Some(Column { kind: 9, index: 0, cells: Some([index, NO_HOLD]), press: Some((effects::column(9, index), None)) })
+        };
+        // Effects on points answer to these as well.
+        let pressed = |kind, index, cells| Some(Column { kind, index, cells, press: Some((effects::column(kind, index), None)) });
         match key {
-            ParamKey::YoungsModulus => Some(Column { kind: 0, index: 0, cells: Some([1, 2]) }),
-            ParamKey::PoissonRatio => Some(Column { kind: 1, index: 0, cells: Some([NO_TOUCH, 3]) }),
-            ParamKey::Density => nodes(2, 0),
-            ParamKey::MassDamping if dynamic => nodes(3, 0),
-            ParamKey::StiffnessDamping if dynamic => Some(Column { kind: 4, index: 0, cells: Some([NO_TOUCH, NO_HOLD]) }),
-            ParamKey::Gravity(a) => nodes(5, a.into()),
+            ParamKey::YoungsModulus => pressed(0, 0, Some([1, 2])),
+            ParamKey::PoissonRatio => column(1, 0, Some([NO_TOUCH, 3])),
+            ParamKey::Density => column(2, 0, None),
+            ParamKey::MassDamping if dynamic => column(3, 0, None),
+            ParamKey::StiffnessDamping if dynamic => column(4, 0, Some([NO_TOUCH, NO_HOLD])),
+            ParamKey::Gravity(a) => pressed(5, a.into(), None),
             ParamKey::TimeStart if self.world.plan.clamps.iter().any(|c| c.motion.is_some()) => {
-                Some(Column { kind: 8, index: 0, cells: Some([NO_TOUCH, 4]) })
+                pressed(8, 0, Some([NO_TOUCH, 4]))
             }
+            ParamKey::TimeStart if !self.world.geometry.effects.points.is_empty() => pressed(8, 0, None),
             ParamKey::PlaneHeight(i) => plane(2, i),
             ParamKey::PlaneTheta(i) => plane(3, i),
             ParamKey::PlanePhi(i) => plane(4, i),
-            ParamKey::PointMass(i) => nodes(10, i.into()),
-            // The rest does not enter a balance; a build refuses plans with effects.
+            ParamKey::PointMass(i) => column(10, i.into(), None),
+            ParamKey::Effect { effect, slot, law } => self.column_of_effect(effect.into(), slot.into(), law.into()),
             _ => None,
         }
     }
 
+    fn column_of_effect(&self, effect: usize, slot: u32, law: usize) -> Option<Column> {
+        let known = &self.world.geometry.effects;
+        if let Some(row) = known.slope_row(effect, slot) {
+            return Some(match palpate_model::effects::ALL[law].site {
+                Site::Modulus(_) => {
+                    let cells = Some([NO_TOUCH, HOLD_SLOPE + 256 * row]);
+                    Column { kind: MODULUS_SLOPE, index: row, cells, press: None }
+                }
+                _ => Column { kind: DENSITY_SLOPE, index: row, cells: None, press: None },
+            });
+        }
+        let cells = known.on_patches().then_some([NO_TOUCH, NO_HOLD]);
+        Some(Column { kind: NOTHING, index: 0, cells, press: Some((effects::column(EFFECT, slot), Some(effect))) })
+    }
+
     /// ∂r/∂p → `column`.
     pub(crate) fn column(&mut self, column: Option<Column>) {
-        let c = column.unwrap_or(Column { kind: NOTHING, index: 0, cells: None });
+        let c = column.unwrap_or(Column { kind: NOTHING, index: 0, cells: None, press: None });
         if let Some([touch, hold]) = c.cells {
             self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, touch);
+            if let Some((question, only)) = c.press {
+                self.press_patches(ALL, question, only, &[]);
+            }
             self.run(pass::HOLD_CELLS, ALL, Per::Hold, hold);
-            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind);
+            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + 16 * c.index);
         }
         let flag = if c.cells.is_some() { FLAG } else { 0 };
         self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + 16 * c.index + flag);
+        if let Some((question, only)) = c.press {
+            self.press_nodes(ALL, question, only, &self.world.buffers["column"], &[]);
+        }
     }
 
     /// dJ/dp −= z · ∂r/∂p for every parameter, z in `direction`.
@@ -76,7 +112,7 @@ impl Solve<'_, '_> {
             ParamKey::AngularVelocity(a) => (7, a),
             _ => return false,
         };
-        self.column(Some(Column { kind, index: axis.into(), cells: None }));
+        self.column(Some(Column { kind, index: axis.into(), cells: None, press: None }));
         true
     }
 

@@ -1,5 +1,6 @@
 //! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
 
+use crate::effects::Effects;
 use crate::error::GpuError;
 use crate::layout::{Cell, Mass, Patch, Shape};
 use crate::memory::Maker;
@@ -81,6 +82,7 @@ pub(crate) struct Geometry {
     pub(crate) classes: Classes,
     /// (clamp, cell of the clamp) of every clamp cell in the device's order.
     pub(crate) holds: Vec<(usize, usize)>,
+    pub(crate) effects: Effects,
 }
 
 fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
@@ -99,9 +101,8 @@ impl Geometry {
         many: bool,
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<Geometry, GpuError> {
-        if plan.layout.effects().next().is_some() {
-            return Err(GpuError::Plan { what: "[[effect]] tables".into() });
-        }
+        let effects = Effects::new(plan)?;
+        let touched = !plan.planes.is_empty() || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();
         let pattern = Pattern::new(body);
@@ -123,7 +124,7 @@ impl Geometry {
                     nodes: cell.nodes,
                     kind: classes.of_cell[e],
                     patch_start: body.patches.partition_point(|p| p.cell < number) as u32,
-                    patch_end: if plan.planes.is_empty() { 0 } else { body.patches.partition_point(|p| p.cell <= number) as u32 },
+                    patch_end: if touched { body.patches.partition_point(|p| p.cell <= number) as u32 } else { 0 },
                     hold_start: holds.partition_point(|h| cell_of(h) < number) as u32,
                     hold_end: holds.partition_point(|h| cell_of(h) <= number) as u32,
                     pad: [0; 3],
@@ -185,7 +186,7 @@ impl Geometry {
             nodes: n as u32,
             cells: cells.len() as u32,
             blocks: blocks as u32,
-            patches: if plan.planes.is_empty() { 0 } else { patches.len() as u32 },
+            patches: if touched { patches.len() as u32 } else { 0 },
             holds: holds.len() as u32,
             clamps: plan.clamps.len() as u32,
             planes: plan.planes.len() as u32,
@@ -205,7 +206,8 @@ impl Geometry {
             most: MOST_ITERATIONS as u32,
             quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
-            pad: [0; 2],
+            fields: effects.bits,
+            slope_rows: effects.slope_rows,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);
@@ -219,8 +221,9 @@ impl Geometry {
         buffers.insert("place_rows", gpu.upload("place_rows", &place_rows)?);
         buffers.insert("places", gpu.upload("places", &contributions.concat())?);
         buffers.insert("ghosts", gpu.upload("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>())?);
+        buffers.insert("effects", gpu.upload("effects", &effects.sites())?);
         buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
-        Ok(Geometry { shape, classes, holds })
+        Ok(Geometry { shape, classes, holds, effects })
     }
 
     /// CG dispatches that one solve may need.

@@ -71,8 +71,10 @@ pub struct Shape {
     pub quantum: f32,
     /// 1 with a ghost penalty.
     pub ghosts: u32,
-    /// Fills up.
-    pub pad: [u32; 2],
+    /// 1: effects vary the stiffness over the body, 2: the density, 4: effects act on patches.
+    pub fields: u32,
+    /// Rows of the slopes of such fields, per member.
+    pub slope_rows: u32,
 }
 
 /// Parameters of one member.
@@ -91,8 +93,8 @@ pub struct Member {
     pub ghost: [f32; 2],
     /// Which element matrices.
     pub slot: u32,
-    /// Fills up.
-    pub pad: u32,
+    /// Time of the initial state [s].
+    pub start: f32,
     /// Gravity [m/s²].
     pub gravity: [f32; 4],
     /// Initial velocity [m/s].
@@ -117,6 +119,28 @@ pub struct Plane {
     pub scales: f32,
     /// Fills up.
     pub pad: [f32; 2],
+}
+
+/// An effect on points: its law, where it acts, and where its numbers lie.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct EffectSite {
+    /// Place of the law in the table of effects.
+    pub law: u32,
+    /// 0 = nodes, 1 = surface, 2 = surface and planes.
+    pub site: u32,
+    /// First of its parameters among a member's.
+    pub first: u32,
+    /// Number of its parameters.
+    pub count: u32,
+    /// Row of the nodes' measures.
+    pub measures: u32,
+    /// First row of the measures' derivatives by the parameters, or `u32::MAX`.
+    pub slopes: u32,
+    /// Parameters of all effects of a member.
+    pub stride: u32,
+    /// Rows of measures of a member.
+    pub rows: u32,
 }
 
 /// A cell.

@@ -10,6 +10,7 @@ mod backend;
 mod backward;
 mod columns;
 pub mod device;
+mod effects;
 pub mod error;
 mod forward;
 mod geometry;

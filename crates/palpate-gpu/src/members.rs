@@ -72,7 +72,7 @@ impl Batch {
                     shear(palpate_model::material::lame_by_nu(1.0, p.poisson_ratio).1),
                 ],
                 slot: slot as u32,
-                pad: 0,
+                start: p.start as f32,
                 gravity: vec4(p.gravity, 0.0),
                 velocity: vec4(p.velocity, 0.0),
                 spin: vec4(p.angular_velocity, 0.0),
@@ -91,6 +91,7 @@ impl Batch {
             }
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
+        geometry.effects.upload(gpu, plan, &self.physics, buffers)?;
         buffers.insert("members", gpu.upload("members", &members)?);
         buffers.insert("planes", gpu.upload("planes", &all_planes)?);
         buffers.insert("poses", gpu.upload("poses", &poses)?);

@@ -88,7 +88,13 @@ pub fn memory(plan: &Plan, members: usize, request: &Request) -> Result<Memory, 
         + whole(b * u64::from(shape.steps + 1) * u64::from(shape.clamps) * size_of::<ClampPose>() as u64)
         + whole(b * u64::from(shape.masses) * 4)
         + matrices(shape.classes)
-        + matrices(shape.holds);
+        + matrices(shape.holds)
+        + geometry
+            .effects
+            .sizes(members, shape.nodes as usize, shape.cells as usize)
+            .iter()
+            .map(|s| whole(4 * s.1 as u64))
+            .sum::<u64>();
     let tally: u64 = tally_sizes(b, plan.layout.len() as u64).iter().map(|t| whole(t.1)).sum();
     let observed = observe::memory(&Counter, plan, members, q)?;
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;

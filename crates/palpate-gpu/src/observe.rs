@@ -5,6 +5,8 @@
 //! are found again on the way back, which costs less memory than keeping them for every frame and member.
 
 #[cfg(test)]
+mod extension_tests;
+#[cfg(test)]
 mod fault_tests;
 mod looks;
 mod results;

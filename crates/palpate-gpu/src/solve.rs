@@ -1,10 +1,14 @@
 //! The nonlinear and linear solves of a step as lists of dispatches. The device decides who takes part in which; the host
 //! only says how often to ask.
 
+use crate::effects;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::tuning::Product;
 use crate::world::{KINDS, State, Tally, World};
+
+/// What `touch_patches` is told where planes have nothing to say.
+pub(crate) const NO_TOUCH: u32 = 5;
 
 /// Sections of the roster.
 pub(crate) const ALL: u32 = 0;
@@ -118,8 +122,14 @@ impl<'a, 'r> Solve<'a, 'r> {
 
     /// Tangent, matrix and preconditioner of the members of a section, at the new state.
     pub(crate) fn assemble(&mut self, section: u32) {
+        if self.world.geometry.effects.on_patches() {
+            // Anew, because the convex part may be wanted after the exact one was taken.
+            self.run(pass::TOUCH_PATCHES, section, Per::Patch, 0);
+            self.press_patches(section, effects::STIFFNESS, None, &[]);
+        }
         self.run(pass::TANGENT_CELLS, section, Per::Cell, 0);
         self.run(pass::GATHER_MATRIX, section, Per::Block, 0);
+        self.press_nodes(section, effects::STIFFNESS, None, &self.world.buffers["column"], &[]);
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
     }
 
@@ -132,9 +142,11 @@ impl<'a, 'r> Solve<'a, 'r> {
         for round in 0..iterations + SPARE_ROUNDS {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
             self.run(pass::TOUCH_PATCHES, TRIAL, Per::Patch, 0);
+            self.press_patches(TRIAL, effects::FORCE, None, &[]);
             self.run(pass::HOLD_CELLS, TRIAL, Per::Hold, 0);
             self.run(pass::PRESS_CELLS, TRIAL, Per::Cell, 0);
             self.run(pass::GATHER_RESIDUAL, TRIAL, Per::Node, 0);
+            self.press_nodes(TRIAL, effects::FORCE, None, &self.world.buffers["residual"], &[]);
             self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, 0);
             self.list();
             self.assemble(MATRIX);
@@ -189,6 +201,14 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.prepare();
         self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
         self.assemble(ALL);
+    }
+
+    /// What effects on patches have to say of the old state, for `couple_old`.
+    pub(crate) fn couple_patches(&mut self, question: u32, more: &Named) {
+        if self.world.geometry.effects.on_patches() {
+            self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, NO_TOUCH);
+            self.press_patches(ALL, question, None, more);
+        }
     }
 
     /// Solves with the tangent of [`Solve::linearise`]: `rhs` → `direction`.

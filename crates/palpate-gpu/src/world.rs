@@ -114,7 +114,10 @@ impl World {
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
         };
-        if many && tuning.product.is_none() {
+        if world.geometry.effects.on_nodes() {
+            // What effects add to the nodes' blocks is in the matrix alone.
+            world.product = Product::Matrix;
+        } else if many && tuning.product.is_none() {
             world.product = tuning::faster(&mut world)?;
         }
         Ok(world)

@@ -103,6 +103,14 @@ pub struct Search {
 /// # Errors
 /// No start can be evaluated.
 pub fn search(plan: &Plan, unknowns: &[Unknown], how: &Search) -> Result<FitResult, Error> {
+    search_on(Backend::Auto, plan, unknowns, how)
+}
+
+/// The same on a given backend.
+///
+/// # Errors
+/// As [`search`], or the backend cannot be had.
+pub fn search_on(backend: Backend, plan: &Plan, unknowns: &[Unknown], how: &Search) -> Result<FitResult, Error> {
     let place = |u: &Unknown| plan.layout.index(u.key);
     let free = unknowns
         .iter()
@@ -125,7 +133,7 @@ pub fn search(plan: &Plan, unknowns: &[Unknown], how: &Search) -> Result<FitResu
         name: "study".into(),
         fingerprint: String::new(),
         base,
-        evaluate: Backend::Auto.evaluator(plan, how.starts.max(1))?,
+        evaluate: backend.evaluator(plan, how.starts.max(1))?,
     };
     let mut problem = Problem::new(vec![scene], free).map_err(Error::Input)?;
     let settings = Settings { iterations: how.iterations, starts: how.starts, seed: how.seed, ..Settings::new(how.optimizer) };

@@ -33,36 +33,12 @@ impl std::fmt::Debug for Acting {
 pub fn acting(plan: &Plan, physics: &Physics) -> Vec<Acting> {
     let make = |((law, _), values): ((&'static Law, _), &Vec<f64>)| {
         let shares = match law.site {
-            Site::Nodes(point) => shares(plan, point, values),
+            Site::Nodes(point) => point.shares(&plan.body.nodes, &plan.body.node_volume, values),
             _ => None,
         };
         Acting { law, values: values.clone(), shares }
     };
     plan.layout.effects().zip(&physics.effects).map(make).collect()
-}
-
-/// s_i = V_i w_i / Σ V_j w_j with the derivatives by the parameters.
-fn shares(plan: &Plan, point: &dyn Point, p: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-    let body = &plan.body;
-    let n = body.nodes.len();
-    let (mut values, mut slopes) = (Vec::with_capacity(n), vec![Vec::with_capacity(n); p.len()]);
-    for (x, v) in body.nodes.iter().zip(&body.node_volume) {
-        let (w, d) = point.shared(*x, p)?;
-        values.push(v * w);
-        for (s, d) in slopes.iter_mut().zip(d) {
-            s.push(v * d);
-        }
-    }
-    // A place so far away that every weight underflows shares nothing instead of dividing by zero.
-    let sum: f64 = values.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    values.iter_mut().for_each(|v| *v /= sum);
-    for slope in &mut slopes {
-        let total: f64 = slope.iter().sum::<f64>() / sum;
-        for (s, v) in slope.iter_mut().zip(&values) {
-            *s = *s / sum - v * total;
-        }
-    }
-    Some((values, slopes))
 }
 
 /// One point that an effect acts on, at one instant.

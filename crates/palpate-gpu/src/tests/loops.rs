@@ -35,6 +35,8 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("i < count; i += 256u") => most.nodes.div_ceil(32 * 256),
         () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),
         () if has("< KINDS") => 10,
+        () if has("< INPUTS") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
+        () if has("< MOST;") => palpate_model::effects::law::MOST as u64,
         () if has("shape.chunk") => most.chunk,
         () if has("i < shape.nodes; i += 256u") => most.share(),
         () if has("c.low.z") => seen.layers,

@@ -4,6 +4,7 @@ use super::scenes::{ball, held, own_device, plan};
 use crate::observe::rollout_tests::{seen, watched};
 use crate::{Gpu, GpuBackend, memory};
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_model::effects::Effect;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::sync::Arc;
@@ -26,6 +27,21 @@ fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
     let off = said.total() as f64 / made as f64 - 1.0;
     println!("{} members: {said:?}, {} predicted, {made} made: {:+.1} %", members, said.total(), 100.0 * off);
     assert!(off.abs() < 0.1, "{said:?} is not {made}");
+}
+
+#[test]
+fn two_sizes_alone_and_in_batches_of_eight() {
+    let Some(gpu) = own_device() else { return };
+    for h in [0.03, 0.02] {
+        let mut scene = ball(h);
+        scene.time.steps = 1;
+        let mut friction = Effect::absent(0);
+        friction.values[0] = Some(0.3);
+        scene.effects.push(friction);
+        for members in [1, 8] {
+            check(&gpu, &plan(&scene), members, &Request { gradient: h > 0.025, sensitivities: Vec::new() });
+        }
+    }
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! Kernels against the CPU backend on small bodies.
 
 mod derivatives;
+mod effects;
 mod extremes;
 mod faults;
 mod forward;
 mod limits;
 mod loops;
 mod memory;
+mod passes;
 mod products;
 pub(crate) mod scenes;
 mod sizes;

@@ -18,7 +18,7 @@ fn many(product: Product) -> Tuning {
 }
 
 /// Everything at once: a clamp, two planes that press, a point mass, a ghost penalty.
-fn crowded() -> Scene {
+pub(super) fn crowded() -> Scene {
     let mut scene = held(0.03);
     scene.solver.ghost = 0.5;
     scene.planes[0].point.z = 0.004;

@@ -184,6 +184,30 @@ pub trait Point: Sync {
     fn skips(&self, place: &Place, z: &[f64]) -> bool;
     /// Share of a node, with its derivatives by the parameters.
     fn shared(&self, rest: DVec3, p: &[f64]) -> Option<(f64, Vec<f64>)>;
+
+    /// s_i = V_i w_i / Σ V_j w_j of nodes at rest positions `nodes` [m] with volumes `volumes` [m³] `[N]`, with the derivatives by
+    /// the parameters `[K][N]`; `None` for laws whose nodes do not share.
+    fn shares(&self, nodes: &[DVec3], volumes: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let n = nodes.len();
+        let (mut values, mut slopes) = (Vec::with_capacity(n), vec![Vec::with_capacity(n); p.len()]);
+        for (x, v) in nodes.iter().zip(volumes) {
+            let (w, d) = self.shared(*x, p)?;
+            values.push(v * w);
+            for (s, d) in slopes.iter_mut().zip(d) {
+                s.push(v * d);
+            }
+        }
+        // A place so far away that every weight underflows shares nothing instead of dividing by zero.
+        let sum: f64 = values.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        values.iter_mut().for_each(|v| *v /= sum);
+        for slope in &mut slopes {
+            let total: f64 = slope.iter().sum::<f64>() / sum;
+            for (s, v) in slope.iter_mut().zip(&values) {
+                *s = *s / sum - v * total;
+            }
+        }
+        Some((values, slopes))
+    }
 }
 
 /// An input as numbers that carry two first derivatives and the mixed second one.

@@ -1,0 +1,203 @@
+//! Effects on the device. Laws of points are WGSL twins (`shaders/effects/`) that two passes call by number; fields of stiffness and
+//! density do not change during a rollout and are computed here, in f64, from the laws themselves.
+
+use crate::error::GpuError;
+use crate::layout::EffectSite;
+use crate::memory::Maker;
+use crate::pipelines::pass;
+use crate::recorder::Named;
+use crate::solve::{Per, Solve};
+use palpate_model::changes::Changes;
+use palpate_model::effects::{Law, Site};
+use palpate_model::plan::{Physics, Plan};
+use std::collections::HashMap;
+
+/// Questions to a law, as `shared/points.wgsl` numbers them.
+pub(crate) const FORCE: u32 = 0;
+pub(crate) const STIFFNESS: u32 = 1;
+pub(crate) const BY_OLD: u32 = 2;
+pub(crate) const BACK: u32 = 3;
+
+/// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
+pub(crate) fn column(kind: u32, index: u32) -> u32 {
+    4 + (kind << 4) + (index << 8)
+}
+
+const NODES: u32 = 0;
+const SURFACE: u32 = 1;
+const CONTACT: u32 = 2;
+
+/// Bits of `Shape::fields`.
+const MODULUS: u32 = 1;
+const DENSITY: u32 = 2;
+const PATCHES: u32 = 4;
+
+/// A plan's effects as the device sees them.
+#[derive(Debug, Default)]
+pub(crate) struct Effects {
+    /// Effects on points: number in the plan, and what the kernels know.
+    pub(crate) points: Vec<(usize, EffectSite)>,
+    /// First row of slopes of every effect that is a field.
+    fields: Vec<Option<u32>>,
+    /// As `Shape` has them.
+    pub(crate) bits: u32,
+    pub(crate) slope_rows: u32,
+    stride: u32,
+    rows: u32,
+}
+
+impl Effects {
+    /// The effects of a plan.
+    ///
+    /// # Errors
+    /// One of them has no place on the device yet.
+    pub(crate) fn new(plan: &Plan) -> Result<Effects, GpuError> {
+        let mut e = Effects::default();
+        for (number, (law, places)) in plan.layout.effects().enumerate() {
+            let count = places.len() as u32;
+            let mut field = None;
+            let site = match law.site {
+                Site::Nodes(_) => Some(NODES),
+                Site::Surface(_) => Some(SURFACE),
+                Site::Contact(_) => Some(CONTACT),
+                Site::Modulus(_) | Site::Density(_) => {
+                    e.bits |= if matches!(law.site, Site::Modulus(_)) { MODULUS } else { DENSITY };
+                    field = Some(e.slope_rows);
+                    e.slope_rows += count;
+                    None
+                }
+                _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
+            };
+            e.fields.push(field);
+            if let Some(site) = site {
+                e.bits |= if site == NODES { 0 } else { PATCHES };
+                let slopes = if shares(plan, law, &plan.theta[places]).is_some() { e.rows + 1 } else { u32::MAX };
+                let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
+                let point = EffectSite { law, site, first: e.stride, count, measures: e.rows, slopes, stride: 0, rows: 0 };
+                e.points.push((number, point));
+                if site == NODES {
+                    e.rows += if slopes == u32::MAX { 1 } else { 1 + count };
+                }
+            }
+            e.stride += count;
+        }
+        for (_, p) in &mut e.points {
+            (p.stride, p.rows) = (e.stride, e.rows);
+        }
+        Ok(e)
+    }
+
+    /// What the kernels know of the effects on points.
+    pub(crate) fn sites(&self) -> Vec<EffectSite> {
+        self.points.iter().map(|p| p.1).collect()
+    }
+
+    /// True when some effect acts on patches.
+    pub(crate) fn on_patches(&self) -> bool {
+        self.bits & PATCHES != 0
+    }
+
+    /// True when some effect acts on nodes.
+    pub(crate) fn on_nodes(&self) -> bool {
+        self.points.iter().any(|p| p.1.site == NODES)
+    }
+
+    /// Row of the slopes of number `slot` of an effect that is a field.
+    pub(crate) fn slope_row(&self, effect: usize, slot: u32) -> Option<u32> {
+        self.fields[effect].map(|first| first + slot)
+    }
+
+    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
+    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 6] {
+        let slopes = self.slope_rows as usize;
+        let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
+        [
+            ("effect_values", members * self.stride as usize),
+            ("effect_measures", members * self.rows as usize * nodes),
+            ("moduli", of(MODULUS, cells)),
+            ("densities", of(DENSITY, nodes)),
+            ("modulus_slopes", of(MODULUS, slopes * cells)),
+            ("density_slopes", of(DENSITY, slopes * nodes)),
+        ]
+    }
+
+    /// Uploads what members' parameters make of them.
+    ///
+    /// # Errors
+    /// More than the device has.
+    pub(crate) fn upload<M: Maker>(
+        &self,
+        gpu: &M,
+        plan: &Plan,
+        batch: &[Physics],
+        buffers: &mut HashMap<&'static str, M::Buffer>,
+    ) -> Result<(), GpuError> {
+        let body = &plan.body;
+        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells.len());
+        let mut data = sizes.map(|s| Vec::<f32>::with_capacity(s.1));
+        let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
+        for physics in batch {
+            physics.effects.iter().for_each(|p| put(&mut data[0], p));
+            for (number, site) in self.points.iter().filter(|p| p.1.site == NODES) {
+                let law = plan.layout.effects().nth(*number).map(|e| e.0);
+                let shared = law.and_then(|law| shares(plan, law, &physics.effects[*number]));
+                match shared.filter(|_| site.slopes != u32::MAX) {
+                    Some((values, slopes)) => {
+                        put(&mut data[1], &values);
+                        slopes.iter().for_each(|s| put(&mut data[1], s));
+                    }
+                    None => put(&mut data[1], &body.node_volume),
+                }
+            }
+            let changes = Changes::new(plan, physics);
+            changes.modulus.iter().for_each(|m| put(&mut data[2], m));
+            changes.density.iter().for_each(|d| put(&mut data[3], d));
+            for (effect, (law, places)) in plan.layout.effects().enumerate().filter(|(e, _)| self.fields[*e].is_some()) {
+                debug_assert!(matches!(law.site, Site::Modulus(_) | Site::Density(_)));
+                for slot in 0..places.len() {
+                    let stiff = changes.modulus_slope(plan, physics, effect, slot);
+                    let heavy = changes.density_slope(plan, physics, effect, slot);
+                    if self.bits & MODULUS != 0 {
+                        put(&mut data[4], &stiff.unwrap_or_else(|| vec![0.0; body.cells.len()]));
+                    }
+                    if self.bits & DENSITY != 0 {
+                        put(&mut data[5], &heavy.unwrap_or_else(|| vec![0.0; body.nodes.len()]));
+                    }
+                }
+            }
+        }
+        for ((name, size), values) in sizes.iter().zip(&data) {
+            debug_assert_eq!(*size, values.len(), "{name}");
+            buffers.insert(name, gpu.upload(name, values)?);
+        }
+        Ok(())
+    }
+}
+
+/// Shares of the nodes in a load that they carry together, with derivatives.
+fn shares(plan: &Plan, law: &Law, p: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let Site::Nodes(point) = law.site else { return None };
+    point.shares(&plan.body.nodes, &plan.body.node_volume, p)
+}
+
+impl Solve<'_, '_> {
+    /// Asks every effect on nodes (or the one of number `only`) and adds its answer to `forces`, or to the matrix.
+    pub(crate) fn press_nodes(&mut self, section: u32, question: u32, only: Option<usize>, forces: &wgpu::Buffer, more: &Named) {
+        let named: Vec<_> = more.iter().copied().chain([("forces", forces)]).collect();
+        self.press(pass::PRESS_NODES, Per::Node, [section, question], only, &named);
+    }
+
+    /// Asks every effect on patches (or the one of number `only`) and adds its answer to what the planes' pass left.
+    pub(crate) fn press_patches(&mut self, section: u32, question: u32, only: Option<usize>, more: &Named) {
+        self.press(pass::PRESS_PATCHES, Per::Patch, [section, question], only, more);
+    }
+
+    fn press(&mut self, pass: usize, per: Per, [section, question]: [u32; 2], only: Option<usize>, more: &Named) {
+        let world = self.world;
+        for (k, (number, site)) in world.geometry.effects.points.iter().enumerate() {
+            if (site.site == NODES) == matches!(per, Per::Node) && only.is_none_or(|o| o == *number) {
+                self.run_with(pass, section, per, k as u32 + (question << 8), more);
+            }
+        }
+    }
+}

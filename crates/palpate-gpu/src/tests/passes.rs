@@ -1,0 +1,339 @@
+//! The passes of a step one by one, at one given state, against the same quantities of the CPU; each comparison must see one percent.
+
+use super::products::crowded;
+use super::scenes::{device, plan};
+use crate::effects::FORCE;
+use crate::pipelines::pass;
+use crate::solve::{ALL, Per, Solve};
+use crate::world::{State, World};
+use crate::{GpuBackend, Product};
+use glam::{DMat3, DVec3};
+use palpate_cpu::linear::matrix::Matrix;
+use palpate_cpu::passes::altered::Altered;
+use palpate_cpu::passes::balance::{Balance, Inertia, States};
+use palpate_cpu::passes::cells::{Mix, corners};
+use palpate_cpu::passes::points::acting;
+use palpate_engine::{Backend, ParamBatch};
+use palpate_model::corotation::{CellPose, multiply};
+use palpate_model::effects::{self, Effect};
+use palpate_model::elements::{Classes, Elements};
+use palpate_model::params::ParamKey;
+use palpate_model::pattern::{Pattern, Places};
+use palpate_model::plan::{Physics, Plan};
+use palpate_model::plane::planes;
+use palpate_model::scene::Scene;
+
+/// What one pass computed: its name, numbers, and the part of the largest number that may differ.
+type Part = (&'static str, Vec<f64>, f64);
+
+// Displacements have 24 bits of the increment and of the flight alone. Forces of cells are sums of products with strains of some
+// percent, each with an error of 6e-8 of the edge: 1e-6 of the force, times the bulk modulus over the shear modulus. Matrices and
+// products are sums of terms of both signs with 24 bits each. Solves end at 2e-7 in the preconditioner's norm, from where the
+// recursive residual of single precision drifts. Energies nearly cancel between two trials.
+const PLACED: f64 = 3e-7;
+const FORCES: f64 = 5e-6;
+const MATRIX: f64 = 2e-6;
+const SOLVED: f64 = 3e-5;
+const ENERGY: f64 = 1e-4;
+
+/// Old displacement [m] and velocity [m/s], and the increment beyond free flight [m], at a node: turned, stretched, waved.
+fn given(x: DVec3) -> [DVec3; 3] {
+    let wave = |f: f64| DVec3::new((f * x.y).sin(), (f * x.z + 1.0).cos(), (f * (x.x + x.y)).sin());
+    let turn = DMat3::from_rotation_y(0.2);
+    let old = turn * (x * DVec3::new(1.04, 0.97, 1.0)) - x + 1e-3 * wave(40.0);
+    [old, 0.3 * wave(25.0), 8e-4 * wave(60.0)]
+}
+
+/// The right-hand side that is solved for [N], large and small alike in the preconditioner's norm.
+fn load(plan: &Plan) -> Vec<DVec3> {
+    plan.body.nodes.iter().zip(&plan.body.node_volume).map(|(x, v)| 1e4 * *v * given(*x)[1]).collect()
+}
+
+fn single(v: &DVec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+fn flat<'a>(v: impl IntoIterator<Item = &'a DVec3>) -> Vec<f64> {
+    v.into_iter().flat_map(|v| v.to_array()).collect()
+}
+
+fn three(v: &[[f32; 4]]) -> Vec<f64> {
+    v.iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+}
+
+fn vectors(v: &[[f32; 4]]) -> Vec<DVec3> {
+    v.iter().map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into())).collect()
+}
+
+/// The device's numbers, with A of the CPU to check solutions by.
+fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
+    let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    world.set_iterations(1);
+    let (world, n) = (&world, plan.body.nodes.len());
+    let tally = backend.new_tally(world, &[]);
+    let (now, next) = (backend.new_state(world), backend.new_state(world));
+    let quantum = f64::from(world.geometry.shape.quantum);
+    let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| given(*x)).collect();
+    let mut old = vec![[0.0f32; 4]; 3 * n];
+    for (i, [u, v, _]) in all.iter().enumerate() {
+        let whole = (*u / quantum).round() * quantum;
+        for (k, part) in [whole, *u - whole, *v].iter().enumerate() {
+            old[k * n + i] = single(part);
+        }
+    }
+    world.gpu.queue.write_buffer(&now.0.buffer, 0, bytemuck::cast_slice(&old));
+    step(world, &now, &next, &tally, |s| {
+        s.list();
+        s.prepare();
+        s.run(pass::PREDICT, ALL, Per::Node, 0);
+    });
+    let get = |name: &str, items: usize| -> Vec<[f32; 4]> {
+        world.gpu.download(&world.buffers[name], items).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let trial = |length: f64| {
+        let w: Vec<[f32; 4]> = all.iter().map(|a| single(&(length * a[2]))).collect();
+        world.gpu.queue.write_buffer(&world.buffers["increment"], 0, bytemuck::cast_slice(&w));
+        step(world, &now, &next, &tally, |s| {
+            s.run(pass::PLACE_NEXT, ALL, Per::Node, 0);
+            s.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
+            s.press_patches(ALL, FORCE, None, &[]);
+            s.run(pass::HOLD_CELLS, ALL, Per::Hold, 0);
+            s.run(pass::PRESS_CELLS, ALL, Per::Cell, 0);
+            s.run(pass::GATHER_RESIDUAL, ALL, Per::Node, 0);
+            s.press_nodes(ALL, FORCE, None, &s.world.buffers["residual"], &[]);
+        });
+        get("residual", n)
+    };
+    let potential = |r: &[[f32; 4]]| r.iter().map(|v| f64::from(v[3])).sum::<f64>();
+    let half = potential(&trial(0.5));
+    let residual = trial(1.0);
+    step(world, &now, &next, &tally, |s| s.assemble(ALL));
+    let placed: Vec<[f32; 4]> = world.gpu.download(&next.0.buffer, 2 * n).unwrap_or_else(|e| panic!("{e}"));
+    let u1: Vec<DVec3> = vectors(&placed[..n]).iter().zip(vectors(&placed[n..])).map(|(a, b)| *a + b).collect();
+    let values: Vec<f32> =
+        world.gpu.download(&world.buffers["values"], 9 * right.pattern.blocks.columns.len()).unwrap_or_else(|e| panic!("{e}"));
+    let rhs: Vec<[f32; 4]> = load(plan).iter().map(single).collect();
+    world.gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&rhs));
+    step(world, &now, &next, &tally, |s| {
+        s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        s.list();
+        s.multiply(Product::Matrix, 0);
+    });
+    let (along, image) = (vectors(&get("cg_along", n)), get("cg_image", n));
+    step(world, &now, &next, &tally, |s| s.solve());
+    let solution = vectors(&get("direction", n));
+    vec![
+        ("place_next", flat(&u1), PLACED),
+        ("press_cells", three(&get("cell_force", 8 * plan.body.cells.len())), FORCES),
+        ("touch_patches and hold_cells", three(&get("sizes", 2 * n)[n..]), FORCES),
+        ("gather_residual", three(&residual), FORCES),
+        ("energies", vec![potential(&residual) - half], ENERGY),
+        ("gather_matrix", values.iter().map(|v| f64::from(*v)).collect(), MATRIX),
+        ("invert_diagonal", flat(&along), FORCES),
+        ("multiply_rows", right.off_product(&along, &vectors(&image)), MATRIX),
+        ("iterate_cg", flat(&right.scaled(&right.product(&solution))), SOLVED),
+    ]
+}
+
+fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: impl FnOnce(&mut Solve)) {
+    world.record(|r| work(&mut Solve::new(world, r, Some(0), now, next, tally)));
+}
+
+/// The CPU's numbers, and its matrix.
+struct Exact {
+    pattern: Pattern,
+    matrix: Matrix,
+    parts: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Exact {
+    fn new(plan: &Plan) -> Exact {
+        let physics = Physics::new(&plan.layout, &plan.theta);
+        let elements = Elements::new(plan, &Classes::new(&plan.body), physics.poisson_ratio);
+        let pattern = Pattern::new(&plan.body);
+        let places = Places::new(plan, &pattern);
+        let altered = Altered::new(plan, &physics, &elements);
+        let effects = acting(plan, &physics);
+        let planes = planes(plan, &physics);
+        let (dt, theta) = (plan.clock.step, plan.clock.theta);
+        let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt, rotation: plan.solver.rotation };
+        let inertia = Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt };
+        let balance = Balance {
+            plan,
+            pattern: &pattern,
+            places: &places,
+            elements: &elements,
+            physics: &physics,
+            planes: &planes,
+            effects: &effects,
+            altered: &altered,
+            inertia: Some(inertia),
+            mix,
+            time: physics.start + dt,
+        };
+        let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| given(*x)).collect();
+        let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = all.iter().map(|a| (a[0], a[1])).unzip();
+        let at = |length: f64| -> Vec<DVec3> {
+            all.iter().map(|a| a[0] + dt * a[1] + theta * dt * dt * physics.gravity + length * a[2]).collect()
+        };
+        let (u1, u_half) = (at(1.0), at(0.5));
+        let s = States { u1: &u1, u0: &u0, v0: &v0 };
+        // Supports of the new state: what clamps, planes and effects add to a residual without the old state's forces.
+        let bare = Plan { clamps: Vec::new(), ..plan.clone() };
+        let fresh = Balance { mix: Mix { old: 0.0, ..mix }, ..balance };
+        let free = Balance { plan: &bare, planes: &[], effects: &[], ..fresh };
+        let supports: Vec<f64> = fresh.residual(s).iter().zip(free.residual(s)).flat_map(|(a, b)| (*a - b).to_array()).collect();
+        let (body, h) = (&plan.body, plan.body.grid.h);
+        let mut cells = Vec::new();
+        for e in 0..body.cells.len() {
+            let poses = [&u1, &u0].map(|u| CellPose::new(&corners(body, e, u), h));
+            let k = &elements.cell(e).k;
+            let (a, b) = (multiply(k, &poses[0].q), multiply(k, &poses[1].q));
+            let y = std::array::from_fn(|i| physics.youngs_modulus * ((mix.new + mix.rate) * a[i] - mix.rate * b[i]));
+            cells.extend(flat(&poses[0].force(&y)));
+        }
+        let residual = flat(&balance.residual(s));
+        let energy = balance.potential(s) - balance.potential(States { u1: &u_half, ..s });
+        let (mut light, mut matrix) = (Matrix::default(), Matrix::default());
+        // On the device inertia is kept out of the matrix.
+        Balance { inertia: Some(Inertia { displacement: 0.0, ..inertia }), ..balance }.tangent(s, false, &mut light);
+        balance.tangent(s, false, &mut matrix);
+        // Rows of blocks, as the device keeps them.
+        let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
+        let mut exact = Exact { pattern, matrix, parts: Vec::new() };
+        let load = exact.scaled(&load(plan));
+        exact.parts = vec![
+            ("place_next", flat(&u1)),
+            ("press_cells", cells),
+            ("touch_patches and hold_cells", supports),
+            ("gather_residual", residual),
+            ("energies", vec![energy]),
+            ("gather_matrix", values),
+            ("invert_diagonal", flat(&load)),
+            ("multiply_rows", vec![0.0, 1.0]),
+            ("iterate_cg", flat(&load)),
+        ];
+        exact
+    }
+
+    /// A x.
+    fn product(&self, x: &[DVec3]) -> Vec<DVec3> {
+        let b = &self.pattern.blocks;
+        (0..x.len()).map(|a| (b.rows[a]..b.rows[a + 1]).map(|k| self.matrix.values[k] * x[b.columns[k] as usize]).sum()).collect()
+    }
+
+    /// D⁻¹ r, D the diagonal blocks.
+    fn scaled(&self, r: &[DVec3]) -> Vec<DVec3> {
+        r.iter().zip(&self.pattern.blocks.diagonal).map(|(r, d)| self.matrix.values[*d].inverse() * *r).collect()
+    }
+
+    /// Largest error of a product over its largest number, beside one: the vector was the device's own.
+    fn off_product(&self, x: &[DVec3], y: &[DVec3]) -> Vec<f64> {
+        let right = self.product(x);
+        let size = right.iter().map(|v| v.length()).fold(0.0, f64::max);
+        vec![right.iter().zip(y).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max) / size, 1.0]
+    }
+}
+
+/// Passes that differ by more than they may.
+fn apart(found: &[Part], right: &Exact) -> Vec<&'static str> {
+    let mut out = Vec::new();
+    for ((name, a, allowed), (other, b)) in found.iter().zip(&right.parts) {
+        assert_eq!((name, a.len()), (other, b.len()));
+        let size = b.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let off = a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
+        print!("{name} {:.1e}; ", off / size);
+        if off.is_nan() || off > allowed * size {
+            out.push(*name);
+        }
+    }
+    println!();
+    out
+}
+
+/// Everything acts: clamps that move, two planes, a point mass, ghosts, both dampings, effects on nodes, patches and cells.
+fn scene() -> Scene {
+    let mut s = crowded();
+    s.material.mass_damping = 5.0;
+    s.material.stiffness_damping = 0.004;
+    s.masses.iter_mut().for_each(|m| m.mass = 0.1);
+    s.planes[0].stiffness = Some(3e5);
+    for (kind, value) in
+        [("coulomb-friction", 0.5), ("uniform-force", 5000.0), ("stiffness-gradient", 5.0), ("density-gradient", 6.0)]
+    {
+        let mut effect = Effect::absent(effects::find(kind).unwrap_or_else(|| panic!("{kind}")));
+        effect.values[0] = Some(value);
+        s.effects.push(effect);
+    }
+    s
+}
+
+fn scale(plan: &mut Plan, key: ParamKey) {
+    let place = plan.layout.index(key);
+    plan.theta[place] *= 1.01;
+}
+
+/// A fault of one percent, and the passes that must show it.
+type Fault = (&'static str, fn(&mut Plan), &'static [&'static str]);
+
+const FAULTS: [Fault; 9] = [
+    ("gravity", |p| scale(p, ParamKey::Gravity(2)), &["place_next"]),
+    (
+        "Young's modulus",
+        |p| scale(p, ParamKey::YoungsModulus),
+        &[
+            "press_cells",
+            "touch_patches and hold_cells",
+            "gather_residual",
+            "energies",
+            "gather_matrix",
+            "multiply_rows",
+            "iterate_cg",
+        ],
+    ),
+    ("Poisson's ratio", |p| scale(p, ParamKey::PoissonRatio), &["press_cells", "gather_residual", "gather_matrix"]),
+    ("density", |p| scale(p, ParamKey::Density), &["gather_residual", "invert_diagonal", "multiply_rows", "iterate_cg"]),
+    ("mass damping", |p| scale(p, ParamKey::MassDamping), &["gather_matrix"]),
+    ("stiffness damping", |p| scale(p, ParamKey::StiffnessDamping), &["press_cells", "gather_matrix"]),
+    ("ghost penalty", |p| p.solver.ghost *= 1.01, &["gather_residual", "gather_matrix"]),
+    (
+        "contact",
+        |p| p.planes.iter_mut().for_each(|q| q.stiffness = q.stiffness.map(|s| 1.01 * s)),
+        &["touch_patches and hold_cells"],
+    ),
+    ("point mass", |p| scale(p, ParamKey::PointMass(0)), &["multiply_rows", "iterate_cg"]),
+];
+
+#[test]
+fn passes_agree_with_the_cpu_and_one_percent_shows() {
+    let Some(gpu) = device(None) else { return };
+    let backend = GpuBackend::on(gpu);
+    let plan = plan(&scene());
+    let mut right = Exact::new(&plan);
+    // Stiffness varies over the body: the CPU's cells by themselves were computed without.
+    let factors = palpate_model::changes::Changes::new(&plan, &Physics::new(&plan.layout, &plan.theta)).modulus;
+    if let Some(factors) = factors {
+        for (f, factor) in right.parts[1].1.chunks_exact_mut(24).zip(factors) {
+            f.iter_mut().for_each(|f| *f *= factor);
+        }
+    }
+    assert_eq!(apart(&found(&backend, &plan, &right), &right), [""; 0]);
+    for (name, fault, passes) in FAULTS {
+        let mut wrong = plan.clone();
+        fault(&mut wrong);
+        print!("{name}: ");
+        let seen = apart(&found(&backend, &wrong, &right), &right);
+        for pass in passes {
+            assert!(seen.contains(pass), "1 % of {name} is not seen in {pass}, only in {seen:?}");
+        }
+    }
+    // Effects: any of the forces.
+    for (place, key) in plan.layout.keys.iter().enumerate() {
+        if let ParamKey::Effect { slot: 0, .. } = key {
+            let mut wrong = plan.clone();
+            wrong.theta[place] *= 1.01;
+            assert!(!apart(&found(&backend, &wrong, &right), &right).is_empty(), "1 % of {} is not seen", key.spec().path);
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What an effect does to every surface patch, at every plane where it is one of contact, added to `touches` of touch_patches.
+//! call.extra as of press_nodes. No effect of patches reads the old velocity, so that BACK has nothing to say of it.
+// use effects/points
+
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> next: array<vec4<f32>>;
+var<storage, read> probe: array<vec4<f32>>;
+var<storage, read> cells: array<Cell>;
+var<storage, read> patches: array<Patch>;
+var<storage, read> planes: array<Plane>;
+var<storage, read> newton: array<Newton>;
+var<storage, read_write> touches: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.patches, 64u);
+    if !p.live {
+        return;
+    }
+    let effect = effects[call.extra & 255u];
+    let what = (call.extra >> 8u) & 15u;
+    let kind = (call.extra >> 12u) & 15u;
+    let index = call.extra >> 16u;
+    let m = members[p.member];
+    let site = patches[p.item];
+    var whole = vec3(0.0);
+    var rest = vec3(0.0);
+    var old_whole = vec3(0.0);
+    var old_rest = vec3(0.0);
+    var mean = vec3(0.0);
+    for (var i = 0u; i < 8u; i++) {
+        let a = at_node(p.member, cells[site.cell].nodes[i]);
+        let w = site.weights[i];
+        whole += w * next[a].xyz;
+        rest += w * next[part(1u) + a].xyz;
+        old_whole += w * now[a].xyz;
+        old_rest += w * now[part(1u) + a].xyz;
+        if what == BACK || what == BY_OLD {
+            mean += w * probe[a].xyz;
+        }
+    }
+    prepare(effect, p.member, m, mix_of(m));
+    place_point(site.point.xyz, whole, rest, old_whole, old_rest, vec3(0.0));
+    measure = number(site.point.w);
+    let at = 3u * (p.member * shape.patches + p.item);
+    var force = vec4(0.0);
+    var diagonal = vec3(0.0);
+    var mixed = vec3(0.0);
+    for (var k = 0u; k < max(shape.planes, 1u); k++) {
+        if (effect.site != AT_CONTACT && k > 0u) || (effect.site == AT_CONTACT && shape.planes == 0u) {
+            break;
+        }
+        for (var i = 0u; i < INPUTS; i++) {
+            change[i] = 0.0;
+        }
+        if what == BY_OLD {
+            for (var i = 0u; i < 3u; i++) {
+                change[OLD_AT + i] = mean[i];
+            }
+        }
+        if what == COLUMN {
+            change_by(kind, index);
+        }
+        if effect.site == AT_CONTACT {
+            let plane = planes[p.member * shape.planes + k];
+            for (var i = 0u; i < 4u; i++) {
+                z[PLANE_AT + i] = number(plane.normal[i]);
+            }
+            z[PLANE_AT + 4u] = number(plane.stiffness);
+            if what == COLUMN && kind == YOUNGS_MODULUS {
+                change[PLANE_AT + 4u] = plane.scales * DEFAULT_STIFFNESS / shape.h;
+            }
+            if what == COLUMN && kind == PLANE && index / 8u == k {
+                switch index % 8u {
+                    case 2u: { change[PLANE_AT + 3u] = 1.0; }
+                    case 3u: {
+                        for (var i = 0u; i < 3u; i++) {
+                            change[PLANE_AT + i] = plane.by_theta[i];
+                        }
+                    }
+                    default: {
+                        for (var i = 0u; i < 3u; i++) {
+                            change[PLANE_AT + i] = plane.by_phi[i];
+                        }
+                    }
+                }
+            }
+        }
+        let r = respond(effect.law, what, mean);
+        if what == STIFFNESS {
+            if newton[p.member].convex == 0u || positive(r) {
+                diagonal += r.b.xyz;
+                mixed += r.c.xyz;
+            }
+        } else {
+            force += r.a;
+        }
+    }
+    // Corner forces take the vector with the minus sign.
+    touches[at] += vec4(-force.xyz, select(0.0, force.w, what == FORCE));
+    if what == STIFFNESS {
+        touches[at + 1u] += vec4(diagonal, 0.0);
+        touches[at + 2u] += vec4(mixed, 0.0);
+    }
+}
