@@ -1,14 +1,13 @@
 //! Forces of the clamps on the corners of their cells, with their energy. call.extra: 0 = of the new state, weighted with θ;
 //! 1 = of the old state, weighted with 1 − θ; 2, 3, 4 = derivative of both by Young's modulus, Poisson's ratio, time;
-//! 5 = the old state's matrix times the vector `probe`; 6 = nothing; 7 + 256 · row = derivative by a parameter of a field of
-//! stiffness, its slopes in that row.
+//! 5 = the old state's matrix times the vector `probe`; 6 = nothing; 7, 8 + 256 · row = derivative by a parameter of a
+//! stiffness that varies over the body, in time, with its slopes in that row.
 // use shared/holds
+// use shared/slopes
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
-// [B][rows][cells]: derivatives of the cells' factors.
-var<storage, read> modulus_slopes: array<f32>;
 var<storage, read_write> hold_forces: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -31,7 +30,10 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         factor /= m.young;
     }
     if what == 7u {
-        factor = m.young * modulus_slopes[(p.member * shape.slope_rows + call.extra / 256u) * shape.cells + site.x];
+        factor = modulus_slope(m, p.member, site.x, call.extra / 256u);
+    }
+    if what == 8u {
+        factor = aging_slope(m, p.member, site.x, call.extra / 256u);
     }
     if what == 3u {
         which = 1u;

@@ -1,14 +1,13 @@
 //! Corner forces of ∂r/∂p for the parameters that act in cells: Young's modulus, Poisson's ratio, stiffness damping, and, through
-//! the passes of clamps and planes, time and planes; and of fields of stiffness. call.extra is the kind of the parameter, plus 16
+//! the passes of clamps and planes, time and planes; and of stiffness that varies. call.extra is the kind of the parameter, plus 16
 //! times the row of a field's slopes.
 // use shared/cells
+// use shared/slopes
 // use shared/supports
 // use shared/keys
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
-// [B][rows][cells]: derivatives of the cells' factors.
-var<storage, read> modulus_slopes: array<f32>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -27,13 +26,16 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let o = at_node(p.member, cell.nodes[0]);
     let kind = call.extra % 16u;
     var f = vec3(0.0);
-    if kind == YOUNGS_MODULUS || kind == POISSON_RATIO || kind == STIFFNESS_DAMPING || kind == MODULUS_SLOPE {
+    if kind == YOUNGS_MODULUS || kind == POISSON_RATIO || kind == STIFFNESS_DAMPING || kind == MODULUS_SLOPE || kind == AGING_SLOPE {
         let u0 = (now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz);
         let u1 = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
         let matrix = matrix_at(m.slot, select(0u, 1u, kind == POISSON_RATIO), cell.kind);
         var factor = select(young, young / m.young, kind == YOUNGS_MODULUS);
         if kind == MODULUS_SLOPE {
-            factor = m.young * modulus_slopes[(p.member * shape.slope_rows + call.extra / 16u) * shape.cells + e];
+            factor = modulus_slope(m, p.member, e, call.extra / 16u);
+        }
+        if kind == AGING_SLOPE {
+            factor = aging_slope(m, p.member, e, call.extra / 16u);
         }
         var on_new = mix.on_new;
         var on_old = mix.on_old;

@@ -1,11 +1,21 @@
-//! Stiffness of a cell where effects vary it over the body; without such effects the factors are not read.
+//! Stiffness of a cell where effects vary it over the body or in time; without such effects the factors are not read.
 
 // [B][cells], times Young's modulus.
 var<storage, read> moduli: array<f32>;
+// [1 + rows][B][steps + 1]: factor on the whole body's modulus at the start and in every step, then its derivatives.
+var<storage, read> agings: array<f32>;
+
+fn aging_at(member: u32, row: u32) -> f32 {
+    return agings[(row * shape.members + member) * (shape.steps + 1u) + call.step + call.mode];
+}
 
 fn young_at(m: Member, member: u32, cell: u32) -> f32 {
+    var young = m.young;
     if (shape.fields & 1u) != 0u {
-        return m.young * moduli[member * shape.cells + cell];
+        young *= moduli[member * shape.cells + cell];
     }
-    return m.young;
+    if (shape.fields & 8u) != 0u {
+        young *= aging_at(member, 0u);
+    }
+    return young;
 }

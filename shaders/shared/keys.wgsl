@@ -14,3 +14,4 @@ const POINT_MASS = 10u;
 const EFFECT = 11u;
 const MODULUS_SLOPE = 12u;
 const DENSITY_SLOPE = 13u;
+const AGING_SLOPE = 14u;

@@ -6,7 +6,7 @@ use crate::tuning::Tuning;
 use crate::world::{Adjoint, State, Tally, Tangent, World};
 use crate::{backward, forward, observe, read};
 use glam::DVec3;
-use palpate_engine::{Backend, BuildError, Evaluation, FrameResiduals, ParamBatch};
+use palpate_engine::{Backend, BuildError, Evaluation, FrameResiduals, ParamBatch, Rows};
 use palpate_model::plan::Plan;
 use std::sync::Arc;
 
@@ -165,6 +165,25 @@ impl Backend for GpuBackend {
         let pairs = tangent.parts.iter().zip(&tangent_next.parts);
         let tangents: Vec<_> = pairs.map(|(a, b)| [&a.buffer, &b.buffer]).collect();
         world.record(|r| world.observer.observe_tangent(r, k, ends, &tangents, &tally.buffers));
+    }
+
+    fn rows(
+        &self,
+        world: &World,
+        k: usize,
+        states: [&State; 2],
+        tangents: [&Tangent; 2],
+        tally: &Tally,
+        member: usize,
+    ) -> Option<Rows> {
+        let pairs = tangents[0].parts.iter().zip(&tangents[1].parts);
+        let tangents: Vec<_> = pairs.map(|(a, b)| [&a.buffer, &b.buffer]).collect();
+        let ends = states.map(|s| &s.0.buffer);
+        // What went wrong is read with the evaluation.
+        Some(observe::rows(world, k, ends, &tangents, &tally.buffers, member).unwrap_or_else(|e| {
+            self.gpu.keep(e);
+            Rows::default()
+        }))
     }
 
     fn all_failed(&self, _tally: &Tally) -> bool {

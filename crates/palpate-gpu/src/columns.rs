@@ -25,8 +25,10 @@ const NOTHING: u32 = 15;
 const EFFECT: u32 = 11;
 const MODULUS_SLOPE: u32 = 12;
 const DENSITY_SLOPE: u32 = 13;
-/// What the clamps' pass is told for a field of stiffness, plus 256 times the row of its slopes.
+const AGING_SLOPE: u32 = 14;
+/// What the clamps' pass is told for stiffness that varies over the body, in time, plus 256 times the row of its slopes.
 const HOLD_SLOPE: u32 = 7;
+const HOLD_AGING: u32 = 8;
 /// Added to a node pass' argument: cells take part; added to the sum's argument: ∂v/∂p of the start.
 const FLAG: u32 = 1 << 16;
 
@@ -69,8 +71,15 @@ impl Solve<'_, '_> {
                     let cells = Some([NO_TOUCH, HOLD_SLOPE + 256 * row]);
                     Column { kind: MODULUS_SLOPE, index: row, cells, press: None }
                 }
+                Site::Aging(_) => {
+                    let cells = Some([NO_TOUCH, HOLD_AGING + 256 * row]);
+                    Column { kind: AGING_SLOPE, index: row, cells, press: None }
+                }
                 _ => Column { kind: DENSITY_SLOPE, index: row, cells: None, press: None },
             });
+        }
+        if known.points.iter().all(|p| p.0 != effect) {
+            return None;
         }
         let cells = known.on_patches().then_some([NO_TOUCH, NO_HOLD]);
         Some(Column { kind: NOTHING, index: 0, cells, press: Some((effects::column(EFFECT, slot), Some(effect))) })

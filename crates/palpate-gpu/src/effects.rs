@@ -1,5 +1,5 @@
-//! Effects on the device. Laws of points are WGSL twins (`shaders/effects/`) that two passes call by number; fields of stiffness and
-//! density do not change during a rollout and are computed here, in f64, from the laws themselves.
+//! Effects on the device. Laws of points are WGSL twins (`shaders/effects/`) that two passes call by number; stiffness and density that
+//! vary over the body or in time do not depend on the states and are computed here, in f64, from the laws themselves.
 
 use crate::error::GpuError;
 use crate::layout::EffectSite;
@@ -7,7 +7,7 @@ use crate::memory::Maker;
 use crate::pipelines::pass;
 use crate::recorder::Named;
 use crate::solve::{Per, Solve};
-use palpate_model::changes::Changes;
+use palpate_model::changes::{self, Changes};
 use palpate_model::effects::{Law, Site};
 use palpate_model::plan::{Physics, Plan};
 use std::collections::HashMap;
@@ -31,17 +31,22 @@ const CONTACT: u32 = 2;
 const MODULUS: u32 = 1;
 const DENSITY: u32 = 2;
 const PATCHES: u32 = 4;
+const AGING: u32 = 8;
 
 /// A plan's effects as the device sees them.
 #[derive(Debug, Default)]
 pub(crate) struct Effects {
     /// Effects on points: number in the plan, and what the kernels know.
     pub(crate) points: Vec<(usize, EffectSite)>,
-    /// First row of slopes of every effect that is a field.
+    /// First row of slopes of every effect that varies stiffness or density.
     fields: Vec<Option<u32>>,
     /// As `Shape` has them.
     pub(crate) bits: u32,
     pub(crate) slope_rows: u32,
+    /// Parameters of changes in time.
+    aging_rows: u32,
+    /// Steps of the clock.
+    steps: usize,
     stride: u32,
     rows: u32,
 }
@@ -52,7 +57,7 @@ impl Effects {
     /// # Errors
     /// One of them has no place on the device yet.
     pub(crate) fn new(plan: &Plan) -> Result<Effects, GpuError> {
-        let mut e = Effects::default();
+        let mut e = Effects { steps: plan.clock.steps, ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let mut field = None;
@@ -66,6 +71,14 @@ impl Effects {
                     e.slope_rows += count;
                     None
                 }
+                Site::Aging(_) => {
+                    e.bits |= AGING;
+                    field = Some(e.aging_rows);
+                    e.aging_rows += count;
+                    None
+                }
+                // The observer's business.
+                Site::Clock => None,
                 _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
             };
             e.fields.push(field);
@@ -102,13 +115,13 @@ impl Effects {
         self.points.iter().any(|p| p.1.site == NODES)
     }
 
-    /// Row of the slopes of number `slot` of an effect that is a field.
+    /// Row of the slopes of number `slot` of an effect that varies stiffness or density.
     pub(crate) fn slope_row(&self, effect: usize, slot: u32) -> Option<u32> {
         self.fields[effect].map(|first| first + slot)
     }
 
     /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
-    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 6] {
+    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 7] {
         let slopes = self.slope_rows as usize;
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
         [
@@ -118,6 +131,7 @@ impl Effects {
             ("densities", of(DENSITY, nodes)),
             ("modulus_slopes", of(MODULUS, slopes * cells)),
             ("density_slopes", of(DENSITY, slopes * nodes)),
+            ("agings", of(AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
         ]
     }
 
@@ -152,8 +166,8 @@ impl Effects {
             let changes = Changes::new(plan, physics);
             changes.modulus.iter().for_each(|m| put(&mut data[2], m));
             changes.density.iter().for_each(|d| put(&mut data[3], d));
-            for (effect, (law, places)) in plan.layout.effects().enumerate().filter(|(e, _)| self.fields[*e].is_some()) {
-                debug_assert!(matches!(law.site, Site::Modulus(_) | Site::Density(_)));
+            let varied = |law: &Law| matches!(law.site, Site::Modulus(_) | Site::Density(_));
+            for (effect, (_, places)) in plan.layout.effects().enumerate().filter(|(_, e)| varied(e.0)) {
                 for slot in 0..places.len() {
                     let stiff = changes.modulus_slope(plan, physics, effect, slot);
                     let heavy = changes.density_slope(plan, physics, effect, slot);
@@ -166,11 +180,36 @@ impl Effects {
                 }
             }
         }
+        if self.bits & AGING != 0 {
+            data[6] = self.agings(plan, batch);
+        }
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
             buffers.insert(name, gpu.upload(name, values)?);
         }
         Ok(())
+    }
+
+    /// Factor on the stiffness and its derivatives, `[1 + rows][B][steps + 1]`, at the start and at the instant that each step's forces
+    /// are taken at.
+    fn agings(&self, plan: &Plan, batch: &[Physics]) -> Vec<f32> {
+        let clock = &plan.clock;
+        let times: Vec<f64> =
+            (0..=clock.steps).map(|i| if i == 0 { 0.0 } else { (i as f64 - 1.0 + clock.theta) * clock.step }).collect();
+        let mut out = Vec::new();
+        for physics in batch {
+            out.extend(times.iter().map(|t| changes::aging(plan, physics, *t) as f32));
+        }
+        let aging = |law: &Law| matches!(law.site, Site::Aging(_));
+        for (effect, (_, places)) in plan.layout.effects().enumerate().filter(|(_, e)| aging(e.0)) {
+            for slot in 0..places.len() {
+                for physics in batch {
+                    let slope = |t: &f64| changes::aging_slope(plan, physics, *t, effect, slot).unwrap_or(0.0) as f32;
+                    out.extend(times.iter().map(slope));
+                }
+            }
+        }
+        out
     }
 }
 

@@ -12,6 +12,8 @@ mod looks;
 mod results;
 #[cfg(test)]
 pub(crate) mod rollout_tests;
+#[cfg(test)]
+mod rows_tests;
 mod shots;
 mod tables;
 #[cfg(test)]
@@ -25,10 +27,11 @@ use crate::pipelines::pass;
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
 use looks::{Agenda, Round};
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::pullback::{NOISE_REACH, TURNED_AWAY};
-pub(crate) use results::residuals;
+pub(crate) use results::{residuals, rows};
 use shots::Shots;
 use std::collections::HashMap;
 use tables::{BandTables, SiteTables};
@@ -66,6 +69,12 @@ struct Room {
     points: usize,
     /// Bytes of scratch.
     scratch: u64,
+}
+
+/// Places in θ of numbers that shift the simulation against the frames.
+fn shifts(plan: &Plan) -> Vec<usize> {
+    let sensors = Sensors::new(&plan.layout, &plan.theta);
+    sensors.clocks().iter().copied().chain([plan.layout.index(ParamKey::TimeStart)]).collect()
 }
 
 fn groups_of(items: usize) -> usize {
@@ -119,8 +128,8 @@ impl Observer {
             });
             tally.insert(name, made);
         }
-        let start = self.plan.layout.index(ParamKey::TimeStart);
-        let shifts: Vec<u32> = directions.iter().map(|&d| u32::from(d == start)).collect();
+        let moving = shifts(&self.plan);
+        let shifts: Vec<u32> = directions.iter().map(|d| u32::from(moving.contains(d))).collect();
         gpu.queue.write_buffer(&tally["shifts"], 0, bytemuck::cast_slice(&shifts));
     }
 
@@ -179,11 +188,27 @@ impl Observer {
         tally: &Buffers,
     ) {
         let q = tangents.len();
-        let band = (self.sight.extended - self.sight.nodes) as usize;
         for round in self.rounds(k).flat_map(|round| round.parts(self.tangent_slots(q))) {
-            let states = [("now", ends[0]), ("next", ends[1])];
-            let own = self.named(&states, tally);
-            look(r, &own, &self.sight, round);
+            let own = self.differentiate(r, round, ends, tangents, tally);
+            run(r, pass::WEIGH_ROWS, &own, round, q + q * (q + 1) / 2, q);
+        }
+    }
+
+    /// Residuals of a round, and their derivatives along the tangents; returns the buffers.
+    fn differentiate<'a>(
+        &'a self,
+        r: &mut Recorder,
+        round: Round,
+        ends: [&'a wgpu::Buffer; 2],
+        tangents: &[[&wgpu::Buffer; 2]],
+        tally: &'a Buffers,
+    ) -> Vec<(&'static str, &'a wgpu::Buffer)> {
+        let q = tangents.len();
+        let band = (self.sight.extended - self.sight.nodes) as usize;
+        let states = [("now", ends[0]), ("next", ends[1])];
+        let own = self.named(&states, tally);
+        look(r, &own, &self.sight, round);
+        if q > 0 {
             for (i, [now, next]) in tangents.iter().enumerate() {
                 let own = self.named(&[&states[..], &[("tangent_now", *now), ("tangent_next", *next)]].concat(), tally);
                 run(r, pass::SEE_TANGENTS, &own, round, groups_of(self.sight.nodes as usize), q + (i << 16));
@@ -193,8 +218,8 @@ impl Observer {
             }
             let items = round.points + round.markers + round.nodes;
             run(r, pass::DIFFERENTIATE_ROWS, &own, round, groups_of(q * items), q);
-            run(r, pass::WEIGH_ROWS, &own, round, q + q * (q + 1) / 2, q);
         }
+        own
     }
 }
 

@@ -10,6 +10,7 @@ use crate::observe::Observer;
 use crate::recorder::{Groups, PassTime, Recorder};
 use crate::tuning::{self, Product, Tuning};
 use palpate_engine::ParamBatch;
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -150,7 +151,9 @@ impl World {
             self.pool.lock().unwrap_or_else(PoisonError::into_inner).clear();
         }
         self.geometry.shape.members = self.members() as u32;
-        let starts: Vec<f64> = self.batch.physics.iter().map(|p| p.start).collect();
+        // Frames are stamped by a clock that may be ahead.
+        let ahead = |row: &Vec<f64>| Sensors::new(&self.plan.layout, row).ahead();
+        let starts: Vec<f64> = self.batch.physics.iter().zip(&self.batch.theta).map(|(p, row)| p.start + ahead(row)).collect();
         self.observer.set(&self.gpu, &starts);
     }
 

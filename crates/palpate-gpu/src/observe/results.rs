@@ -1,14 +1,14 @@
 //! What observations found, back on the host: sums over frames in double precision, and residuals for reports.
 
-use super::{FOUND, Observer, look};
+use super::{FOUND, Observer, look, shifts};
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Health;
 use crate::memory::Maker as _;
 use crate::world::{Buffers, World};
 use glam::DVec3;
-use palpate_engine::{Curvature, Evaluation, FrameResiduals};
-use palpate_model::params::ParamKey;
+use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, Source};
+use palpate_model::kernel;
 
 impl Observer {
     /// Adds to evaluations (one a member) what a tally holds of observations.
@@ -20,7 +20,6 @@ impl Observer {
         if frames == 0 {
             return Ok(());
         }
-        let start = self.plan.layout.index(ParamKey::TimeStart);
         let sums: Vec<[f32; 4]> = gpu.download(&tally["frame_sums"], all.len() * frames)?;
         let later: Vec<[f32; 4]> = gpu.download(&tally["start_sums"], all.len() * frames)?;
         let each = q + q * q;
@@ -32,8 +31,8 @@ impl Observer {
                 e.sum_squares += f64::from(*squares);
                 e.sum_signed += f64::from(*signed);
             }
-            if let Some(g) = e.gradient.get_mut(start) {
-                *g += later[m * frames..(m + 1) * frames].iter().map(|s| f64::from(s[0])).sum::<f64>();
+            for place in shifts(&self.plan) {
+                e.gradient[place] += later[m * frames..(m + 1) * frames].iter().map(|s| f64::from(s[0])).sum::<f64>();
             }
             if q > 0 {
                 let mut own = curvature[m * each..(m + 1) * each].iter().map(|x| f64::from(*x));
@@ -82,4 +81,82 @@ pub(crate) fn residuals(
         all.push(out);
     }
     Ok(all)
+}
+
+/// Every residual of the frames of step k of one member with its derivatives along the tangents; `tally` was made for as many.
+///
+/// # Errors
+/// Whatever went wrong on the device.
+pub(crate) fn rows(
+    world: &World,
+    k: usize,
+    ends: [&wgpu::Buffer; 2],
+    tangents: &[[&wgpu::Buffer; 2]],
+    tally: &Buffers,
+    member: usize,
+) -> Result<Rows, GpuError> {
+    let (o, gpu, q) = (&world.observer, &world.gpu, tangents.len());
+    let (body, obs) = (&*world.plan.body, &*world.plan.observation);
+    let mut out = Rows::default();
+    for round in o.rounds(k).flat_map(|round| round.parts(1)) {
+        let at = o.agenda.looks[round.first];
+        if at.member as usize != member {
+            continue;
+        }
+        world.record(|r| {
+            o.differentiate(r, round, ends, tangents, tally);
+        });
+        let frame = at.frame as usize;
+        let (f, shot) = (&obs.frames[frame], &o.shots.shots[frame]);
+        let (points, most) = (f.points.len(), o.sight.rows as usize);
+        let found: Vec<[f32; FOUND as usize / 4]> = gpu.download(&o.buffers["found"], points)?;
+        let values: Vec<[f32; 2]> = gpu.download(&o.buffers["rows"], f.residuals())?;
+        let slopes: Vec<f32> = if q > 0 { gpu.download(&tally["slopes"], q * most)? } else { Vec::new() };
+        let mut add = |row: ResidualRow, place: usize| {
+            out.residuals.push(row);
+            out.sensitivity.extend((0..q).map(|q| f64::from(slopes[q * most + place])));
+        };
+        // The device has points and markers in an order of its own.
+        let mut place_of = vec![0; points];
+        for (place, &p) in o.shots.point_order[shot.point_start as usize..][..points].iter().enumerate() {
+            place_of[p as usize] = place;
+        }
+        for (p, (&place, seen)) in place_of.iter().zip(&f.points).enumerate() {
+            let [x, y, z, phi, gx, gy, gz, cell] = found[place];
+            let source = Source::Point { point: p as u32, camera: seen.camera };
+            let (noise, value) = (obs.depth_noise, f64::from(phi));
+            let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest: seen.position, along_sight: 0.0 };
+            let row = body.band.cells.get(cell.to_bits() as usize).map_or(bare, |cell| {
+                let sight = (seen.position - obs.cameras[seen.camera as usize].center).normalize_or_zero();
+                let gradient = DVec3::new(gx.into(), gy.into(), gz.into());
+                ResidualRow {
+                    value: Some(value),
+                    weight: kernel::weight(value, world.plan.band),
+                    rest: body.grid.position(cell.lattice) + body.grid.h * DVec3::new(x.into(), y.into(), z.into()),
+                    along_sight: gradient.dot(sight),
+                    ..bare
+                }
+            });
+            add(row, place);
+        }
+        let mut vector = |noise: f64, rest: DVec3, place: usize, source: &dyn Fn(u8) -> Source| {
+            for a in 0..3u8 {
+                let place = points + 3 * place + usize::from(a);
+                let value = Some(f64::from(values[place][0]));
+                add(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0 }, place);
+            }
+        };
+        let markers = f.markers.len();
+        let order = &o.shots.mark_order[shot.marker_start as usize..][..markers];
+        for (m, marker) in f.markers.iter().enumerate() {
+            let place = order.iter().position(|&o| o as usize == m).unwrap_or(m);
+            let rest = obs.markers[marker.site as usize].carry(|i| body.nodes[i]).0;
+            vector(obs.marker_noise, rest, place, &|axis| Source::Marker { site: marker.site, axis });
+        }
+        for i in 0..f.displacements.len() {
+            let source = |axis| Source::Node { node: i as u32, axis };
+            vector(obs.displacement_noise, body.nodes[i], markers + i, &source);
+        }
+    }
+    Ok(out)
 }

@@ -248,7 +248,7 @@ fn evaluations_with_loads_agree() {
     with(&mut s, "air-drag", &[("coefficient", &[5.0]), ("fluid_density", &[50.0])]);
     let place: &[(&str, &[f64])] = &[("stiffness", &[0.5]), ("distance", &[0.045]), ("azimuth", &[3.0]), ("elevation", &[0.3])];
     with(&mut s, "second-plane", place);
-    with(&mut s, "density-gradient", &[("slope", &[5.0, -3.0, 4.0])]);
+    with(&mut s, "time-offset", &[("offset", &[-4e-3])]);
     compare(&seen(&s), 0.1);
 }
 
@@ -269,7 +269,7 @@ fn evaluations_with_contact_and_varying_stiffness_agree() {
 }
 
 #[test]
-fn evaluations_of_a_held_body_with_inclusions_agree() {
+fn evaluations_of_a_held_body_that_creeps_agree() {
     let mut s = held(0.03);
     s.time.steps = 1;
     s.observation = watched();
@@ -279,10 +279,11 @@ fn evaluations_of_a_held_body_with_inclusions_agree() {
         "slack",
         &[("force", &[500.0, 200.0, -300.0]), ("by_x", by[0]), ("by_y", by[1]), ("by_z", by[2]), ("width", &[0.5])],
     );
+    with(&mut s, "creep", &[("fraction", &[0.6]), ("time", &[0.005])]);
     with(&mut s, "inclusion", &[]);
-    s.effects[1].values[0] = Some(0.8);
+    s.effects[2].values[0] = Some(0.8);
     with(&mut s, "density-inclusion", &[]);
-    s.effects[2].values[0] = Some(0.7);
+    s.effects[3].values[0] = Some(0.7);
     compare(&seen(&s), 0.1);
 }
 

@@ -1,12 +1,13 @@
 //! What is too large, lost or out of memory is an error with a name, a size and a way out.
 
-use super::scenes::{ball, device, own_device, plan, spread};
+use super::scenes::{ball, device, held, own_device, plan, spread};
 use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Recorder, Size};
+use crate::solve::{ALL, Per, SOLVE, Solve};
 use crate::tuning::Tuning;
 use crate::world::{KINDS, SECTIONS, World};
 use crate::{GpuBackend, device::Gpu};
@@ -116,6 +117,41 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
     // One invocation goes through all members: the most that a build accepts.
     let most = LOOPS - 64;
     assert_eq!(u64::from(listed(&gpu, most as usize)), most);
+}
+
+#[test]
+fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
+    let Some(gpu) = device(None) else { return };
+    // Held and without inertia: more iterations to convergence than a dispatch may have.
+    let plan = plan(&held(0.014));
+    let backend = GpuBackend::on(gpu.clone());
+    let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    world.set_iterations(1);
+    let tally = backend.new_tally(&world, &[]);
+    let (now, next) = (backend.new_state(&world), backend.new_state(&world));
+    let wave: Vec<[f32; 4]> = (0..plan.body.nodes.len()).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), 1.0, 0.0]).collect();
+    gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));
+    let world = &world;
+    let run = |work: fn(&mut Solve)| world.record(|r| work(&mut Solve::new(world, r, None, &now, &next, &tally)));
+    let newton = || gpu.download::<Newton>(&world.buffers["newton"], 1).unwrap_or_else(|e| panic!("{e}"))[0];
+    run(|s| {
+        s.linearise();
+        s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+    });
+    // An accuracy that cannot be reached: the dispatch ends at its bound, which the loops set and not the longest chunk.
+    let start = Newton { goal: 0.0, ..newton() };
+    gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::bytes_of(&start));
+    run(|s| {
+        s.list();
+        s.run(pass::ITERATE_CG, SOLVE, Per::Member, 1);
+    });
+    let (end, chunk) = (newton(), world.geometry.shape.chunk);
+    println!("{} nodes, {chunk} iterations, {:.1e} of the residual left", plan.body.nodes.len(), (end.rz / start.rz).sqrt());
+    assert!((20..512).contains(&chunk));
+    assert_eq!((end.cg, end.stage), (chunk, 2), "{end:?}");
+    // Sums cut short by an adapter would make directions that do not descend.
+    assert!(end.rz < 1e-4 * start.rz, "{end:?}");
 }
 
 #[test]

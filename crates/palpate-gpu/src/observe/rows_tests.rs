@@ -1,0 +1,62 @@
+//! Single residuals and their derivatives against the CPU backend.
+
+use super::rollout_tests::{seen, watched};
+use super::tests::ball_plan;
+use crate::GpuBackend;
+use crate::tests::scenes::{ball, device};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Linearised, Rollout, Source};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+
+/// Numbers that differ, over what they may be: distances by a thousandth of the noise (rounding is 1e-7 of a cell), places by as much
+/// of a cell, derivatives by a thousandth of the largest of their column.
+fn apart(a: &Linearised, b: &Linearised, plan: &Plan) -> [f64; 3] {
+    let q = b.directions.len();
+    assert_eq!((a.rows.residuals.len(), a.rows.sensitivity.len()), (b.rows.residuals.len(), b.rows.sensitivity.len()));
+    let mut worst = [0.0f64; 3];
+    for (x, y) in a.rows.residuals.iter().zip(&b.rows.residuals) {
+        assert_eq!((x.frame, x.source, x.noise, x.value.is_some()), (y.frame, y.source, y.noise, y.value.is_some()));
+        let value = (x.value.unwrap_or(0.0) - y.value.unwrap_or(0.0)).abs() / y.noise;
+        let kind = (x.weight - y.weight).abs().max((x.along_sight - y.along_sight).abs());
+        worst[0] = worst[0].max(value).max(kind);
+        worst[1] = worst[1].max((x.rest - y.rest).length() / plan.body.grid.h);
+    }
+    for k in 0..q {
+        let column = |l: &Linearised| -> Vec<f64> { l.rows.sensitivity.iter().skip(k).step_by(q).copied().collect() };
+        let (x, y) = (column(a), column(b));
+        let size = y.iter().fold(1e-12, |m: f64, v| m.max(v.abs()));
+        worst[2] = x.iter().zip(&y).map(|(x, y)| (x - y).abs() / size).fold(worst[2], f64::max);
+    }
+    worst
+}
+
+#[test]
+fn rows_are_those_of_the_cpu_and_one_percent_shows() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = ball(0.03);
+    scene.time.steps = 2;
+    scene.observation = watched();
+    let (first, second) = (seen(&scene), ball_plan());
+    for plan in [first, second] {
+        let keys = [ParamKey::YoungsModulus, ParamKey::Gravity(2), ParamKey::TimeStart];
+        let directions = keys.map(|k| plan.layout.index(k));
+        let mut cpu = Rollout::new(CpuBackend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+        let right = cpu.linearise(&plan.theta, &directions).unwrap_or_else(|e| panic!("{e}"));
+        let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+        let mut linearise = |theta: &[f64]| rollout.linearise(theta, &directions).unwrap_or_else(|e| panic!("{e}"));
+        let found = linearise(&plan.theta);
+        let kinds = |f: fn(&Source) -> bool| found.rows.residuals.iter().filter(|r| f(&r.source)).count();
+        let [points, markers] = [kinds(|s| matches!(s, Source::Point { .. })), kinds(|s| matches!(s, Source::Marker { .. }))];
+        let d = apart(&found, &right, &plan);
+        println!("{points} points, {markers} coordinates of markers: {d:?}");
+        assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
+        let mut wrong = plan.theta.clone();
+        wrong[directions[1]] *= 1.01;
+        let d = apart(&linearise(&wrong), &right, &plan);
+        assert!(d.iter().any(|d| *d > 1e-3), "{d:?}");
+        // Without directions there are residuals alone.
+        let bare = rollout.linearise(&plan.theta, &[]).unwrap_or_else(|e| panic!("{e}"));
+        assert!(bare.rows.residuals == found.rows.residuals && bare.rows.sensitivity.is_empty());
+    }
+}
