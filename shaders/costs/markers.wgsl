@@ -29,6 +29,8 @@ struct Carried {
 }
 
 var<storage, read> sites: array<Site>;
+// [B][sites]: how far markers sit off the places that the recording states, on the rest shape [m].
+var<storage, read> offsets: array<vec4<f32>>;
 var<storage, read> site_rows: array<u32>;
 var<storage, read> site_nodes: array<u32>;
 // Weights for the gradient [1/m] and, last, for the position.
@@ -36,6 +38,11 @@ var<storage, read> site_weights: array<vec4<f32>>;
 var<storage, read> marks: array<Mark>;
 // [slots][most markers]
 var<storage, read_write> carried: array<Carried>;
+
+// From the attachment point to the centre of a member's marker, at rest.
+fn stalk_of(member: u32, site: u32) -> vec3<f32> {
+    return sites[site].stalk.xyz + offsets[member * sight.sites + site].xyz;
+}
 
 // d ⊗ g, by columns.
 fn outer(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {

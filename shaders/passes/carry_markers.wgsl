@@ -22,15 +22,17 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         moved += w.w * d;
         h += outer(d, w.xyz);
     }
+    let stalk = stalk_of(s.look.member, mark.site);
     let excess = excess_of(rotation_of(h));
     var c: Carried;
     c.turn = identity3() + excess;
     c.pair = pair_inverse(stretch_of(excess, h));
     let far = (seen[origin].xyz - mark.goal) + (seen[rest_part() + origin].xyz - mark.goal_rest);
-    let r = far + (moved + excess * site.stalk.xyz);
+    // The measured place is counted from the stated one: the offset itself comes on top of its turning.
+    let r = far + (moved + excess * stalk + (stalk - site.stalk.xyz));
     let pull = sight.marker * r;
     c.pull = vec4(pull, 0.0);
-    c.spin = vec4(c.pair * cross(site.stalk.xyz, transpose(c.turn) * pull), 0.0);
+    c.spin = vec4(c.pair * cross(stalk, transpose(c.turn) * pull), 0.0);
     carried[s.slot * sight.markers + s.item] = c;
     let row = s.slot * sight.rows + shot.point_count + 3u * s.item;
     rows[row] = vec2(r.x, sight.marker);

@@ -1,6 +1,6 @@
 //! Derivative of the cells' force by the old state, times the vector `probe` (call.extra 0), or its transpose (1); with what the
 //! clamps' pass and the effects' left for the old state. Twin of `by_old` and `by_old_transposed` of the CPU backend.
-// use shared/cells
+// use shared/corner
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
@@ -14,65 +14,54 @@ var<storage, read_write> cell_force: array<vec4<f32>>;
 @compute @workgroup_size(64)
 fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) local: u32) {
-    lanes_start(local);
-    let p = find_place(group, groups, local / 8u, shape.cells, 8u);
-    let e = min(p.item, shape.cells - 1u);
-    let corner = local % 8u;
-    let sign = sign_of(corner);
-    let cell = cells[e];
-    let m = members[p.member];
-    let mix = mix_of(m);
-    let young = young_at(m, p.member, e);
-    let a = at_node(p.member, cell.nodes[corner]);
-    let o = at_node(p.member, cell.nodes[0]);
-    let u0 = (now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz);
-    let u1 = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
+    let c = find_corner(group, groups, local);
+    let u0 = (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz);
+    let u1 = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
     // Taken from corner 0 as well: rigid translation of the probe costs no digits.
-    let d = probe[a].xyz - probe[o].xyz;
-    let matrix = matrix_at(m.slot, 0u, cell.kind);
-    let at = (p.member * shape.cells + e) * 8u + corner;
-    let before = old_stress[at].xyz;
-    let turning = free_pose(u0, sign);
+    let d = probe[c.node].xyz - probe[c.first].xyz;
+    let matrix = matrix_at(c.m.slot, 0u, cells[c.cell].kind);
+    let before = old_stress[c.at].xyz;
+    let turning = free_pose(u0, c.sign);
     var f = vec3(0.0);
     if is_lagged() {
-        let fresh = held_pose(turning.turn, u1, sign);
-        let old = held_pose(turning.turn, u0, sign);
-        let arms = mix.on_new * fresh.z + mix.on_old * old.z;
-        let y = (mix.on_new * young) * stiff(matrix, corner, fresh.q) + mix.on_old * before;
+        let fresh = held_pose(turning.turn, u1, c.sign);
+        let old = held_pose(turning.turn, u0, c.sign);
+        let arms = c.mix.on_new * fresh.z + c.mix.on_old * old.z;
+        let y = (c.mix.on_new * c.young) * stiff(matrix, c.number, fresh.q) + c.mix.on_old * before;
         if call.extra == 0u {
-            let omega = spin_body(turning, centred(transpose(turning.r) * d), sign);
-            let dq = mix.on_old * strain_rate(old, d, sign) - cross(omega, arms);
-            f = force(fresh, young * stiff(matrix, corner, dq) + cross(omega, y), sign);
+            let omega = spin_body(turning, centred(transpose(turning.r) * d), c.sign);
+            let dq = c.mix.on_old * strain_rate(old, d, c.sign) - cross(omega, arms);
+            f = force(fresh, c.young * stiff(matrix, c.number, dq) + cross(omega, y), c.sign);
         } else {
-            let s = strain_rate(fresh, d, sign);
-            let t = young * stiff(matrix, corner, s);
+            let s = strain_rate(fresh, d, c.sign);
+            let t = c.young * stiff(matrix, c.number, s);
             let g = sum8(cross(y, s) - cross(arms, t));
-            f = force(old, mix.on_old * t, sign) + turning.r * spin_adjoint_body(turning, g, sign);
+            f = force(old, c.mix.on_old * t, c.sign) + turning.r * spin_adjoint_body(turning, g, c.sign);
         }
     } else {
-        let fresh = free_pose(u1, sign);
+        let fresh = free_pose(u1, c.sign);
         if call.extra == 0u {
-            f = force(fresh, (mix.on_old * young) * stiff(matrix, corner, strain_rate(turning, d, sign)), sign);
+            f = force(fresh, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(turning, d, c.sign)), c.sign);
         } else {
-            f = force(turning, (mix.on_old * young) * stiff(matrix, corner, strain_rate(fresh, d, sign)), sign);
+            f = force(turning, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(fresh, d, c.sign)), c.sign);
         }
         // The old state's own force, whose derivative is symmetric.
         let body = centred(transpose(turning.r) * d);
-        let dq = body - cross(spin_body(turning, body, sign), turning.z);
-        let own = force_body(turning, centred(young * stiff(matrix, corner, dq)), sign)
-            + second_body(turning, centred(before), body, sign);
-        f += turning.r * (mix.old * own);
+        let dq = body - cross(spin_body(turning, body, c.sign), turning.z);
+        let own = force_body(turning, centred(c.young * stiff(matrix, c.number, dq)), c.sign)
+            + second_body(turning, centred(before), body, c.sign);
+        f += turning.r * (c.mix.old * own);
     }
-    for (var k = cell.hold_start; k < cell.hold_end; k++) {
-        f += hold_forces[(p.member * shape.holds + k) * 8u + corner].xyz;
+    for (var k = cells[c.cell].hold_start; k < cells[c.cell].hold_end; k++) {
+        f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     // Effects on patches leave their share where contact has its force.
     if (shape.fields & 4u) != 0u {
-        for (var k = cell.patch_start; k < cell.patch_end; k++) {
-            f -= patches[k].weights[corner] * touches[3u * (p.member * shape.patches + k)].xyz;
+        for (var k = cells[c.cell].patch_start; k < cells[c.cell].patch_end; k++) {
+            f -= patches[k].weights[c.number] * touches[3u * (c.member * shape.patches + k)].xyz;
         }
     }
-    if p.live {
-        cell_force[at] = vec4(f, 0.0);
+    if c.live {
+        cell_force[c.at] = vec4(f, 0.0);
     }
 }

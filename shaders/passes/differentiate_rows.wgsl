@@ -4,10 +4,13 @@
 // use shared/found
 
 var<storage, read> changes: array<vec4<f32>>;
+// Directions that are an offset of a marker: 1 + 3 · marker + axis, else 0.
+var<storage, read> offset_directions: array<u32>;
 // [slots][Q][most rows]
 var<storage, read_write> slopes: array<f32>;
 
-fn marker_change(base: u32, mark: Mark, c: Carried) -> vec3<f32> {
+fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -> vec3<f32> {
+    var c = carrier;
     var moved = vec3(0.0);
     var df = mat3x3(vec3(0.0), vec3(0.0), vec3(0.0));
     for (var k = site_rows[mark.site]; k < site_rows[mark.site + 1u]; k++) {
@@ -17,7 +20,12 @@ fn marker_change(base: u32, mark: Mark, c: Carried) -> vec3<f32> {
         df += outer(d, w.xyz);
     }
     let spin = c.pair * axial(transpose(c.turn) * df);
-    return moved + c.turn * cross(spin, sites[mark.site].stalk.xyz);
+    moved += c.turn * cross(spin, stalk_of(member, mark.site));
+    let own = offset_directions[q];
+    if own != 0u && (own - 1u) / 3u == mark.site {
+        moved += c.turn[(own - 1u) % 3u];
+    }
+    return moved;
 }
 
 @compute @workgroup_size(64)
@@ -49,7 +57,7 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
     var change = vec3(0.0);
     let vector = item - shot.point_count;
     if vector < shot.marker_count {
-        change = marker_change(base, marks[shot.marker_start + vector], carried[s.slot * sight.markers + vector]);
+        change = marker_change(base, s.look.member, q, marks[shot.marker_start + vector], carried[s.slot * sight.markers + vector]);
     } else {
         change = changes[base + vector - shot.marker_count].xyz;
     }

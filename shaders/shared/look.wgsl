@@ -23,7 +23,9 @@ struct Sight { // mirrored
     frames: u32,
     // Lattice nodes.
     lattice: array<u32, 3>,
-    pad: array<u32, 2>,
+    // Parameters P, and those of them that are offsets of markers.
+    parameters: u32,
+    offsets: u32,
     // Edge of a cell [m].
     h: f32,
     // Half width of the cost's band [m].

@@ -66,7 +66,7 @@ const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 /// Features that are used where they are.
 const WELCOME: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
 /// Storage buffers that the widest kernel binds.
-const STORAGE_BUFFERS: u32 = 20;
+pub(crate) const STORAGE_BUFFERS: u32 = 20;
 
 fn instance() -> wgpu::Instance {
     // Indirect arguments come from our own kernels, so the validating dispatch before each of them is left out.

@@ -77,6 +77,14 @@ fn shifts(plan: &Plan) -> Vec<usize> {
     sensors.clocks().iter().copied().chain([plan.layout.index(ParamKey::TimeStart)]).collect()
 }
 
+/// Parameters that are offsets of markers: 3 · marker + axis, and the place in θ.
+fn offset_places(plan: &Plan) -> Vec<[u32; 2]> {
+    let sensors = Sensors::new(&plan.layout, &plan.theta);
+    let of =
+        |m: u32| sensors.marker_places(m).flat_map(move |at| (0..3).map(move |a| [3 * m + a, at as u32 + a])).collect::<Vec<_>>();
+    (0..plan.observation.markers.len() as u32).flat_map(of).collect()
+}
+
 fn groups_of(items: usize) -> usize {
     items.div_ceil(64).max(1)
 }
@@ -100,8 +108,8 @@ impl Observer {
         self.buffers.values().map(wgpu::Buffer::size).sum()
     }
 
-    /// A new batch: where each member starts on the recording's clock [s].
-    pub(crate) fn set(&mut self, gpu: &Gpu, starts: &[f64]) {
+    /// A new batch: where each member starts on the recording's clock [s], and what its sensors do.
+    pub(crate) fn set(&mut self, gpu: &Gpu, starts: &[f64], sensors: &[Sensors]) {
         self.sight.members = starts.len() as u32;
         self.agenda = Agenda::new(&self.plan, starts, self.sight.slots as usize);
         if let (Some(looks), Some(sight)) = (self.buffers.get("looks"), self.buffers.get("sight")) {
@@ -110,6 +118,11 @@ impl Observer {
                 gpu.queue.write_buffer(looks, 0, bytes);
             }
             gpu.queue.write_buffer(sight, 0, bytemuck::bytes_of(&self.sight));
+        }
+        let offset = |s: &Sensors, marker: u32| shots::split(s.marker_offset(marker))[0];
+        let offsets: Vec<[f32; 4]> = sensors.iter().flat_map(|s| (0..self.sight.sites).map(|m| offset(s, m))).collect();
+        if let Some(buffer) = self.buffers.get("offsets").filter(|b| 16 * offsets.len() as u64 <= b.size()) {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&offsets));
         }
     }
 
@@ -131,6 +144,10 @@ impl Observer {
         let moving = shifts(&self.plan);
         let shifts: Vec<u32> = directions.iter().map(|d| u32::from(moving.contains(d))).collect();
         gpu.queue.write_buffer(&tally["shifts"], 0, bytemuck::cast_slice(&shifts));
+        let places = offset_places(&self.plan);
+        let code = |d: &usize| places.iter().find(|p| p[1] as usize == *d).map_or(0, |p| p[0] + 1);
+        let codes: Vec<u32> = directions.iter().map(code).collect();
+        gpu.queue.write_buffer(&tally["offset_directions"], 0, bytemuck::cast_slice(&codes));
     }
 
     fn rounds(&self, k: usize) -> impl Iterator<Item = Round> {
@@ -171,6 +188,9 @@ impl Observer {
             if round.points > 0 {
                 run(r, pass::PULL_POINTS, &own, round, cell_groups(&self.sight), 0);
                 run(r, pass::GATHER_PULLS, &own, round, groups_of(self.sight.extended as usize), 0);
+            }
+            if round.markers > 0 && self.sight.offsets > 0 {
+                run(r, pass::PULL_OFFSETS, &own, round, self.sight.offsets as usize, 0);
             }
             let parts = groups_of(self.sight.nodes as usize).min(PARTS);
             run(r, pass::FOLD_PULLS, &own, round, parts, usize::from(round.points > 0));
@@ -230,7 +250,7 @@ fn tangent_slots(s: &Sight, room: Room, largest: u64, directions: usize) -> usiz
 }
 
 /// What observations add to a tally along q directions, in bytes.
-fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 6] {
+fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 7] {
     let looks = u64::from(s.members) * u64::from(s.frames);
     let together = if q == 0 || looks == 0 { 0 } else { together };
     [
@@ -240,6 +260,7 @@ fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 6] {
         ("changes", VECTOR * together * q * u64::from(s.extended)),
         ("slopes", 4 * together * q * u64::from(s.rows)),
         ("shifts", 4 * q),
+        ("offset_directions", 4 * q),
     ]
 }
 
@@ -276,6 +297,8 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         markers: most(|f| f.markers.len()) as u32,
         stripes: points.div_ceil(room.points).max(1) as u32,
         sites: sites.sites.len() as u32,
+        parameters: plan.layout.len() as u32,
+        offsets: offset_places(plan).len() as u32,
         frames: obs.frames.len() as u32,
         lattice: body.grid.size.map(|n| n as u32),
         h: body.grid.h as f32,
@@ -324,6 +347,8 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         buffers.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
         buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
         buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
+        buffers.insert("offsets", gpu.buffer("offsets", VECTOR * (members.max(1) * sites.sites.len()) as u64)?);
+        buffers.insert("offset_places", gpu.upload("offset_places", &offset_places(plan))?);
         buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
         buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
         buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);

@@ -152,9 +152,9 @@ impl World {
         }
         self.geometry.shape.members = self.members() as u32;
         // Frames are stamped by a clock that may be ahead.
-        let ahead = |row: &Vec<f64>| Sensors::new(&self.plan.layout, row).ahead();
-        let starts: Vec<f64> = self.batch.physics.iter().zip(&self.batch.theta).map(|(p, row)| p.start + ahead(row)).collect();
-        self.observer.set(&self.gpu, &starts);
+        let sensors: Vec<Sensors> = self.batch.theta.iter().map(|row| Sensors::new(&self.plan.layout, row)).collect();
+        let starts: Vec<f64> = self.batch.physics.iter().zip(&sensors).map(|(p, s)| p.start + s.ahead()).collect();
+        self.observer.set(&self.gpu, &starts, &sensors);
     }
 
     /// Tells the kernels how many Newton iterations they have.

@@ -30,8 +30,10 @@ pub struct Sight {
     pub frames: u32,
     /// Lattice nodes along each axis.
     pub lattice: [u32; 3],
-    /// Fills up.
-    pub pad: [u32; 2],
+    /// Parameters P.
+    pub parameters: u32,
+    /// Parameters that are offsets of markers.
+    pub offsets: u32,
     /// Edge of a cell [m].
     pub h: f32,
     /// Half width of the cost's band [m].

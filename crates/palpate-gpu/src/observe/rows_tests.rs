@@ -1,11 +1,12 @@
 //! Single residuals and their derivatives against the CPU backend.
 
-use super::rollout_tests::{seen, watched};
-use super::tests::ball_plan;
+use super::rollout_tests::{differences, seen, watched};
+use super::tests::{ball_plan, ball_plan_with};
 use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Linearised, Rollout, Source};
+use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Source};
+use palpate_model::effects::{Effect, find};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -59,4 +60,43 @@ fn rows_are_those_of_the_cpu_and_one_percent_shows() {
         let bare = rollout.linearise(&plan.theta, &[]).unwrap_or_else(|e| panic!("{e}"));
         assert!(bare.rows.residuals == found.rows.residuals && bare.rows.sensitivity.is_empty());
     }
+}
+
+#[test]
+fn markers_that_sit_elsewhere_are_those_of_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    let mut effect = Effect::absent(find("marker-offset").unwrap_or_default());
+    for (value, v) in effect.values.iter_mut().zip([1.0, 4e-3, -6e-3, 5e-3]) {
+        *value = Some(v);
+    }
+    let plan = ball_plan_with(vec![effect]);
+    let own = |k: &ParamKey| match *k {
+        ParamKey::Effect { slot, .. } => slot > 0,
+        ParamKey::YoungsModulus => true,
+        _ => false,
+    };
+    let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
+    let request = Request { gradient: true, sensitivities: directions.clone() };
+    // The second member's marker sits elsewhere again.
+    let mut other = plan.theta.clone();
+    other[directions[1]] += 0.01;
+    let rows = ParamBatch::from_rows(&[plan.theta.clone(), other]);
+    let mut cpu = Rollout::new(CpuBackend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let right = cpu.evaluate(&rows, &request);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let found = rollout.evaluate(&rows, &request);
+    for (a, b) in found.iter().zip(&right) {
+        assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
+        let off = differences(a, b, &directions);
+        assert!(off.is_empty(), "{off:#?}");
+    }
+    let lin = cpu.linearise(&plan.theta, &directions).unwrap_or_else(|e| panic!("{e}"));
+    let rows = rollout.linearise(&plan.theta, &directions).unwrap_or_else(|e| panic!("{e}"));
+    let d = apart(&rows, &lin, &plan);
+    assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
+    // One percent more in every component shows.
+    let mut wrong = plan.theta.clone();
+    directions[1..].iter().for_each(|p| wrong[*p] *= 1.01);
+    let wrong = rollout.linearise(&wrong, &directions).unwrap_or_else(|e| panic!("{e}"));
+    assert!(apart(&wrong, &lin, &plan)[0] > 1e-3);
 }

@@ -9,6 +9,7 @@ use glam::{DQuat, DVec3};
 use palpate_cpu::passes::frames::{self, Along, Look};
 use palpate_cpu::passes::matching::{BandLookup, PointHash};
 use palpate_engine::{Backend, Evaluation, ParamBatch};
+use palpate_model::effects::Effect;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::instant::instants;
 use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
@@ -134,6 +135,11 @@ pub(super) fn scene(source: Analytic, h: f64) -> Scene {
 
 /// A ball with three markers, two of them on stalks, one surface point twice.
 pub(super) fn ball_plan() -> Plan {
+    ball_plan_with(Vec::new())
+}
+
+/// The same with effects.
+pub(super) fn ball_plan_with(effects: Vec<Effect>) -> Plan {
     let center = DVec3::new(0.003, 0.001, 0.051);
     let marker = |name: &str, way: DVec3, length: f64| {
         let way = way.normalize();
@@ -142,7 +148,7 @@ pub(super) fn ball_plan() -> Plan {
     };
     let rest =
         [marker("a", DVec3::X, 0.02), marker("b", DVec3::new(0.2, 1.0, 0.3), 0.0), marker("c", DVec3::new(1.0, 0.1, 0.9), 0.05)];
-    observed(&scene(Analytic::Ball { radius: 0.05, center }, 0.021), &rest, 3)
+    observed(&Scene { effects, ..scene(Analytic::Ball { radius: 0.05, center }, 0.021) }, &rest, 3)
 }
 
 /// Numbers that are compared, and their name.

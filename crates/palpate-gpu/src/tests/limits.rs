@@ -1,11 +1,12 @@
 //! What is too large, lost or out of memory is an error with a name, a size and a way out.
 
 use super::scenes::{ball, device, held, own_device, plan, spread};
+use crate::device::STORAGE_BUFFERS;
 use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
-use crate::pipelines::pass;
+use crate::pipelines::{PASSES, pass};
 use crate::recorder::{Args, Recorder, Size};
 use crate::solve::{ALL, Per, SOLVE, Solve};
 use crate::tuning::Tuning;
@@ -117,6 +118,12 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
     // One invocation goes through all members: the most that a build accepts.
     let most = LOOPS - 64;
     assert_eq!(u64::from(listed(&gpu, most as usize)), most);
+}
+
+#[test]
+fn no_kernel_binds_more_buffers_than_adapters_are_asked_for() {
+    let widest = PASSES.iter().map(|p| p.bindings.iter().filter(|b| !b.3).count()).max();
+    assert!(widest.is_some_and(|w| w <= STORAGE_BUFFERS as usize && w > 10), "{widest:?}");
 }
 
 #[test]
