@@ -6,7 +6,7 @@
 fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
     let s = find_seat(group, groups, local, 64u);
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     if !s.runs || s.item >= shot.marker_count {
         return;
     }

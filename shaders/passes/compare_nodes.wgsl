@@ -9,7 +9,7 @@ var<storage, read> measured: array<vec4<f32>>;
 fn compare_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
     let s = find_seat(group, groups, local, 64u);
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     if !s.runs || s.item >= shot.node_count {
         return;
     }

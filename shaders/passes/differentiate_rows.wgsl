@@ -4,10 +4,14 @@
 // use shared/found
 
 var<storage, read> changes: array<vec4<f32>>;
-// Directions that are an offset of a marker: 1 + 3 · marker + axis, else 0.
-var<storage, read> offset_directions: array<u32>;
+// Directions that change the measurement: 1 + 3 · marker + axis of an offset, READING + number of what moves readings, else 0.
+var<storage, read> own_directions: array<u32>;
+// [points][readings]: derivatives of the true points.
+var<storage, read> reading_slopes: array<vec4<f32>>;
 // [slots][Q][most rows]
 var<storage, read_write> slopes: array<f32>;
+
+const READING = 0x80000000u;
 
 fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -> vec3<f32> {
     var c = carrier;
@@ -21,8 +25,8 @@ fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -
     }
     let spin = c.pair * axial(transpose(c.turn) * df);
     moved += c.turn * cross(spin, stalk_of(member, mark.site));
-    let own = offset_directions[q];
-    if own != 0u && (own - 1u) / 3u == mark.site {
+    let own = own_directions[q];
+    if own != 0u && own < READING && (own - 1u) / 3u == mark.site {
         moved += c.turn[(own - 1u) % 3u];
     }
     return moved;
@@ -32,7 +36,7 @@ fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -
 fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                       @builtin(local_invocation_index) local: u32) {
     let s = find_seat(group, groups, local, 64u);
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     let items = shot.point_count + shot.marker_count + shot.node_count;
     let q = s.item / max(items, 1u);
     let item = s.item % max(items, 1u);
@@ -48,6 +52,10 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
             var change = vec3(0.0);
             for (var i = 0u; i < 8u; i++) {
                 change += shape_at(f.xi, i) * changes[base + band_cells[f.cell].nodes[i]].xyz;
+            }
+            let own = own_directions[q];
+            if own >= READING {
+                change -= reading_slopes[(shot.point_start + item) * sight.readings + own - READING].xyz;
             }
             d = -dot(f.gradient, change);
         }

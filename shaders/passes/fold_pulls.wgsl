@@ -54,7 +54,7 @@ fn fold_pulls(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if !s.runs {
         return;
     }
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     let plane = sight.members * sight.nodes;
     let f = s.look.value;
     let rate = s.look.rate;

@@ -8,7 +8,7 @@ var<storage, read_write> owners: array<u32>;
 fn forget_matches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
     let s = find_seat(group, groups, local, 64u);
-    if !s.runs || s.item >= shots[s.look.frame].point_count {
+    if !s.runs || s.item >= shots[s.look.shot].point_count {
         return;
     }
     keys[s.slot * sight.points + s.item] = 0xffffffffu;

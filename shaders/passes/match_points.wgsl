@@ -52,7 +52,7 @@ fn match_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     if !s.runs || cell >= sight.cells {
         return;
     }
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     if shot.point_count == 0u {
         return;
     }

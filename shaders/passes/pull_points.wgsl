@@ -16,7 +16,7 @@ fn pull_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !s.runs || cell >= sight.cells {
         return;
     }
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     var sum = vec3(0.0);
     if shot.point_count != 0u {
         let e = load_hexahedron(s.slot, cell, shot);

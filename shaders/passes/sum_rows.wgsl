@@ -11,7 +11,7 @@ fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     if !s.runs {
         return;
     }
-    let shot = shots[s.look.frame];
+    let shot = shots[s.look.shot];
     var sum = vec4(0.0);
     for (var i = s.item; i < rows_of(shot); i += 64u * call.roster) {
         let row = rows[s.slot * sight.rows + i];

@@ -29,7 +29,7 @@ fn weigh_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     }
     let base = s.slot * count * sight.rows;
     var sum = 0.0;
-    for (var i = local; i < rows_of(shots[s.look.frame]); i += 64u) {
+    for (var i = local; i < rows_of(shots[s.look.shot]); i += 64u) {
         let row = rows[s.slot * sight.rows + i];
         var other = row.x;
         if b < count {

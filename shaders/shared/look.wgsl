@@ -38,13 +38,16 @@ struct Sight { // mirrored
     depth: f32,
     marker: f32,
     displacement: f32,
-    pad_end: f32,
+    // Numbers that move depth readings.
+    readings: u32,
 }
 
 struct Look { // mirrored
     member: u32,
     frame: u32,
-    pad: vec2<u32>,
+    // Which shot: the frame's, or the member's own where effects move its readings.
+    shot: u32,
+    pad: u32,
     // Factors of u₀, v₀, u₁, v₁, and their derivatives by time.
     value: vec4<f32>,
     rate: vec4<f32>,

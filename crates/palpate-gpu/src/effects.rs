@@ -78,7 +78,7 @@ impl Effects {
                     None
                 }
                 // The observer's business.
-                Site::Clock | Site::Marker => None,
+                Site::Clock | Site::Marker | Site::Readings(_) => None,
                 _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
             };
             e.fields.push(field);

@@ -9,6 +9,7 @@ mod extension_tests;
 #[cfg(test)]
 mod fault_tests;
 mod looks;
+mod readings;
 mod results;
 #[cfg(test)]
 pub(crate) mod rollout_tests;
@@ -28,7 +29,6 @@ use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
 use looks::{Agenda, Round};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::pullback::{NOISE_REACH, TURNED_AWAY};
 pub(crate) use results::{residuals, rows};
@@ -56,6 +56,7 @@ pub(crate) struct Observer {
     shots: Shots,
     sight: Sight,
     agenda: Agenda,
+    sensors: Vec<Sensors>,
     buffers: Buffers,
     /// Largest buffer that can be bound [B].
     largest: u64,
@@ -69,20 +70,6 @@ struct Room {
     points: usize,
     /// Bytes of scratch.
     scratch: u64,
-}
-
-/// Places in θ of numbers that shift the simulation against the frames.
-fn shifts(plan: &Plan) -> Vec<usize> {
-    let sensors = Sensors::new(&plan.layout, &plan.theta);
-    sensors.clocks().iter().copied().chain([plan.layout.index(ParamKey::TimeStart)]).collect()
-}
-
-/// Parameters that are offsets of markers: 3 · marker + axis, and the place in θ.
-fn offset_places(plan: &Plan) -> Vec<[u32; 2]> {
-    let sensors = Sensors::new(&plan.layout, &plan.theta);
-    let of =
-        |m: u32| sensors.marker_places(m).flat_map(move |at| (0..3).map(move |a| [3 * m + a, at as u32 + a])).collect::<Vec<_>>();
-    (0..plan.observation.markers.len() as u32).flat_map(of).collect()
 }
 
 fn groups_of(items: usize) -> usize {
@@ -100,7 +87,8 @@ impl Observer {
 
     fn within(gpu: &Gpu, plan: &Plan, members: usize, room: Room) -> Result<Observer, GpuError> {
         let (shots, sight, buffers) = tables(gpu, plan, members, room)?;
-        Ok(Observer { plan: plan.clone(), shots, sight, agenda: Agenda::default(), buffers, largest: gpu.largest, room })
+        let (agenda, sensors) = (Agenda::default(), Vec::new());
+        Ok(Observer { plan: plan.clone(), shots, sight, agenda, sensors, buffers, largest: gpu.largest, room })
     }
 
     /// Device memory of tables and scratch [B].
@@ -112,6 +100,16 @@ impl Observer {
     pub(crate) fn set(&mut self, gpu: &Gpu, starts: &[f64], sensors: &[Sensors]) {
         self.sight.members = starts.len() as u32;
         self.agenda = Agenda::new(&self.plan, starts, self.sight.slots as usize);
+        self.sensors = sensors.to_vec();
+        if self.sight.readings > 0 && self.sight.frames > 0 {
+            self.shots = Shots::of(&self.plan, sensors);
+            for look in &mut self.agenda.looks {
+                look.shot = look.member * self.sight.frames + look.frame;
+            }
+            if let Err(e) = readings::upload(gpu, &self.plan, sensors, &self.shots, &mut self.buffers) {
+                gpu.keep(e);
+            }
+        }
         if let (Some(looks), Some(sight)) = (self.buffers.get("looks"), self.buffers.get("sight")) {
             let bytes: &[u8] = bytemuck::cast_slice(&self.agenda.looks);
             if bytes.len() as u64 <= looks.size() {
@@ -119,8 +117,7 @@ impl Observer {
             }
             gpu.queue.write_buffer(sight, 0, bytemuck::bytes_of(&self.sight));
         }
-        let offset = |s: &Sensors, marker: u32| shots::split(s.marker_offset(marker))[0];
-        let offsets: Vec<[f32; 4]> = sensors.iter().flat_map(|s| (0..self.sight.sites).map(|m| offset(s, m))).collect();
+        let offsets = readings::offsets(sensors, self.sight.sites);
         if let Some(buffer) = self.buffers.get("offsets").filter(|b| 16 * offsets.len() as u64 <= b.size()) {
             gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&offsets));
         }
@@ -141,13 +138,11 @@ impl Observer {
             });
             tally.insert(name, made);
         }
-        let moving = shifts(&self.plan);
+        let moving = readings::shifts(&self.plan);
         let shifts: Vec<u32> = directions.iter().map(|d| u32::from(moving.contains(d))).collect();
         gpu.queue.write_buffer(&tally["shifts"], 0, bytemuck::cast_slice(&shifts));
-        let places = offset_places(&self.plan);
-        let code = |d: &usize| places.iter().find(|p| p[1] as usize == *d).map_or(0, |p| p[0] + 1);
-        let codes: Vec<u32> = directions.iter().map(code).collect();
-        gpu.queue.write_buffer(&tally["offset_directions"], 0, bytemuck::cast_slice(&codes));
+        let codes = readings::codes(&self.plan, directions);
+        gpu.queue.write_buffer(&tally["own_directions"], 0, bytemuck::cast_slice(&codes));
     }
 
     fn rounds(&self, k: usize) -> impl Iterator<Item = Round> {
@@ -191,6 +186,9 @@ impl Observer {
             }
             if round.markers > 0 && self.sight.offsets > 0 {
                 run(r, pass::PULL_OFFSETS, &own, round, self.sight.offsets as usize, 0);
+            }
+            if round.points > 0 && self.sight.readings > 0 {
+                run(r, pass::PULL_READINGS, &own, round, self.sight.readings as usize, 0);
             }
             let parts = groups_of(self.sight.nodes as usize).min(PARTS);
             run(r, pass::FOLD_PULLS, &own, round, parts, usize::from(round.points > 0));
@@ -260,7 +258,7 @@ fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 7] {
         ("changes", VECTOR * together * q * u64::from(s.extended)),
         ("slopes", 4 * together * q * u64::from(s.rows)),
         ("shifts", 4 * q),
-        ("offset_directions", 4 * q),
+        ("own_directions", 4 * q),
     ]
 }
 
@@ -280,7 +278,8 @@ type Made<B> = (Shots, Sight, HashMap<&'static str, B>);
 /// Tables, and scratch.
 fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<Made<M::Buffer>, GpuError> {
     let (body, obs) = (&*plan.body, &*plan.observation);
-    let shots = Shots::new(plan);
+    let sensors = readings::distinct(plan, &vec![Sensors::new(&plan.layout, &plan.theta); members.max(1)]);
+    let shots = Shots::of(plan, &sensors);
     let band = BandTables::new(plan);
     let sites = SiteTables::new(plan);
     let most = |f: fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
@@ -298,7 +297,8 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         stripes: points.div_ceil(room.points).max(1) as u32,
         sites: sites.sites.len() as u32,
         parameters: plan.layout.len() as u32,
-        offsets: offset_places(plan).len() as u32,
+        offsets: readings::offset_places(plan).len() as u32,
+        readings: readings::places(plan).len() as u32,
         frames: obs.frames.len() as u32,
         lattice: body.grid.size.map(|n| n as u32),
         h: body.grid.h as f32,
@@ -323,18 +323,15 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         for (name, bytes) in each {
             buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
         }
-        let cameras: Vec<_> = obs.cameras.iter().map(|c| shots::split(c.center - body.center)[0]).collect();
         let node_sites: Vec<[u32; 2]> = sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
         let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
         buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
         buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
-        buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
-        buffers.insert("points", gpu.upload("points", &shots.points)?);
-        buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
+        readings::upload(gpu, plan, &sensors, &shots, &mut buffers)?;
+        buffers.insert("reading_places", gpu.upload("reading_places", &readings::places(plan))?);
         buffers.insert("marks", gpu.upload("marks", &shots.marks)?);
         buffers.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
         buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
-        buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
         buffers.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
         buffers.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
         buffers.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
@@ -348,7 +345,7 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
         buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
         buffers.insert("offsets", gpu.buffer("offsets", VECTOR * (members.max(1) * sites.sites.len()) as u64)?);
-        buffers.insert("offset_places", gpu.upload("offset_places", &offset_places(plan))?);
+        buffers.insert("offset_places", gpu.upload("offset_places", &readings::offset_places(plan))?);
         buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
         buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
         buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);

@@ -48,8 +48,8 @@ pub struct Sight {
     pub marker: f32,
     /// 1/(n σ²) of observed displacements [1/m²].
     pub displacement: f32,
-    /// Fills up.
-    pub pad_end: f32,
+    /// Numbers that move depth readings.
+    pub readings: u32,
 }
 
 /// One frame, seen by one member.
@@ -60,8 +60,10 @@ pub struct Look {
     pub member: u32,
     /// Frame.
     pub frame: u32,
+    /// Shot.
+    pub shot: u32,
     /// Fills up.
-    pub pad: [u32; 2],
+    pub pad: u32,
     /// Factors of u₀, v₀, u₁, v₁.
     pub value: [f32; 4],
     /// Their derivatives by time [1/s].

@@ -36,7 +36,8 @@ impl Agenda {
                     let look = |at: &palpate_model::instant::Instant| Look {
                         member: member as u32,
                         frame: at.frame as u32,
-                        pad: [0; 2],
+                        shot: at.frame as u32,
+                        pad: 0,
                         value: at.value.map(|f| f as f32),
                         rate: at.rate.map(|f| f as f32),
                     };

@@ -1,6 +1,7 @@
 //! What observations found, back on the host: sums over frames in double precision, and residuals for reports.
 
-use super::{FOUND, Observer, look, shifts};
+use super::readings::shifts;
+use super::{FOUND, Observer, look};
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Health;
@@ -66,7 +67,7 @@ pub(crate) fn residuals(
         }
         world.record(|r| look(r, &own, &o.sight, round));
         let frame = at.frame as usize;
-        let shot = &o.shots.shots[frame];
+        let shot = &o.shots.shots[at.shot as usize];
         let (points, markers) = (shot.point_count as usize, shot.marker_count as usize);
         let found: Vec<[f32; FOUND as usize / 4]> = gpu.download(&o.buffers["found"], points)?;
         let rows: Vec<[f32; 2]> = gpu.download(&o.buffers["rows"], points + 3 * markers)?;
@@ -107,7 +108,7 @@ pub(crate) fn rows(
             o.differentiate(r, round, ends, tangents, tally);
         });
         let frame = at.frame as usize;
-        let (f, shot) = (&obs.frames[frame], &o.shots.shots[frame]);
+        let (f, shot) = (&obs.frames[frame], &o.shots.shots[at.shot as usize]);
         let (points, most) = (f.points.len(), o.sight.rows as usize);
         let found: Vec<[f32; FOUND as usize / 4]> = gpu.download(&o.buffers["found"], points)?;
         let values: Vec<[f32; 2]> = gpu.download(&o.buffers["rows"], f.residuals())?;
@@ -127,7 +128,8 @@ pub(crate) fn rows(
             let (noise, value) = (obs.depth_noise, f64::from(phi));
             let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest: seen.position, along_sight: 0.0 };
             let row = body.band.cells.get(cell.to_bits() as usize).map_or(bare, |cell| {
-                let sight = (seen.position - obs.cameras[seen.camera as usize].center).normalize_or_zero();
+                let truth = o.sensors[member].truth(&obs.cameras[seen.camera as usize], seen);
+                let sight = DVec3::from_array(truth.ray()).normalize_or_zero();
                 let gradient = DVec3::new(gx.into(), gy.into(), gz.into());
                 ResidualRow {
                     value: Some(value),

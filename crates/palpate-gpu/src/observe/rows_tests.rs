@@ -6,7 +6,7 @@ use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Source};
-use palpate_model::effects::{Effect, find};
+use palpate_model::effects::{ALL, Effect, Unstated, find};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -99,4 +99,62 @@ fn markers_that_sit_elsewhere_are_those_of_the_cpu() {
     directions[1..].iter().for_each(|p| wrong[*p] *= 1.01);
     let wrong = rollout.linearise(&wrong, &directions).unwrap_or_else(|e| panic!("{e}"));
     assert!(apart(&wrong, &lin, &plan)[0] > 1e-3);
+}
+
+fn effect(kind: &str, values: &[(usize, f64)]) -> Effect {
+    let mut effect = Effect::absent(find(kind).unwrap_or_else(|| panic!("{kind}")));
+    values.iter().for_each(|(slot, v)| effect.values[*slot] = Some(*v));
+    effect
+}
+
+#[test]
+fn readings_that_are_off_are_those_of_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = ball(0.03);
+    scene.time.steps = 2;
+    scene.observation = watched();
+    scene.effects = vec![
+        effect("depth-bias", &[(0, 4e-3)]),
+        effect("camera-pose", &[(0, 1.0), (1, 3e-3), (3, -2e-3), (4, 0.004), (5, -0.003), (6, 0.002)]),
+        effect("depth-bias-part", &[(0, 5e-3), (2, 0.5), (3, 0.3)]),
+        effect("depth-scale", &[(0, 0.01)]),
+        effect("depth-along-ray", &[(0, 0.2)]),
+    ];
+    let plan = seen(&scene);
+    let own = |k: &ParamKey| match *k {
+        ParamKey::Effect { law, slot, .. } => {
+            !matches!(ALL[usize::from(law)].params[usize::from(slot)].default, Unstated::Choice(_))
+        }
+        ParamKey::YoungsModulus => true,
+        _ => false,
+    };
+    let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
+    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let mut other = plan.theta.clone();
+    other[directions[1]] *= 1.5;
+    other[directions[3]] *= 1.2;
+    let rows = ParamBatch::from_rows(&[plan.theta.clone(), other]);
+    let mut cpu = Rollout::new(CpuBackend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let right = cpu.evaluate(&rows, &request);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let found = rollout.evaluate(&rows, &request);
+    for (a, b) in found.iter().zip(&right) {
+        assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
+        let off = differences(a, b, &directions);
+        assert!(off.is_empty(), "{off:#?}");
+    }
+    let lin = cpu.linearise(&plan.theta, &directions).unwrap_or_else(|e| panic!("{e}"));
+    let d = apart(&rollout.linearise(&plan.theta, &directions).unwrap_or_else(|e| panic!("{e}")), &lin, &plan);
+    println!("{d:?}");
+    assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
+    // One percent of each effect's first number.
+    for (p, key) in plan.layout.keys.iter().enumerate() {
+        if matches!(*key, ParamKey::Effect { slot: 0, .. }) {
+            let p = if own(key) { p } else { p + 1 };
+            let mut wrong = plan.theta.clone();
+            wrong[p] *= 1.01;
+            let wrong = rollout.linearise(&wrong, &directions).unwrap_or_else(|e| panic!("{e}"));
+            assert!(apart(&wrong, &lin, &plan)[0] > 1e-3, "{}", plan.layout.keys[p].spec().path);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::layout::{Mark, Shot};
 use glam::DVec3;
+use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 
 /// Most cubes along y and z: a cell's loop over rows of cubes stays far below [`super::MOST_LOOPS`] with it.
@@ -35,33 +36,51 @@ pub(crate) struct Shots {
 }
 
 impl Shots {
-    pub(crate) fn new(plan: &Plan) -> Shots {
+    /// Of the recording as these sensors took it, `[sensors][F]`; markers and displacements are the same for all.
+    pub(crate) fn of(plan: &Plan, sensors: &[Sensors]) -> Shots {
         let mut all = Shots::default();
+        for s in sensors {
+            all.add(plan, s);
+        }
+        all
+    }
+
+    fn add(&mut self, plan: &Plan, sensors: &Sensors) {
+        let all = self;
         // Where markers are at rest: their goal is a displacement.
         let sites = &plan.observation.markers;
         let rest: Vec<DVec3> = sites.iter().map(|s| s.carry(|i| plan.body.nodes[i]).0 + s.stalk).collect();
-        for f in &plan.observation.frames {
+        let count = plan.observation.frames.len();
+        let first_camera = all.shots.len() / count.max(1) * plan.observation.cameras.len();
+        for (frame, f) in plan.observation.frames.iter().enumerate() {
+            let known = (all.shots.len() >= count).then(|| all.shots[frame]);
             let mut shot = Shot {
                 point_start: all.points.len() as u32,
                 point_count: f.points.len() as u32,
-                marker_start: all.marks.len() as u32,
+                marker_start: known.map_or(all.marks.len() as u32, |s| s.marker_start),
                 marker_count: f.markers.len() as u32,
-                node_start: (all.measured.len() / 2) as u32,
+                node_start: known.map_or((all.measured.len() / 2) as u32, |s| s.node_start),
                 node_count: f.displacements.len() as u32,
                 cube_start: all.cube_starts.len() as u32,
                 ..Shot::default()
             };
-            let origin = f.points.iter().map(|p| p.position).sum::<DVec3>() / f.points.len().max(1) as f64;
+            let moved = sensors.points(&plan.observation.cameras, &f.points);
+            let points = moved.as_ref().unwrap_or(&f.points);
+            let origin = points.iter().map(|p| p.position).sum::<DVec3>() / points.len().max(1) as f64;
             [shot.shift, shot.shift_rest] = split(origin - plan.body.center);
-            let from: Vec<[f32; 3]> = f.points.iter().map(|p| (p.position - origin).as_vec3().to_array()).collect();
+            let from: Vec<[f32; 3]> = points.iter().map(|p| (p.position - origin).as_vec3().to_array()).collect();
             let cubes = Cubes::new(&from, plan.body.grid.h as f32);
             (shot.cubes, shot.low, shot.inverse_edge) = (cubes.size, cubes.low, cubes.inverse_edge);
             all.cube_starts.extend(cubes.starts.iter().map(|s| s + shot.point_start));
             for &i in &cubes.order {
                 let [x, y, z] = from[i as usize];
-                all.points.push([x, y, z, f.points[i as usize].camera as f32]);
+                all.points.push([x, y, z, (first_camera + points[i as usize].camera as usize) as f32]);
             }
             all.point_order.extend(cubes.order);
+            all.shots.push(shot);
+            if known.is_some() {
+                continue;
+            }
 
             let mut order: Vec<u32> = (0..f.markers.len() as u32).collect();
             order.sort_by_key(|&m| f.markers[m as usize].site);
@@ -74,9 +93,7 @@ impl Shots {
             all.mark_rows.extend((0..=sites.len()).map(before));
             all.mark_order.extend(order);
             all.measured.extend(f.displacements.iter().flat_map(|d| split(*d)));
-            all.shots.push(shot);
         }
-        all
     }
 }
 

@@ -429,7 +429,8 @@ fn loops_stay_bounded_and_strays_do_not_stretch_the_cubes() {
     assert!(edge < 0.0075, "{edge}");
 
     let plan = ball_plan();
-    let (shots, band, sites) = (super::Shots::new(&plan), super::BandTables::new(&plan), super::SiteTables::new(&plan));
+    let (shots, band, sites) =
+        (super::Shots::of(&plan, &[Sensors::default()]), super::BandTables::new(&plan), super::SiteTables::new(&plan));
     let mut crowd = shots.clone();
     crowd.shots[0].cubes = [4000, 40, 40];
     let sight = |points: u32, stripes: u32| super::Sight {

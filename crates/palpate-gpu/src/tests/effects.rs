@@ -291,7 +291,7 @@ fn evaluations_of_a_held_body_that_creeps_agree() {
 fn an_effect_without_a_place_on_the_device_is_refused_by_name() {
     let Some(gpu) = device(None) else { return };
     let mut s = ball(0.05);
-    with(&mut s, "depth-bias", &[("bias", &[0.01])]);
+    with(&mut s, "strain-stiffening", &[]);
     let e = GpuBackend::on(gpu).build(&super::scenes::plan(&s), 1).err().map(|e| e.to_string()).unwrap_or_default();
-    assert!(e.contains("`depth-bias`"), "{e}");
+    assert!(e.contains("`strain-stiffening`"), "{e}");
 }

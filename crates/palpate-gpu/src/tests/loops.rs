@@ -51,7 +51,8 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("rows_of(shot); i += 64u * call.roster") => seen.rows.div_ceil(64 * 256),
         () if has("sight.nodes; node += 64u * call.roster") => most.nodes.div_ceil(64 * 256),
         () if has("i < call.mode; i += 64u") => 4,
-        () if has("rows_of(shots[s.look.frame])") => seen.rows.div_ceil(64),
+        () if has("shot.point_count; i += 64u") => seen.points.div_ceil(64),
+        () if has("rows_of(shots[s.look.shot])") => seen.rows.div_ceil(64),
         () if has("while left > a") => 256,
         () => return None,
     })

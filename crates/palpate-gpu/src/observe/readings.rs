@@ -1,0 +1,110 @@
+//! Effects on the measurement: the clock's shift, markers' offsets, and, for depth readings, true points and cameras of every member with
+//! the points' derivatives, computed in double precision when a batch is set. Without the latter all members share the recording's points.
+
+use super::shots::{Shots, split};
+use crate::error::GpuError;
+use crate::memory::Maker;
+use palpate_model::effects::sensors::Sensors;
+use palpate_model::effects::{Site, Unstated};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use std::collections::HashMap;
+
+/// First code of directions that move readings (`differentiate_rows`).
+const READING: u32 = 1 << 31;
+
+/// Places in θ of numbers that shift the simulation against the frames.
+pub(super) fn shifts(plan: &Plan) -> Vec<usize> {
+    let sensors = Sensors::new(&plan.layout, &plan.theta);
+    sensors.clocks().iter().copied().chain([plan.layout.index(ParamKey::TimeStart)]).collect()
+}
+
+/// Parameters that are offsets of markers: 3 · marker + axis, and the place in θ.
+pub(super) fn offset_places(plan: &Plan) -> Vec<[u32; 2]> {
+    let sensors = Sensors::new(&plan.layout, &plan.theta);
+    let of =
+        |m: u32| sensors.marker_places(m).flat_map(move |at| (0..3).map(move |a| [3 * m + a, at as u32 + a])).collect::<Vec<_>>();
+    (0..plan.observation.markers.len() as u32).flat_map(of).collect()
+}
+
+/// What directions change of the measurement, as `differentiate_rows` wants it.
+pub(super) fn codes(plan: &Plan, directions: &[usize]) -> Vec<u32> {
+    let (offsets, readings) = (offset_places(plan), places(plan));
+    let code = |d: &usize| {
+        let offset = offsets.iter().find(|p| p[1] as usize == *d).map(|p| p[0] + 1);
+        offset.or_else(|| readings.iter().position(|p| *p as usize == *d).map(|k| READING + k as u32)).unwrap_or(0)
+    };
+    directions.iter().map(code).collect()
+}
+
+/// Offsets of all markers, `[B][sites]` [m].
+pub(super) fn offsets(sensors: &[Sensors], sites: u32) -> Vec<[f32; 4]> {
+    sensors.iter().flat_map(|s| (0..sites).map(|m| split(s.marker_offset(m))[0])).collect()
+}
+
+/// Numbers of effects on readings that have derivatives: their places in θ.
+pub(super) fn places(plan: &Plan) -> Vec<u32> {
+    let of_readings = plan.layout.effects().filter(|(law, _)| matches!(law.site, Site::Readings(_)));
+    of_readings
+        .flat_map(|(law, range)| law.params.iter().zip(range))
+        .filter(|(p, _)| !matches!(p.default, Unstated::Choice(_)))
+        .map(|(_, place)| place as u32)
+        .collect()
+}
+
+/// The sensors that shots are made for: one for all members where readings are exact.
+pub(super) fn distinct(plan: &Plan, sensors: &[Sensors]) -> Vec<Sensors> {
+    if places(plan).is_empty() { vec![Sensors::default()] } else { sensors.to_vec() }
+}
+
+/// Uploads what depends on the sensors.
+///
+/// # Errors
+/// More than the device has.
+pub(super) fn upload<M: Maker>(
+    gpu: &M,
+    plan: &Plan,
+    sensors: &[Sensors],
+    shots: &Shots,
+    buffers: &mut HashMap<&'static str, M::Buffer>,
+) -> Result<(), GpuError> {
+    let obs = &plan.observation;
+    let cameras = sensors.iter().flat_map(|s| s.cameras(&obs.cameras));
+    let cameras: Vec<[f32; 4]> = cameras.map(|c| split(c.center - plan.body.center)[0]).collect();
+    buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
+    buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
+    buffers.insert("points", gpu.upload("points", &shots.points)?);
+    buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
+    buffers.insert("reading_slopes", gpu.upload("reading_slopes", &slopes(plan, sensors, shots))?);
+    Ok(())
+}
+
+/// ∂(true point)/∂θ of every point in the device's order, `[points][K]`.
+fn slopes(plan: &Plan, sensors: &[Sensors], shots: &Shots) -> Vec<[f32; 4]> {
+    let (obs, places) = (&plan.observation, places(plan));
+    if places.is_empty() {
+        return Vec::new();
+    }
+    let mut out = vec![[0.0; 4]; shots.points.len() * places.len()];
+    for (number, shot) in shots.shots.iter().enumerate() {
+        let (member, frame) = (number / obs.frames.len(), number % obs.frames.len());
+        let first = shot.point_start as usize;
+        for (i, &p) in shots.point_order[first..][..shot.point_count as usize].iter().enumerate() {
+            let seen = &obs.frames[frame].points[p as usize];
+            sensors[member].point_slopes(
+                &obs.cameras[seen.camera as usize],
+                seen,
+                |_| true,
+                |at, by| {
+                    if let Some(k) = places.iter().position(|p| *p as usize == at) {
+                        let slot = &mut out[(first + i) * places.len() + k];
+                        for (s, v) in slot.iter_mut().zip(by.to_array()) {
+                            *s += v as f32;
+                        }
+                    }
+                },
+            );
+        }
+    }
+    out
+}
