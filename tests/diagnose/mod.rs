@@ -1,5 +1,7 @@
 //! Diagnosis from end to end: recordings made on another grid with another step, and a model that lacks one thing, or nothing.
 
+mod measured;
+
 use crate::cli::BLOCK;
 use serde_json::Value;
 use std::fs;

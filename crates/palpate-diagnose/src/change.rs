@@ -47,7 +47,9 @@ impl Change {
     pub fn free_slots(&self) -> Vec<usize> {
         match self {
             Change::Effect(e) => {
-                let free = |p: &EffectParam| matches!(p.default, Unstated::Absent(_) | Unstated::Stated(_) | Unstated::Center);
+                let free = |p: &EffectParam| {
+                    matches!(p.default, Unstated::Absent(_) | Unstated::Stated(_) | Unstated::Center | Unstated::OnBody)
+                };
                 (0..e.values.len()).filter(|s| free(&e.law().params[*s])).collect()
             }
             Change::Freed { paths, .. } => (0..paths.len()).collect(),
@@ -94,6 +96,11 @@ const FREED: [(&str, &str, &[&str]); 10] = [
     ("plane-pose", "the ground lies higher, lower or more tilted than assumed", &["plane."]),
 ];
 
+/// True when a path is the one named, up to the scene's name behind it; a name that ends in a dot stands for all paths below it.
+fn names(name: &str, path: &str) -> bool {
+    path.strip_prefix(name).is_some_and(|rest| name.ends_with('.') || rest.is_empty() || rest.starts_with(' '))
+}
+
 /// Every hypothesis for a scene: the table of effects, and what the scene holds fixed.
 pub fn candidates(setting: &Setting) -> Vec<Candidate> {
     let mut out = Vec::new();
@@ -108,7 +115,9 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
             for (v, p) in effect.values.iter_mut().zip(l.params) {
                 match p.default {
                     Unstated::Choice(_) => *v = Some(choice as f64),
-                    Unstated::Center => *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))]),
+                    Unstated::Center | Unstated::OnBody => *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))]),
+                    // A load at a place acts there as sharply as the grid allows.
+                    Unstated::Fixed(_) if p.key == "radius" => *v = Some(setting.spot),
                     _ => {}
                 }
             }
@@ -117,7 +126,7 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
         }
     }
     for (name, sentence, prefixes) in FREED {
-        let paths: Vec<String> = setting.held.iter().filter(|p| prefixes.iter().any(|x| p.starts_with(x))).cloned().collect();
+        let paths: Vec<String> = setting.held.iter().filter(|p| prefixes.iter().any(|x| names(x, p))).cloned().collect();
         if !paths.is_empty() {
             out.push(Candidate { variants: vec![Change::Freed { name, sentence, paths }] });
         }
@@ -147,7 +156,7 @@ fn radical_inverse(mut i: usize, base: usize) -> f64 {
 fn spread(effect: &Effect, setting: &Setting) -> Vec<Effect> {
     const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
     let params = effect.law().params;
-    let open = |p: &EffectParam| matches!(p.default, Unstated::Stated(_) | Unstated::Center);
+    let open = |p: &EffectParam| matches!(p.default, Unstated::Stated(_) | Unstated::Center | Unstated::OnBody);
     let vectors: Vec<usize> = (0..params.len()).filter(|s| open(&params[*s]) && params[*s].axis == Some(0)).collect();
     let numbers: Vec<usize> = (0..params.len()).filter(|s| open(&params[*s]) && params[*s].axis.is_none()).collect();
     let dimensions = 2 * vectors.len() + numbers.len();

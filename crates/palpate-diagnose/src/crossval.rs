@@ -5,7 +5,8 @@
 
 use crate::cells::{Cells, Table};
 use crate::laboratory::Readings;
-use crate::linear::least_squares;
+use crate::linear::{dot, least_squares};
+use crate::null::extended;
 use palpate_engine::Source;
 
 /// Blocks of time.
@@ -20,6 +21,8 @@ pub struct Predicted {
     pub y: Vec<f64>,
     /// Root mean square distance of single points, predicted likewise [m].
     pub rms: f64,
+    /// Sum of squares that the right model would leave: noise, and what nothing outside a fold tells of the fields inside.
+    pub floor: f64,
 }
 
 impl Predicted {
@@ -47,19 +50,26 @@ pub fn foldings(cells: &Cells) -> Vec<Vec<usize>> {
     out
 }
 
-/// Predicts every fold from the others, for a model's readings and their table. Fields of discretisation `[fields][m]` are fitted along, as
-/// they are part of every model's error.
+/// Predicts every fold from the others, for a model's readings and their table. Fields of errors `[fields][m]` are fitted along with
+/// their prior N(0, 1), as they are part of every model's error.
 pub fn predict(cells: &Cells, readings: &Readings, table: &Table, fields: &[Vec<f64>], folds: &[usize]) -> Predicted {
     let q = readings.columns;
     let all: Vec<&Vec<f64>> = table.columns.iter().chain(fields).collect();
+    let (own, n) = (table.columns.len(), fields.len());
+    let mut floor = cells.len() as f64;
     let mut y = table.y.clone();
     let mut moved = vec![vec![0.0; all.len()]; folds.iter().max().map_or(0, |f| f + 1)];
     for (fold, step) in moved.iter_mut().enumerate() {
         let keep = |v: &[f64]| -> Vec<f64> { v.iter().zip(folds).map(|(v, f)| if *f == fold { 0.0 } else { *v }).collect() };
-        let columns: Vec<Vec<f64>> = all.iter().map(|c| keep(c)).collect();
+        let mut columns: Vec<Vec<f64>> = all.iter().map(|c| extended(&keep(c), n)).collect();
+        (0..n).for_each(|k| columns[own + k][cells.len() + k] = 1.0);
+        for (f, c) in fields.iter().zip(&columns[own..]) {
+            let hidden: f64 = f.iter().zip(folds).map(|(f, x)| if *x == fold { f * f } else { 0.0 }).sum();
+            floor += hidden / dot(c, c);
+        }
         let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         if !all.is_empty()
-            && let Some(x) = least_squares(&chosen, &keep(&table.y), RIDGE)
+            && let Some(x) = least_squares(&chosen, &extended(&keep(&table.y), n), RIDGE)
         {
             *step = x;
         }
@@ -75,7 +85,7 @@ pub fn predict(cells: &Cells, readings: &Readings, table: &Table, fields: &[Vec<
         });
         r.row.value.map(|v| v + change)
     };
-    Predicted { y, rms: rms((0..readings.rows.len()).map(|i| (readings.rows[i].row.source, at(i)))) }
+    Predicted { y, floor, rms: rms((0..readings.rows.len()).map(|i| (readings.rows[i].row.source, at(i)))) }
 }
 
 /// Root mean square distance of depth points and markers.
@@ -92,14 +102,16 @@ pub fn rms(values: impl Iterator<Item = (Source, Option<f64>)>) -> f64 {
 }
 
 /// How much worse `other` predicts than `best`, in standard deviations of the difference (Vuong, *Econometrica* 57, 1989, with frames as
-/// independent units); infinite when both are the same to rounding but one is worse.
+/// independent units, or regions of the body where there are few frames).
 pub fn worse_by(cells: &Cells, best: &Predicted, other: &Predicted) -> (f64, f64) {
-    let mut frames = std::collections::BTreeMap::new();
+    let mut units = std::collections::BTreeMap::new();
+    let by_region = cells.few_instants();
     for (i, k) in cells.keys.iter().enumerate() {
-        *frames.entry((k.scene, k.frame)).or_insert(0.0) += other.y[i].powi(2) - best.y[i].powi(2);
+        let unit = (k.scene, k.frame, if by_region { k.region } else { 0 });
+        *units.entry(unit).or_insert(0.0) += other.y[i].powi(2) - best.y[i].powi(2);
     }
-    let n = frames.len() as f64;
-    let sum: f64 = frames.values().sum();
-    let variance = frames.values().map(|d| (d - sum / n).powi(2)).sum::<f64>() * n / (n - 1.0).max(1.0);
+    let n = units.len() as f64;
+    let sum: f64 = units.values().sum();
+    let variance = units.values().map(|d| (d - sum / n).powi(2)).sum::<f64>() * n / (n - 1.0).max(1.0);
     (sum, if sum == 0.0 { 0.0 } else { sum / variance.sqrt().max(1e-12) })
 }

@@ -26,6 +26,8 @@ pub struct Setting {
     pub up: DVec3,
     /// Points spread over the rest surface [m], where something may be attached.
     pub places: Vec<DVec3>,
+    /// Size of the smallest region that may carry a load: half a cell [m].
+    pub spot: f64,
     /// Number of cameras that saw the body.
     pub cameras: usize,
     /// Number of markers.
@@ -86,13 +88,21 @@ pub struct Readings {
     pub sensitivity: Vec<f64>,
 }
 
-/// An error of the discretisation: what a finer computation would add to every residual, carried on to the limit.
+/// An error that every model has, up to a factor of about one and either sign: what a finer computation would add to every residual,
+/// carried on to the limit, or one of the recording's systematic errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// What was refined.
+    /// What was refined, or what is not known better.
     pub name: &'static str,
-    /// Change of every residual [m]; `None` where one of the two met nothing.
+    /// Change of every residual [m]; `None` where it cannot be said.
     pub change: Vec<Option<f64>>,
+    /// Share of the field that is not known, independently in every block.
+    pub rough: f64,
+}
+
+impl Field {
+    /// Share of the discretisation's error that its estimate from one refinement misses.
+    pub const REFINED: f64 = 0.3;
 }
 
 /// Whoever simulates and fits.
@@ -109,6 +119,11 @@ pub trait Laboratory {
     fn linearise_new(&mut self, tries: &[(Vec<Change>, Vec<f64>)], from: usize) -> Vec<Result<Readings, LabError>>;
     /// What finer computations would change.
     fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError>;
+    /// What the recording's systematic errors (`noise_systematic`: places of markers, zero points of cameras) would change, each of them
+    /// by its standard deviation; none where the recording states none.
+    fn systematic(&mut self, _changes: &[Change], _values: &[f64]) -> Result<Vec<Field>, LabError> {
+        Ok(Vec::new())
+    }
     /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none.
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError>;
     /// How far [m] two models are apart in other measurements: description and root mean square distance.

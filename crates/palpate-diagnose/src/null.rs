@@ -1,8 +1,9 @@
 //! Is something missing? Structure of residuals over body and time, against what noise and discretisation leave after a refit.
 //!
-//! In units of the noise a right model leaves r = Π (ε + Σ s_k d_k), ε noise, d_k the fields by which finer computations differ, Π what
-//! refitting leaves, drawn with the shapes that noise was seen to have. s_k is one number per field with prior N(0, 1), fitted along; a field is itself known only roughly, so a
-//! share of it, with a random sign for every block, counts as noise. The statistics are calibrated by drawing such residuals.
+//! In units of the noise a right model leaves r = Π (ε + Σ s_k d_k), ε noise, d_k the fields by which finer computations differ and the
+//! recording's systematic errors, Π what refitting leaves, drawn with the shapes that noise was seen to have. s_k is one number per field
+//! with prior N(0, 1), fitted along; what finer computations change is itself known only roughly, so a share of it, with a random sign for
+//! every block, counts as noise. The statistics are calibrated by drawing such residuals.
 
 use crate::cells::{Cells, Table};
 use crate::linear::Basis;
@@ -12,8 +13,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
 
-/// Share of the discretisation's error that its estimate from one refinement misses.
-const ROUGHNESS: f64 = 0.3;
 /// Recordings drawn from the null.
 pub const DRAWS: usize = 499;
 
@@ -24,8 +23,10 @@ pub struct Frame {
     pub y: Vec<f64>,
     /// What a refit absorbs: free numbers and fields.
     pub absorbed: Basis,
-    /// Fields of discretisation in units of the noise `[fields][m]`.
+    /// Errors that every model has, in units of the noise `[fields][m]`.
     pub fields: Vec<Vec<f64>>,
+    /// Share of each that is not known.
+    rough: Vec<f64>,
 }
 
 /// A vector over cells with zeros for the pseudo-readings.
@@ -34,8 +35,8 @@ pub fn extended(v: &[f64], fields: usize) -> Vec<f64> {
 }
 
 impl Frame {
-    /// A model's table with fields of discretisation.
-    pub fn new(table: &Table, fields: Vec<Vec<f64>>) -> Frame {
+    /// A model's table with fields of errors and the shares of them that are not known.
+    pub fn new(table: &Table, fields: Vec<Vec<f64>>, rough: Vec<f64>) -> Frame {
         let n = fields.len();
         let mut absorbed = Basis::default();
         table.columns.iter().for_each(|c| absorbed.add(&extended(c, n)));
@@ -44,7 +45,7 @@ impl Frame {
             column[f.len() + k] = 1.0;
             absorbed.add(&column);
         }
-        Frame { y: extended(&table.y, n), absorbed, fields }
+        Frame { y: extended(&table.y, n), absorbed, fields, rough }
     }
 
     /// Residuals after the refit `[m + fields]`.
@@ -99,11 +100,11 @@ fn sum(block: &Block, y: &[f64]) -> f64 {
 fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, blocks: &[Block], rng: &mut ChaCha8Rng) -> Vec<f64> {
     let mut y = noise.draw(cells, rng);
     let mut gauss = || -> f64 { StandardNormal.sample(rng) };
-    for f in &frame.fields {
+    for (f, share) in frame.fields.iter().zip(&frame.rough) {
         let s = gauss();
         y.iter_mut().zip(f).for_each(|(y, f)| *y += s * f);
-        for b in blocks {
-            let rough = ROUGHNESS * gauss();
+        for b in blocks.iter().filter(|_| *share > 0.0) {
+            let rough = share * gauss();
             b.cells.iter().for_each(|i| y[*i] += rough * f[*i]);
         }
     }

@@ -184,10 +184,16 @@ impl Session<'_> {
             None => {
                 self.lab.say("discretisation error: finer grid, half step");
                 // A scene that is too large to be refined, or fails there, has no estimate.
-                match self.lab.finer(&model.changes, &model.values) {
-                    Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                    other => other.unwrap_or_default(),
+                let finer = self.lab.finer(&model.changes, &model.values);
+                let systematic = self.lab.systematic(&model.changes, &model.values);
+                let mut all = Vec::new();
+                for fields in [finer, systematic] {
+                    match fields {
+                        Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+                        other => all.extend(other.unwrap_or_default()),
+                    }
                 }
+                all
             }
         };
         let table = self.cells.table(&readings, fallback);
@@ -197,7 +203,8 @@ impl Session<'_> {
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {
-        Frame::new(table, fields.iter().map(|f| self.cells.means(&f.change)).collect())
+        let means = fields.iter().map(|f| self.cells.means(&f.change)).collect();
+        Frame::new(table, means, fields.iter().map(|f| f.rough).collect())
     }
 
     fn predict(&self, readings: &Readings, table: &Table, frame: &Frame) -> Vec<Predicted> {

@@ -1,17 +1,21 @@
 //! Direct solver: faer's sparse Cholesky factorisation over a pattern that is analysed once.
 
 use super::matrix::Matrix;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::factorize_symbolic_cholesky;
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Mat, Side, linalg::solvers::Solve};
+use faer::{Conj, Mat, Par, Side};
 use glam::DVec3;
 use palpate_model::pattern::BlockRows;
+use std::sync::Arc;
 
 /// Fill-reducing order and structure of the factor, shared by all members and steps.
 #[derive(Debug)]
 pub struct Analysis {
     structure: SymbolicSparseColMat<usize>,
-    symbolic: SymbolicLlt<usize>,
+    symbolic: Arc<SymbolicCholesky<usize>>,
     // For every entry of the lower triangle: block and place inside it (3·column + row).
     entries: Vec<(u32, u8)>,
 }
@@ -41,8 +45,15 @@ impl Analysis {
             }
         }
         let structure = SymbolicSparseColMat::new_checked(3 * n, 3 * n, starts, None, indices);
-        let symbolic = SymbolicLlt::try_new(structure.as_ref(), Side::Lower).map_err(|e| format!("{e:?}"))?;
-        Ok(Analysis { structure, symbolic, entries })
+        // Three unknowns a node make dense blocks: supernodes factorise them 3.5 times as fast already at 500 unknowns, where
+        // faer would still choose single columns (0.28 against 0.99 ms).
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(structure.as_ref(), Side::Lower, SymmetricOrdering::Amd, params)
+            .map_err(|e| format!("{e:?}"))?;
+        Ok(Analysis { structure, symbolic: Arc::new(symbolic), entries })
     }
 
     /// Factorises; the error names the first pivot that is not positive.
@@ -53,15 +64,23 @@ impl Analysis {
             .map(|&(k, place)| matrix.values[k as usize].col((place / 3) as usize)[(place % 3) as usize])
             .collect();
         let a = SparseColMat::new(self.structure.clone(), values);
-        let llt = Llt::try_new_with_symbolic(self.symbolic.clone(), a.as_ref(), Side::Lower).map_err(|e| format!("{e:?}"))?;
-        Ok(Factor { llt })
+        let symbolic = self.symbolic.clone();
+        let mut values = vec![0.0; symbolic.len_val()];
+        // One thread: what is batched above keeps all of them busy, and the same bits come out on any number of them.
+        let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()));
+        let (stack, regularization) = (MemStack::new(&mut memory), Default::default());
+        symbolic
+            .factorize_numeric_llt(&mut values, a.as_ref(), Side::Lower, regularization, Par::Seq, stack, Default::default())
+            .map_err(|e| format!("{e:?}"))?;
+        Ok(Factor { symbolic, values })
     }
 }
 
 /// A factorised matrix.
 #[derive(Debug)]
 pub struct Factor {
-    llt: Llt<usize, f64>,
+    symbolic: Arc<SymbolicCholesky<usize>>,
+    values: Vec<f64>,
 }
 
 impl Factor {
@@ -72,7 +91,9 @@ impl Factor {
         }
         let n = columns[0].len();
         let mut rhs = Mat::from_fn(3 * n, columns.len(), |i, j| columns[j][i / 3][i % 3]);
-        self.llt.solve_in_place(rhs.as_mut());
+        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns.len(), Par::Seq));
+        let factor = LltRef::new(&self.symbolic, &self.values);
+        factor.solve_in_place_with_conj(Conj::No, rhs.as_mut(), Par::Seq, MemStack::new(&mut memory));
         for (j, column) in columns.iter_mut().enumerate() {
             for (i, v) in column.iter_mut().enumerate() {
                 *v = DVec3::new(rhs[(3 * i, j)], rhs[(3 * i + 1, j)], rhs[(3 * i + 2, j)]);

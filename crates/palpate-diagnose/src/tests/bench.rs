@@ -91,6 +91,7 @@ impl Bench {
             bounds: (DVec3::splat(-0.05), DVec3::splat(0.05)),
             up: DVec3::Z,
             places: rest.iter().step_by(30).copied().collect(),
+            spot: 0.01,
             cameras: 1,
             markers: 0,
             held: held.clone(),
@@ -191,7 +192,7 @@ impl Laboratory for Bench {
     fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
         let at = |i: usize| pattern("grid", self.rest[i % POINTS], (i / POINTS) as f64 / FRAMES as f64);
         let change = (0..FRAMES * POINTS).map(|i| Some(2e-4 * at(i))).collect();
-        Ok(vec![Field { name: "grid", change }])
+        Ok(vec![Field { name: "grid", change, rough: Field::REFINED }])
     }
 
     fn held_out(&mut self, _: &Model) -> Result<Option<Readings>, LabError> {

@@ -69,7 +69,9 @@ fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
         let readings = bench.linearise(&[(Vec::new(), model.values.clone())]).remove(0).unwrap();
         let fields = bench.finer(&[], &model.values).unwrap();
         let mut cells = Cells::new(&readings);
-        let frame = |cells: &Cells| Frame::new(&cells.table(&readings, None), vec![cells.means(&fields[0].change)]);
+        let frame = |cells: &Cells| {
+            Frame::new(&cells.table(&readings, None), vec![cells.means(&fields[0].change)], vec![fields[0].rough])
+        };
         let first = frame(&cells);
         let (factor, noise) = design_effect(&cells, &first.left(), |i| first.absorbed.leverage(i));
         factors.push(factor);

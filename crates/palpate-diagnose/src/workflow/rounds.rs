@@ -92,8 +92,8 @@ impl Session<'_> {
         let freedom = v.columns.len();
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * count).min(1.0);
-        let m = self.cells.len() as f64;
-        let gains = state.predicted.iter().zip(&new.predicted).map(|(b, a)| (b.loss() - a.loss()) / (b.loss() - m).max(0.02 * m));
+        let gains = state.predicted.iter().zip(&new.predicted);
+        let gains = gains.map(|(b, a)| (b.loss() - a.loss()) / (b.loss() - b.floor).max(0.02 * b.floor));
         let mut gain = gains.fold(1.0, f64::min);
         if let (Some(b), Some(a)) = (self.held_out(&state.model)?, self.held_out(&new.model)?) {
             gain = gain.min((b.rms * b.rms - a.rms * a.rms) / b.gap().max(0.02 * b.noise * b.noise));
@@ -113,15 +113,20 @@ impl Session<'_> {
     #[expect(clippy::type_complexity, reason = "as `round`")]
     fn decide(&mut self, state: &State, fitted: Vec<Fitted>) -> Result<(Option<(Found, State)>, Vec<Found>), LabError> {
         let passes = |f: &Fitted| f.p_value < self.options.significance && f.gain >= self.options.least_gain;
-        let m = self.cells.len() as f64;
-        let whole = (state.predicted[0].loss() - m).max(0.0);
+        let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
         let Some(best) = fitted.iter().position(passes) else {
             return Ok((None, fitted.iter().take(3).map(|f| self.found(f, false)).collect()));
         };
+        let excess = |i: usize| {
+            let p = &fitted[i].state.predicted[0];
+            ((p.loss() - p.floor).max(0.0), p.floor)
+        };
+        // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
+        let as_close = |i: usize| excess(i).0 < 2.0 * excess(best).0 + 0.5 * excess(best).1;
         // Candidates that predict as well as the best, up to noise or up to a share of the gap.
         let near = |i: usize, share: f64| {
             let (by, z) = worse_by(&self.cells, &fitted[best].state.predicted[0], &fitted[i].state.predicted[0]);
-            passes(&fitted[i]) && (z < 2.0 || by < share * whole)
+            passes(&fitted[i]) && (by < share * whole || (z < 2.0 && as_close(i)))
         };
         let equal: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, TIE)).collect();
         // The simplest explanation wins unless it is clearly worse: a freer one also fits what no model gets right.

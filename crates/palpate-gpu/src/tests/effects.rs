@@ -239,7 +239,7 @@ fn evaluations_with_loads_agree() {
     s.time.steps = 3;
     s.observation = watched();
     with(&mut s, "uniform-force", &[("force", &[3000.0, -1000.0, 500.0])]);
-    with(&mut s, "point-mass", &[("mass", &[0.05]), ("point", &[0.02, 0.01, 0.08]), ("radius", &[0.02])]);
+    with(&mut s, "point-mass", &[("mass", &[0.05]), ("point", &[0.02, 0.01, 0.08]), ("radius", &[0.02]), ("hung", &[0.4])]);
     with(
         &mut s,
         "tether",

@@ -115,6 +115,8 @@ pub enum Unstated {
     Fixed(f64),
     /// This component of the body's centre of mass [m].
     Center,
+    /// The same, for a place that only makes sense on the body: a diagnosis looks for it in the box around the rest shape.
+    OnBody,
     /// Must be stated (a diagnosis starts it at this value).
     Stated(f64),
     /// The number, counted from 0, of one thing among several; 0 where it is not stated. It cannot be fitted.
@@ -229,7 +231,7 @@ const fn direction(key: &'static str, axis: u8, doc: &'static str) -> EffectPara
 
 /// One coordinate of a place; the body's centre of mass unless stated.
 const fn place(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
-    EffectParam { default: Unstated::Center, typical: 0.02, ..component(key, axis, "m", 0.02, doc) }
+    EffectParam { default: Unstated::OnBody, typical: 0.02, ..component(key, axis, "m", 0.02, doc) }
 }
 
 /// One component of a vector of any sign that is zero when absent.
@@ -305,7 +307,7 @@ impl Unstated {
         match self {
             Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Stated(v) => Some(v),
             Unstated::Choice(_) => Some(0.0),
-            Unstated::Center => None,
+            Unstated::Center | Unstated::OnBody => None,
         }
     }
 }

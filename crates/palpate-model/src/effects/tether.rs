@@ -24,9 +24,9 @@ const ANCHOR: &str = "fixed point at its other end";
 
 const PARAMS: [EffectParam; 8] = [
     number("stiffness", "N/m", [0.0, 1e9, 10.0], Unstated::Absent(0.0), "force over change of length"),
-    EffectParam { default: Unstated::Center, ..component("attachment", 0, "m", 0.05, ATTACHMENT) },
-    EffectParam { default: Unstated::Center, ..component("attachment", 1, "m", 0.05, ATTACHMENT) },
-    EffectParam { default: Unstated::Center, ..component("attachment", 2, "m", 0.05, ATTACHMENT) },
+    EffectParam { default: Unstated::OnBody, ..component("attachment", 0, "m", 0.05, ATTACHMENT) },
+    EffectParam { default: Unstated::OnBody, ..component("attachment", 1, "m", 0.05, ATTACHMENT) },
+    EffectParam { default: Unstated::OnBody, ..component("attachment", 2, "m", 0.05, ATTACHMENT) },
     EffectParam { default: Unstated::Center, ..component("anchor", 0, "m", 0.05, ANCHOR) },
     EffectParam { default: Unstated::Center, ..component("anchor", 1, "m", 0.05, ANCHOR) },
     EffectParam { default: Unstated::Center, ..component("anchor", 2, "m", 0.05, ANCHOR) },

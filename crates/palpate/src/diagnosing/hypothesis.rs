@@ -5,6 +5,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{FreeNumber, free_parameters};
 use palpate_diagnose::{Change, LabError, Number};
 use palpate_fit::{FreeParameter, Slot};
+use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::{ParamKey, Transform};
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer};
 
@@ -98,7 +99,14 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
 fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
     let key = e.plan.layout.keys.iter().find(|k| path_of(e, **k) == path);
     let Some(spec) = key.map(|k| k.spec()) else { return };
-    let bounds = if path == "material.mass" { (1e-9, 1e6) } else { (spec.lower, spec.upper) };
+    let mut bounds = if path == "material.mass" { (1e-9, 1e6) } else { (spec.lower, spec.upper) };
+    if let Some(ParamKey::Effect { law, slot, .. }) = key {
+        let p = &ALL[usize::from(*law)].params[usize::from(*slot)];
+        if let (Unstated::OnBody, Some(axis)) = (p.default, p.axis) {
+            let (low, high) = e.shape().bounds();
+            bounds = (low[usize::from(axis)], high[usize::from(axis)]);
+        }
+    }
     let middle = 0.0f64.clamp(bounds.0, bounds.1);
     let parameter = FitParameter { path, start: (middle, middle), bounds, per_scene };
     let empty =

@@ -4,6 +4,7 @@ use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
 use super::others::{contact_times, held_out, separations};
+use super::systematic::systematic;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -59,6 +60,7 @@ impl<'a> Lab<'a> {
             bounds: first.shape().bounds(),
             up: first.up(),
             places: regions.centers.iter().filter_map(nearest).collect(),
+            spot: 0.5 * body.grid.h,
             cameras: most(|e| e.plan.observation.cameras.len()),
             markers: most(|e| e.plan.observation.markers.len()),
             held: held(base),
@@ -280,13 +282,17 @@ impl Laboratory for Lab<'_> {
         let difference = |name: &'static str, ready: &Prepared, factor: f64| -> Result<Field, LabError> {
             let r = linearise(ready, values, none)?;
             let change = r.rows.iter().zip(&coarse.rows).map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
-            Ok(Field { name, change })
+            Ok(Field { name, change, rough: Field::REFINED })
         };
         // Errors fall with the square of the cell and with the step: what is left after the refinement follows from what it changed.
         let (grid, step) =
             rayon::join(|| difference("grid", &fine, 1.0 / (1.0 - 1.0 / (FINER * FINER))), || difference("step", &halved, 2.0));
         let is_static = self.base.iter().all(|e| e.plan.clock.steps == 0);
         Ok(if is_static { vec![grid?] } else { vec![grid?, step?] })
+    }
+
+    fn systematic(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
+        systematic(&self.base, changes, values)
     }
 
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError> {

@@ -4,6 +4,7 @@ mod checkpoint;
 mod hypothesis;
 mod lab;
 mod others;
+mod systematic;
 
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;
