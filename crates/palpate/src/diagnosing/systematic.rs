@@ -46,9 +46,7 @@ pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]
         change: (readings.rows.iter().enumerate())
             .map(|(i, r)| {
                 let d = size * readings.sensitivity[i * readings.columns + column];
-                if r.row.value.is_none() {
-                    return None;
-                }
+                r.row.value?;
                 Some(if mine(r.scene, &r.row.source) { d } else { 0.0 })
             })
             .collect(),
