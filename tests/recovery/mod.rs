@@ -90,6 +90,12 @@ fn gravity_is_found_beside_stiffness_and_damping() {
     let r = study::search(&plan, &unknowns, &gauss_newton(2)).unwrap();
     for run in &r.runs {
         println!("{:?} -> {:?}, cost {:.6}, {:?}", run.start, run.end, run.cost, run.status);
+    }
+    // The first start is the far corner of all ranges: a ball ten times too soft under twice the gravity is crushed at its first
+    // bounce and need not find back. Whatever starts end as well as the best have found the same gravity.
+    let good: Vec<_> = r.runs.iter().filter(|run| run.cost < 1.01 * r.cost).collect();
+    assert!(!good.is_empty() && r.cost < 0.5, "{} of 2, cost {}", good.len(), r.cost);
+    for run in good {
         let g = DVec3::new(run.end[0], run.end[1], run.end[2]);
         assert!((g - DVec3::new(0.0, 0.0, -9.81)).length() < 0.005 * 9.81, "gravity {g}");
     }

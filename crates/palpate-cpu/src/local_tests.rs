@@ -3,11 +3,12 @@
 
 use crate::linear::matrix::{Operator, Packed};
 use crate::passes::balance::{Balance, States};
-use crate::passes::cells::zeros;
+use crate::passes::cells::{corners, zeros};
 use crate::simulate::balance;
 use crate::world::World;
 use glam::{DAffine3, DVec3};
 use palpate_engine::ParamBatch;
+use palpate_model::corotation::CellPose;
 use palpate_model::effects::{ALL, Effect, Site};
 use palpate_model::motion::RigidMotion;
 use palpate_model::observation::Observation;
@@ -112,17 +113,23 @@ fn moved(v: &[DVec3], s: f64, d: &[DVec3]) -> Vec<DVec3> {
     v.iter().zip(d).map(|(v, d)| *v + s * *d).collect()
 }
 
+/// A displacement that turns the body inside out: z mirrored and shortened a little, and noise.
+fn inverted(p: &Plan) -> Vec<DVec3> {
+    let mirror = |(u, x): (DVec3, &DVec3)| u - DVec3::Z * (1.75 * (x.z - 0.045));
+    random(p.body.nodes.len(), 0.003, 3).into_iter().zip(&p.body.nodes).map(mirror).collect()
+}
+
 /// Runs a check for the static balance and for a step, with both ways of taking the rotation, without effects and with all that change
-/// the body, at two states each.
+/// the body, at three states each.
 fn everywhere(check: impl Fn(&Plan, Option<usize>, &[Vec<DVec3>; 3])) {
     for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
         for effects in [Vec::new(), altering(rotation)] {
             let p = plan(rotation, effects);
             let n = p.body.nodes.len();
             for step in [None, Some(1)] {
-                for seed in [1, 2] {
-                    // Strains of some 10 %, contact active, the old state elsewhere, fast.
-                    check(&p, step, &[random(n, 0.003, seed), random(n, 0.003, seed + 10), random(n, 0.3, seed + 20)]);
+                // Strains of some 10 % or cells turned inside out, contact active, the old state elsewhere, fast.
+                for (seed, u) in [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))] {
+                    check(&p, step, &[u, random(n, 0.003, seed + 10), random(n, 0.3, seed + 20)]);
                 }
             }
         }
@@ -132,6 +139,17 @@ fn everywhere(check: impl Fn(&Plan, Option<usize>, &[Vec<DVec3>; 3])) {
 // Central differences over 1e-6 of a direction of size 1e-3: truncation 1e-12 of the third derivative, rounding 1e-16 / 1e-9.
 const STEP: f64 = 1e-4;
 const CLOSE: f64 = 2e-7;
+
+#[test]
+fn one_of_the_states_is_guarded_against_inversion() {
+    let p = plan(RotationUpdate::Converged, Vec::new());
+    let u = inverted(&p);
+    let pose = |e: usize| CellPose::new(&corners(&p.body, e, &u), p.body.grid.h);
+    let guarded = (0..p.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count();
+    assert!(guarded > 0);
+    // Clear of the jump itself, where nothing has a derivative.
+    assert!((0..p.body.cells.len()).all(|e| pose(e).distance() > 0.01));
+}
 
 #[test]
 fn residual_is_the_gradient_of_the_potential() {

@@ -6,6 +6,7 @@ use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, add_scaled, dot, is_finite};
 use crate::linear::{Digits, Prepared, Purpose, Solvers, Task, Trouble};
 use crate::passes::balance::{Balance, States};
+use crate::passes::posed::{Before, Curvature, Posed};
 use glam::DVec3;
 use palpate_engine::{Failure, FailureKind};
 
@@ -19,6 +20,10 @@ const COARSEST: f64 = 0.1;
 
 /// Newton iterations of a time step that share the second level of the preconditioner: the body barely moves between them.
 const REFRESH: usize = 8;
+
+/// A step of Newton's method that leaves less than this part of the residual shows that the tangent hardly changes any more: the
+/// next direction of a time step takes it over. A static problem factorises anyway.
+const KEEP: f64 = 0.02;
 
 /// Attaches the time of the simulation to a reason.
 pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
@@ -50,6 +55,13 @@ fn task<'a>(
     Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits }
 }
 
+/// What a solve keeps of its cells.
+struct Cells {
+    before: Before,
+    /// Of the displacement that the last residual was computed at.
+    posed: Vec<Posed>,
+}
+
 /// Finds u₁ with r(u₁) = 0 from the guess in `u1`. Converged when the residual, scaled by the inverse diagonal blocks,
 /// is below `tolerance` times the scaled sizes of the forces that it is the sum of.
 pub fn solve(
@@ -63,10 +75,12 @@ pub fn solve(
     tolerance: f64,
     most: usize,
 ) -> Result<(), Reason> {
-    let mut residual = balance.residual(States { u1, u0, v0 });
+    let mut cells = Cells { before: balance.before(u0), posed: Vec::new() };
+    let mut residual = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
     let (mut scale, mut level) = (None, None);
     let mut history: Vec<f64> = Vec::new();
     let mut forcing = COARSEST;
+    let mut kept = None;
     for _ in 0..most {
         if !is_finite(&residual) {
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
@@ -76,14 +90,15 @@ pub fn solve(
             level = None;
         }
         let (direction, norm, diagonal) =
-            direction(balance, solvers, matrix, purpose, s, &residual, forcing, tolerance, &mut scale, &mut level)?;
+            direction(balance, solvers, matrix, purpose, s, &cells, &residual, forcing, tolerance, &mut scale, &mut level, kept)?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
         let after;
-        (residual, after) = line_search(balance, &diagonal, u1, u0, v0, &residual, norm, &direction);
+        (residual, after) = line_search(balance, &diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
         if after <= tolerance * scale.unwrap_or(0.0) {
             return Ok(());
         }
+        kept = (purpose != Purpose::Static && after <= KEEP * norm).then_some(diagonal);
         // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
         forcing = (0.9 * (after / norm).powi(2)).clamp(1e-4, COARSEST);
     }
@@ -110,28 +125,37 @@ fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
     9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
 }
 
-/// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and what it is measured with. Where the exact tangent is
-/// not positive definite its convex part gives a descent direction instead.
+/// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and what it is measured with. Where
+/// the exact tangent is not positive definite one that is gives a descent direction instead. With the diagonal of an earlier tangent
+/// in `kept`, the matrix is that tangent and stays.
 fn direction(
     balance: &Balance,
     solvers: &Solvers,
     matrix: &mut Matrix,
     purpose: Purpose,
     s: States,
+    cells: &Cells,
     residual: &[DVec3],
     forcing: f64,
     tolerance: f64,
     scale: &mut Option<f64>,
     level: &mut Option<Level>,
+    mut kept: Option<BlockJacobi>,
 ) -> Result<(Option<Nodes>, f64, BlockJacobi), Reason> {
-    for convex in [false, true] {
-        balance.tangent(s, convex, matrix);
-        let diagonal = match BlockJacobi::new(&balance.pattern.blocks, matrix) {
-            Ok(diagonal) => diagonal,
-            Err(_) if !convex => continue,
-            Err(a) => return Err(not_positive(a)),
+    for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
+        let last = curvature == Curvature::Convex;
+        let diagonal = match kept.take() {
+            Some(diagonal) => diagonal,
+            None => {
+                balance.tangent_from(s, &cells.posed, curvature, matrix);
+                match BlockJacobi::new(&balance.pattern.blocks, matrix) {
+                    Ok(diagonal) => diagonal,
+                    Err(_) if !last => continue,
+                    Err(a) => return Err(not_positive(a)),
+                }
+            }
         };
-        let reference = *scale.get_or_insert_with(|| balance.scale(s, |f| diagonal.norm(f)));
+        let reference = *scale.get_or_insert_with(|| balance.scale(s, &cells.before, &cells.posed, |f| diagonal.norm(f)));
         let norm = diagonal.norm(residual);
         if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
             return Ok((None, norm, diagonal));
@@ -148,11 +172,11 @@ fn direction(
         match solved {
             Ok(d) if is_finite(&d) => return Ok((Some(d), norm, diagonal)),
             Ok(_) => return Err((FailureKind::NotFinite, "displacement of a Newton step".into())),
-            Err(Trouble::Indefinite(_)) if !convex => {}
+            Err(Trouble::Indefinite(_)) if !last => {}
             Err(t) => return Err(trouble(t)),
         }
     }
-    unreachable!("the second pass always returns")
+    unreachable!("the last pass always returns")
 }
 
 /// Takes the full step where it halves the residual; otherwise the longest of the steps 1, ½, ¼ … that lowers the potential
@@ -163,22 +187,23 @@ fn line_search(
     u1: &mut Nodes,
     u0: &[DVec3],
     v0: &[DVec3],
+    cells: &mut Cells,
     residual: &[DVec3],
     norm: f64,
     d: &[DVec3],
 ) -> (Nodes, f64) {
     let start = u1.clone();
     add_scaled(u1, 1.0, d);
-    let full = balance.residual(States { u1, u0, v0 });
+    let full = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
     let full_norm = diagonal.norm(&full);
     if full_norm <= 0.5 * norm {
         return (full, full_norm);
     }
     let slope = dot(residual, d);
-    let before = balance.potential(States { u1: &start, u0, v0 });
+    let before = balance.potential_from(States { u1: &start, u0, v0 }, &cells.before);
     let mut step = 1.0;
     for _ in 0..30 {
-        let after = balance.potential(States { u1, u0, v0 });
+        let after = balance.potential_from(States { u1, u0, v0 }, &cells.before);
         // Close to the solution the change drowns in rounding; then the step is as good as any.
         let rounding = 1e-12 * (before.abs() + after.abs());
         if after <= before + 1e-4 * step * slope + rounding {
@@ -188,7 +213,7 @@ fn line_search(
         u1.copy_from_slice(&start);
         add_scaled(u1, step, d);
     }
-    let residual = if step == 1.0 { full } else { balance.residual(States { u1, u0, v0 }) };
+    let residual = if step == 1.0 { full } else { balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed) };
     let norm = diagonal.norm(&residual);
     (residual, norm)
 }

@@ -14,6 +14,9 @@
 //!
 //! So a cell's Hessian is its stiffness matrix plus a symmetric update of rank six.
 
+mod hessian;
+pub mod inversion;
+
 use crate::grid::SIGNS;
 use crate::rotation::{Polar, cross_matrix};
 use glam::{DMat3, DVec3};
@@ -280,81 +283,6 @@ impl CellPose {
         }
         self.to_world(&out)
     }
-
-    /// World-frame, exactly symmetric matrix scale · PᵀKP + D²q\[y\]; not definite in general.
-    ///
-    /// With y = scale · K q this is the second derivative of [`CellPose::energy`].
-    #[inline(always)]
-    pub fn hessian(&self, k: &M24, scale: f64, y: &V24, out: &mut M24) {
-        self.assemble(k, scale, Some(y), out);
-    }
-
-    /// World-frame, exactly symmetric and positive semi-definite part scale · PᵀKP.
-    #[inline(always)]
-    pub fn gauss_newton(&self, k: &M24, scale: f64, out: &mut M24) {
-        self.assemble(k, scale, None, out);
-    }
-
-    #[inline(always)]
-    fn assemble(&self, k: &M24, scale: f64, y: Option<&V24>, out: &mut M24) {
-        // W = ½ scale K + ΩᵀD with D = B + ½QΩ − scale (N − ½TΩ), rows of N = ZᵀK; then H = R (W + Wᵀ) Rᵀ.
-        let mut w = k.map(|k| 0.5 * scale * k);
-        if !self.fixed {
-            let omega = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| self.spin_adjoint_body(e));
-            let arms = self.arm_rows();
-            let mut d = self.arm_products(k);
-            let mut q = DMat3::from_cols_array_2d(&arms.map(|z| d.map(|n| scale * dot(&n, &z))));
-            d.iter_mut().flatten().for_each(|n| *n *= -scale);
-            if let Some(y) = y {
-                let y = centred(*y);
-                add_cross_rows(&mut d, &self.force_body(&y));
-                q += self.spin_stiffness(&y);
-            }
-            let q = q.to_cols_array_2d();
-            for (d, q) in d.iter_mut().zip(&q) {
-                for c in 0..24 {
-                    d[c] += 0.5 * (q[0] * omega[0][c] + q[1] * omega[1][c] + q[2] * omega[2][c]);
-                }
-            }
-            for (i, row) in w.as_chunks_mut::<24>().0.iter_mut().enumerate() {
-                let (a, b, c) = (omega[0][i], omega[1][i], omega[2][i]);
-                for j in 0..24 {
-                    row[j] += a * d[0][j] + b * d[1][j] + c * d[2][j];
-                }
-            }
-        }
-        rotate_and_symmetrise(&w, self.polar.r.to_cols_array_2d(), out);
-    }
-
-    /// Rows of N = ZᵀK.
-    #[inline(always)]
-    fn arm_products(&self, k: &M24) -> [V24; 3] {
-        let mut n = [[0.0; 24]; 3];
-        for (rows, z) in k.as_chunks::<72>().0.iter().zip(self.z.as_chunks::<3>().0) {
-            for c in 0..24 {
-                n[0][c] += z[1] * rows[48 + c] - z[2] * rows[24 + c];
-                n[1][c] += z[2] * rows[c] - z[0] * rows[48 + c];
-                n[2][c] += z[0] * rows[24 + c] - z[1] * rows[c];
-            }
-        }
-        n
-    }
-
-    /// Columns of Z: e_a × z_i.
-    #[inline(always)]
-    fn arm_rows(&self) -> [V24; 3] {
-        let mut out = [[0.0; 24]; 3];
-        for i in 0..8 {
-            let (x, y, z) = (self.z[3 * i], self.z[3 * i + 1], self.z[3 * i + 2]);
-            out[0][3 * i + 1] = -z;
-            out[0][3 * i + 2] = y;
-            out[1][3 * i] = z;
-            out[1][3 * i + 2] = -x;
-            out[2][3 * i] = -y;
-            out[2][3 * i + 1] = x;
-        }
-        out
-    }
 }
 
 /// Deformation gradient at a cell's centre: F = (1/4h) Σ x_i σ_iᵀ.
@@ -376,55 +304,6 @@ fn subtract_cross(out: &mut V24, omega: DVec3, v: &V24) {
         out[3 * i] -= omega.y * z - omega.z * y;
         out[3 * i + 1] -= omega.z * x - omega.x * z;
         out[3 * i + 2] -= omega.x * y - omega.y * x;
-    }
-}
-
-/// Adds the blocks [f_i]× to three rows.
-#[inline(always)]
-fn add_cross_rows(rows: &mut [V24; 3], f: &V24) {
-    for i in 0..8 {
-        let (a, b, c) = (f[3 * i], f[3 * i + 1], f[3 * i + 2]);
-        rows[0][3 * i + 1] -= c;
-        rows[0][3 * i + 2] += b;
-        rows[1][3 * i] += c;
-        rows[1][3 * i + 2] -= a;
-        rows[2][3 * i] -= b;
-        rows[2][3 * i + 1] += a;
-    }
-}
-
-/// out = R (W + Wᵀ) Rᵀ per 3 × 3 block, exactly symmetric; `r` by columns.
-#[inline(always)]
-fn rotate_and_symmetrise(w: &M24, r: [[f64; 3]; 3], out: &mut M24) {
-    // Rows only, so that the compiler may use vector instructions: R (R W)ᵀ = (R W Rᵀ)ᵀ.
-    let mut half = [0.0; 576];
-    rotate_rows(w, r, &mut half);
-    let mut transposed = [0.0; 576];
-    transpose(&half, &mut transposed);
-    rotate_rows(&transposed, r, &mut half);
-    transpose(&half, out);
-    for i in 0..576 {
-        out[i] += half[i];
-    }
-}
-
-#[inline(always)]
-fn transpose(m: &M24, out: &mut M24) {
-    for i in 0..24 {
-        for j in 0..24 {
-            out[24 * i + j] = m[24 * j + i];
-        }
-    }
-}
-
-#[inline(always)]
-fn rotate_rows(w: &M24, r: [[f64; 3]; 3], out: &mut M24) {
-    for (w, out) in w.as_chunks::<72>().0.iter().zip(out.as_chunks_mut::<72>().0) {
-        for a in 0..3 {
-            for c in 0..24 {
-                out[24 * a + c] = r[0][a] * w[c] + r[1][a] * w[24 + c] + r[2][a] * w[48 + c];
-            }
-        }
     }
 }
 

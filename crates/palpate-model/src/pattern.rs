@@ -97,6 +97,11 @@ impl Pattern {
         self.blocks.len()
     }
 
+    /// Number of the part that a row belongs to.
+    pub fn part_of(&self, row: usize) -> usize {
+        self.parts.partition_point(|p| p.end <= row)
+    }
+
     /// Places of all 64 blocks of a group of eight nodes, row by row.
     pub fn blocks8(&self, nodes: &[u32; 8]) -> [u32; 64] {
         std::array::from_fn(|k| self.blocks.find(nodes[k / 8], nodes[k % 8]) as u32)

@@ -8,6 +8,7 @@ use crate::linear::simd::wide;
 use crate::passes::balance::States;
 use crate::passes::cells::{Elasticity, Mix};
 use crate::passes::materials::Materials;
+use crate::passes::posed::{Curvature, Posed};
 use glam::{DMat3, DVec3};
 use palpate_model::corotation::M24;
 use palpate_model::pattern::{Pattern, Places};
@@ -24,7 +25,8 @@ pub fn cells(
     places: &Places,
     mix: &Mix,
     s: States,
-    convex: bool,
+    posed: &[Posed],
+    curvature: Curvature,
     matrix: &mut Matrix,
 ) {
     matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
@@ -33,7 +35,7 @@ pub fn cells(
         .map(|(part, values)| {
             wide(
                 #[inline(always)]
-                || fill(elasticity, materials, pattern, places, mix, s, convex, part, values),
+                || fill(elasticity, materials, pattern, places, mix, s, posed, curvature, part, values),
             )
         })
         .collect();
@@ -54,7 +56,8 @@ fn fill(
     places: &Places,
     mix: &Mix,
     s: States,
-    convex: bool,
+    posed: &[Posed],
+    curvature: Curvature,
     part: usize,
     values: &mut [DMat3],
 ) -> Spill {
@@ -67,22 +70,23 @@ fn fill(
         if !rows.contains(&(cell.nodes[0] as usize)) {
             continue;
         }
-        elasticity.tangent(mix, e, s.u1, s.u0, convex, &mut h);
+        elasticity.upper_tangent(mix, posed, e, curvature, &mut h);
         if let Some(m) = materials {
-            m.add_tangent(e, s.u1, s.u0, convex, &mut h);
+            m.add_tangent(e, s.u1, s.u0, curvature == Curvature::Convex, &mut h);
         }
+        // Rows of other parts: which part.
+        let others = cell.nodes.map(|n| n as usize).map(|n| (!rows.contains(&n)).then(|| pattern.part_of(n)));
+        let places = &places.cells[e];
+        let mut put = |i: usize, j: usize, block: DMat3| match others[i] {
+            None => values[places[8 * i + j] as usize - base] += block,
+            Some(other) => spill[other].push((places[8 * i + j], block)),
+        };
         for i in 0..8 {
-            let row = cell.nodes[i] as usize;
-            let places = &places.cells[e][8 * i..8 * i + 8];
-            if rows.contains(&row) {
-                for j in 0..8 {
-                    values[places[j] as usize - base] += block(&h, i, j);
-                }
-            } else {
-                let other = pattern.parts.partition_point(|p| p.end <= row);
-                for j in 0..8 {
-                    spill[other].push((places[j], block(&h, i, j)));
-                }
+            put(i, i, block(&h, i, i));
+            for j in i + 1..8 {
+                let block = block(&h, i, j);
+                put(i, j, block);
+                put(j, i, block.transpose());
             }
         }
     }

@@ -11,11 +11,11 @@ use crate::passes::altered::Altered;
 use crate::passes::assembly::{self, block};
 use crate::passes::cells::{Elasticity, Matrices, Mix, zeros};
 use crate::passes::points::Acting;
+use crate::passes::posed::{Before, Curvature, Posed};
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
 use palpate_model::contact;
 use palpate_model::elements::Elements;
-use palpate_model::params::ParamKey;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
 
@@ -86,7 +86,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Adds ghost forces for a shear modulus.
-    fn ghost(&self, shear: f64, mix: &Mix, s: States, out: &mut [DVec3]) {
+    pub(super) fn ghost(&self, shear: f64, mix: &Mix, s: States, out: &mut [DVec3]) {
         if self.plan.body.ghosts.is_empty() {
             return;
         }
@@ -101,7 +101,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Adds M a for accelerations a(node) of the body alone and of the point masses.
-    fn masses(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+    pub(super) fn masses(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
         for (i, w) in self.plan.body.node_volume.iter().enumerate() {
             out[i] += self.density(i) * w * body(i);
         }
@@ -129,10 +129,27 @@ impl<'a> Balance<'a> {
         }
     }
 
+    /// The old state's share in the elastic force: all solves from that state take it over.
+    pub fn before(&self, u0: &[DVec3]) -> Before {
+        self.elasticity().before(&self.mix, u0)
+    }
+
+    /// The cells' poses at a state, for [`Balance::tangent_from`].
+    fn posed(&self, s: States) -> Vec<Posed> {
+        let (mut posed, mut unused) = (Vec::new(), zeros(s.u1.len()));
+        self.elasticity().force_from(&self.mix, &self.before(s.u0), s.u1, &mut posed, &mut unused);
+        posed
+    }
+
     /// r(u₁), shape `[N]` [N].
     pub fn residual(&self, s: States<'a>) -> Nodes {
+        self.residual_from(s, &self.before(s.u0), &mut Vec::new())
+    }
+
+    /// The same within a solve. Keeps the cells' poses in `posed`, for [`Balance::tangent_from`] at the same displacement.
+    pub fn residual_from(&self, s: States<'a>, before: &Before, posed: &mut Vec<Posed>) -> Nodes {
         let mut r = zeros(s.u1.len());
-        self.elasticity().force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut r);
+        self.elasticity().force_from(&self.mix, before, s.u1, posed, &mut r);
         if let Some(m) = self.materials() {
             m.force(self.young(), s.u1, s.u0, &mut r);
         }
@@ -150,7 +167,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Adds the clamps' force, moved in time by `shift`, with matrices scaled by `young`.
-    fn clamps(&self, which: Matrices, young: f64, shift: f64, s: States<'a>, out: &mut [DVec3]) {
+    pub(super) fn clamps(&self, which: Matrices, young: f64, shift: f64, s: States<'a>, out: &mut [DVec3]) {
         let held = self.held();
         for i in 0..self.plan.clamps.len() {
             for (weight, time, u) in self.instants(s) {
@@ -172,8 +189,9 @@ impl<'a> Balance<'a> {
         }
     }
 
-    /// Sizes of the forces that the residual is the sum of, in the given norm: what "small" is measured against.
-    pub fn scale(&self, s: States<'a>, norm: impl Fn(&[DVec3]) -> f64) -> f64 {
+    /// Sizes of the forces that the residual is the sum of, in the given norm: what "small" is measured against. `posed` is
+    /// what the residual at the same displacement left.
+    pub fn scale(&self, s: States<'a>, before: &Before, posed: &[Posed], norm: impl Fn(&[DVec3]) -> f64) -> f64 {
         let n = s.u1.len();
         let g = self.physics.gravity;
         let mut weight = zeros(n);
@@ -183,7 +201,7 @@ impl<'a> Balance<'a> {
             self.masses(|i| t.velocity * s.v0[i], |i| t.velocity * s.v0[i], &mut momentum);
         }
         let mut elastic = zeros(n);
-        self.elasticity().force(&self.mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut elastic);
+        self.elasticity().add_forces(before, posed, &mut elastic);
         let mut support = zeros(n);
         self.supports(s, &mut support);
         self.add_effects(s, &mut support);
@@ -192,8 +210,13 @@ impl<'a> Balance<'a> {
 
     /// Potential whose gradient by u₁ is the residual, up to a constant [J].
     pub fn potential(&self, s: States<'a>) -> f64 {
+        self.potential_from(s, &self.before(s.u0))
+    }
+
+    /// The same within a solve.
+    pub fn potential_from(&self, s: States<'a>, before: &Before) -> f64 {
         let young = self.physics.youngs_modulus;
-        let mut w = self.elasticity().potential(&self.mix, s.u1, s.u0);
+        let mut w = self.elasticity().potential(&self.mix, before, s.u1);
         w += self.materials().map_or(0.0, |m| m.potential(s.u1, s.u0));
         if !self.plan.body.ghosts.is_empty() {
             let scale = self.ghost_scale(young * self.elements.shear[0]);
@@ -230,11 +253,19 @@ impl<'a> Balance<'a> {
         w + 0.5 * dot(s.u1, &at_new) + self.effects_potential(s)
     }
 
-    /// ∂r/∂u₁, symmetric. With `convex` the indefinite part of the elastic tangent is left out.
+    /// ∂r/∂u₁, symmetric.
     pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
-        assembly::cells(&self.elasticity(), self.materials().as_ref(), self.pattern, self.places, &self.mix, s, convex, matrix);
+        let curvature = if convex { Curvature::Convex } else { Curvature::Exact };
+        self.tangent_from(s, &self.posed(s), curvature, matrix);
+    }
+
+    /// The same within a solve. `posed` is what the residual at
+    /// the same displacement left.
+    pub fn tangent_from(&self, s: States, posed: &[Posed], curvature: Curvature, matrix: &mut Matrix) {
+        let (elasticity, materials) = (self.elasticity(), self.materials());
+        assembly::cells(&elasticity, materials.as_ref(), self.pattern, self.places, &self.mix, s, posed, curvature, matrix);
         self.add_sparse(s.u1, matrix);
-        self.add_effects_tangent(s, convex, matrix);
+        self.add_effects_tangent(s, curvature != Curvature::Exact, matrix);
     }
 
     /// Adds everything but the cells to the matrix.
@@ -246,18 +277,18 @@ impl<'a> Balance<'a> {
         for (g, line) in plan.body.ghosts.iter().enumerate() {
             for k in 0..9 {
                 let s = ghost * line.weight * STENCIL[k / 3] * STENCIL[k % 3];
-                values[self.places.ghosts[g][k] as usize] += DMat3::from_diagonal(DVec3::splat(s));
+                add_to_diagonal(&mut values[self.places.ghosts[g][k] as usize], s);
             }
         }
         if let Some(t) = self.inertia {
             let factor = t.displacement + physics.mass_damping * t.rate;
             for (i, w) in plan.body.node_volume.iter().enumerate() {
-                values[pattern.blocks.diagonal[i]] += DMat3::from_diagonal(DVec3::splat(self.density(i) * w * factor));
+                add_to_diagonal(&mut values[pattern.blocks.diagonal[i]], self.density(i) * w * factor);
             }
             for (k, (site, m)) in plan.masses.iter().zip(&physics.masses).enumerate() {
                 for b in 0..64 {
                     let s = m * t.displacement * site.weights[b / 8] * site.weights[b % 8];
-                    values[self.places.masses[k][b] as usize] += DMat3::from_diagonal(DVec3::splat(s));
+                    add_to_diagonal(&mut values[self.places.masses[k][b] as usize], s);
                 }
             }
         }
@@ -332,104 +363,11 @@ impl<'a> Balance<'a> {
         }
         out
     }
+}
 
-    /// ∂r/∂p at fixed states, or `None` when the residual does not depend on p.
-    pub fn column(&self, key: ParamKey, s: States<'a>) -> Option<Nodes> {
-        let n = s.u1.len();
-        let mut out = zeros(n);
-        let young = self.physics.youngs_modulus;
-        let elements = self.elements;
-        match key {
-            ParamKey::YoungsModulus | ParamKey::PoissonRatio => {
-                let (which, factor, shear) = match key {
-                    ParamKey::YoungsModulus => (Matrices::Stiffness, self.aging(), elements.shear[0]),
-                    _ => (Matrices::ByPoisson, self.young(), young * elements.shear[1]),
-                };
-                self.elasticity().force(&self.mix, which, factor, s.u1, s.u0, &mut out);
-                match (self.materials(), which) {
-                    (Some(m), Matrices::Stiffness) => m.force(factor, s.u1, s.u0, &mut out),
-                    (Some(m), Matrices::ByPoisson) => m.poisson_column(s.u1, s.u0, &mut out),
-                    (None, _) => {}
-                }
-                self.ghost(shear, &self.mix, s, &mut out);
-                self.clamps(which, factor, 0.0, s, &mut out);
-                if which == Matrices::Stiffness {
-                    for plane in self.planes.iter().filter(|p| p.scales) {
-                        self.contact_column(plane, s.u1, |t| (t.pressure / young) * plane.normal[0], &mut out);
-                    }
-                }
-            }
-            ParamKey::Density => {
-                let rho = self.physics.density;
-                let g = self.physics.gravity;
-                let drag = self.physics.mass_damping;
-                let acceleration = |i: usize| match self.inertia {
-                    None => -g,
-                    Some(t) => (t.displacement + drag * t.rate) * (s.u1[i] - s.u0[i]) - t.velocity * s.v0[i] - g,
-                };
-                self.masses(|i| acceleration(i) / rho, |_| DVec3::ZERO, &mut out);
-            }
-            ParamKey::MassDamping => {
-                let t = self.inertia?;
-                self.masses(|i| t.rate * (s.u1[i] - s.u0[i]), |_| DVec3::ZERO, &mut out);
-            }
-            ParamKey::StiffnessDamping => {
-                let t = self.inertia?;
-                let mix = Mix { new: 0.0, old: 0.0, rate: t.rate, ..self.mix };
-                self.elasticity().force(&mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut out);
-                self.ghost(young * elements.shear[0], &mix, s, &mut out);
-            }
-            ParamKey::Gravity(a) => self.masses(|_| -DVec3::AXES[a as usize], |_| -DVec3::AXES[a as usize], &mut out),
-            ParamKey::PointMass(k) => {
-                let site = &self.plan.masses[k as usize];
-                let g = self.physics.gravity;
-                let mut a = -g;
-                if let Some(t) = self.inertia {
-                    for i in 0..8 {
-                        let m = site.nodes[i] as usize;
-                        a += site.weights[i] * (t.displacement * (s.u1[m] - s.u0[m]) - t.velocity * s.v0[m]);
-                    }
-                }
-                for i in 0..8 {
-                    out[site.nodes[i] as usize] += site.weights[i] * a;
-                }
-            }
-            ParamKey::PlaneHeight(k) => {
-                let plane = &self.planes[k as usize];
-                self.contact_column(plane, s.u1, |t| -t.slope * plane.normal[0], &mut out);
-            }
-            ParamKey::PlaneTheta(k) | ParamKey::PlanePhi(k) => {
-                let plane = &self.planes[k as usize];
-                let dn = plane.normal[if matches!(key, ParamKey::PlaneTheta(_)) { 1 } else { 2 }];
-                self.contact_column(plane, s.u1, |t| t.slope * dn.dot(t.point) * plane.normal[0] + t.pressure * dn, &mut out);
-            }
-            ParamKey::TimeStart => {
-                let moving = self.plan.clamps.iter().any(|c| c.motion.is_some());
-                if !moving && self.effects.is_empty() {
-                    return None;
-                }
-                // The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10.
-                let d = 1e-6;
-                for sign in [1.0, -1.0].into_iter().filter(|_| moving) {
-                    self.clamps(Matrices::Stiffness, sign * self.young() / (2.0 * d), sign * d, s, &mut out);
-                }
-            }
-            ParamKey::Effect { effect, slot, .. } => {
-                self.add_altered_column(usize::from(effect), usize::from(slot), s, &mut out);
-            }
-            ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => return None,
-        }
-        self.add_effects_column(key, s, &mut out);
-        Some(out)
-    }
-
-    /// Adds −area · weight · f(touch) over the patches that touch a plane.
-    fn contact_column(&self, plane: &PlaneNow, u: &[DVec3], f: impl Fn(&supports::Touch) -> DVec3, out: &mut [DVec3]) {
-        for t in supports::touches(&self.plan.body, plane, u) {
-            let v = t.area * f(&t);
-            for i in 0..8 {
-                out[t.nodes[i] as usize] -= t.weights[i] * v;
-            }
-        }
-    }
+/// block += s I.
+fn add_to_diagonal(block: &mut DMat3, s: f64) {
+    block.x_axis.x += s;
+    block.y_axis.y += s;
+    block.z_axis.z += s;
 }

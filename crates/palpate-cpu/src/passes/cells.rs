@@ -17,7 +17,7 @@ use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 
 /// Cells that one task treats in a row.
-const CHUNK: usize = 128;
+pub(super) const CHUNK: usize = 128;
 
 /// Eight vectors, one per corner.
 pub type Corners = [DVec3; 8];
@@ -38,6 +38,12 @@ pub struct Mix {
 impl Mix {
     /// The elastic force of one state alone.
     pub const STATIC: Mix = Mix { new: 1.0, old: 0.0, rate: 0.0, rotation: RotationUpdate::Converged };
+
+    /// Factors of q₁ and q₀ in the new pose's force.
+    pub(super) fn factors(&self) -> (f64, f64) {
+        let own = if self.rotation == RotationUpdate::Lagged { self.old } else { 0.0 };
+        (self.new + self.rate, own - self.rate)
+    }
 }
 
 /// Positions of a cell's corners at displacement `u`.
@@ -50,11 +56,11 @@ pub(super) fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
 }
 
 #[inline(always)]
-fn times(k: &M24, q: &V24, scale: f64) -> V24 {
+pub(super) fn times(k: &M24, q: &V24, scale: f64) -> V24 {
     multiply(k, q).map(|y| scale * y)
 }
 
-fn dot24(a: &V24, b: &V24) -> f64 {
+pub(super) fn dot24(a: &V24, b: &V24) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
@@ -88,18 +94,12 @@ impl Poses {
     /// Body-frame force that goes with the new pose, and the one that goes with the old pose.
     #[inline(always)]
     fn stress(&self, mix: &Mix, k: &M24, e: f64) -> (V24, Option<V24>) {
-        let (a, b) = self.factors(mix);
+        let (a, b) = mix.factors();
         let zero = [0.0; 24];
         let q0 = self.old.as_ref().map_or(&zero, |p| &p.q);
         let combined: V24 = std::array::from_fn(|i| a * self.new.q[i] + b * q0[i]);
         let old = (self.spin.is_none() && mix.old != 0.0).then(|| times(k, q0, e * mix.old));
         (times(k, &combined, e), old)
-    }
-
-    /// Factors of q₁ and q₀ in the new pose's force.
-    fn factors(&self, mix: &Mix) -> (f64, f64) {
-        let b = if self.spin.is_some() { mix.old - mix.rate } else { -mix.rate };
-        (mix.new + mix.rate, b)
     }
 
     #[inline(always)]
@@ -153,12 +153,17 @@ impl<'a> Elasticity<'a> {
     #[inline(always)]
     fn poses(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> Poses {
         let mut poses = Poses::new(mix, self.body.grid.h, &corners(self.body, e, u1), &corners(self.body, e, u0));
-        if let Some(rest) = self.rest {
-            let shift = |p: &mut CellPose| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w);
-            shift(&mut poses.new);
-            poses.old.iter_mut().for_each(shift);
-        }
+        self.shift(e, &mut poses.new);
+        poses.old.iter_mut().for_each(|p| self.shift(e, p));
         poses
+    }
+
+    /// Measures a cell's deformation from the stress-free shape.
+    #[inline(always)]
+    pub(super) fn shift(&self, e: usize, pose: &mut CellPose) {
+        if let Some(rest) = self.rest {
+            pose.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w);
+        }
     }
 
     /// Stiffness of a cell at E = 1 Pa.
@@ -183,12 +188,12 @@ impl<'a> Elasticity<'a> {
     }
 
     /// Young's modulus in a cell [Pa].
-    fn young_of(&self, e: usize) -> f64 {
+    pub(super) fn young_of(&self, e: usize) -> f64 {
         self.young * self.factor(e)
     }
 
     /// A value of every cell.
-    fn each_cell<T: Clone + Default + Send>(&self, cell: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    pub(super) fn each_cell<T: Clone + Default + Send>(&self, cell: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
         let mut values = vec![T::default(); self.body.cells.len()];
         values.par_chunks_mut(CHUNK).enumerate().for_each(|(c, values)| {
             wide(
@@ -206,10 +211,15 @@ impl<'a> Elasticity<'a> {
     /// Adds per-cell corner vectors to nodes, always in the same order.
     pub(super) fn gather(&self, cell: impl Fn(usize) -> Corners + Sync + Send, out: &mut [DVec3]) {
         let parts = self.each_cell(cell);
+        self.sum_corners(|e, i| parts[e][i], out);
+    }
+
+    /// Adds vectors given by cell and corner to nodes, always in the same order.
+    pub(super) fn sum_corners(&self, part: impl Fn(usize, usize) -> DVec3 + Sync, out: &mut [DVec3]) {
         let p = self.pattern;
         let sum = |a: usize, v: &mut DVec3| {
             for &(e, i) in &p.cell_list[p.cell_rows[a]..p.cell_rows[a + 1]] {
-                *v += parts[e as usize][i as usize];
+                *v += part(e as usize, i as usize);
             }
         };
         out.par_iter_mut().with_min_len(2048).enumerate().for_each(|(a, v)| sum(a, v));
@@ -222,49 +232,15 @@ impl<'a> Elasticity<'a> {
             #[inline(always)]
             |e| {
                 let poses = self.poses(mix, e, u1, u0);
-                poses.force(&poses.stress(mix, self.matrix(e, which), young * self.factor(e)))
+                let young = young * self.factor(e);
+                let mut f = poses.force(&poses.stress(mix, self.matrix(e, which), young));
+                if which == Matrices::Stiffness {
+                    self.add_guard(mix, e, &poses.new, young, &mut f);
+                }
+                f
             },
             out,
         );
-    }
-
-    /// Incremental potential whose gradient by u₁ is [`Elasticity::force`], up to a constant.
-    pub fn potential(&self, mix: &Mix, u1: &[DVec3], u0: &[DVec3]) -> f64 {
-        self.each_cell(
-            #[inline(always)]
-            |e| {
-                let poses = self.poses(mix, e, u1, u0);
-                let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
-                let (a, b) = poses.factors(mix);
-                let kq = times(k, &poses.new.q, young);
-                let mut w = 0.5 * a * dot24(&poses.new.q, &kq);
-                if let Some(old) = &poses.old {
-                    w += b * dot24(&old.q, &kq);
-                    if poses.spin.is_none() && mix.old != 0.0 {
-                        let f0 = old.force(&times(k, &old.q, young * mix.old));
-                        w += pick(self.body, e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
-                    }
-                }
-                w
-            },
-        )
-        .iter()
-        .sum()
-    }
-
-    /// Derivative of cell e's force by the new state, world frame, 24 × 24. With `convex` the part that may be indefinite
-    /// (second derivative of the rotation) is left out.
-    #[inline(always)]
-    pub fn tangent(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3], convex: bool, out: &mut M24) {
-        let poses = self.poses(mix, e, u1, u0);
-        let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
-        let scale = young * poses.factors(mix).0;
-        if convex || poses.spin.is_some() {
-            poses.new.gauss_newton(k, scale, out);
-        } else {
-            let y = poses.stress(mix, k, young).0;
-            poses.new.hessian(k, scale, &y, out);
-        }
     }
 
     /// Derivative by the old state with converged rotation, for one cell: `b` Pᵀ_to E K P_from d, and the symmetric share of the
@@ -297,7 +273,7 @@ impl<'a> Elasticity<'a> {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, du0);
-                let (a, b) = poses.factors(mix);
+                let (a, b) = mix.factors();
                 if let Some(turn) = &poses.spin {
                     let old = poses.old.as_ref().expect("lagged rotation has an old pose");
                     let y = poses.stress(mix, k, young).0;
@@ -328,7 +304,7 @@ impl<'a> Elasticity<'a> {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, z);
-                let (a, b) = poses.factors(mix);
+                let (a, b) = mix.factors();
                 if let Some(turn) = &poses.spin {
                     let old = poses.old.as_ref().expect("lagged rotation has an old pose");
                     let y = poses.stress(mix, k, young).0;
