@@ -3,6 +3,7 @@
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;
 use crate::experiment::Experiment;
+pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::interrupt::Interrupt;
 use crate::residuals::ResidualSummary;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
@@ -331,42 +332,6 @@ fn batch(plan: &Plan, starts: usize, free: usize) -> usize {
     let factor = 8.0 * 150.0 * nodes.powf(4.0 / 3.0);
     let member = states + factor;
     ((BATCH_MEMORY / member) as usize).clamp(1, starts.max(1))
-}
-
-/// Where [`fnv1a`] begins.
-pub(crate) const FNV_START: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// FNV-1a of some more bytes.
-pub(crate) fn fnv1a(hash: u64, bytes: &[u8]) -> u64 {
-    bytes.iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3))
-}
-
-/// Identifies what a plan compares with what, up to the values of θ: FNV-1a over everything that enters the cost.
-pub(crate) fn fingerprint(plan: &Plan) -> String {
-    let mut hash = FNV_START;
-    let mut eat = |x: u64| hash = fnv1a(hash, &x.to_le_bytes());
-    let o = &plan.observation;
-    let numbers =
-        [o.depth_noise, o.marker_noise, plan.band, plan.clock.step, plan.clock.theta, plan.body.grid.h, plan.body.volume];
-    numbers.iter().for_each(|x| eat(x.to_bits()));
-    [plan.clock.steps, plan.body.nodes.len(), plan.clamps.len(), plan.masses.len()].iter().for_each(|n| eat(*n as u64));
-    plan.body.nodes.iter().for_each(|p| p.to_array().iter().for_each(|x| eat(x.to_bits())));
-    plan.body.node_volume.iter().for_each(|x| eat(x.to_bits()));
-    plan.pivot.to_array().iter().for_each(|x| eat(x.to_bits()));
-    format!("{:?} {:?} {:?} {:?}", plan.solver, plan.initial, plan.planes, plan.clamps).bytes().for_each(|b| eat(u64::from(b)));
-    format!("{:?} {:?}", plan.masses, o.markers).bytes().for_each(|b| eat(u64::from(b)));
-    for f in &o.frames {
-        eat(f.time.to_bits());
-        for p in &f.points {
-            p.position.to_array().iter().for_each(|x| eat(x.to_bits()));
-            eat(u64::from(p.camera));
-        }
-        for m in &f.markers {
-            m.position.to_array().iter().for_each(|x| eat(x.to_bits()));
-            eat(u64::from(m.site));
-        }
-    }
-    format!("{hash:016x}")
 }
 
 /// Counts evaluations against an interrupt's budget.
