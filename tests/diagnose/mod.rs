@@ -1,5 +1,6 @@
 //! Diagnosis from end to end: recordings made on another grid with another step, and a model that lacks one thing, or nothing.
 
+mod blind;
 mod measured;
 
 use crate::cli::BLOCK;

@@ -12,6 +12,8 @@ pub enum Verdict {
     MissingEffect,
     /// Something is missing that no known effect explains.
     Unexplained,
+    /// Something is missing, and the search ended before every explanation was tried.
+    Undecided,
 }
 
 impl Verdict {
@@ -21,6 +23,7 @@ impl Verdict {
             Verdict::Adequate => "adequate",
             Verdict::MissingEffect => "missing-effect",
             Verdict::Unexplained => "unexplained",
+            Verdict::Undecided => "undecided",
         }
     }
 }
@@ -168,15 +171,22 @@ impl Diagnosis {
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
         match self.verdict {
             Verdict::Adequate => format!("Nothing is missing that these data could show: {apart} ({}).", p(self.p_value)),
-            Verdict::Unexplained => {
-                let close = self.effects.first().map_or("no known effect helps".to_string(), |e| {
+            Verdict::Unexplained | Verdict::Undecided => {
+                let open = self.verdict == Verdict::Undecided;
+                let none = if open { "nothing helps so far" } else { "no known effect helps" };
+                let close = self.effects.first().map_or(none.to_string(), |e| {
                     format!(
                         "the known effect that helps most, {}, closes {:.0} % of the gap on data left out",
                         e.kind,
                         100.0 * e.held_out_gain
                     )
                 });
-                format!("Something is missing ({}) that no known effect explains: {apart}{place}; {close}.", p(self.p_value))
+                let why = match (open, self.interrupted) {
+                    (false, _) => " that no known effect explains",
+                    (true, true) => ", and the search was interrupted before every known effect was tried",
+                    (true, false) => ", and the time was over before every known effect was tried",
+                };
+                format!("Something is missing ({}){why}: {apart}{place}; {close}.", p(self.p_value))
             }
             Verdict::MissingEffect => {
                 let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();

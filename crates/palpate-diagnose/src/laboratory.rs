@@ -3,6 +3,7 @@
 use crate::change::Change;
 use glam::DVec3;
 use palpate_engine::ResidualRow;
+use std::sync::Arc;
 
 /// Why the laboratory has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -13,6 +14,9 @@ pub enum LabError {
     /// Asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// The time that was allowed is over.
+    #[error("no time left")]
+    NoTime,
 }
 
 /// What a scene is like, as far as hypotheses are made from it.
@@ -66,6 +70,19 @@ pub struct Model {
     pub errors: Vec<Option<f64>>,
 }
 
+/// A fit of a hypothesis, finished or not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Where it is.
+    pub model: Model,
+    /// Its cost per scalar residual.
+    pub cost: f64,
+    /// By how much it lowered the cost it started from.
+    pub gained: f64,
+    /// False when more iterations would go on.
+    pub settled: bool,
+}
+
 /// One scalar residual in its scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -80,8 +97,10 @@ pub struct Reading {
 /// All residuals of a model, in the same order for every model of the same scenes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Readings {
-    /// The residuals `[R]`.
-    pub rows: Vec<Reading>,
+    /// The residuals `[R]`; hypotheses that are absent share them.
+    pub rows: Arc<Vec<Reading>>,
+    /// Cost per scalar residual.
+    pub cost: f64,
     /// Number of columns Q.
     pub columns: usize,
     /// Derivatives by the model's numbers, `[R, Q]`.
@@ -111,8 +130,11 @@ pub trait Laboratory {
     fn setting(&self) -> &Setting;
     /// Free numbers of the scene with these changes.
     fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError>;
-    /// Fits each set of changes, starting from these values; one answer each.
-    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Model, LabError>>;
+    /// Cost per scalar residual of each set of changes at these values; infinite where there is none.
+    fn costs(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<f64>;
+    /// Fits each set of changes, starting from these values, for so many iterations at most and until an iteration lowers the cost by less than
+    /// this share of it; one answer each.
+    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>>;
     /// Residuals and derivatives of each set of changes at these values.
     fn linearise(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Readings, LabError>>;
     /// As [`Laboratory::linearise`], with derivatives by the numbers from place `from` on alone.

@@ -58,8 +58,14 @@ impl Basis {
 
 /// x that makes |y + Σ x_q a_q|² + |x|² `ridge` smallest, columns brought to unit length first; `None` if that is not finite.
 pub fn least_squares(columns: &[&[f64]], y: &[f64], ridge: f64) -> Option<Vec<f64>> {
-    let q = columns.len();
     let size: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt()).collect();
+    least_squares_in(columns, y, ridge, &size)
+}
+
+/// As [`least_squares`] with x_q counted in units of 1 / `size[q]`: columns of one kind that share a size are held back alike, however
+/// little one of them says.
+pub fn least_squares_in(columns: &[&[f64]], y: &[f64], ridge: f64, size: &[f64]) -> Option<Vec<f64>> {
+    let q = columns.len();
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
     let normal =
         Mat::from_fn(q, q, |i, j| dot(columns[i], columns[j]) * unit(i) * unit(j) + if i == j { ridge.max(1e-12) } else { 0.0 });

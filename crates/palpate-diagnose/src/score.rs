@@ -10,6 +10,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 /// Ridge on columns of unit length: directions that the fitted numbers absorb up to a thousandth are not told apart from them.
 const RIDGE: f64 = 1e-6;
 
+/// Ridges of the step from which a fit starts, the shortest step first.
+const STEP_RIDGES: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 1e-3, RIDGE];
+/// The shortest step with this share of the whole gain is taken: what gains little more may lead far away, where nothing is linear.
+const STEP_GAIN: f64 = 0.9;
+
 /// A candidate's score.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
@@ -48,7 +53,14 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Scor
             left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c);
         }
         out.gain = (total - dot(&left, &left)).max(0.0);
-        active.iter().zip(&x).for_each(|(k, x)| out.step[*k] = *x);
+        let remains = |x: &[f64]| {
+            let mut left = y.clone();
+            x.iter().zip(&chosen).for_each(|(x, c)| left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c));
+            dot(&left, &left)
+        };
+        let near = |s: &Vec<f64>| total - remains(s) >= STEP_GAIN * out.gain;
+        let start = STEP_RIDGES.iter().filter_map(|r| least_squares(&chosen, &y, *r)).find(near).unwrap_or(x);
+        active.iter().zip(&start).for_each(|(k, x)| out.step[*k] = *x);
         out.freedom = Basis::new(active.iter().map(|k| &bent[*k])).rank();
         break;
     }

@@ -1,10 +1,12 @@
 //! The order of questions: is something missing, where, what is it called, how sure, what else, how much of the gap closes; and again.
 
+mod bound;
 mod conclude;
+mod race;
 mod rounds;
 
 use crate::cells::{Cells, Table};
-use crate::change::{Change, candidates};
+use crate::change::{Candidate, Change, candidates};
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Readings};
@@ -22,6 +24,8 @@ pub struct Options {
     pub least_gain: f64,
     /// Share of the gap that all accepted effects together must close, unless nothing remains.
     pub enough: f64,
+    /// The same when there are several effects, whatever remains: what takes a patchwork to be followed roughly is not known.
+    pub enough_of_several: f64,
     /// Most effects added.
     pub rounds: usize,
     /// Candidates fitted in a round.
@@ -36,11 +40,22 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { significance: 0.01, least_gain: 0.3, enough: 0.7, rounds: 3, fits: 8, bins: 8, windows: 5, seed: 1 }
+        Options {
+            significance: 0.01,
+            least_gain: 0.3,
+            enough: 0.7,
+            enough_of_several: 0.9,
+            rounds: 3,
+            fits: 8,
+            bins: 8,
+            windows: 5,
+            seed: 1,
+        }
     }
 }
 
 /// A model with everything that is known about its residuals.
+#[derive(Clone)]
 struct State {
     model: Model,
     readings: Readings,
@@ -48,6 +63,8 @@ struct State {
     fields: Vec<Field>,
     frame: Frame,
     predicted: Vec<Predicted>,
+    /// Residuals of data that no fit has seen, where there are any.
+    held_out: Option<Readings>,
 }
 
 /// A variant of a candidate with its columns where it is absent.
@@ -65,6 +82,7 @@ struct Variant {
 
 /// A fitted candidate.
 struct Fitted {
+    /// Its number in the table of candidates.
     candidate: usize,
     state: State,
     p_value: f64,
@@ -85,7 +103,14 @@ struct Session<'a> {
     scored: Option<Vec<Variant>>,
     tried: Vec<Tried>,
     not_tried: Vec<String>,
+    /// True when the time was over before everything was tried.
+    no_time: bool,
 }
+
+/// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
+const FIRST_STARTS: usize = 8;
+/// The share of the best candidate's gain that is within reach.
+const REACH: f64 = 0.6;
 
 /// Diagnoses a scene from its fitted baseline.
 ///
@@ -114,13 +139,15 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         scored: None,
         tried: Vec::new(),
         not_tried: Vec::new(),
+        no_time: false,
     };
-    let mut state = s.state(baseline.clone(), readings, None, None)?;
-    s.correlate(&mut state)?;
+    let fields = s.finer(&baseline);
+    let mut state = s.state(baseline.clone(), readings, fields, None)?;
+    s.correlate(&mut state);
     let first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress::default();
     let mut adequacy;
-    let base_predicted = state.predicted[0].rms;
+    let base = state.clone();
     loop {
         adequacy = test(&s.cells, &state.frame, &s.noise, options.bins, options.seed);
         if out.places.is_none() {
@@ -128,7 +155,13 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             out.p_value = adequacy.p_value;
             out.blocks.clone_from(&adequacy.blocks);
         }
-        if adequacy.p_value > options.significance || out.accepted.len() >= options.rounds || s.lab.out_of_time() {
+        out.interrupted = s.lab.interrupted();
+        if adequacy.p_value > options.significance || out.accepted.len() >= options.rounds || out.interrupted {
+            break;
+        }
+        if s.lab.out_of_time() {
+            s.no_time = true;
+            s.not_tried.push("whatever a further round would have tried: no time left".into());
             break;
         }
         match s.round(&state, out.accepted.len() + 1) {
@@ -150,7 +183,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     }
     // Both levels in the noise as it is known at the end.
     let before = s.level_of(&first.0, first.1);
-    s.conclude(baseline, before, base_predicted, state, &adequacy, out)
+    Ok(s.conclude((base, before), state, &adequacy, out))
 }
 
 /// What the rounds have brought so far.
@@ -170,36 +203,32 @@ fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
 }
 
 impl Session<'_> {
-    /// Everything known about a model; discretisation errors of another model are taken over where given, and so are its means of
-    /// cells that this one lost.
+    /// What a finer grid and half the step would change, and what the recording's systematic errors may have changed. A scene that is too
+    /// large to be refined, or fails there, has no estimate, and neither has one whose diagnosis was asked to stop.
+    fn finer(&mut self, model: &Model) -> Vec<Field> {
+        self.lab.say("discretisation error: finer grid, half step");
+        let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
+        all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
+        all
+    }
+
+    /// Everything known about a model; means of cells that it lost are taken over from another one's.
     fn state(
         &mut self,
         model: Model,
         readings: Readings,
-        fields: Option<Vec<Field>>,
+        fields: Vec<Field>,
         fallback: Option<&Table>,
     ) -> Result<State, LabError> {
-        let fields = match fields {
-            Some(f) => f,
-            None => {
-                self.lab.say("discretisation error: finer grid, half step");
-                // A scene that is too large to be refined, or fails there, has no estimate.
-                let finer = self.lab.finer(&model.changes, &model.values);
-                let systematic = self.lab.systematic(&model.changes, &model.values);
-                let mut all = Vec::new();
-                for fields in [finer, systematic] {
-                    match fields {
-                        Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                        other => all.extend(other.unwrap_or_default()),
-                    }
-                }
-                all
-            }
-        };
         let table = self.cells.table(&readings, fallback);
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
-        Ok(State { model, readings, table, fields, frame, predicted })
+        let held_out = match self.lab.held_out(&model) {
+            Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+            // A model that cannot follow the other recording is judged by this one.
+            other => other.unwrap_or_default(),
+        };
+        Ok(State { model, readings, table, fields, frame, predicted, held_out })
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {
@@ -219,8 +248,9 @@ impl Session<'_> {
     }
 
     /// Finds how much more cells scatter than independent readings would, and rescales everything by it.
-    fn correlate(&mut self, state: &mut State) -> Result<(), LabError> {
-        let variants = self.variants(state)?;
+    fn correlate(&mut self, state: &mut State) {
+        // Asked to stop: what is known without any candidate.
+        let variants = self.variants(state).unwrap_or_default();
         let mut saturated = state.frame.absorbed.clone();
         let mut best: Vec<&Variant> = variants.iter().collect();
         best.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
@@ -242,7 +272,6 @@ impl Session<'_> {
             v.score = self.score(state, v);
         }
         self.scored = Some(variants);
-        Ok(())
     }
 
     /// Looks at the noise again after an effect was added: what the model missed before may have passed for noise, so that only a
@@ -264,39 +293,51 @@ impl Session<'_> {
         self.remeasure(state);
     }
 
-    /// Every variant of every candidate, scored where it is absent.
+    /// Variants of every candidate, scored where it is absent: of effects at an unknown place first a few, the others only of those that
+    /// promise much.
     fn variants(&mut self, state: &State) -> Result<Vec<Variant>, LabError> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
+        let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(FIRST_STARTS).max(1) };
+        let split = |(n, c): (usize, &Candidate)| -> Vec<(bool, usize, Change)> {
+            let by = stride(c);
+            c.variants.iter().enumerate().map(|(i, v)| (i % by == 0, n, v.clone())).collect()
+        };
+        let (first, later): (Vec<_>, Vec<_>) = all.iter().enumerate().flat_map(split).partition(|(first, ..)| *first);
+        let mut scored = self.scored(state, first)?;
+        let best = scored.iter().map(|v| v.score.gain).fold(0.0, f64::max);
+        let within = |n: usize| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
+        let more: Vec<_> = later.into_iter().filter(|(_, n, _)| within(*n)).collect();
+        scored.extend(self.scored(state, more)?);
+        Ok(scored)
+    }
+
+    /// These variants (which pass, number of their candidate, change), scored where they are absent.
+    fn scored(&mut self, state: &State, wanted: Vec<(bool, usize, Change)>) -> Result<Vec<Variant>, LabError> {
         let mut tries = Vec::new();
         let mut out: Vec<Variant> = Vec::new();
         let own = state.model.values.len();
-        for (candidate, c) in all.iter().enumerate() {
-            for change in &c.variants {
-                if state
-                    .model
-                    .changes
-                    .iter()
-                    .any(|x| matches!((x, change), (Change::Freed { name: a, .. }, Change::Freed { name: b, .. }) if a == b))
-                {
-                    continue;
-                }
-                let mut changes = state.model.changes.clone();
-                changes.push(change.clone());
-                let numbers = self.lab.numbers(&changes)?;
-                let mut values = state.model.values.clone();
-                values.extend(numbers[own..].iter().map(|n| n.start));
-                out.push(Variant {
-                    candidate,
-                    change: change.clone(),
-                    columns: Vec::new(),
-                    amplitudes: change.amplitudes(),
-                    start: values[own..].to_vec(),
-                    bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
-                    score: Score::default(),
-                });
-                tries.push((changes, values));
+        for (_, candidate, change) in wanted {
+            let same =
+                |x: &Change| matches!((x, &change), (Change::Freed { name: a, .. }, Change::Freed { name: b, .. }) if a == b);
+            if state.model.changes.iter().any(same) {
+                continue;
             }
+            let mut changes = state.model.changes.clone();
+            changes.push(change.clone());
+            let numbers = self.lab.numbers(&changes)?;
+            let mut values = state.model.values.clone();
+            values.extend(numbers[own..].iter().map(|n| n.start));
+            out.push(Variant {
+                candidate,
+                columns: Vec::new(),
+                amplitudes: change.amplitudes(),
+                change,
+                start: values[own..].to_vec(),
+                bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
+                score: Score::default(),
+            });
+            tries.push((changes, values));
         }
         let answers = self.lab.linearise_new(&tries, own);
         let mut kept = Vec::new();
@@ -309,6 +350,7 @@ impl Session<'_> {
                 }
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(LabError::Failed(_)) => {}
+                Err(LabError::NoTime) => self.missed(&v.change, &LabError::NoTime),
             }
         }
         Ok(kept)

@@ -145,7 +145,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     };
     let values = runs[best].end.clone();
     let z = starts[best].outcome.z.clone();
-    let (u, extra) = curvature(problem, &z, settings, &hooks);
+    let (u, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, &hooks);
     let mut warnings = u.warnings.clone();
     warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
     let failed: Vec<usize> = (0..runs.len()).filter(|&s| runs[s].cost.is_infinite()).collect();
@@ -188,14 +188,29 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
 }
 
 /// Uncertainty at the best point, and how many evaluations that took.
-fn curvature(problem: &mut Problem, z: &[f64], settings: &Settings, hooks: &Hooks) -> (Uncertainty, usize) {
+fn curvature(
+    problem: &mut Problem,
+    z: &[f64],
+    known: Option<&Sample>,
+    settings: &Settings,
+    hooks: &Hooks,
+) -> (Uncertainty, usize) {
     // A sample without curvature still tells of bounds.
     let without = |problem: &Problem, why: &str| {
         let mut u = uncertainty::assess(problem, z, &Sample::default(), &settings.errors);
         u.warnings.push(format!("no standard errors: {why}"));
         u
     };
-    if hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)) {
+    let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
+    // Gauss–Newton has seen its best point's curvature.
+    if let Some(sample) = known.filter(|s| s.curvature.len() == z.len() * z.len()) {
+        let mut u = uncertainty::assess(problem, z, sample, &settings.errors);
+        if interrupted {
+            u.warnings.push("the fit was interrupted: standard errors are those of the place that it had reached".into());
+        }
+        return (u, 0);
+    }
+    if interrupted {
         return (without(problem, "the fit was interrupted"), 0);
     }
     let sample = problem.evaluate(&[z.to_vec()], Want::Curvature).swap_remove(0);

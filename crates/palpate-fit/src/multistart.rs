@@ -132,6 +132,7 @@ pub fn run(
                             iterations: 0,
                             evaluations: 0,
                             status: Status::Failed("the optimiser broke off".into()),
+                            sample: None,
                         };
                         let run = StartRun { start: Vec::new(), outcome };
                         drop(tell.send((number, Message::Done(Box::new(run)))));

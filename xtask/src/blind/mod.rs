@@ -19,9 +19,9 @@ use std::time::{Duration, Instant};
 /// Which cases run, and how long each may take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Only cases that hide this; "magnet", "pair" and "null" name groups.
+    /// Only cases that hide one of these (separated by commas); "magnet", "pair" and "null" name groups.
     pub only: Option<String>,
-    /// Only cases of this scene.
+    /// Only cases of this scene; "pebble" are the small ones of the tests.
     pub scene: Option<String>,
     /// Recordings with nothing hidden.
     pub nulls: usize,
@@ -61,6 +61,23 @@ const PAIRS: [([&str; 2], &str); 4] = [
     (["two-part-stiffness", "marker-offset"], "beam"),
     (["two-part-stiffness", "depth-along-ray"], "plate"),
 ];
+
+/// A case of the tests on the small ball: what is hidden (a line of the table in any scene), nothing, or a magnet.
+pub fn small(hidden: Option<&str>, magnet: bool, seed: u64) -> Option<Case> {
+    let line = |name: &str| TABLE.iter().position(|h| h.name == name && h.scene == "ball").map(|k| (k, STRONG));
+    let hidden: Vec<(usize, f64)> = match hidden {
+        Some(name) => vec![line(name)?],
+        None => Vec::new(),
+    };
+    let group = match (hidden.is_empty(), magnet) {
+        (false, _) => "strong",
+        (true, true) => "magnet",
+        (true, false) => "null",
+    };
+    let name = hidden.first().map_or(group, |h| TABLE[h.0].name);
+    let magnet = magnet.then_some((DVec3::new(0.05, 0.075, 0.07), STRONG));
+    Some(Case { name: format!("{name} pebble {seed}"), scene: "pebble", group, hidden, magnet, seed })
+}
 
 /// Where the magnet is [m].
 const MAGNETS: [(&str, [f64; 3]); 3] =
@@ -109,7 +126,7 @@ pub fn cases(nulls: usize) -> Vec<Case> {
 impl Options {
     fn wants(&self, c: &Case) -> bool {
         let hides = |name: &str| c.group == name || c.hidden.iter().any(|h| TABLE[h.0].name == name) || c.name == name;
-        self.only.as_deref().is_none_or(hides)
+        self.only.as_deref().is_none_or(|all| all.split(',').any(|name| hides(name.trim())))
             && self.scene.as_deref().is_none_or(|s| c.scene == s)
             && (!self.quick
                 || QUICK.contains(&c.name.as_str())
@@ -124,7 +141,15 @@ impl Options {
 pub fn run(options: &Options) -> Result<(), String> {
     let name = if options.quick { "blind-quick" } else { "blind" };
     let path = table::root().join("bench").join(format!("{name}.json"));
-    let wanted: Vec<Case> = cases(options.nulls).into_iter().filter(|c| options.wants(c)).collect();
+    let mut all = cases(options.nulls);
+    if options.scene.as_deref() == Some("pebble") {
+        let ball = TABLE.iter().filter(|h| h.scene == "ball").filter_map(|h| small(Some(h.name), false, 11));
+        all = ball
+            .chain((0..options.nulls as u64).filter_map(|i| small(None, false, 12 + i)))
+            .chain(small(None, true, 13))
+            .collect();
+    }
+    let wanted: Vec<Case> = all.into_iter().filter(|c| options.wants(c)).collect();
     if wanted.is_empty() {
         return Err("no case fits these options".into());
     }

@@ -110,9 +110,7 @@ impl<'a> Balance<'a> {
             supports::ghost_product(&plan.body, scale, &dw, out);
             self.each_clamp(s, |c, i, pose, weight, _| c.rest_column(i, pose.0, weight * self.young(), &dw, out));
         }
-        if let Some(m) = self.materials() {
-            m.own_column(effect, slot, s.u1, s.u0, out);
-        }
+        self.all_materials().own_column(effect, slot, s.u1, s.u0, out);
         if self.altered.grips.is_some() {
             for (weight, time, u) in self.instants(s) {
                 for i in 0..plan.clamps.len() {
@@ -123,14 +121,19 @@ impl<'a> Balance<'a> {
         }
     }
 
-    /// The laws of cells, if there are any.
+    /// The laws of cells, if there are any that are not absent.
     pub(super) fn materials(&self) -> Option<Materials<'a>> {
-        (!self.altered.laws.is_empty()).then(|| Materials {
+        self.altered.laws.iter().any(|l| !l.absent).then(|| self.all_materials())
+    }
+
+    /// The laws of cells, absent ones too.
+    fn all_materials(&self) -> Materials<'a> {
+        Materials {
             elasticity: self.elasticity(),
             laws: &self.altered.laws,
             mix: self.mix,
             rate: self.inertia.map_or(0.0, |t| t.rate),
-        })
+        }
     }
 
     /// Visits every clamp at both instants: clamp number, pose, weight in time and displacement.

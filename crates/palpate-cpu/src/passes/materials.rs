@@ -7,8 +7,8 @@
 use crate::passes::cells::{Corners, Elasticity, Mix, pick};
 use glam::DVec3;
 use palpate_model::corotation::{CellPose, M24, V24, flatten, multiply};
-use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
+use palpate_model::effects::{EffectParam, Site, Unstated};
 use palpate_model::grid::SIGNS;
 use palpate_model::plan::{Physics, Plan};
 
@@ -19,6 +19,8 @@ pub struct CellActing {
     pub effect: usize,
     law: &'static dyn Cell,
     p: Vec<f64>,
+    /// Its amplitudes are zero: it has no energy, only derivatives by them.
+    pub absent: bool,
 }
 
 impl std::fmt::Debug for CellActing {
@@ -31,7 +33,10 @@ impl std::fmt::Debug for CellActing {
 pub fn cell_laws(plan: &Plan, physics: &Physics) -> Vec<CellActing> {
     let all = plan.layout.effects().zip(&physics.effects).enumerate();
     all.filter_map(|(effect, ((law, _), p))| match law.site {
-        Site::Cells(law) => Some(CellActing { effect, law, p: p.clone() }),
+        Site::Cells(cell) => {
+            let zero = |(spec, v): (&EffectParam, &f64)| !matches!(spec.default, Unstated::Absent(a) if a != *v);
+            Some(CellActing { effect, law: cell, p: p.clone(), absent: law.params.iter().zip(p).all(zero) })
+        }
         _ => None,
     })
     .collect()
@@ -190,9 +195,14 @@ impl<'a> Materials<'a> {
         Part::Loss { rate: self.rate }
     }
 
-    /// Number of scalars that any law's energy depends on.
+    /// The laws that are not absent.
+    fn acting(&self) -> impl Iterator<Item = &'a CellActing> {
+        self.laws.iter().filter(|l| !l.absent)
+    }
+
+    /// Number of scalars that the energy of any acting law depends on; the density comes first.
     fn needs(&self) -> usize {
-        self.laws.iter().map(|l| l.law.needs(Part::Energy)).max().unwrap_or(0)
+        self.acting().map(|l| l.law.needs(Part::Energy)).max().unwrap_or(1)
     }
 
     fn side(&self, k: &M24, volume: f64, pose: CellPose, n: usize, gradient: f64) -> Side {
@@ -203,7 +213,7 @@ impl<'a> Materials<'a> {
             *s = dot(&strain_row(c, gradient), &pose.q);
         }
         let mut slopes = Slopes::default();
-        for l in self.laws {
+        for l in self.acting() {
             let (z, len) = input(&s, &l.p);
             slopes.value += l.law.value(Part::Energy, &z[..len]);
             let own = l.law.needs(Part::Energy);
@@ -223,9 +233,14 @@ impl<'a> Materials<'a> {
     }
 
     fn local(&self, e: usize, u1: &[DVec3], u0: &[DVec3], young: f64) -> Local<'a> {
+        self.local_with(self.needs(), e, u1, u0, young)
+    }
+
+    /// The same with at least `n` scalars.
+    fn local_with(&self, n: usize, e: usize, u1: &[DVec3], u0: &[DVec3], young: f64) -> Local<'a> {
         let el = &self.elasticity;
         let (h, k) = (el.body.grid.h, el.stiffness(e));
-        let (volume, n, gradient) = (el.body.cells[e].fraction * h.powi(3), self.needs(), 0.25 / h);
+        let (volume, gradient) = (el.body.cells[e].fraction * h.powi(3), 0.25 / h);
         let (new, old) = el.both(&self.mix, e, u1, u0);
         let new = self.side(k, volume, new, n, gradient);
         let old = old.map(|p| self.side(k, volume, p, n, gradient));
@@ -233,7 +248,7 @@ impl<'a> Materials<'a> {
         if let (Some(old), true) = (&old, self.rate > 0.0) {
             kd = std::array::from_fn(|i| new.kq[i] - old.kq[i]);
             d = 0.5 * (0..24).map(|i| kd[i] * (new.pose.q[i] - old.pose.q[i])).sum::<f64>() / volume;
-            for l in self.laws {
+            for l in self.acting() {
                 let (z, len) = input(&[d, old.s[0]], &l.p);
                 let [by_d, _, by_dd] = l.law.slopes(self.loss_part(), &z[..len], 0, 0);
                 loss.value += l.law.value(self.loss_part(), &z[..len]);
@@ -351,13 +366,14 @@ impl<'a> Materials<'a> {
     pub fn own_column(&self, effect: usize, slot: usize, u1: &[DVec3], u0: &[DVec3], out: &mut [DVec3]) {
         let Some(acting) = self.laws.iter().find(|l| l.effect == effect) else { return };
         let el = &self.elasticity;
+        let n = self.needs().max(acting.law.needs(Part::Energy));
         let by = |part: Part, scalars: &[f64], k: usize| {
             let (z, len) = input(scalars, &acting.p);
             acting.law.slopes(part, &z[..len], k, scalars.len() + slot)[2]
         };
         el.gather(
             |e| {
-                let l = self.local(e, u1, u0, el.young);
+                let l = self.local_with(n, e, u1, u0, el.young);
                 let energy = |side: &Side| {
                     let c = std::array::from_fn(|k| if k < l.n { by(Part::Energy, &side.s, k) } else { 0.0 });
                     l.stress(side, &c)

@@ -107,7 +107,7 @@ impl Bench {
 
     pub fn baseline(&mut self) -> Model {
         let start = self.numbers(&[]).unwrap().iter().map(|n| n.start).collect();
-        self.fit(&[(Vec::new(), start)]).remove(0).unwrap()
+        self.fit(&[(Vec::new(), start)], 1, 0.0).remove(0).unwrap().model
     }
 
     fn all_names(&self, changes: &[Change]) -> Vec<String> {
@@ -118,6 +118,7 @@ impl Bench {
         let names = self.all_names(changes);
         let q = names.len() - from;
         let mut out = Readings { columns: q, ..Readings::default() };
+        let mut rows = Vec::new();
         let offsets: Vec<f64> = self.numbers(changes).unwrap().iter().map(|n| n.start).collect();
         for frame in 0..FRAMES {
             let time = frame as f64 / FRAMES as f64;
@@ -135,10 +136,12 @@ impl Bench {
                     rest: *p,
                     along_sight: 1.0,
                 };
-                out.rows.push(Reading { scene: 0, time, row });
+                out.cost += 0.5 * (value / NOISE).powi(2) / (FRAMES * POINTS) as f64;
+                rows.push(Reading { scene: 0, time, row });
                 out.sensitivity.extend(&d[from..]);
             }
         }
+        out.rows = std::sync::Arc::new(rows);
         out
     }
 }
@@ -167,7 +170,11 @@ impl Laboratory for Bench {
         Ok(out)
     }
 
-    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Model, LabError>> {
+    fn costs(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<f64> {
+        tries.iter().map(|(c, v)| self.readings(c, v, v.len()).cost).collect()
+    }
+
+    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)], _: usize, _: f64) -> Vec<Result<Fit, LabError>> {
         let one = |(changes, values): &(Vec<Change>, Vec<f64>)| {
             let r = self.readings(changes, values, 0);
             let columns: Vec<Vec<f64>> =
@@ -176,7 +183,14 @@ impl Laboratory for Bench {
             let y: Vec<f64> = r.rows.iter().map(|r| r.row.value.unwrap()).collect();
             let step = least_squares(&chosen, &y, 0.0).unwrap();
             let values = values.iter().zip(&step).map(|(v, s)| v + s).collect::<Vec<f64>>();
-            Ok(Model { changes: changes.clone(), numbers: self.numbers(changes)?, errors: vec![None; values.len()], values })
+            let cost = self.readings(changes, &values, values.len()).cost;
+            let errors = vec![None; values.len()];
+            Ok(Fit {
+                model: Model { changes: changes.clone(), numbers: self.numbers(changes)?, errors, values },
+                cost,
+                gained: 0.0,
+                settled: true,
+            })
         };
         tries.iter().map(one).collect()
     }

@@ -1,12 +1,11 @@
-//! The verdict: levels before and after, the gap that is closed, and what any load could explain where nothing does.
+//! The verdict: levels before and after, and the gap that is closed.
 
 use super::{Progress, Session, State};
-use crate::change::{Change, slack};
 use crate::crossval::rms;
-use crate::diagnosis::{Diagnosis, Level, MapEntry, Slack, SlackWindow, Verdict};
-use crate::laboratory::{LabError, Model, Readings};
-use crate::linear::{Basis, dot, least_squares};
-use crate::null::{Adequacy, Block, extended};
+use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
+use crate::laboratory::Readings;
+use crate::linear::Basis;
+use crate::null::{Adequacy, Block};
 use palpate_engine::Source;
 
 impl Session<'_> {
@@ -41,21 +40,17 @@ impl Session<'_> {
         Level { rms: rms(readings.rows.iter().map(|r| (r.row.source, r.row.value))), noise }
     }
 
+    /// The answer, from the baseline with its level, and the state that the rounds led to.
     pub(super) fn conclude(
         &mut self,
-        baseline: Model,
-        before: Level,
-        base_predicted: f64,
+        (mut base, before): (State, Level),
         state: State,
         adequacy: &Adequacy,
         mut out: Progress,
-    ) -> Result<Diagnosis, LabError> {
+    ) -> Diagnosis {
         let after = self.level(&state);
-        let predicted = (base_predicted, state.predicted[0].rms);
-        let held_out = match (self.held_out(&baseline), self.held_out(&state.model)) {
-            (Ok(Some(b)), Ok(Some(a))) => Some((b, a)),
-            _ => None,
-        };
+        let predicted = (base.predicted[0].rms, state.predicted[0].rms);
+        let held_out = self.held_out(&base).zip(self.held_out(&state));
         let (b, a, noise) = match held_out {
             Some((b, a)) => (b.rms, a.rms, b.noise),
             None => (predicted.0, predicted.1, before.noise),
@@ -63,20 +58,26 @@ impl Session<'_> {
         let gap = b * b - noise * noise;
         let gap_closed = if gap > 0.0 { (1.0 - (a * a - noise * noise).max(0.0) / gap).clamp(0.0, 1.0) } else { 0.0 };
         let adequate = adequacy.p_value > self.options.significance;
-        let verdict = match (adequate, out.accepted.is_empty()) {
-            (true, true) => Verdict::Adequate,
-            (true, false) => Verdict::MissingEffect,
-            (false, false) if gap_closed >= self.options.enough => Verdict::MissingEffect,
+        let verdict = match (adequate, out.accepted.len()) {
+            (true, 0) => Verdict::Adequate,
+            (true, 1) => Verdict::MissingEffect,
+            (false, 1) if gap_closed >= self.options.enough => Verdict::MissingEffect,
+            (_, 2..) if gap_closed >= self.options.enough_of_several => Verdict::MissingEffect,
+            // What was not tried may explain it.
+            _ if out.interrupted || self.no_time => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
-        let slack = if verdict == Verdict::Unexplained && !out.interrupted { self.slack(&state).ok() } else { None };
+        // Of all that is missing, not of what a rejected explanation leaves; the noise may have become known better since.
+        self.remeasure(&mut base);
+        let slack = if verdict == Verdict::Unexplained { self.slack(&base).ok() } else { None };
+        let baseline = base.model;
         if verdict == Verdict::Unexplained {
             // Part of an explanation is not one: it is shown, but not believed.
             out.accepted.iter_mut().for_each(|f| f.accepted = false);
         }
         let mut effects = out.accepted;
         effects.extend(out.close);
-        Ok(Diagnosis {
+        Diagnosis {
             verdict,
             p_value: out.p_value,
             p_value_after: adequacy.p_value,
@@ -96,7 +97,7 @@ impl Session<'_> {
             noise_ratio: self.noise_ratio,
             design_effect: self.design_effect,
             interrupted: out.interrupted,
-        })
+        }
     }
 
     fn entry(&self, before: &Block, after: &Block) -> MapEntry {
@@ -109,59 +110,5 @@ impl Session<'_> {
             before: before.z,
             after: after.z,
         }
-    }
-
-    /// What any smooth load could explain of what is left.
-    fn slack(&mut self, state: &State) -> Result<Slack, LabError> {
-        self.lab.say("slack: what any load could explain");
-        let (from, to) = self.cells.times.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-        let changes = slack(self.lab.setting(), from, to, self.options.windows);
-        let own = state.model.values.len();
-        let mut tries = Vec::new();
-        for c in &changes {
-            let mut all = state.model.changes.clone();
-            all.push(c.clone());
-            let numbers = self.lab.numbers(&all)?;
-            tries.push((all, state.model.values.iter().copied().chain(numbers[own..].iter().map(|n| n.start)).collect()));
-        }
-        let n = state.frame.fields.len();
-        let mut columns: Vec<(usize, usize, Vec<f64>)> = Vec::new();
-        for (w, readings) in self.lab.linearise_new(&tries, own).into_iter().enumerate() {
-            let amplitudes = changes[w].amplitudes();
-            for (k, c) in self.cells.table(&readings?, None).columns.iter().enumerate().filter(|(k, _)| amplitudes[*k]) {
-                columns.push((w, changes[w].free_slots()[k], state.frame.absorbed.without(&extended(c, n))));
-            }
-        }
-        let y = state.frame.left();
-        let chosen: Vec<&[f64]> = columns.iter().map(|c| c.2.as_slice()).collect();
-        // Smooth rather than exact: a hundredth of a column's weight damps what the data hardly see.
-        let x = least_squares(&chosen, &y, 1e-2).ok_or_else(|| LabError::Failed("no slack".into()))?;
-        let mut left = y.clone();
-        for (x, c) in x.iter().zip(&chosen) {
-            left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c);
-        }
-        let m = self.cells.len() as f64;
-        let excess = (dot(&y, &y) - m).max(0.02 * m);
-        let mut windows: Vec<SlackWindow> = changes
-            .iter()
-            .map(|c| match c {
-                Change::Effect(e) => SlackWindow {
-                    time: e
-                        .law()
-                        .params
-                        .iter()
-                        .zip(&e.values)
-                        .find(|(p, _)| p.key == "time")
-                        .and_then(|(_, v)| *v)
-                        .unwrap_or(0.0),
-                    values: e.values.iter().map(|v| v.unwrap_or(0.0)).collect(),
-                },
-                Change::Freed { .. } => SlackWindow { time: 0.0, values: Vec::new() },
-            })
-            .collect();
-        for ((w, slot, _), x) in columns.iter().zip(&x) {
-            windows[*w].values[*slot] = *x;
-        }
-        Ok(Slack { share: ((dot(&y, &y) - dot(&left, &left)) / excess).clamp(0.0, 1.0), windows })
     }
 }

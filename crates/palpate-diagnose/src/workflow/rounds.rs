@@ -1,6 +1,6 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
-use super::{Fitted, Session, State, Variant, one};
+use super::{Fitted, Session, State, Variant};
 use crate::change::Change;
 use crate::crossval::worse_by;
 use crate::diagnosis::{Found, Level, Tried};
@@ -9,7 +9,7 @@ use crate::linear::dot;
 use crate::score::f_tail;
 
 /// Share of the gap by which candidates may differ and still count as equal.
-const TIE: f64 = 0.003;
+const TIE: f64 = 0.01;
 /// Share of the gap that an effect with fewer parameters may leave open and still be preferred.
 const SIMPLER: f64 = 0.03;
 
@@ -24,7 +24,7 @@ impl Session<'_> {
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
         let mut seen: Vec<usize> = Vec::new();
-        let mut tries = Vec::new();
+        let mut tries: Vec<&Variant> = Vec::new();
         let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
         for v in &variants {
             let before = seen.iter().filter(|c| **c == v.candidate).count();
@@ -35,41 +35,20 @@ impl Session<'_> {
             }
             // The best start of a candidate, and a second one where it acts at an unknown place.
             let starts = if v.amplitudes.iter().all(|a| *a) { 1 } else { 2 };
-            if before < starts && v.score.p_value * count < 0.05 && tries.len() < fits + fits / 2 {
+            if before < starts && tries.len() < fits + fits / 2 {
                 tries.push(v);
             }
         }
-        self.lab.say(&format!("fitting {} candidates", tries.len()));
-        let jobs: Vec<(Vec<Change>, Vec<f64>)> = tries
-            .iter()
-            .map(|v| {
-                let mut changes = state.model.changes.clone();
-                changes.push(v.change.clone());
-                let moved = |k: usize| v.start[k] + v.score.step[k].clamp(v.bounds[k].0, v.bounds[k].1);
-                (changes, state.model.values.iter().copied().chain((0..v.start.len()).map(moved)).collect())
-            })
-            .collect();
-        let models = self.lab.fit(&jobs);
+        let arrived = self.race(state, &tries)?;
+        let jobs: Vec<(Vec<Change>, Vec<f64>)> =
+            arrived.iter().map(|(_, f)| (f.model.changes.clone(), f.model.values.clone())).collect();
+        self.lab.say(&format!("judging {} candidates", jobs.len()));
         let mut fitted: Vec<Fitted> = Vec::new();
-        for (v, model) in tries.iter().zip(models) {
-            let model = match model {
-                Ok(m) => m,
+        for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
+            match readings {
+                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings, count)?),
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                Err(LabError::Failed(why)) => {
-                    self.not_tried.push(format!("{}: {why}", v.change.kind()));
-                    continue;
-                }
-            };
-            let readings = match one(self.lab.linearise(&[(model.changes.clone(), model.values.clone())])) {
-                Ok(r) => r,
-                Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                Err(LabError::Failed(_)) => continue,
-            };
-            let f = self.judge(state, v, model, readings, count)?;
-            match fitted.iter_mut().find(|o| o.candidate == f.candidate) {
-                Some(o) if o.state.predicted[0].loss() > f.state.predicted[0].loss() => *o = f,
-                Some(_) => {}
-                None => fitted.push(f),
+                Err(why) => self.missed(&v.change, &why),
             }
         }
         fitted.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
@@ -83,7 +62,7 @@ impl Session<'_> {
 
     /// What a fitted candidate is worth.
     fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
-        let new = self.state(model, readings, Some(state.fields.clone()), Some(&state.table))?;
+        let new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
         let squares = |s: &State| {
             let left = s.frame.left();
             dot(&left, &left)
@@ -95,18 +74,15 @@ impl Session<'_> {
         let gains = state.predicted.iter().zip(&new.predicted);
         let gains = gains.map(|(b, a)| (b.loss() - a.loss()) / (b.loss() - b.floor).max(0.02 * b.floor));
         let mut gain = gains.fold(1.0, f64::min);
-        if let (Some(b), Some(a)) = (self.held_out(&state.model)?, self.held_out(&new.model)?) {
+        if let (Some(b), Some(a)) = (self.held_out(state), self.held_out(&new)) {
             gain = gain.min((b.rms * b.rms - a.rms * a.rms) / b.gap().max(0.02 * b.noise * b.noise));
         }
         Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom })
     }
 
-    pub(super) fn held_out(&mut self, model: &Model) -> Result<Option<Level>, LabError> {
-        match self.lab.held_out(model) {
-            Ok(readings) => Ok(readings.map(|r| self.level_of(&r, 0.0))),
-            Err(LabError::Interrupted) => Err(LabError::Interrupted),
-            Err(LabError::Failed(_)) => Ok(None),
-        }
+    /// Distance of a model from the data that no fit has seen.
+    pub(super) fn held_out(&self, state: &State) -> Option<Level> {
+        state.held_out.as_ref().map(|r| self.level_of(r, 0.0))
     }
 
     /// Chooses among fitted candidates, best prediction first.
@@ -123,15 +99,18 @@ impl Session<'_> {
         };
         // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
         let as_close = |i: usize| excess(i).0 < 2.0 * excess(best).0 + 0.5 * excess(best).1;
-        // Candidates that predict as well as the best, up to noise or up to a share of the gap.
-        let near = |i: usize, share: f64| {
-            let (by, z) = worse_by(&self.cells, &fitted[best].state.predicted[0], &fitted[i].state.predicted[0]);
+        // Candidates that predict as well as another, up to noise or up to a share of the gap.
+        let near = |i: usize, to: usize, share: f64| {
+            let (by, z) = worse_by(&self.cells, &fitted[to].state.predicted[0], &fitted[i].state.predicted[0]);
             passes(&fitted[i]) && (by < share * whole || (z < 2.0 && as_close(i)))
         };
-        let equal: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, TIE)).collect();
+        let equal: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, best, TIE)).collect();
         // The simplest explanation wins unless it is clearly worse: a freer one also fits what no model gets right.
-        let simplest = (0..fitted.len()).filter(|i| near(*i, SIMPLER)).min_by_key(|i| (fitted[*i].freedom, *i));
-        let winner = simplest.unwrap_or(best);
+        let able: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, best, SIMPLER)).collect();
+        let simplest = able.iter().copied().min_by_key(|i| (fitted[*i].freedom, *i)).unwrap_or(best);
+        // What the data cannot tell apart is named in the table's order: the plainer cause first.
+        let plain = |i: &&usize| fitted[**i].freedom == fitted[simplest].freedom && near(**i, simplest, TIE);
+        let winner = able.iter().filter(plain).copied().min_by_key(|i| fitted[*i].candidate).unwrap_or(simplest);
         let mut found = self.found(&fitted[winner], true);
         for &other in equal.iter().filter(|i| **i != winner) {
             let change = fitted[other].state.model.changes.last();
@@ -144,8 +123,10 @@ impl Session<'_> {
             found.separated_by = ways.into_iter().next();
         }
         let mut fitted = fitted;
-        let won = fitted.swap_remove(winner).state;
-        let next = self.state(won.model, won.readings, None, None)?;
+        let mut next = fitted.swap_remove(winner).state;
+        // The discretisation errs in its own way with the effect in place.
+        next.fields = self.finer(&next.model);
+        self.remeasure(&mut next);
         Ok((Some((found, next)), Vec::new()))
     }
 

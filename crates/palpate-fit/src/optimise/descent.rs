@@ -13,7 +13,7 @@ const FIRST: f64 = 0.3;
 pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
     loop {
         let (status, cost) = descend(search, z, at)?;
-        let Some((best, best_cost)) = search.best.clone() else { return Ok(status) };
+        let Some((best, Sample { cost: best_cost, .. })) = search.best.clone() else { return Ok(status) };
         if !matches!(status, Status::Converged | Status::Stalled) || best_cost >= cost {
             return Ok(status);
         }

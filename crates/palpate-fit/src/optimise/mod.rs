@@ -117,7 +117,7 @@ pub struct Search<'a> {
     pub upper: &'a [f64],
     /// Limits and tolerances.
     pub settings: &'a Settings,
-    best: Option<(Vec<f64>, f64)>,
+    best: Option<(Vec<f64>, Sample)>,
     start_cost: f64,
     evaluations: usize,
     iterations: usize,
@@ -138,6 +138,8 @@ pub struct Outcome {
     pub evaluations: usize,
     /// How it ended.
     pub status: Status,
+    /// Cost and derivatives at z, as far as the optimiser asked for them; `None` if no point could be evaluated.
+    pub sample: Option<Sample>,
 }
 
 impl<'a> Search<'a> {
@@ -181,9 +183,10 @@ impl<'a> Search<'a> {
                 walk.unwrap_or(Status::Interrupted)
             }
         };
-        let (z, cost) = self.best.unwrap_or((start, f64::INFINITY));
-        let Search { start_cost, iterations, evaluations, .. } = self;
-        Outcome { z, cost, start_cost, iterations, evaluations, status }
+        let Search { start_cost, iterations, evaluations, best, .. } = self;
+        let (z, sample) = best.map_or((start, None), |(z, s)| (z, Some(s)));
+        let cost = sample.as_ref().map_or(f64::INFINITY, |s| s.cost);
+        Outcome { z, cost, start_cost, iterations, evaluations, status, sample }
     }
 
     /// Evaluates a point. Whatever is not a number counts as a failed point with infinite cost.
@@ -194,8 +197,8 @@ impl<'a> Search<'a> {
             let derivatives = sample.gradient.iter().chain(&sample.curvature);
             if !sample.cost.is_finite() || derivatives.into_iter().any(|x| !x.is_finite()) {
                 sample = Sample::failed("the cost or its derivatives are not finite".into());
-            } else if self.best.as_ref().is_none_or(|(_, cost)| sample.cost < *cost) {
-                self.best = Some((z.to_vec(), sample.cost));
+            } else if self.best.as_ref().is_none_or(|(_, best)| sample.cost < best.cost) {
+                self.best = Some((z.to_vec(), sample.clone()));
             }
         }
         Ok(sample)

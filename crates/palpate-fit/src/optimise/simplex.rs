@@ -48,7 +48,7 @@ impl CostFunction for &Shared<'_, '_> {
 
 pub fn minimise(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, Stop> {
     let first = descend(search, z, at.cost, EDGE)?;
-    let Some((best, cost)) = search.best.clone() else { return Ok(first) };
+    let Some((best, Sample { cost, .. })) = search.best.clone() else { return Ok(first) };
     if first != Status::Converged {
         return Ok(first);
     }
@@ -95,7 +95,7 @@ fn descend(search: &mut Search, z: Vec<f64>, cost: f64, edge: f64) -> Result<Sta
             if borrowed.0.out_of_iterations() {
                 return Ok(Status::IterationLimit);
             }
-            if let Some((z, cost)) = borrowed.0.best.clone() {
+            if let Some((z, Sample { cost, .. })) = borrowed.0.best.clone() {
                 let tried = shared.tried.borrow();
                 let far = |t: &Vec<f64>| t.iter().zip(&z).any(|(a, b)| (a - b).abs() > tolerance.step);
                 if tried.len() == 4 * (q + 1) && !tried.iter().any(far) {

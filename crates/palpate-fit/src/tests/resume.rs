@@ -39,10 +39,11 @@ fn a_resumed_fit_equals_an_uninterrupted_one() {
         let fresh: usize = batches.lock().expect("not poisoned").iter().sum();
         assert_eq!(fresh, whole.evaluations - part.evaluations, "{optimizer:?}: journalled evaluations are not repeated");
 
-        // Now everything is in the journal but the curvature at the end.
+        // Now everything is in the journal but the curvature at the end, which Gauss–Newton has already.
+        let left: &[usize] = if optimizer == Optimizer::GaussNewton { &[] } else { &[1] };
         let (mut problem, batches) = counted_oscillator();
         assert_eq!(timeless(fit(&mut problem, &settings, with_journal(&path, true)).expect("the journal fits")), whole);
-        assert_eq!(*batches.lock().expect("not poisoned"), [1]);
+        assert_eq!(*batches.lock().expect("not poisoned"), left);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Fits of hypotheses that are already done, so that an interrupted diagnosis goes on where it stopped.
 
 use crate::error::Error;
+use palpate_diagnose::Fit;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::io::Write;
@@ -12,6 +13,9 @@ pub(super) struct Done {
     key: String,
     pub values: Vec<f64>,
     pub errors: Vec<Option<f64>>,
+    pub cost: f64,
+    pub gained: f64,
+    pub settled: bool,
 }
 
 /// Fits by what was fitted.
@@ -43,8 +47,9 @@ impl Checkpoint {
     }
 
     /// Keeps a fit. A disk that is full costs the checkpoint, not the diagnosis.
-    pub fn keep(&mut self, key: String, values: &[f64], errors: &[Option<f64>]) {
-        let done = Done { key: key.clone(), values: values.to_vec(), errors: errors.to_vec() };
+    pub fn keep(&mut self, key: String, fit: &Fit) {
+        let (values, errors) = (fit.model.values.clone(), fit.model.errors.clone());
+        let done = Done { key: key.clone(), values, errors, cost: fit.cost, gained: fit.gained, settled: fit.settled };
         if let (Some(path), Ok(line)) = (&self.path, serde_json::to_string(&done)) {
             let file = std::fs::OpenOptions::new().append(true).create(true).open(path);
             let _ = file.and_then(|mut f| writeln!(f, "{line}"));

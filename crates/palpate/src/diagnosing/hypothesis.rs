@@ -3,9 +3,11 @@
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FreeNumber, free_parameters};
+use glam::DVec3;
 use palpate_diagnose::{Change, LabError, Number};
 use palpate_fit::{FreeParameter, Slot};
-use palpate_model::effects::{ALL, Unstated};
+use palpate_model::effects::field::{Field, Spot};
+use palpate_model::effects::{ALL, Site, Unstated};
 use palpate_model::params::{ParamKey, Transform};
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer};
 
@@ -96,6 +98,26 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
     Ok(Prepared { experiments, names, free })
 }
 
+/// Largest displacement gradient of a rest shape that could be mistaken for the one given: a strain of 30 %, or a turn of 17°.
+const MOST_RESHAPED: f64 = 0.3;
+
+/// Largest displacement gradient within the body's box that one number of a rest shape makes, for each unit of it.
+fn steepness(e: &Experiment, field: &dyn Field<3>, (slot, of): (usize, usize)) -> f64 {
+    let middle = Spot::of(&e.plan);
+    let (low, high) = e.shape().bounds();
+    let still = vec![0.0; of];
+    let mut most: f64 = 0.0;
+    for corner in 0..8 {
+        let at = DVec3::from_array([0, 1, 2].map(|a| if corner >> a & 1 == 0 { low[a] } else { high[a] }));
+        for axis in DVec3::AXES {
+            let way = 1e-3 * middle.size * axis;
+            let moved = |rest: DVec3| DVec3::from_array(field.slope(&Spot { rest, ..middle }, &still, slot));
+            most = most.max((moved(at + way) - moved(at - way)).length() / (2.0 * way.length()));
+        }
+    }
+    most
+}
+
 fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
     let key = e.plan.layout.keys.iter().find(|k| path_of(e, **k) == path);
     let Some(spec) = key.map(|k| k.spec()) else { return };
@@ -105,6 +127,10 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
         if let (Unstated::OnBody, Some(axis)) = (p.default, p.axis) {
             let (low, high) = e.shape().bounds();
             bounds = (low[usize::from(axis)], high[usize::from(axis)]);
+        }
+        if let Site::Rest(field) = &ALL[usize::from(*law)].site {
+            let most = MOST_RESHAPED / steepness(e, *field, (usize::from(*slot), ALL[usize::from(*law)].params.len()));
+            bounds = (bounds.0.max(-most), bounds.1.min(most));
         }
     }
     let middle = 0.0f64.clamp(bounds.0, bounds.1);

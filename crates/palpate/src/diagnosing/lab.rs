@@ -11,19 +11,23 @@ use crate::experiment::Experiment;
 use crate::fitting::{errors, fingerprint};
 use crate::interrupt::Interrupt;
 use palpate_cpu::CpuBackend;
-use palpate_diagnose::{Change, Field, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting};
+use palpate_diagnose::{Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting};
 use palpate_engine::Rollout;
-use palpate_fit::{FitScene, Hooks, Problem, Settings, Tolerance};
+use palpate_fit::{FitScene, Hooks, Problem, Progress, Settings, Status, Tolerance, Want};
 use palpate_model::scene::Optimizer;
 use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Cells of the finer grid per cell along an edge: the cheapest that shows the error well.
 const FINER: f64 = 1.5;
-/// Iterations of a hypothesis' fit: it starts from a linear estimate.
-const ITERATIONS: usize = 16;
-/// Hypotheses whose sensitivities are computed in one simulation.
-const TOGETHER: usize = 10;
+/// Most bytes of tangents of one simulation that computes the sensitivities of several hypotheses.
+const MEMORY: usize = 1 << 29;
+/// Newton's tolerance over the relative decrease of the cost that a fit is after: forces that are off by 1e-6 move costs by less than 1e-4.
+const NEWTON: f64 = 5e-3;
+/// Bytes of one tangent per node: displacement and velocity, before and after a step.
+const TANGENT: usize = 2 * 2 * 24;
 
 /// A set of changes with values of all free numbers.
 type Try = (Vec<Change>, Vec<f64>);
@@ -80,15 +84,37 @@ impl<'a> Lab<'a> {
         })
     }
 
-    fn key(&self, changes: &[Change], start: &[f64]) -> String {
+    fn key(&self, changes: &[Change], start: &[f64], effort: (usize, f64)) -> String {
         let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
         let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
-        format!("{prints:?} {theta:?} {changes:?} {start:?}")
+        format!("{prints:?} {theta:?} {changes:?} {start:?} {effort:?}")
     }
 }
 
-/// Fits one hypothesis.
-fn fit(base: &[Experiment], backend: Backend, interrupt: &Interrupt, (changes, start): &Try) -> Result<Model, LabError> {
+/// When to stop: asked to, or out of time.
+#[derive(Clone, Copy)]
+struct Limits<'a> {
+    interrupt: &'a Interrupt,
+    deadline: Option<Instant>,
+}
+
+impl Limits<'_> {
+    fn check(&self) -> Result<(), LabError> {
+        match self {
+            l if l.interrupt.is_raised() => Err(LabError::Interrupted),
+            l if l.deadline.is_some_and(|d| Instant::now() > d) => Err(LabError::NoTime),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The problem of fitting one hypothesis from a start, with its numbers; Newton's method in it is no tighter than `newton`.
+fn problem(
+    base: &[Experiment],
+    backend: Backend,
+    (changes, start): (&[Change], &[f64]),
+    newton: f64,
+) -> Result<(Problem<'static>, Vec<Number>), LabError> {
     let mut ready = prepare(base, changes).map_err(lab_error)?;
     let numbers = ready.numbers();
     for ((f, v), n) in ready.free.iter_mut().zip(start).zip(&numbers) {
@@ -96,9 +122,12 @@ fn fit(base: &[Experiment], backend: Backend, interrupt: &Interrupt, (changes, s
         let low = if f.transform == palpate_model::params::Transform::Log { f.bounds.0.max(1e-2 * n.scale) } else { f.bounds.0 };
         let v = v.clamp(low, f.bounds.1);
         f.start = (v, v);
+        // The longest step of an iteration counts in typical sizes: a number that starts far above its own may change by as much as it is.
+        f.typical = f.typical.max(v.abs());
     }
     let mut scenes = Vec::new();
-    for e in &ready.experiments {
+    for e in &mut ready.experiments {
+        e.plan.solver.tolerance = e.plan.solver.tolerance.max(newton);
         scenes.push(FitScene {
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
@@ -106,28 +135,54 @@ fn fit(base: &[Experiment], backend: Backend, interrupt: &Interrupt, (changes, s
             evaluate: backend.evaluator(&e.plan, 1).map_err(lab_error)?,
         });
     }
-    if ready.free.is_empty() {
-        return Ok(Model { changes: changes.clone(), numbers, values: Vec::new(), errors: Vec::new() });
-    }
-    let mut problem = Problem::new(scenes, ready.free).map_err(LabError::Failed)?;
+    Ok((Problem::new(scenes, ready.free).map_err(LabError::Failed)?, numbers))
+}
+
+/// Cost of one hypothesis at these values.
+fn cost(base: &[Experiment], backend: Backend, limits: Limits, (changes, values): &Try) -> Result<f64, LabError> {
+    limits.check()?;
+    let (mut problem, _) = problem(base, backend, (changes, values), NEWTON * 1e-3)?;
+    let values = problem.free().iter().map(|f| f.start.0).collect();
+    Ok(problem.evaluate_values(&[values], Want::Cost).first().map_or(f64::INFINITY, |s| s.cost))
+}
+
+/// Fits one hypothesis; when the time is over, what was reached until then.
+fn fit(
+    base: &[Experiment],
+    backend: Backend,
+    limits: Limits,
+    (changes, start): &Try,
+    (iterations, tolerance): (usize, f64),
+) -> Result<Fit, LabError> {
+    limits.check()?;
+    let (mut problem, numbers) = problem(base, backend, (changes, start), NEWTON * tolerance)?;
     let settings = Settings {
-        iterations: ITERATIONS,
-        // Cheaper than the baseline: what is compared are candidates, and differences far below the noise decide nothing.
-        tolerance: Tolerance { cost: 1e-6, gradient: 1e-6, step: 1e-5 },
+        iterations,
+        // Of ten thousand readings a share of 2e-4 of the cost is that of two. Steps count as its square root.
+        tolerance: Tolerance { cost: tolerance, gradient: tolerance, step: 0.1 * tolerance.sqrt() },
         errors: errors(base),
         ..Settings::new(Optimizer::GaussNewton)
     };
-    let hooks = Hooks { interrupt: Some(interrupt.flag()), ..Hooks::default() };
+    let stop = AtomicBool::new(false);
+    let mut first = None;
+    let mut watch = |p: &Progress| {
+        first.get_or_insert(p.cost);
+        stop.store(limits.check().is_err(), Ordering::SeqCst);
+    };
+    let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| LabError::Failed(e.to_string()))?;
-    if interrupt.is_raised() {
+    if limits.interrupt.is_raised() {
         return Err(LabError::Interrupted);
     }
-    Ok(Model {
+    let model = Model {
         changes: changes.clone(),
         numbers,
         values: result.parameters.iter().map(|p| p.value).collect(),
         errors: result.parameters.iter().map(|p| p.standard_error).collect(),
-    })
+    };
+    let unsettled = matches!(result.runs[result.best].status, Status::IterationLimit | Status::Interrupted);
+    let gained = first.map_or(0.0, |f| (f - result.cost).max(0.0));
+    Ok(Fit { model, cost: result.cost, gained, settled: !unsettled })
 }
 
 /// Residuals of every scene, with derivatives by the numbers from `from` on. Always the reference backend: statistics want its precision.
@@ -139,6 +194,7 @@ pub(super) fn linearise(ready: &Prepared, values: &[f64], from: usize) -> Result
 fn linearise_some(ready: &Prepared, values: &[f64], from: usize, wanted: impl Fn(usize) -> bool) -> Result<Readings, LabError> {
     let columns = ready.free.len() - from;
     let mut out = Readings { columns, ..Readings::default() };
+    let (mut rows, mut residuals) = (Vec::new(), 0.0);
     for (scene, e) in ready.experiments.iter().enumerate() {
         let mut directions = Vec::new();
         let mut columns_of = Vec::new();
@@ -150,10 +206,12 @@ fn linearise_some(ready: &Prepared, values: &[f64], from: usize, wanted: impl Fn
         }
         let mut rollout = Rollout::new(CpuBackend, &e.plan, 1).map_err(|e| lab_error(e.into()))?;
         let l = rollout.linearise(&ready.theta(scene, values), &directions).map_err(|e| lab_error(e.into()))?;
-        let q = directions.len();
+        let (q, n) = (directions.len(), l.evaluation.residuals.max(1) as f64);
+        out.cost += n * l.evaluation.cost;
+        residuals += n;
         for (i, row) in l.rows.residuals.iter().enumerate() {
             let time = e.plan.observation.frames[row.frame].time;
-            out.rows.push(Reading { scene, time, row: *row });
+            rows.push(Reading { scene, time, row: *row });
             let at = out.sensitivity.len();
             out.sensitivity.resize(at + columns, 0.0);
             for ((k, factor), d) in columns_of.iter().zip(&l.rows.sensitivity[i * q..(i + 1) * q]) {
@@ -161,6 +219,8 @@ fn linearise_some(ready: &Prepared, values: &[f64], from: usize, wanted: impl Fn
             }
         }
     }
+    out.cost /= f64::max(residuals, 1.0);
+    out.rows = Arc::new(rows);
     Ok(out)
 }
 
@@ -187,9 +247,24 @@ fn together(base: &[Experiment], tries: &[Try], from: usize) -> Result<Vec<Readi
     let part = |n: usize| {
         let sensitivity = r.sensitivity.chunks(r.columns.max(1)).flat_map(|row| row[at..at + n].to_vec()).collect();
         at += n;
-        Readings { rows: r.rows.clone(), columns: n, sensitivity }
+        Readings { rows: r.rows.clone(), cost: r.cost, columns: n, sensitivity }
     };
     Ok(counts.into_iter().map(part).collect())
+}
+
+/// As [`together`]; where one of them cannot be computed, halves show which.
+fn many(base: &[Experiment], tries: &[Try], from: usize, limits: Limits) -> Vec<Result<Readings, LabError>> {
+    if let Err(e) = limits.check() {
+        return tries.iter().map(|_| Err(e.clone())).collect();
+    }
+    match together(base, tries, from) {
+        Ok(all) => all.into_iter().map(Ok).collect(),
+        Err(e) if tries.len() == 1 => vec![Err(e)],
+        Err(_) => {
+            let (a, b) = tries.split_at(tries.len() / 2);
+            [many(base, a, from, limits), many(base, b, from, limits)].concat()
+        }
+    }
 }
 
 impl Laboratory for Lab<'_> {
@@ -201,64 +276,62 @@ impl Laboratory for Lab<'_> {
         Ok(prepare(&self.base, changes).map_err(lab_error)?.numbers())
     }
 
-    fn fit(&mut self, tries: &[Try]) -> Vec<Result<Model, LabError>> {
-        let known: Vec<Option<Result<Model, LabError>>> = tries
+    fn costs(&mut self, tries: &[Try]) -> Vec<f64> {
+        let (base, backend) = (&self.base, self.backend);
+        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        tries.par_iter().map(|t| cost(base, backend, limits, t).unwrap_or(f64::INFINITY)).collect()
+    }
+
+    fn fit(&mut self, tries: &[Try], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>> {
+        let effort = (iterations, tolerance);
+        let known: Vec<Option<Result<Fit, LabError>>> = tries
             .iter()
             .map(|(c, start)| {
-                let done = self.checkpoint.find(&self.key(c, start))?;
+                let done = self.checkpoint.find(&self.key(c, start, effort))?;
                 let (values, errors) = (done.values.clone(), done.errors.clone());
-                Some(self.numbers(c).map(|numbers| Model { changes: c.clone(), numbers, values, errors }))
+                let (cost, gained, settled) = (done.cost, done.gained, done.settled);
+                let model = |numbers| Model { changes: c.clone(), numbers, values, errors };
+                Some(self.numbers(c).map(|n| Fit { model: model(n), cost, gained, settled }))
             })
             .collect();
-        let (base, backend, interrupt, deadline) = (&self.base, self.backend, &self.interrupt, self.deadline);
-        let answers: Vec<Result<Model, LabError>> = tries
+        let (base, backend) = (&self.base, self.backend);
+        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        let answers: Vec<Result<Fit, LabError>> = tries
             .par_iter()
             .zip(known)
-            .map(|(t, known)| {
-                known.unwrap_or_else(|| {
-                    if interrupt.is_raised() {
-                        return Err(LabError::Interrupted);
-                    }
-                    if deadline.is_some_and(|d| Instant::now() > d) {
-                        return Err(LabError::Failed("no time left".into()));
-                    }
-                    fit(base, backend, interrupt, t)
-                })
-            })
+            .map(|(t, known)| known.unwrap_or_else(|| fit(base, backend, limits, t, effort)))
             .collect();
+        // What the deadline cut short is not kept: with more time the fit would go on.
+        let in_time = !self.out_of_time();
         for (t, a) in tries.iter().zip(&answers) {
-            if let Ok(m) = a {
-                let key = self.key(&t.0, &t.1);
-                self.checkpoint.keep(key, &m.values, &m.errors);
+            if let (Ok(f), true) = (a, in_time) {
+                let key = self.key(&t.0, &t.1, effort);
+                self.checkpoint.keep(key, f);
             }
         }
         answers
     }
 
     fn linearise(&mut self, tries: &[Try]) -> Vec<Result<Readings, LabError>> {
-        let one = |(c, v): &Try| linearise(&prepare(&self.base, c).map_err(lab_error)?, v, 0);
-        tries.iter().map(one).collect()
+        let base = &self.base;
+        let one = |(c, v): &Try| linearise(&prepare(base, c).map_err(lab_error)?, v, 0);
+        tries.par_iter().map(one).collect()
     }
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
-        let (base, interrupt) = (&self.base, &self.interrupt);
-        let one = |t: &Try| linearise(&prepare(base, &t.0).map_err(lab_error)?, &t.1, from);
-        tries
-            .par_chunks(TOGETHER)
-            .flat_map_iter(|chunk| {
-                if interrupt.is_raised() {
-                    return chunk.iter().map(|_| Err(LabError::Interrupted)).collect::<Vec<_>>();
-                }
-                match together(base, chunk, from) {
-                    Ok(all) => all.into_iter().map(Ok).collect(),
-                    // One of them cannot be computed: find out which.
-                    Err(_) => chunk.iter().map(one).collect(),
-                }
-            })
-            .collect()
+        let base = &self.base;
+        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        // As few simulations as there are threads, where tangents leave room: each costs its steps and one factorisation per step.
+        let nodes = base.iter().map(|e| e.plan.body.nodes.len()).max().unwrap_or(1);
+        let most = (MEMORY / (TANGENT * nodes)).max(1);
+        let together = tries.len().div_ceil(rayon::current_num_threads()).clamp(1, most);
+        tries.par_chunks(together).flat_map_iter(|chunk| many(base, chunk, from, limits)).collect()
     }
 
     fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
+        if self.interrupt.is_raised() {
+            return Err(LabError::Interrupted);
+        }
         let ready = prepare(&self.base, changes).map_err(lab_error)?;
         let none = ready.free.len();
         let coarse = linearise(&ready, values, none)?;
@@ -281,7 +354,8 @@ impl Laboratory for Lab<'_> {
         }
         let difference = |name: &'static str, ready: &Prepared, factor: f64| -> Result<Field, LabError> {
             let r = linearise(ready, values, none)?;
-            let change = r.rows.iter().zip(&coarse.rows).map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
+            let change =
+                r.rows.iter().zip(coarse.rows.iter()).map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
             Ok(Field { name, change, rough: Field::REFINED })
         };
         // Errors fall with the square of the cell and with the step: what is left after the refinement follows from what it changed.

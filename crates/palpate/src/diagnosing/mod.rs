@@ -143,6 +143,6 @@ pub fn diagnose(
 fn failed(e: LabError) -> Error {
     match e {
         LabError::Interrupted => Error::Interrupted,
-        LabError::Failed(why) => Error::Failed(why),
+        e => Error::Failed(e.to_string()),
     }
 }

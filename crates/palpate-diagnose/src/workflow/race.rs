@@ -1,0 +1,109 @@
+//! Candidates race: all are fitted for an iteration, and only those within reach of the leader go on (successive halving; Jamieson &
+//! Talwalkar, *AISTATS* 2016).
+
+use super::{Session, State, Variant};
+use crate::change::Change;
+use crate::laboratory::{Fit, LabError};
+use crate::linear::least_squares;
+
+/// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
+/// behind after it and still go on. The last lap brings what is compared to its optimum.
+const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.05), (20, 2e-6, 1.0)];
+/// A fit may gain as many times again what it gained in a lap.
+const STAMINA: f64 = 2.0;
+/// Shares of the linear estimate that a fit may start from: the first at which the cost is lower than without.
+const STARTS: [f64; 3] = [1.0, 0.3, 0.1];
+/// Largest change of a fitted number at the start, relative to its size.
+const MOVES: f64 = 0.3;
+/// Ridge of the fitted numbers' linear answer.
+const RIDGE: f64 = 1e-3;
+
+impl Session<'_> {
+    /// Fits variants side by side; those that arrived, the lowest cost first, at most one for each candidate.
+    pub(super) fn race<'v>(&mut self, state: &State, tries: &[&'v Variant]) -> Result<Vec<(&'v Variant, Fit)>, LabError> {
+        let mut jobs = self.starts(state, tries);
+        let mut running: Vec<(&Variant, Option<Fit>)> = tries.iter().map(|v| (*v, None)).collect();
+        for (lap, (iterations, tolerance, lag)) in LAPS.into_iter().enumerate() {
+            let last = lap + 1 == LAPS.len();
+            let goes_on = |i: &usize| last || running[*i].1.as_ref().is_none_or(|f| !f.settled);
+            let open: Vec<usize> = (0..running.len()).filter(goes_on).collect();
+            self.lab.say(&format!("fitting {} candidates, lap {} of {}", open.len(), lap + 1, LAPS.len()));
+            let answers = self.lab.fit(&open.iter().map(|i| jobs[*i].clone()).collect::<Vec<_>>(), iterations, tolerance);
+            for (&i, answer) in open.iter().zip(answers) {
+                match answer {
+                    Ok(fit) => {
+                        jobs[i].1.clone_from(&fit.model.values);
+                        // A lap that gained nothing leaves what was reached before.
+                        match &mut running[i].1 {
+                            Some(before) if before.cost < fit.cost => before.gained = 0.0,
+                            reached => *reached = Some(fit),
+                        }
+                    }
+                    Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+                    Err(why) => self.missed(&running[i].0.change, &why),
+                }
+            }
+            let reached = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost);
+            let best = running.iter().map(reached).fold(f64::INFINITY, f64::min);
+            let worst = best + lag * (state.readings.cost - best).max(0.0);
+            // Steps have a longest length: who starts far away and still gains with every step is not behind for good.
+            let promises = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost - STAMINA * f.gained);
+            let stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst).collect();
+            let mut keep = stays.iter();
+            jobs.retain(|_| *keep.next().unwrap_or(&false));
+            let mut keep = stays.iter();
+            running.retain(|_| *keep.next().unwrap_or(&false));
+        }
+        let mut arrived: Vec<(&Variant, Fit)> = running.into_iter().filter_map(|(v, f)| Some((v, f?))).collect();
+        arrived.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let mut seen = Vec::new();
+        arrived.retain(|(v, _)| {
+            !seen.contains(&v.candidate) && {
+                seen.push(v.candidate);
+                true
+            }
+        });
+        Ok(arrived)
+    }
+
+    /// Where each fit starts: along the linear estimate, as far as that lowers the cost.
+    fn starts(&mut self, state: &State, tries: &[&Variant]) -> Vec<(Vec<Change>, Vec<f64>)> {
+        let mut jobs: Vec<_> = tries.iter().map(|v| start(state, v, STARTS[0])).collect();
+        let mut open: Vec<usize> = (0..jobs.len()).collect();
+        self.lab.say(&format!("looking for starts of {} candidates", jobs.len()));
+        for share in &STARTS[1..] {
+            let costs = self.lab.costs(&open.iter().map(|i| jobs[*i].clone()).collect::<Vec<_>>());
+            let kept: Vec<bool> = costs.iter().map(|c| *c < state.readings.cost).collect();
+            open = open.into_iter().zip(kept).filter(|(_, kept)| !kept).map(|(i, _)| i).collect();
+            open.iter().for_each(|i| jobs[*i] = start(state, tries[*i], *share));
+        }
+        jobs
+    }
+
+    /// Notes that a hypothesis could not be tried.
+    pub(super) fn missed(&mut self, change: &Change, why: &LabError) {
+        self.no_time |= *why == LabError::NoTime;
+        let line = format!("{}: {why}", change.kind());
+        if !self.not_tried.contains(&line) {
+            self.not_tried.push(line);
+        }
+    }
+}
+
+/// A candidate at a share of its linear estimate, with the fitted numbers where they best go with it.
+fn start(state: &State, v: &Variant, share: f64) -> (Vec<Change>, Vec<f64>) {
+    let mut changes = state.model.changes.clone();
+    changes.push(v.change.clone());
+    let step = |k: usize| share * v.score.step[k].clamp(v.bounds[k].0, v.bounds[k].1);
+    let mut y = state.table.y.clone();
+    for (k, c) in v.columns.iter().enumerate() {
+        y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
+    }
+    let columns: Vec<&[f64]> = state.table.columns.iter().map(Vec::as_slice).collect();
+    let moves = least_squares(&columns, &y, RIDGE).unwrap_or_else(|| vec![0.0; columns.len()]);
+    let own = state.model.values.iter().zip(&moves).zip(&state.model.numbers).map(|((v, d), n)| {
+        let most = MOVES * v.abs().max(n.scale);
+        (v + d.clamp(-most, most)).clamp(n.bounds.0, n.bounds.1)
+    });
+    (changes, own.chain((0..v.start.len()).map(|k| v.start[k] + step(k))).collect())
+}
