@@ -14,6 +14,7 @@ pub mod element;
 pub mod elements;
 pub mod extension;
 pub mod grid;
+pub mod grips;
 pub mod instant;
 pub mod kernel;
 pub mod material;

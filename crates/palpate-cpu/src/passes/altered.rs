@@ -11,6 +11,7 @@ use palpate_model::changes::{self, Changes};
 use palpate_model::corotation::CellPose;
 use palpate_model::element::CellMatrices;
 use palpate_model::elements::Elements;
+use palpate_model::grips::Pose;
 use palpate_model::plan::{Physics, Plan};
 
 /// What a member's effects make of the body; all empty without such effects.
@@ -137,7 +138,7 @@ impl<'a> Balance<'a> {
     }
 
     /// Visits every clamp at both instants: clamp number, pose, weight in time and displacement.
-    fn each_clamp(&self, s: States<'a>, mut visit: impl FnMut(&clamps::Clamps, usize, clamps::Pose, f64, &[DVec3])) {
+    fn each_clamp(&self, s: States<'a>, mut visit: impl FnMut(&clamps::Clamps, usize, Pose, f64, &[DVec3])) {
         let held = self.held();
         for (weight, time, u) in self.instants(s) {
             for i in 0..self.plan.clamps.len() {

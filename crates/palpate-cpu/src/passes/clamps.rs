@@ -6,16 +6,12 @@
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
 use palpate_model::body::Body;
-use palpate_model::changes::{self, Changes, HOLD};
+use palpate_model::changes::Changes;
 use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
-use palpate_model::effects::Site;
-use palpate_model::effects::field::Spot;
 use palpate_model::element::CellMatrices;
-use palpate_model::elements::{Elements, layer_matrix, layered};
-use palpate_model::plan::{ClampCell, Physics, Plan, clamp_pose};
-
-/// Rotation and translation of a clamp.
-pub type Pose = (DMat3, DVec3);
+use palpate_model::elements::Elements;
+use palpate_model::grips::{self, Grips, Pose};
+use palpate_model::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
 
 /// A member's clamps.
 #[derive(Clone, Copy)]
@@ -30,23 +26,6 @@ pub struct Clamps<'a> {
     pub changes: &'a Changes,
     /// Matrices changed by effects; `None` where none acts on clamps.
     pub grips: Option<&'a [Vec<CellMatrices>]>,
-}
-
-/// Rotation of Cayley's vector r and its derivatives by the three components: (1 − r²/4) I + ½ r rᵀ + \[r\]×, over 1 + r²/4.
-fn cayley(r: DVec3) -> (DMat3, [DMat3; 3]) {
-    let cross = palpate_model::rotation::cross_matrix;
-    let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-    let (s, below) = (0.25 * r.length_squared(), 1.0 + 0.25 * r.length_squared());
-    let above = DMat3::from_diagonal(DVec3::splat(1.0 - s)) + outer(r, r) * 0.5 + cross(r);
-    let slope = |e: DVec3| {
-        let own = DMat3::from_diagonal(DVec3::splat(-0.5 * r.dot(e))) + (outer(e, r) + outer(r, e)) * 0.5 + cross(e);
-        (own - above * (0.5 * r.dot(e) / below)) * (1.0 / below)
-    };
-    (above * (1.0 / below), DVec3::AXES.map(slope))
-}
-
-fn three(hold: &[f64; HOLD], at: usize) -> DVec3 {
-    DVec3::from_slice(&hold[at..at + 3])
 }
 
 /// Where a clamp cell's points are wanted, seen from the clamp: displacement W of the stress-free shape.
@@ -64,19 +43,9 @@ fn deviation(body: &Body, rest: Option<&[DVec3]>, c: &ClampCell, (a, b): Pose, u
 
 /// Matrices of every clamp cell with the layers that effects put in, or `None` when no effect acts on clamps.
 pub fn grips(plan: &Plan, physics: &Physics, elements: &Elements) -> Option<Vec<Vec<CellMatrices>>> {
-    if !plan.layout.effects().any(|(law, _)| matches!(law.site, Site::Clamps(_))) {
-        return None;
-    }
-    let h = plan.body.grid.h;
-    let hold = changes::hold(plan, physics, &Spot::of(plan));
-    let of = |i: usize, m: usize, c: &ClampCell| {
-        let cell = &elements.clamps[i][m];
-        let [k3, k3_nu] = layer_matrix(c, plan.body.cells[c.cell as usize].fraction, elements.nu);
-        let make = |k: &M24, k3: &M24| Box::new(layered(k, k3, h, hold[1], false).map(|v| hold[0] * v));
-        CellMatrices { k: make(&cell.k, &k3), k_nu: make(&cell.k_nu, &k3_nu) }
-    };
-    let all = plan.clamps.iter().enumerate();
-    Some(all.map(|(i, clamp)| clamp.cells.iter().enumerate().map(|(m, c)| of(i, m, c)).collect()).collect())
+    let grips = grips::acted(plan).then(|| Grips::new(plan, physics, 0.0))?;
+    let of = |(i, clamp): (usize, &ClampSite)| (0..clamp.cells.len()).map(|m| grips.matrices(elements, i, m)).collect();
+    Some(plan.clamps.iter().enumerate().map(of).collect())
 }
 
 impl Clamps<'_> {
@@ -92,19 +61,12 @@ impl Clamps<'_> {
         self.changes.modulus.as_ref().map_or(1.0, |m| m[c.cell as usize])
     }
 
-    fn hold(&self, elapsed: f64) -> [f64; HOLD] {
-        changes::hold(self.plan, self.physics, &Spot { elapsed, ..Spot::of(self.plan) })
-    }
-
     /// Pose of clamp `index` at a time on the recording's clock, `elapsed` seconds after the start.
     pub fn pose(&self, index: usize, time: f64, elapsed: f64) -> Pose {
-        let (a, b) = clamp_pose(self.plan.clamps[index].motion.as_ref(), time);
         if self.grips.is_none() {
-            return (a, b);
+            return clamp_pose(self.plan.clamps[index].motion.as_ref(), time);
         }
-        let (hold, c) = (self.hold(elapsed), Spot::of(self.plan).anchor);
-        let turn = cayley(three(&hold, 5)).0;
-        (a * turn, b + a * (c + three(&hold, 2) - turn * c))
+        Grips::new(self.plan, self.physics, elapsed).pose(index, time)
     }
 
     /// Adds the force of clamp `index` that stands in `pose`: A K (Aᵀ(x − b) − X − W), with matrices scaled by `young`.
@@ -174,16 +136,9 @@ impl Clamps<'_> {
         u: &[DVec3],
         out: &mut [DVec3],
     ) {
-        let (plan, h) = (self.plan, self.plan.body.grid.h);
-        let spot = Spot { elapsed, ..Spot::of(plan) };
-        let Some(slope) = changes::hold_slope(plan, self.physics, &spot, effect, slot) else { return };
-        let hold = self.hold(elapsed);
-        let pose = self.pose(index, time, elapsed);
-        let (a, _) = clamp_pose(plan.clamps[index].motion.as_ref(), time);
-        let turns = cayley(three(&hold, 5)).1;
-        let dr = three(&slope, 5);
-        let turn = turns[0] * dr.x + turns[1] * dr.y + turns[2] * dr.z;
-        let (da, db) = (a * turn, a * (three(&slope, 2) - turn * spot.anchor));
+        let (plan, grips) = (self.plan, Grips::new(self.plan, self.physics, elapsed));
+        let Some((da, db)) = grips.pose_slope(index, time, effect, slot) else { return };
+        let pose = grips.pose(index, time);
         for (m, c) in plan.clamps[index].cells.iter().enumerate() {
             let (nodes, scale) = (&plan.body.cells[c.cell as usize].nodes, young * self.factor(c));
             let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
@@ -194,10 +149,7 @@ impl Clamps<'_> {
             self.add(c, da, scale, corners(&multiply(k, &d)), out);
             self.add(c, pose.0, scale, corners(&multiply(k, &flatten(&moved))), out);
             // The matrix: factor and layer.
-            if slope[0] != 0.0 || slope[1] != 0.0 {
-                let [k3, _] = layer_matrix(c, plan.body.cells[c.cell as usize].fraction, self.elements.nu);
-                let by_layer = layered(&self.elements.clamps[index][m].k, &k3, h, hold[1], true);
-                let change: M24 = std::array::from_fn(|i| k[i] * slope[0] / hold[0] + hold[0] * slope[1] * by_layer[i]);
+            if let Some(change) = grips.matrix_slope(self.elements, [index, m], [effect, slot]) {
                 self.add(c, pose.0, scale, corners(&multiply(&change, &d)), out);
             }
         }
