@@ -27,7 +27,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let fresh = held_pose(turning.turn, u1, c.sign);
         let old = held_pose(turning.turn, u0, c.sign);
         let arms = c.mix.on_new * fresh.z + c.mix.on_old * old.z;
-        let y = (c.mix.on_new * c.young) * stiff(matrix, c.number, fresh.q) + c.mix.on_old * before;
+        let y = (c.mix.on_new * c.young) * stiff(matrix, c.number, from_rest(fresh.q, c.at)) + c.mix.on_old * before;
         if call.extra == 0u {
             let omega = spin_body(turning, centred(transpose(turning.r) * d), c.sign);
             let dq = c.mix.on_old * strain_rate(old, d, c.sign) - cross(omega, arms);

@@ -1,5 +1,5 @@
 //! dJ/dp −= z · ∂r/∂p for the parameter call.extra (mod 2¹⁶); with 2¹⁶ on top dJ/dp += dJ/dv · ∂v/∂p of the start, `probe`
-//! then being an adjoint. One workgroup per member, fixed order.
+//! then being an adjoint, and with 2¹⁷ dJ/dp += dJ/du · ∂u/∂p. One workgroup per member, fixed order.
 // use shared/grid
 // use shared/totals
 
@@ -15,10 +15,11 @@ fn dot_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let start = call.extra >= 65536u;
+    let of_velocity = start && call.extra < 131072u;
     var sum = vec4(0.0);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
-        sum.x += dot(probe[select(0u, part(1u), start) + a].xyz, column[a].xyz);
+        sum.x += dot(probe[select(0u, part(1u), of_velocity) + a].xyz, column[a].xyz);
     }
     let s = total(local, sum).x;
     if local == 0u {

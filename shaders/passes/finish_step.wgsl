@@ -1,5 +1,7 @@
-//! The new velocity, v₁ = v₀ + Δt g + w/(θΔt) with w the increment beyond free flight; at the start (call.mode 0) the initial one.
+//! The new velocity, v₁ = v₀ + Δt g + w/(θΔt) with w the increment beyond free flight; at the start (call.mode 0) the initial
+//! one, of a body that is put into its stress-free shape where it starts at rest.
 // use shared/mix
+// use shared/unstrained
 
 var<storage, read> rest: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
@@ -16,7 +18,15 @@ fn finish_step(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let m = members[p.member];
     let a = at_node(p.member, p.item);
     if call.mode == 0u {
-        let v = m.velocity.xyz + cross(m.spin.xyz, rest[p.item].xyz - shape.pivot);
+        var arm = rest[p.item].xyz - shape.pivot;
+        if starts_unstrained() {
+            let w = rests[a].xyz;
+            let steps = round(w / shape.quantum);
+            next[a] = vec4(steps * shape.quantum, 0.0);
+            next[part(1u) + a] = vec4(w - steps * shape.quantum, 0.0);
+            arm += w;
+        }
+        let v = m.velocity.xyz + cross(m.spin.xyz, arm);
         next[part(2u) + a] = vec4(v, 0.0);
     } else {
         let w = increment[a].xyz;

@@ -1,8 +1,9 @@
-//! ∂r/∂p per node: corners of cells from press_column, and what acts on nodes. call.extra = kind + 16 · index + 2¹⁶ if cells
+//! ∂r/∂p per node: corners of cells from press_column, and what acts on nodes. call.extra = kind + 32 · index + 2¹⁶ if cells
 //! take part. For initial velocities it is ∂v/∂p of the start.
 // use shared/mix
 // use shared/inertia
 // use shared/keys
+// use shared/unstrained
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
@@ -35,14 +36,16 @@ fn speed(member: u32, node: u32) -> vec3<f32> {
     return ((next[a].xyz - now[a].xyz) + (next[part(1u) + a].xyz - now[part(1u) + a].xyz)) / shape.dt;
 }
 
-// Factors of the ghost penalty at the new and old state.
-fn ghost_factors(kind: u32, m: Member, mix: Mix) -> vec2<f32> {
-    var both = vec2(mix.on_ghost, mix.old - mix.rate);
+// Factors of the ghost penalty at the new and old state, and at the stress-free shape (or its derivative).
+fn ghost_factors(kind: u32, m: Member, mix: Mix) -> vec3<f32> {
+    let fixed = select(0.0, -mix.fresh - mix.old, has_rest());
+    let both = vec3(mix.on_ghost, mix.old - mix.rate, fixed);
     switch kind {
         case YOUNGS_MODULUS: { return m.ghost.x * both; }
         case POISSON_RATIO: { return m.young * m.ghost.y * both; }
-        case STIFFNESS_DAMPING: { return m.young * m.ghost.x * vec2(1.0, -1.0) / shape.dt; }
-        default: { return vec2(0.0); }
+        case STIFFNESS_DAMPING: { return m.young * m.ghost.x * vec3(1.0, -1.0, 0.0) / shape.dt; }
+        case REST_SLOPE: { return m.young * m.ghost.x * vec3(0.0, 0.0, fixed); }
+        default: { return vec3(0.0); }
     }
 }
 
@@ -53,8 +56,8 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     if !p.live {
         return;
     }
-    let kind = call.extra % 16u;
-    let index = (call.extra / 16u) % 4096u;
+    let kind = call.extra % 32u;
+    let index = (call.extra / 32u) % 2048u;
     let m = members[p.member];
     let mix = mix_of(m);
     let a = at_node(p.member, p.item);
@@ -65,7 +68,7 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
     }
     let ghost = ghost_factors(kind, m, mix);
-    if shape.ghosts != 0u && ghost.x != 0.0 {
+    if shape.ghosts != 0u && (ghost.x != 0.0 || ghost.z != 0.0) {
         for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
             let b = at_node(p.member, columns[k]);
             let d1 = (next[b].xyz - next[a].xyz) + (next[part(1u) + b].xyz - next[part(1u) + a].xyz);
@@ -73,6 +76,15 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             if call.mode != 0u {
                 let d0 = (now[b].xyz - now[a].xyz) + (now[part(1u) + b].xyz - now[part(1u) + a].xyz);
                 f += (ghost.y * ghosts[k]) * d0;
+            }
+            if ghost.z != 0.0 {
+                var d = vec3(0.0);
+                if kind == REST_SLOPE {
+                    d = rest_slope(index, b) - rest_slope(index, a);
+                } else {
+                    d = rests[b].xyz - rests[a].xyz;
+                }
+                f += (ghost.z * ghosts[k]) * d;
             }
         }
     }
@@ -114,7 +126,15 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             }
         }
         case VELOCITY: { f = axis(index); }
-        case ANGULAR_VELOCITY: { f = cross(axis(index), rest[p.item].xyz - shape.pivot); }
+        case ANGULAR_VELOCITY: {
+            var arm = rest[p.item].xyz - shape.pivot;
+            if starts_unstrained() {
+                arm += rests[a].xyz;
+            }
+            f = cross(axis(index), arm);
+        }
+        case START_SHAPE: { f = rest_slope(index, a); }
+        case START_SPIN: { f = cross(m.spin.xyz, rest_slope(index, a)); }
         default: {}
     }
     column[a] = vec4(f, 0.0);

@@ -77,7 +77,7 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 instant = call.step + 1u;
             }
             let turn = poses[(p.member * (shape.steps + 1u) + instant) * shape.clamps + holds[h].y].turn;
-            sum += (turn * hold_block((m.slot * 2u * shape.holds + h) * 576u, i, j) * transpose(turn)) * (mix.fresh * young);
+            sum += (turn * hold_block(grip_at(m, p.member, 0u, h), i, j) * transpose(turn)) * (mix.fresh * young);
         }
         if shape.patches != 0u {
             for (var t = cells[e].patch_start; t < cells[e].patch_end; t++) {

@@ -2,6 +2,7 @@
 //! increment beyond free flight alone, so nothing large cancels.
 // use shared/mix
 // use shared/inertia
+// use shared/unstrained
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
@@ -71,6 +72,11 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             let d = (next[b].xyz - next[a].xyz) + (next[part(1u) + b].xyz - next[part(1u) + a].xyz);
             // Rows of the penalty sum to zero: uᵀGu = −½ Σ G_ab |u_a − u_b|².
             elastic += (scale * ghosts[k]) * vec4(d, -0.25 * dot(d, d));
+            if has_rest() {
+                // The penalty is on u − W; as a force that does not change its potential is linear.
+                let s = (m.young * m.ghost.x * (mix.fresh + mix.old) * ghosts[k]) * (rests[b].xyz - rests[a].xyz);
+                elastic -= vec4(s, dot(s, w));
+            }
         }
     }
     residual[a] = elastic + support + body;

@@ -1,10 +1,13 @@
 //! Forces of the clamps on the corners of their cells, with their energy. call.extra: 0 = of the new state, weighted with θ;
 //! 1 = of the old state, weighted with 1 − θ; 2, 3, 4 = derivative of both by Young's modulus, Poisson's ratio, time;
 //! 5 = the old state's matrix times the vector `probe`; 6 = nothing; 7, 8 + 256 · row = derivative by a parameter of a
-//! stiffness that varies over the body, in time, with its slopes in that row.
+//! stiffness that varies over the body, in time, with its slopes in that row; 9 + 256 · row = by the stress-free shape; 10 + 256 · row
+//! + 2¹⁶ · matrix = by how effects hold the clamps, with the poses' slopes in that row, and the matrices' slopes in row matrix − 1.
 // use shared/holds
 // use shared/slopes
 
+// [rows][B][steps + 1][clamps].
+var<storage, read> hold_slopes: array<HoldSlope>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
@@ -38,6 +41,7 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if what == 3u {
         which = 1u;
     }
+    let matrix = grip_at(m, p.member, which, hold);
     var total = vec3(0.0);
     var energy = 0.0;
     // New state, then old.
@@ -54,14 +58,33 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             u = now[a].xyz + now[part(1u) + a].xyz;
         }
         var d = deviation(pose, u, x);
+        if has_rest() {
+            d -= rests[a].xyz;
+        }
         if what == 5u {
             d = transpose(pose.turn) * probe[a].xyz;
         }
-        let f = hold_stiff(m.slot, which, hold, corner, d);
+        if what == 9u {
+            d = -rest_slope(call.extra / 256u, a);
+        }
+        let f = hold_stiff(matrix, corner, d);
         var g = pose.turn * f;
-        if what == 4u {
-            let rate = transpose(pose.turn_rate) * (u + x - pose.shift.xyz) - transpose(pose.turn) * pose.shift_rate.xyz;
-            g = pose.turn_rate * f + pose.turn * hold_stiff(m.slot, which, hold, corner, rate);
+        if what == 4u || what == 10u {
+            var turn = pose.turn_rate;
+            var shift = pose.shift_rate.xyz;
+            if what == 10u {
+                let row = (call.extra / 256u) % 256u;
+                let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + at) * shape.clamps + site.y];
+                turn = slope.turn;
+                shift = slope.shift.xyz;
+            }
+            let rate = transpose(turn) * (u + x - pose.shift.xyz) - transpose(pose.turn) * shift;
+            g = turn * f + pose.turn * hold_stiff(matrix, corner, rate);
+            if call.extra >= 65536u {
+                // The matrix itself: rows of slopes follow the members' own two matrices.
+                let row = 2u + call.extra / 65536u - 1u;
+                g += pose.turn * hold_stiff(((row * shape.members + p.member) * shape.holds + hold) * 576u, corner, d);
+            }
         }
         if !skipped {
             total += (weight * factor) * g;

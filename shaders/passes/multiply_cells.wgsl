@@ -57,7 +57,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         let turn = poses[(p.member * (shape.steps + 1u) + instant) * shape.clamps + holds[k].y].turn;
         var f = vec3(0.0);
         for (var j = 0u; j < 8u; j++) {
-            f += hold_block((m.slot * 2u * shape.holds + k) * 576u, corner, j)
+            f += hold_block(grip_at(m, p.member, 0u, k), corner, j)
                 * (transpose(turn) * cg_along[at_node(p.member, cell.nodes[j])].xyz);
         }
         y += (mix.fresh * young) * (turn * f);

@@ -19,6 +19,7 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     } else {
         pose = free_pose(d, c.sign);
     }
+    pose.q = from_rest(pose.q, c.at);
     // Nothing is left of an old state in a static problem.
     var before = vec3(0.0);
     if call.mode != 0u {

@@ -1,5 +1,5 @@
 //! Corner forces of ∂r/∂p for the parameters that act in cells: Young's modulus, Poisson's ratio, stiffness damping, and, through
-//! the passes of clamps and planes, time and planes; and of stiffness that varies. call.extra is the kind of the parameter, plus 16
+//! the passes of clamps and planes, time and planes; of stiffness that varies, and of the stress-free shape. call.extra is the kind of the parameter, plus 32
 //! times the row of a field's slopes.
 // use shared/corner
 // use shared/slopes
@@ -10,11 +10,25 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
+// By the stress-free shape, whose derivative stands in this row. Damping does not see it: both states shift alike.
+fn by_rest(c: Corner, row: u32) -> vec3<f32> {
+    let u0 = (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz);
+    let u1 = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
+    let shifted = free_pose(rests[c.node].xyz - rests[c.first].xyz, c.sign);
+    let dq = strain_rate(shifted, rest_slope(row, c.node) - rest_slope(row, c.first), c.sign);
+    let y = -c.young * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, dq);
+    let old = free_pose(u0, c.sign);
+    if is_lagged() {
+        return force(held_pose(old.turn, u1, c.sign), (c.mix.fresh + c.mix.old) * y, c.sign);
+    }
+    return force(free_pose(u1, c.sign), c.mix.fresh * y, c.sign) + force(old, c.mix.old * y, c.sign);
+}
+
 @compute @workgroup_size(64)
 fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
-    let kind = call.extra % 16u;
+    let kind = call.extra % 32u;
     var f = vec3(0.0);
     if kind == YOUNGS_MODULUS || kind == POISSON_RATIO || kind == STIFFNESS_DAMPING || kind == MODULUS_SLOPE || kind == AGING_SLOPE {
         let u0 = (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz);
@@ -22,10 +36,10 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let matrix = matrix_at(c.m.slot, select(0u, 1u, kind == POISSON_RATIO), cells[c.cell].kind);
         var factor = select(c.young, c.young / c.m.young, kind == YOUNGS_MODULUS);
         if kind == MODULUS_SLOPE {
-            factor = modulus_slope(c.m, c.member, c.cell, call.extra / 16u);
+            factor = modulus_slope(c.m, c.member, c.cell, call.extra / 32u);
         }
         if kind == AGING_SLOPE {
-            factor = aging_slope(c.m, c.member, c.cell, call.extra / 16u);
+            factor = aging_slope(c.m, c.member, c.cell, call.extra / 32u);
         }
         var on_new = c.mix.on_new;
         var on_old = c.mix.on_old;
@@ -39,17 +53,22 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             on_old = 0.0;
             own = 0.0;
         }
-        let old = free_pose(u0, c.sign);
+        var old = free_pose(u0, c.sign);
         var fresh: Pose;
         if is_lagged() {
             fresh = held_pose(old.turn, u1, c.sign);
         } else {
             fresh = free_pose(u1, c.sign);
         }
+        old.q = from_rest(old.q, c.at);
+        fresh.q = from_rest(fresh.q, c.at);
         f = force(fresh, factor * stiff(matrix, c.number, on_new * fresh.q + on_old * old.q), c.sign);
         if !is_lagged() {
             f += force(old, (factor * own) * stiff(matrix, c.number, old.q), c.sign);
         }
+    }
+    if kind == REST_SLOPE {
+        f = by_rest(c, call.extra / 32u);
     }
     if kind != STIFFNESS_DAMPING {
         f += support_of(cells[c.cell], c.member, c.number).xyz;

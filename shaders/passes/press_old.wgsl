@@ -11,7 +11,8 @@ var<storage, read> hold_forces: array<vec4<f32>>;
 fn press_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
              @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
-    let pose = free_pose((now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz), c.sign);
+    var pose = free_pose((now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz), c.sign);
+    pose.q = from_rest(pose.q, c.at);
     let y = c.young * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, pose.q);
     // With lagged rotation the old force goes through the new pose, which has the same rotation.
     var f = force(pose, c.mix.old * y, c.sign);

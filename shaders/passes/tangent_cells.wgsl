@@ -2,6 +2,7 @@
 //! (corotation.rs: D = B + ½QΩ − s(N − ½TΩ); without B and Q where the convex part is wanted). 30 vectors per cell: no 24 × 24
 //! matrix is ever stored.
 // use shared/cells
+// use shared/unstrained
 
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> old_turn: array<vec4<f32>>;
@@ -33,6 +34,7 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     } else {
         pose = free_pose(d, sign);
     }
+    pose.q = from_rest(pose.q, (p.member * shape.cells + e) * 8u + corner);
     // N_i: column m is Σ_j K_ij (e_m × z_j).
     let nx = stiff(matrix, corner, vec3(0.0, -pose.z.z, pose.z.y));
     let ny = stiff(matrix, corner, vec3(pose.z.z, 0.0, -pose.z.x));

@@ -1,5 +1,6 @@
 //! The corner of a cell that an invocation works on: eight neighbouring lanes are a cell, lanes beyond the last cell repeat it.
 // use shared/cells
+// use shared/unstrained
 
 struct Corner {
     // False for lanes that must not write.

@@ -5,6 +5,13 @@ var<storage, read> moduli: array<f32>;
 // [1 + rows][B][steps + 1]: factor on the whole body's modulus at the start and in every step, then its derivatives.
 var<storage, read> agings: array<f32>;
 
+// Where a matrix of a clamp cell starts in `hold_elements`: [slot][K, dK/dν][clamp cell][24 · 24]; where effects act on clamps
+// every member has its own, and [rows][B][clamp cell] derivatives of K by their parameters follow.
+fn grip_at(m: Member, member: u32, which: u32, hold: u32) -> u32 {
+    let slot = select(m.slot, member, (shape.fields & 64u) != 0u);
+    return ((slot * 2u + which) * shape.holds + hold) * 576u;
+}
+
 fn aging_at(member: u32, row: u32) -> f32 {
     return agings[(row * shape.members + member) * (shape.steps + 1u) + call.step + call.mode];
 }

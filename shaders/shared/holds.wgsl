@@ -2,11 +2,12 @@
 // use shared/lanes
 // use shared/mix
 // use shared/fields
+// use shared/unstrained
 
 var<storage, read> cells: array<Cell>;
 // (cell, clamp) of each clamp cell, ordered by cell.
 var<storage, read> holds: array<vec2<u32>>;
-// [slot][K, dK/dν][clamp cell][24 · 24].
+// As `grip_at` says.
 var<storage, read> hold_elements: array<f32>;
 // [B][steps + 1][clamps]: poses at the start and at the end of every step.
 var<storage, read> poses: array<ClampPose>;
@@ -16,9 +17,10 @@ fn pose_at(member: u32, instant: u32, clamp_number: u32) -> ClampPose {
     return poses[(member * (shape.steps + 1u) + instant) * shape.clamps + clamp_number];
 }
 
-fn hold_stiff(slot: u32, which: u32, hold: u32, corner: u32, v: vec3<f32>) -> vec3<f32> {
+// This corner's three rows of the matrix that starts there, times v.
+fn hold_stiff(matrix: u32, corner: u32, v: vec3<f32>) -> vec3<f32> {
     publish(v);
-    let start = ((slot * 2u + which) * shape.holds + hold) * 576u + 3u * corner;
+    let start = matrix + 3u * corner;
     var sum = vec3(0.0);
     for (var j = 0u; j < 8u; j++) {
         let a = start + 72u * j;

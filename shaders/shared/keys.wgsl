@@ -15,3 +15,7 @@ const EFFECT = 11u;
 const MODULUS_SLOPE = 12u;
 const DENSITY_SLOPE = 13u;
 const AGING_SLOPE = 14u;
+const REST_SLOPE = 16u;
+// Of the start in another stress-free shape: of its displacement, and of the velocity that a spin gives it.
+const START_SHAPE = 17u;
+const START_SPIN = 18u;

@@ -89,6 +89,11 @@ struct ClampPose { // mirrored
     shift_rate: vec4<f32>,
 }
 
+struct HoldSlope { // mirrored
+    turn: mat3x3<f32>,
+    shift: vec4<f32>,
+}
+
 const IDLE = 0u;
 const WANTS_MATRIX = 1u;
 const WANTS_SOLVE = 2u;

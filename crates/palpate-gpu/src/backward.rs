@@ -29,7 +29,7 @@ pub(crate) fn start_adjoint(world: &World, first: &State, adj: &Adjoint, tally: 
         r.clear(&blank.0.buffer);
         let mut s = Solve::new(world, r, None, &blank, first, tally);
         s.list();
-        s.add_velocity_columns(&adj.0.buffer);
+        s.add_start_columns(&adj.0.buffer);
         if world.plan.initial == InitialShape::StaticEquilibrium {
             s.linearise();
             s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
@@ -56,6 +56,9 @@ pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tal
             s.list();
             if s.velocity_column(keys[*p]) {
                 s.recorder.copy_part(&world.buffers["column"], &part.buffer, half, half);
+                if s.shape_column(keys[*p]) {
+                    s.recorder.copy_part(&world.buffers["column"], &part.buffer, 0, half);
+                }
             } else if let Some(column) = s.column_of(keys[*p]).filter(|_| moved) {
                 s.column(Some(column));
                 s.run(pass::SUM_OLD, ALL, Per::Node, 0);

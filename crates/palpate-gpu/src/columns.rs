@@ -26,11 +26,21 @@ const EFFECT: u32 = 11;
 const MODULUS_SLOPE: u32 = 12;
 const DENSITY_SLOPE: u32 = 13;
 const AGING_SLOPE: u32 = 14;
+const REST_SLOPE: u32 = 16;
+const START_SHAPE: u32 = 17;
+const START_SPIN: u32 = 18;
+/// Kinds in an argument, beside the index.
+const KINDS: u32 = 32;
 /// What the clamps' pass is told for stiffness that varies over the body, in time, plus 256 times the row of its slopes.
 const HOLD_SLOPE: u32 = 7;
 const HOLD_AGING: u32 = 8;
+/// For the stress-free shape, and for how effects hold the clamps.
+const HOLD_REST: u32 = 9;
+const HOLD_GRIP: u32 = 10;
 /// Added to a node pass' argument: cells take part; added to the sum's argument: ∂v/∂p of the start.
 const FLAG: u32 = 1 << 16;
+/// Added to the sum's argument: ∂u/∂p of the start.
+const OF_SHAPE: u32 = 1 << 17;
 
 impl Solve<'_, '_> {
     /// How a parameter enters this balance, or `None`.
@@ -75,6 +85,15 @@ impl Solve<'_, '_> {
                     let cells = Some([NO_TOUCH, HOLD_AGING + 256 * row]);
                     Column { kind: AGING_SLOPE, index: row, cells, press: None }
                 }
+                Site::Rest(_) => {
+                    let cells = Some([NO_TOUCH, HOLD_REST + 256 * row]);
+                    Column { kind: REST_SLOPE, index: row, cells, press: None }
+                }
+                Site::Clamps(_) => {
+                    let matrix = known.matrix_row(row).map_or(0, |k| (k + 1) << 16);
+                    let cells = Some([NO_TOUCH, HOLD_GRIP + 256 * row + matrix]);
+                    Column { kind: NOTHING, index: 0, cells, press: None }
+                }
                 _ => Column { kind: DENSITY_SLOPE, index: row, cells: None, press: None },
             });
         }
@@ -94,10 +113,10 @@ impl Solve<'_, '_> {
                 self.press_patches(ALL, question, only, &[]);
             }
             self.run(pass::HOLD_CELLS, ALL, Per::Hold, hold);
-            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + 16 * c.index);
+            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + KINDS * c.index);
         }
         let flag = if c.cells.is_some() { FLAG } else { 0 };
-        self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + 16 * c.index + flag);
+        self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + KINDS * c.index + flag);
         if let Some((question, only)) = c.press {
             self.press_nodes(ALL, question, only, &self.world.buffers["column"], &[]);
         }
@@ -114,23 +133,44 @@ impl Solve<'_, '_> {
         }
     }
 
-    /// ∂v/∂p of the start for initial velocities → `column`; false for other parameters.
-    pub(crate) fn velocity_column(&mut self, key: ParamKey) -> bool {
-        let (kind, axis) = match key {
-            ParamKey::Velocity(a) => (6, a),
-            ParamKey::AngularVelocity(a) => (7, a),
-            _ => return false,
-        };
-        self.column(Some(Column { kind, index: axis.into(), cells: None, press: None }));
+    /// ∂u/∂p of the start → `column`; false for parameters that the shape at the start does not depend on.
+    pub(crate) fn shape_column(&mut self, key: ParamKey) -> bool {
+        let Some(row) = self.start_row(key) else { return false };
+        self.column(Some(Column { kind: START_SHAPE, index: row, cells: None, press: None }));
         true
     }
 
-    /// dJ/dp += dJ/dv · ∂v/∂p of the start.
-    pub(crate) fn add_velocity_columns(&mut self, adj: &wgpu::Buffer) {
+    /// Row of a parameter of the stress-free shape, where the body starts in it.
+    fn start_row(&self, key: ParamKey) -> Option<u32> {
+        let ParamKey::Effect { effect, slot, law } = key else { return None };
+        let known = &self.world.geometry.effects;
+        let rest = matches!(palpate_model::effects::ALL[usize::from(law)].site, Site::Rest(_));
+        known.slope_row(effect.into(), slot.into()).filter(|_| rest && known.starts_unstrained())
+    }
+
+    /// ∂v/∂p of the start → `column`; false for parameters that the velocity does not depend on.
+    pub(crate) fn velocity_column(&mut self, key: ParamKey) -> bool {
+        let (kind, axis) = match key {
+            ParamKey::Velocity(a) => (6, a.into()),
+            ParamKey::AngularVelocity(a) => (7, a.into()),
+            _ => match self.start_row(key) {
+                Some(row) => (START_SPIN, row),
+                None => return false,
+            },
+        };
+        self.column(Some(Column { kind, index: axis, cells: None, press: None }));
+        true
+    }
+
+    /// dJ/dp += dJ/dv · ∂v/∂p + dJ/du · ∂u/∂p of the start.
+    pub(crate) fn add_start_columns(&mut self, adj: &wgpu::Buffer) {
         let keys = self.world.plan.layout.keys.clone();
         for (p, key) in keys.iter().enumerate() {
             if self.velocity_column(*key) {
                 self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + FLAG, &[("probe", adj)]);
+            }
+            if self.shape_column(*key) {
+                self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + OF_SHAPE, &[("probe", adj)]);
             }
         }
     }

@@ -1,5 +1,9 @@
 //! Effects on the device. Laws of points are WGSL twins (`shaders/effects/`) that two passes call by number; stiffness and density that
-//! vary over the body or in time do not depend on the states and are computed here, in f64, from the laws themselves.
+//! vary over the body or in time do not depend on the states and are computed here, in f64, from the laws themselves; so are
+//! stress-free shapes (`rests`) and what effects make of clamps (`grips`).
+
+mod grips;
+mod rests;
 
 use crate::error::GpuError;
 use crate::layout::EffectSite;
@@ -10,6 +14,7 @@ use crate::solve::{Per, Solve};
 use palpate_model::changes::{self, Changes};
 use palpate_model::effects::{Law, Site};
 use palpate_model::plan::{Physics, Plan};
+use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
 
 /// Questions to a law, as `shared/points.wgsl` numbers them.
@@ -32,19 +37,28 @@ const MODULUS: u32 = 1;
 const DENSITY: u32 = 2;
 const PATCHES: u32 = 4;
 const AGING: u32 = 8;
+const REST: u32 = 16;
+const STARTS: u32 = 32;
+const GRIPS: u32 = 64;
 
 /// A plan's effects as the device sees them.
 #[derive(Debug, Default)]
 pub(crate) struct Effects {
     /// Effects on points: number in the plan, and what the kernels know.
     pub(crate) points: Vec<(usize, EffectSite)>,
-    /// First row of slopes of every effect that varies stiffness or density.
+    /// First row of slopes of every effect that is computed here.
     fields: Vec<Option<u32>>,
     /// As `Shape` has them.
     pub(crate) bits: u32,
     pub(crate) slope_rows: u32,
     /// Parameters of changes in time.
     aging_rows: u32,
+    /// Parameters of the stress-free shape.
+    rest_rows: u32,
+    /// Parameters of how clamps are held: effect and number of each.
+    grip_rows: Vec<[usize; 2]>,
+    /// Those among them that change the clamps' matrices, by their row.
+    matrix_rows: Vec<usize>,
     /// Steps of the clock.
     steps: usize,
     stride: u32,
@@ -77,6 +91,18 @@ impl Effects {
                     e.aging_rows += count;
                     None
                 }
+                Site::Rest(_) => {
+                    e.bits |= REST | if plan.initial == InitialShape::Rest { STARTS } else { 0 };
+                    field = Some(e.rest_rows);
+                    e.rest_rows += count;
+                    None
+                }
+                Site::Clamps(_) => {
+                    e.bits |= GRIPS;
+                    field = Some(e.grip_rows.len() as u32);
+                    e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
+                    None
+                }
                 // The observer's business.
                 Site::Clock | Site::Marker | Site::Readings(_) => None,
                 _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
@@ -94,6 +120,7 @@ impl Effects {
             }
             e.stride += count;
         }
+        e.matrix_rows = grips::matrix_rows(plan, &e.grip_rows);
         for (_, p) in &mut e.points {
             (p.stride, p.rows) = (e.stride, e.rows);
         }
@@ -115,16 +142,21 @@ impl Effects {
         self.points.iter().any(|p| p.1.site == NODES)
     }
 
-    /// Row of the slopes of number `slot` of an effect that varies stiffness or density.
+    /// True when the body starts in a stress-free shape of its own.
+    pub(crate) fn starts_unstrained(&self) -> bool {
+        self.bits & STARTS != 0
+    }
+
+    /// Row of the slopes of number `slot` of an effect that is computed on the host.
     pub(crate) fn slope_row(&self, effect: usize, slot: u32) -> Option<u32> {
         self.fields[effect].map(|first| first + slot)
     }
 
     /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
-    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 7] {
+    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize, clamps: usize) -> Vec<(&'static str, usize)> {
         let slopes = self.slope_rows as usize;
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
-        [
+        let mut all = vec![
             ("effect_values", members * self.stride as usize),
             ("effect_measures", members * self.rows as usize * nodes),
             ("moduli", of(MODULUS, cells)),
@@ -132,7 +164,10 @@ impl Effects {
             ("modulus_slopes", of(MODULUS, slopes * cells)),
             ("density_slopes", of(DENSITY, slopes * nodes)),
             ("agings", of(AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
-        ]
+        ];
+        all.extend(self.rest_sizes(members, nodes, cells));
+        all.push(("hold_slopes", grips::FLOATS * self.grip_rows.len() * members * (self.steps + 1) * clamps));
+        all
     }
 
     /// Uploads what members' parameters make of them.
@@ -147,8 +182,8 @@ impl Effects {
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<(), GpuError> {
         let body = &plan.body;
-        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells.len());
-        let mut data = sizes.map(|s| Vec::<f32>::with_capacity(s.1));
+        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells.len(), plan.clamps.len());
+        let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {
             physics.effects.iter().for_each(|p| put(&mut data[0], p));
@@ -183,6 +218,10 @@ impl Effects {
         if self.bits & AGING != 0 {
             data[6] = self.agings(plan, batch);
         }
+        if self.bits & REST != 0 {
+            self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[7 + k] = v);
+        }
+        data[10] = self.hold_slopes(plan, batch);
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
             buffers.insert(name, gpu.upload(name, values)?);

@@ -71,7 +71,8 @@ pub struct Shape {
     pub quantum: f32,
     /// 1 with a ghost penalty.
     pub ghosts: u32,
-    /// 1: effects vary the stiffness over the body, 2: the density, 4: effects act on patches.
+    /// 1: effects vary the stiffness over the body, 2: the density, 4: effects act on patches, 8: the stiffness varies in time, 16: the stress-free
+    /// shape is another, 32: and the body starts in it, 64: effects act on clamps.
     pub fields: u32,
     /// Rows of the slopes of such fields, per member.
     pub slope_rows: u32,
@@ -201,6 +202,16 @@ pub struct ClampPose {
     pub turn_rate: [[f32; 4]; 3],
     /// db/dt [m/s].
     pub shift_rate: [f32; 4],
+}
+
+/// Derivative of a clamp's pose by a parameter of an effect.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct HoldSlope {
+    /// Columns of dA/dp.
+    pub turn: [[f32; 4]; 3],
+    /// db/dp [m].
+    pub shift: [f32; 4],
 }
 
 /// Where the nonlinear solve of one member stands.

@@ -5,23 +5,16 @@ use crate::error::GpuError;
 use crate::geometry::Geometry;
 use crate::layout::{ClampPose, Member, Plane};
 use crate::memory::Maker as _;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use palpate_engine::ParamBatch;
 use palpate_model::corotation::M24;
 use palpate_model::elements::Elements;
-use palpate_model::plan::{ClampSite, Physics, Plan, clamp_pose};
+use palpate_model::plan::{Physics, Plan};
 use palpate_model::plane::planes;
 use std::collections::HashMap;
 
-/// Central differences of a prescribed motion over this time [s] leave about 1e-10 of it (as on the CPU).
-const MOMENT: f64 = 1e-6;
-
 fn vec4(v: DVec3, w: f64) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w as f32]
-}
-
-fn mat3(m: DMat3) -> [[f32; 4]; 3] {
-    [m.x_axis, m.y_axis, m.z_axis].map(|c| vec4(c, 0.0))
 }
 
 /// θ of a batch on the device.
@@ -31,6 +24,8 @@ pub(crate) struct Batch {
     pub(crate) theta: Vec<Vec<f64>>,
     /// Poisson's ratio of each slot of element matrices that is on the device.
     slots: Vec<f64>,
+    /// The matrices themselves where effects make other clamps of them.
+    elements: Vec<Elements>,
 }
 
 impl Batch {
@@ -85,10 +80,7 @@ impl Batch {
                 scales: f32::from(u8::from(q.scales)),
                 pad: [0.0; 2],
             }));
-            for k in 0..=plan.clock.steps {
-                let time = p.start + k as f64 * plan.clock.step;
-                poses.extend(plan.clamps.iter().map(|c| pose(c, time)));
-            }
+            geometry.effects.poses(plan, p, &mut poses);
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
         geometry.effects.upload(gpu, plan, &self.physics, buffers)?;
@@ -100,12 +92,17 @@ impl Batch {
             self.upload_elements(gpu, plan, geometry, &slots, buffers)?;
             self.slots = slots;
         }
+        if geometry.effects.on_clamps() {
+            let own: Vec<&Elements> = members.iter().map(|m| &self.elements[m.slot as usize]).collect();
+            let grips = geometry.effects.grips(plan, &self.physics, &own, &geometry.holds);
+            buffers.insert("hold_elements", gpu.upload("hold_elements", &grips)?);
+        }
         Ok(())
     }
 
     /// Element and clamp matrices of every Poisson's ratio in the batch: `[slot][K, dK/dν][class]`.
     fn upload_elements(
-        &self,
+        &mut self,
         gpu: &Gpu,
         plan: &Plan,
         geometry: &Geometry,
@@ -113,31 +110,23 @@ impl Batch {
         buffers: &mut HashMap<&'static str, wgpu::Buffer>,
     ) -> Result<(), GpuError> {
         let (mut cells, mut holds) = (Vec::new(), Vec::new());
+        self.elements.clear();
         let push = |out: &mut Vec<f32>, m: &M24| out.extend(m.iter().map(|x| *x as f32));
         for nu in slots {
             let e = Elements::new(plan, &geometry.classes, *nu);
             e.matrices.iter().for_each(|m| push(&mut cells, &m.k));
             e.matrices.iter().for_each(|m| push(&mut cells, &m.k_nu));
+            if geometry.effects.on_clamps() {
+                self.elements.push(e);
+                continue;
+            }
             geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k));
             geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k_nu));
         }
         buffers.insert("elements", gpu.upload("elements", &cells)?);
-        buffers.insert("hold_elements", gpu.upload("hold_elements", &holds)?);
+        if !geometry.effects.on_clamps() {
+            buffers.insert("hold_elements", gpu.upload("hold_elements", &holds)?);
+        }
         Ok(())
-    }
-}
-
-/// Pose of a clamp at a time on the recording's clock, with its rate.
-fn pose(clamp: &ClampSite, time: f64) -> ClampPose {
-    let at = |t: f64| clamp_pose(clamp.motion.as_ref(), t);
-    let (a, b) = at(time);
-    let (later, earlier) = (at(time + MOMENT), at(time - MOMENT));
-    let rate = 0.5 / MOMENT;
-    ClampPose {
-        turn: mat3(a),
-        excess: mat3(a - DMat3::IDENTITY),
-        shift: vec4(b, 0.0),
-        turn_rate: mat3((later.0 - earlier.0) * rate),
-        shift_rate: vec4((later.1 - earlier.1) * rate, 0.0),
     }
 }

@@ -89,9 +89,10 @@ pub fn memory(plan: &Plan, members: usize, request: &Request) -> Result<Memory, 
         + whole(b * u64::from(shape.masses) * 4)
         + matrices(shape.classes)
         + matrices(shape.holds)
+        + whole(b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64)
         + geometry
             .effects
-            .sizes(members, shape.nodes as usize, shape.cells as usize)
+            .sizes(members, shape.nodes as usize, shape.cells as usize, shape.clamps as usize)
             .iter()
             .map(|s| whole(4 * s.1 as u64))
             .sum::<u64>();

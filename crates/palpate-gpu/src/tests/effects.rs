@@ -14,7 +14,7 @@ use palpate_model::effects::law::{COMMON, MOST, OLD, PLANE, Place, Point, STIFFN
 use palpate_model::effects::{self, ALL, Effect, Law, Site, Unstated};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::scene::Scene;
+use palpate_model::scene::{RotationUpdate, Scene};
 use std::collections::HashMap;
 
 /// Random numbers in [low, high): a linear congruential generator (Knuth's constants).
@@ -284,6 +284,41 @@ fn evaluations_of_a_held_body_that_creeps_agree() {
     s.effects[2].values[0] = Some(0.8);
     with(&mut s, "density-inclusion", &[]);
     s.effects[3].values[0] = Some(0.7);
+    compare(&seen(&s), 0.1);
+}
+
+/// A stress-free shape that differs in every mode, of a body that rests against its ghost penalty.
+fn bent(s: &mut Scene) {
+    s.solver.ghost = 0.5;
+    let bends: [(&str, &[f64]); 3] = [("bend_x_to_z", &[1.5]), ("bend_z_to_y", &[-1.0]), ("bend_y_to_x", &[0.8])];
+    with(s, "rest-shape", &[&[("stretch", [0.04, -0.02, 0.03].as_slice())], bends.as_slice()].concat());
+}
+
+#[test]
+fn evaluations_of_a_body_of_another_shape_agree() {
+    let mut s = ball(0.03);
+    s.time.steps = 3;
+    s.observation = watched();
+    bent(&mut s);
+    compare(&seen(&s), 0.1);
+}
+
+#[test]
+fn evaluations_of_a_body_of_another_shape_in_soft_slipping_clamps_agree() {
+    let mut s = held(0.03);
+    s.time.steps = 2;
+    s.observation = watched();
+    bent(&mut s);
+    with(&mut s, "compliant-clamp", &[("layer", &[0.004])]);
+    let turning: &[f64] = &[0.5, 1.0, -0.7];
+    with(
+        &mut s,
+        "clamp-slip",
+        &[("offset", &[0.002, -0.001, 0.003]), ("turn", &[0.05, 0.1, -0.08]), ("drift", &[0.1, 0.0, -0.2]), ("turning", turning)],
+    );
+    with(&mut s, "stiffness-gradient", &[("slope", &[6.0, 2.0, -4.0])]);
+    compare(&seen(&s), 0.1);
+    s.solver.rotation = RotationUpdate::Lagged;
     compare(&seen(&s), 0.1);
 }
 

@@ -187,7 +187,10 @@ impl Exact {
         let (body, h) = (&plan.body, plan.body.grid.h);
         let mut cells = Vec::new();
         for e in 0..body.cells.len() {
-            let poses = [&u1, &u0].map(|u| CellPose::new(&corners(body, e, u), h));
+            let mut poses = [&u1, &u0].map(|u| CellPose::new(&corners(body, e, u), h));
+            if let Some(rest) = &altered.rest {
+                poses.iter_mut().for_each(|p| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w));
+            }
             let k = &elements.cell(e).k;
             let (a, b) = (multiply(k, &poses[0].q), multiply(k, &poses[1].q));
             let y = std::array::from_fn(|i| physics.youngs_modulus * ((mix.new + mix.rate) * a[i] - mix.rate * b[i]));
@@ -252,7 +255,7 @@ fn apart(found: &[Part], right: &Exact) -> Vec<&'static str> {
     out
 }
 
-/// Everything acts: clamps that move, two planes, a point mass, ghosts, both dampings, effects on nodes, patches and cells.
+/// Everything acts: clamps that move, two planes, a point mass, ghosts, both dampings, effects on nodes, patches, cells and clamps.
 fn scene() -> Scene {
     let mut s = crowded();
     s.material.mass_damping = 5.0;
@@ -261,6 +264,8 @@ fn scene() -> Scene {
     s.planes[0].stiffness = Some(3e5);
     for (kind, value) in
         [("coulomb-friction", 0.5), ("uniform-force", 5000.0), ("stiffness-gradient", 5.0), ("density-gradient", 6.0)]
+            .into_iter()
+            .chain([("rest-shape", 0.04), ("compliant-clamp", 0.004), ("clamp-slip", 0.002)])
     {
         let mut effect = Effect::absent(effects::find(kind).unwrap_or_else(|| panic!("{kind}")));
         effect.values[0] = Some(value);

@@ -1,0 +1,124 @@
+//! What effects make of clamps, computed on the host: poses over time, matrices, and the derivatives of both.
+
+use super::{Effects, GRIPS};
+use crate::layout::{ClampPose, HoldSlope};
+use glam::{DMat3, DVec3};
+use palpate_model::changes;
+use palpate_model::effects::field::Spot;
+use palpate_model::elements::Elements;
+use palpate_model::grips::{Grips, Pose};
+use palpate_model::plan::{Physics, Plan, clamp_pose};
+
+/// Numbers of a [`HoldSlope`].
+pub(super) const FLOATS: usize = size_of::<HoldSlope>() / 4;
+/// Central differences of a prescribed motion over this time [s] leave about 1e-10 of it (as on the CPU).
+const MOMENT: f64 = 1e-6;
+
+fn vec4(v: DVec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+fn mat3(m: DMat3) -> [[f32; 4]; 3] {
+    [m.x_axis, m.y_axis, m.z_axis].map(vec4)
+}
+
+/// A pose as the device has it, with its rate, from the pose as a function of time.
+fn device_pose(at: impl Fn(f64) -> Pose, time: f64) -> ClampPose {
+    let (a, b) = at(time);
+    let (later, earlier) = (at(time + MOMENT), at(time - MOMENT));
+    let rate = 0.5 / MOMENT;
+    ClampPose {
+        turn: mat3(a),
+        excess: mat3(a - DMat3::IDENTITY),
+        shift: vec4(b),
+        turn_rate: mat3((later.0 - earlier.0) * rate),
+        shift_rate: vec4((later.1 - earlier.1) * rate),
+    }
+}
+
+/// Rows of the parameters that change the clamps' matrices, at the plan's own parameters or a little beyond.
+pub(super) fn matrix_rows(plan: &Plan, rows: &[[usize; 2]]) -> Vec<usize> {
+    let spot = Spot::of(plan);
+    let physics = Physics::new(&plan.layout, &plan.theta);
+    let mut beyond = physics.clone();
+    beyond.effects.iter_mut().flatten().for_each(|p| *p += 1e-3);
+    let changes = |p: &Physics, [effect, slot]: [usize; 2]| {
+        changes::hold_slope(plan, p, &spot, effect, slot).is_some_and(|s| s[0] != 0.0 || s[1] != 0.0)
+    };
+    (0..rows.len()).filter(|r| changes(&physics, rows[*r]) || changes(&beyond, rows[*r])).collect()
+}
+
+impl Effects {
+    /// True when some effect acts on clamps: then every member has its own clamp matrices.
+    pub(crate) fn on_clamps(&self) -> bool {
+        self.bits & GRIPS != 0
+    }
+
+    /// Place among the matrices' slopes of a parameter of the clamps, by its row.
+    pub(crate) fn matrix_row(&self, row: u32) -> Option<u32> {
+        self.matrix_rows.iter().position(|r| *r == row as usize).map(|k| k as u32)
+    }
+
+    /// Numbers that a member's slopes of clamp matrices take, for a body of `holds` clamp cells.
+    pub(crate) fn matrix_floats(&self, holds: usize) -> usize {
+        576 * self.matrix_rows.len() * holds
+    }
+
+    /// Poses of a member's clamps at the start and at the end of every step, `[steps + 1][clamps]`.
+    pub(crate) fn poses(&self, plan: &Plan, physics: &Physics, out: &mut Vec<ClampPose>) {
+        let grips = Grips::new(plan, physics, 0.0);
+        for k in 0..=plan.clock.steps {
+            let elapsed = k as f64 * plan.clock.step;
+            let (time, now) = (physics.start + elapsed, grips.after(elapsed));
+            out.extend(plan.clamps.iter().enumerate().map(|(i, clamp)| {
+                if self.on_clamps() {
+                    device_pose(|t| now.pose(i, t), time)
+                } else {
+                    device_pose(|t| clamp_pose(clamp.motion.as_ref(), t), time)
+                }
+            }));
+        }
+    }
+
+    /// Derivatives of the poses, `[rows][B][steps + 1][clamps]` of [`HoldSlope`].
+    pub(super) fn hold_slopes(&self, plan: &Plan, batch: &[Physics]) -> Vec<f32> {
+        let mut out: Vec<HoldSlope> = Vec::new();
+        for [effect, slot] in &self.grip_rows {
+            for physics in batch {
+                let grips = Grips::new(plan, physics, 0.0);
+                for k in 0..=plan.clock.steps {
+                    let elapsed = k as f64 * plan.clock.step;
+                    let (time, now) = (physics.start + elapsed, grips.after(elapsed));
+                    out.extend((0..plan.clamps.len()).map(|i| {
+                        let slope = now.pose_slope(i, time, *effect, *slot);
+                        slope.map_or_else(HoldSlope::default, |(a, b)| HoldSlope { turn: mat3(a), shift: vec4(b) })
+                    }));
+                }
+            }
+        }
+        bytemuck::cast_slice(&out).to_vec()
+    }
+
+    /// Clamp matrices of all members, `[B][K, dK/dν][clamp cell]`, then the slopes of K, `[rows][B][clamp cell]`; `holds` are the
+    /// clamp cells in the device's order, `elements` those at each member's Poisson's ratio.
+    pub(crate) fn grips(&self, plan: &Plan, batch: &[Physics], elements: &[&Elements], holds: &[(usize, usize)]) -> Vec<f32> {
+        let mut out = Vec::new();
+        let mut put = |m: &[f64]| out.extend(m.iter().map(|x| *x as f32));
+        for (physics, elements) in batch.iter().zip(elements) {
+            let grips = Grips::new(plan, physics, 0.0);
+            let all: Vec<_> = holds.iter().map(|h| grips.matrices(elements, h.0, h.1)).collect();
+            all.iter().for_each(|m| put(&*m.k));
+            all.iter().for_each(|m| put(&*m.k_nu));
+        }
+        for row in &self.matrix_rows {
+            for (physics, elements) in batch.iter().zip(elements) {
+                let grips = Grips::new(plan, physics, 0.0);
+                for (index, m) in holds {
+                    let slope = grips.matrix_slope(elements, [*index, *m], self.grip_rows[*row]);
+                    put(slope.as_deref().unwrap_or(&[0.0; 576]));
+                }
+            }
+        }
+        out
+    }
+}
