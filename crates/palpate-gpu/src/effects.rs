@@ -97,7 +97,7 @@ impl Effects {
                     e.rest_rows += count;
                     None
                 }
-                Site::Clamps(_) => {
+                Site::Clamps(_) if grips::known(plan, number, places.len()) => {
                     e.bits |= GRIPS;
                     field = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
