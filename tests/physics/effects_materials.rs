@@ -242,3 +242,33 @@ fn slipped_clamp_takes_the_body_along() {
     let off = off.fold(0.0, f64::max);
     assert!(off < 1e-7, "{off:e} m away from the rigid motion");
 }
+
+#[test]
+fn an_edge_further_along_is_a_clamp_that_reaches_further() {
+    // A bar that hangs: what is held does not stretch, so that its tip sinks by ρ g (L − s)² / 2E.
+    let law = |shift: f64| 0.5 * DENSITY * GRAVITY * (LENGTH - shift).powi(2) / YOUNG;
+    for shift in [0.005, 0.02, 0.033] {
+        let found = tip(&bar(vec![effect("clamp-edge", &[("shift", &[shift])])]));
+        println!("clamp-edge {shift}: {found:e}, closed form {:e}", law(shift));
+        // Held volume is held by a penalty of 10 (λ + 2μ)/h²: its edge gives way as much as some hundredths of a cell (3 mm) more length would.
+        assert!((found / law(shift) - 1.0).abs() < 2.0 * 0.003 / LENGTH, "{shift}: {found:e} instead of {:e}", law(shift));
+    }
+    // A cantilever in a clamp of 25 mm with an edge 5 mm further, or before: those of 30 and 20 mm.
+    let cantilever = |held: f64, shift: f64| {
+        let effects = if shift == 0.0 { Vec::new() } else { vec![effect("clamp-edge", &[("shift", &[shift])])] };
+        let mut s = bar(effects);
+        s.gravity = DVec3::new(0.0, 0.0, -GRAVITY);
+        s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(held, 1.0, 1.0))];
+        let plan = scenes::plan(&s);
+        let node = run::nearest(&plan, DVec3::new(LENGTH, 0.0, 0.0));
+        run::states(&plan).last().expect("there is a start").displacement[node].z
+    };
+    let even = cantilever(0.025, 0.0);
+    for shift in [0.005, -0.005] {
+        let (found, moved) = (cantilever(0.025, shift), cantilever(0.025 + shift, 0.0));
+        println!("cantilever {shift}: {found:e}, moved box {moved:e}, without {even:e}");
+        // The same integrals in another order; Newton stops at 1e-8 of the forces.
+        assert!((found / moved - 1.0).abs() < 1e-6, "{shift}: {found:e}, with a moved box {moved:e}");
+        assert!((found / even - 1.0).abs() > 0.05, "{shift}: the edge matters");
+    }
+}

@@ -22,7 +22,7 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         }
     }
     scene.effects = vec![effect];
-    if matches!(ALL[law].site, effects::Site::Clamps(_)) {
+    if matches!(ALL[law].site, effects::Site::Clamps(_) | effects::Site::Edges(_)) {
         // They need a clamp, and a start that it does not jerk.
         scene.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
         scene.initial.state = InitialShape::StaticEquilibrium;

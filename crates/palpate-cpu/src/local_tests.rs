@@ -19,7 +19,7 @@ use palpate_model::scene::*;
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
 fn altering(rotation: RotationUpdate) -> Vec<Effect> {
     let alters = |site: &Site| match site {
-        Site::Modulus(_) | Site::Density(_) | Site::Aging(_) | Site::Rest(_) | Site::Clamps(_) => true,
+        Site::Modulus(_) | Site::Density(_) | Site::Aging(_) | Site::Rest(_) | Site::Clamps(_) | Site::Edges(_) => true,
         Site::Cells(_) => rotation == RotationUpdate::Converged,
         _ => false,
     };

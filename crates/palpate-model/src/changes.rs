@@ -175,3 +175,16 @@ pub fn hold_slope(plan: &Plan, physics: &Physics, spot: &Spot, effect: usize, sl
     out[0] *= hold(plan, physics, spot)[0] / field.at(spot, p)[0];
     Some(out)
 }
+
+/// How far effects shift the clamps' edges [m]; `None` where no effect does, be it by nothing.
+pub fn edge(plan: &Plan, physics: &Physics) -> Option<f64> {
+    let spot = Spot::of(plan);
+    let shift = |(_, law, p): Numbered| if let Site::Edges(f) = law.site { Some(f.at(&spot, p)[0]) } else { None };
+    effects(&plan.layout, physics).filter_map(shift).reduce(|a, b| a + b)
+}
+
+/// Derivative of [`edge`] by number `slot` of effect `effect`; `None` for other effects.
+pub fn edge_slope(plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<f64> {
+    let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
+    if let Site::Edges(field) = law.site { Some(field.slope(&Spot::of(plan), p, slot)[0]) } else { None }
+}

@@ -8,7 +8,7 @@ mod clip;
 mod quadrature;
 mod walk;
 
-pub use clip::{ClipBox, HeldMoments, held_moments};
+pub use clip::{ClipBox, HeldMoments, Pieces, held_moments};
 pub use walk::Lattice;
 
 use crate::grid::shape_functions;

@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::element::CellMatrices;
 use crate::material::{lame, lame_by_nu};
-use crate::plan::{ClampCell, ClampSite, Plan};
+use crate::plan::{ClampCell, Plan};
 use std::collections::BTreeMap;
 
 /// Nitsche's surface penalty, in units of (λ + 2μ)/h. The mean-strain traction of a full cell needs 2; a cell that is cut down
@@ -65,7 +65,7 @@ impl Elements {
             .par_iter()
             .map(|(weights, fraction)| CellMatrices::new(plan.solver.element, h, weights, *fraction, nu))
             .collect();
-        let clamps = plan.clamps.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect();
+        let clamps = plan.clamps.iter().map(|s| s.cells.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect()).collect();
         Elements { nu, matrices, of_cell: classes.of_cell.clone(), clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
     }
 
@@ -75,20 +75,11 @@ impl Elements {
     }
 }
 
-fn clamp_matrices(body: &Body, clamp: &ClampSite, nu: f64) -> Vec<CellMatrices> {
-    let (l, m) = lame(1.0, nu);
-    let (dl, dm) = lame_by_nu(1.0, nu);
-    clamp
-        .cells
-        .iter()
-        .map(|c| {
-            let fraction = body.cells[c.cell as usize].fraction;
-            CellMatrices {
-                k: Box::new(clamp_matrix(c, body.grid.h, fraction, l, m)),
-                k_nu: Box::new(clamp_matrix(c, body.grid.h, fraction, dl, dm)),
-            }
-        })
-        .collect()
+/// Nitsche's matrix of one clamp cell for E = 1 Pa, and its derivative by ν.
+pub fn clamp_matrices(body: &Body, c: &ClampCell, nu: f64) -> CellMatrices {
+    let (h, fraction) = (body.grid.h, body.cells[c.cell as usize].fraction);
+    let make = |(l, m)| Box::new(clamp_matrix(c, h, fraction, l, m));
+    CellMatrices { k: make(lame(1.0, nu)), k_nu: make(lame_by_nu(1.0, nu)) }
 }
 
 /// Nitsche's symmetric terms of one cell, linear in (λ, μ): −T − Tᵀ + penalty (Nitsche 1971; the penalty's sign is plus).

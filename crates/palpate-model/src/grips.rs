@@ -82,22 +82,30 @@ impl<'a> Grips<'a> {
 
     /// Matrices of cell `m` of clamp `index` with the layer that effects put in (constant in time).
     pub fn matrices(&self, elements: &Elements, index: usize, m: usize) -> CellMatrices {
-        let (c, cell) = (&self.plan.clamps[index].cells[m], &elements.clamps[index][m]);
+        self.layered(&self.plan.clamps[index].cells[m], &elements.clamps[index][m], elements.nu)
+    }
+
+    /// The same of any held cell, from its matrices without layer.
+    pub fn layered(&self, c: &ClampCell, cell: &CellMatrices, nu: f64) -> CellMatrices {
         let hold = changes::hold(self.plan, self.physics, &self.spot);
-        let [k3, k3_nu] = self.layer(c, elements.nu);
+        let [k3, k3_nu] = self.layer(c, nu);
         let make = |k: &M24, k3: &M24| Box::new(layered(k, k3, self.plan.body.grid.h, hold[1], false).map(|v| hold[0] * v));
         CellMatrices { k: make(&cell.k, &k3), k_nu: make(&cell.k_nu, &k3_nu) }
     }
 
     /// Derivative of the stiffness in [`Grips::matrices`] by number `slot` of effect `effect`; `None` where there is none.
-    pub fn matrix_slope(&self, elements: &Elements, [index, m]: [usize; 2], [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
+    pub fn matrix_slope(&self, elements: &Elements, [index, m]: [usize; 2], by: [usize; 2]) -> Option<Box<M24>> {
+        self.layered_slope(&self.plan.clamps[index].cells[m], &elements.clamps[index][m].k, elements.nu, by)
+    }
+
+    /// The same of any held cell, from its stiffness without layer.
+    pub fn layered_slope(&self, c: &ClampCell, k: &M24, nu: f64, [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
         let slope = changes::hold_slope(self.plan, self.physics, &self.spot, effect, slot)?;
         if slope[0] == 0.0 && slope[1] == 0.0 {
             return None;
         }
-        let (c, k) = (&self.plan.clamps[index].cells[m], &elements.clamps[index][m].k);
         let (hold, h) = (changes::hold(self.plan, self.physics, &self.spot), self.plan.body.grid.h);
-        let [k3, _] = self.layer(c, elements.nu);
+        let [k3, _] = self.layer(c, nu);
         let (own, by_layer) = (layered(k, &k3, h, hold[1], false), layered(k, &k3, h, hold[1], true));
         Some(Box::new(std::array::from_fn(|i| slope[0] * own[i] + hold[0] * slope[1] * by_layer[i])))
     }

@@ -6,6 +6,7 @@
 
 pub mod body;
 pub mod changes;
+pub mod clamp_edge;
 pub mod contact;
 pub mod corotation;
 pub mod cut;

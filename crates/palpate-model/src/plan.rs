@@ -1,6 +1,7 @@
 //! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
 
 use crate::body::Body;
+use crate::clamp_edge::Edge;
 use crate::motion::RigidMotion;
 use crate::observation::Observation;
 use crate::params::{Layout, ParamKey};
@@ -47,12 +48,21 @@ pub struct PlaneSite {
 }
 
 /// A held region: per-cell weights of Nitsche's terms and of the held volume.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ClampSite {
-    /// Cells with surface or volume in the region.
+    /// Cells with surface or volume in the region, in increasing order.
     pub cells: Vec<ClampCell>,
     /// Prescribed motion; `None` = held still.
     pub motion: Option<RigidMotion>,
+    /// What is held when an effect moves the region's edge.
+    pub edge: Arc<Edge>,
+}
+
+impl std::fmt::Debug for ClampSite {
+    /// Without the edge, which follows from the rest and the body.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_struct("ClampSite").field("cells", &self.cells).field("motion", &self.motion).finish()
+    }
 }
 
 /// One cell of a held region.

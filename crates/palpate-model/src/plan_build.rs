@@ -1,6 +1,7 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
 use crate::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
+use crate::clamp_edge::Edge;
 use crate::cut::{ClipBox, HeldMoments, Lattice, POINTS27, held_moments};
 use crate::effects::check_choices;
 use crate::extension::{NodeLookup, active_cell, affine_weights};
@@ -59,12 +60,8 @@ fn band_cells(scene: &Scene) -> f64 {
 /// entry of `marker_rest` in the same order.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
     let (parts, shape) = build_parts(scene)?;
-    let clamps = scene
-        .clamps
-        .iter()
-        .enumerate()
-        .map(|(i, c)| clamp_site(i, c, scene, &parts, shape.as_ref()))
-        .collect::<Result<Vec<_>, _>>()?;
+    let clamps =
+        scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);
     let masses = scene
         .masses
@@ -126,7 +123,7 @@ fn theta(scene: &Scene, planes: &[PlaneSite], body: &Body) -> Vec<f64> {
     scene.layout().keys.iter().map(value).collect()
 }
 
-fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &dyn Shape) -> Result<ClampSite, PlanError> {
+fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {
     let body = &parts.body;
     let (grid, h) = (&body.grid, body.grid.h);
     let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
@@ -173,11 +170,12 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &dyn
             ),
         ));
     }
-    Ok(ClampSite { cells, motion: clamp.motion.clone() })
+    let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
+    Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })
 }
 
 /// Mean of ∇N_i over the body in a cell [1/m]; the cell's weights integrate it exactly.
-fn mean_gradient(cell: &body::Cell, h: f64) -> [DVec3; 8] {
+pub(crate) fn mean_gradient(cell: &body::Cell, h: f64) -> [DVec3; 8] {
     let mut mean = [DVec3::ZERO; 8];
     for q in 0..27 {
         let g = shape_gradients(POINTS27[q]);

@@ -1,6 +1,7 @@
 //! Plans made from scenes: places of clamps, masses and markers.
 
 use super::*;
+use crate::clamp_edge::{Held, slope};
 use crate::motion::RigidMotion;
 use crate::scene::*;
 use glam::{DMat3, DQuat};
@@ -177,4 +178,72 @@ fn markers_are_attached_in_the_order_given() {
     let far = [rest("far", tip, Some(DVec3::splat(9.0)))];
     let message = build_plan(&scene, Observation::default(), &far).unwrap_err().to_string();
     assert!(message.starts_with("markers.rest \"far\".surface: "), "{message}");
+}
+
+/// Largest difference of two lists of clamp cells' moments, in units of a full cell's; cells that hold nothing may be missing.
+fn apart(a: &[ClampCell], b: &[ClampCell], h: f64) -> f64 {
+    let numbers = |c: &ClampCell| {
+        let surface = c.surface_mass.iter().flatten().map(|x| x / (h * h));
+        let normal = c.surface_normal.iter().flat_map(|n| n.to_array()).map(|x| x / (h * h));
+        surface.chain(normal).chain(c.volume_mass.iter().flatten().map(|x| x / h.powi(3))).collect::<Vec<f64>>()
+    };
+    let one_way = |a: &[ClampCell], b: &[ClampCell]| {
+        let off = |c: &ClampCell| match b.iter().find(|d| d.cell == c.cell) {
+            Some(d) => numbers(c).iter().zip(numbers(d)).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max),
+            None => numbers(c).into_iter().map(f64::abs).fold(0.0, f64::max),
+        };
+        a.iter().map(off).fold(0.0, f64::max)
+    };
+    one_way(a, b).max(one_way(b, a))
+}
+
+#[test]
+fn a_shifted_edge_holds_what_a_larger_box_would() {
+    let mut scene = scene();
+    // Off the lattice and turned: edge and surface cut cells. The box is wide across, and ends 0.031 m along the beam in its own frame.
+    scene.object.pose = DAffine3::from_rotation_translation(DQuat::from_rotation_z(0.3), DVec3::new(0.003, 0.001, 0.002));
+    let boxed = |end: f64| {
+        let mut scene = scene.clone();
+        scene.clamps = vec![Clamp { object_frame: true, ..clamp(DVec3::splat(-1.0), DVec3::new(end, 0.0501, 0.0398)) }];
+        plan(&scene).unwrap()
+    };
+    let stated = boxed(0.031);
+    let (body, site) = (&stated.body, &stated.clamps[0]);
+    let h = body.grid.h;
+    // The lateral faces lie 0.1 mm outside and 0.2 mm inside the beam: beside it, so that they stay.
+    for shift in [0.0, 0.004, 0.023, -0.007, -0.026, 0.1] {
+        let held = site.edge.cells(body, &site.cells, shift);
+        let now: Vec<ClampCell> = held.iter().map(|h| h.now.clone()).collect();
+        assert!(now.is_sorted_by_key(|c| c.cell));
+        // Sums over the same pieces in another order.
+        assert!(apart(&now, &boxed(0.031 + shift).clamps[0].cells, h) < 1e-9, "{shift} m");
+        if shift == 0.0 {
+            let same = |c: &ClampCell| now.iter().any(|n| format!("{n:?}") == format!("{c:?}"));
+            assert!(site.cells.iter().all(same), "at 0 the plan's own cells");
+        }
+        // The held volume grows by the beam's cross section, as far as the box reaches across it.
+        let sum = |c: &ClampCell| c.volume_mass.iter().flatten().sum::<f64>();
+        let by = |h: &Held| h.near.as_ref().map_or(0.0, |(f, step)| slope(sum(&h.now), sum(&f[0]), sum(&f[1]), *step));
+        let section: f64 = held.iter().map(by).sum();
+        // The body's volume is second order in the sub-lattice at its edges (0.2 %).
+        assert!((section / (0.05 * 0.0398) - 1.0).abs() < 4e-3, "{shift} m: {section} m²");
+    }
+}
+
+#[test]
+fn a_clamp_that_only_touches_the_body_has_an_edge() {
+    let mut scene = scene();
+    scene.clamps = vec![clamp(DVec3::splat(-1.0), DVec3::new(0.0, 1.0, 1.0))];
+    let plan = plan(&scene).unwrap();
+    let site = &plan.clamps[0];
+    let volume = |held: &[Held]| held.iter().flat_map(|h| h.now.volume_mass.as_flattened()).sum::<f64>();
+    assert!(volume(&site.edge.cells(&plan.body, &site.cells, 0.0)) == 0.0);
+    let grown = volume(&site.edge.cells(&plan.body, &site.cells, 0.005));
+    assert!((grown / (0.005 * 0.05 * 0.04) - 1.0).abs() < 1e-9, "{grown} m³");
+    // A box around the whole body has no edge on it.
+    let mut whole = scene.clone();
+    whole.clamps = vec![clamp(DVec3::splat(-1.0), DVec3::ONE)];
+    let whole = super::tests::plan(&whole).unwrap();
+    let site = &whole.clamps[0];
+    assert!(site.edge.cells(&whole.body, &site.cells, -0.05).iter().all(|h| h.near.is_none()));
 }

@@ -9,7 +9,6 @@ use crate::passes::supports;
 use glam::DVec3;
 use palpate_model::changes::{self, Changes};
 use palpate_model::corotation::CellPose;
-use palpate_model::element::CellMatrices;
 use palpate_model::elements::Elements;
 use palpate_model::grips::Pose;
 use palpate_model::plan::{Physics, Plan};
@@ -21,8 +20,8 @@ pub struct Altered {
     pub changes: Changes,
     /// Every cell in the stress-free shape.
     pub rest: Option<Vec<CellPose>>,
-    /// Clamp matrices with compliant layers.
-    pub grips: Option<Vec<Vec<CellMatrices>>>,
+    /// Clamps with compliant layers and moved edges.
+    pub grips: Option<Vec<clamps::Grip>>,
     /// Laws of cells.
     pub laws: Vec<CellActing>,
 }

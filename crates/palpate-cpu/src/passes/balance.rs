@@ -293,9 +293,9 @@ impl<'a> Balance<'a> {
             }
         }
         let held = self.held();
-        for (c, clamp) in plan.clamps.iter().enumerate() {
+        for c in 0..plan.clamps.len() {
             let (a, _) = held.pose(c, self.time, self.time - physics.start);
-            for (m, cell) in clamp.cells.iter().enumerate() {
+            for (m, cell) in held.cells(c).iter().enumerate() {
                 let (k, factor) = held.stiffness(c, m);
                 let places = &self.places.cells[cell.cell as usize];
                 for b in 0..64 {

@@ -1,15 +1,17 @@
-//! Clamps: Nitsche's forces on the held regions, as effects change them (compliance, slip), with all their derivatives.
+//! Clamps: Nitsche's forces on the held regions, as effects change them (compliance, slip, edge), with all their derivatives.
 //!
-//! A clamp wants its points at A X + b. Effects turn and move that pose and put a compliant layer between body and clamp; a body
+//! A clamp wants its points at A X + b. Effects turn and move that pose, put a compliant layer between body and clamp and shift the edge
+//! of what is held; a body
 //! whose stiffness varies is held as stiffly as it is itself, and one with another stress-free shape X + W is held in that shape.
 
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
 use palpate_model::body::Body;
-use palpate_model::changes::Changes;
+use palpate_model::changes::{self, Changes};
+use palpate_model::clamp_edge::{self, Held};
 use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
 use palpate_model::element::CellMatrices;
-use palpate_model::elements::Elements;
+use palpate_model::elements::{Elements, clamp_matrices};
 use palpate_model::grips::{self, Grips, Pose};
 use palpate_model::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
 
@@ -24,8 +26,21 @@ pub struct Clamps<'a> {
     pub elements: &'a Elements,
     /// What effects change of the body.
     pub changes: &'a Changes,
-    /// Matrices changed by effects; `None` where none acts on clamps.
-    pub grips: Option<&'a [Vec<CellMatrices>]>,
+    /// What effects change of every clamp; `None` where none acts on clamps.
+    pub grips: Option<&'a [Grip]>,
+}
+
+/// A clamp as effects change it; everything cell by cell.
+#[derive(Debug)]
+pub struct Grip {
+    /// What is held.
+    cells: Vec<ClampCell>,
+    /// Matrices without layer.
+    stiff: Vec<CellMatrices>,
+    /// Matrices.
+    matrices: Vec<CellMatrices>,
+    /// Their derivative by the shift of the edge [1/m]; `None` away from the edge.
+    by_edge: Vec<Option<Box<M24>>>,
 }
 
 /// Where a clamp cell's points are wanted, seen from the clamp: displacement W of the stress-free shape.
@@ -41,16 +56,41 @@ fn deviation(body: &Body, rest: Option<&[DVec3]>, c: &ClampCell, (a, b): Pose, u
     }))
 }
 
-/// Matrices of every clamp cell with the layers that effects put in, or `None` when no effect acts on clamps.
-pub fn grips(plan: &Plan, physics: &Physics, elements: &Elements) -> Option<Vec<Vec<CellMatrices>>> {
-    let grips = grips::acted(plan).then(|| Grips::new(plan, physics, 0.0))?;
-    let of = |(i, clamp): (usize, &ClampSite)| (0..clamp.cells.len()).map(|m| grips.matrices(elements, i, m)).collect();
-    Some(plan.clamps.iter().enumerate().map(of).collect())
+/// Every clamp with the layers that effects put in and the edges that they shift, or `None` when no effect acts on clamps.
+pub fn grips(plan: &Plan, physics: &Physics, elements: &Elements) -> Option<Vec<Grip>> {
+    let shift = changes::edge(plan, physics);
+    if !grips::acted(plan) && shift.is_none() {
+        return None;
+    }
+    let (body, nu) = (&plan.body, elements.nu);
+    let grips = Grips::new(plan, physics, 0.0);
+    let by_edge = |(held, now): (&Held, &CellMatrices)| {
+        let (further, step) = held.near.as_ref()?;
+        let [next, second] = [0, 1].map(|i| grips.layered(&further[i], &clamp_matrices(body, &further[i], nu), nu).k);
+        Some(Box::new(std::array::from_fn(|i| clamp_edge::slope(now.k[i], next[i], second[i], *step))))
+    };
+    let grip = |clamp: &ClampSite| {
+        let held = match shift {
+            Some(shift) => clamp.edge.cells(body, &clamp.cells, shift),
+            None => clamp.cells.iter().map(|c| Held { now: c.clone(), near: None }).collect(),
+        };
+        let stiff: Vec<CellMatrices> = held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect();
+        let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| grips.layered(&h.now, k, nu)).collect();
+        let by_edge = held.iter().zip(&matrices).map(by_edge).collect();
+        let cells = held.into_iter().map(|h| h.now).collect();
+        Grip { cells, stiff, matrices, by_edge }
+    };
+    Some(plan.clamps.iter().map(grip).collect())
 }
 
-impl Clamps<'_> {
-    fn matrix(&self, index: usize, cell: usize, which: Matrices) -> &M24 {
-        let m = &self.grips.unwrap_or(&self.elements.clamps)[index][cell];
+impl<'a> Clamps<'a> {
+    /// Cells that clamp `index` holds.
+    pub fn cells(&self, index: usize) -> &'a [ClampCell] {
+        self.grips.map_or(&self.plan.clamps[index].cells, |g| &g[index].cells)
+    }
+
+    fn matrix(&self, index: usize, cell: usize, which: Matrices) -> &'a M24 {
+        let m = &self.grips.map_or(&self.elements.clamps[index], |g| &g[index].matrices)[cell];
         match which {
             Matrices::Stiffness => &m.k,
             Matrices::ByPoisson => &m.k_nu,
@@ -72,7 +112,7 @@ impl Clamps<'_> {
     /// Adds the force of clamp `index` that stands in `pose`: A K (Aᵀ(x − b) − X − W), with matrices scaled by `young`.
     pub fn force(&self, index: usize, which: Matrices, pose: Pose, young: f64, u: &[DVec3], out: &mut [DVec3]) {
         let body = &self.plan.body;
-        for (m, c) in self.plan.clamps[index].cells.iter().enumerate() {
+        for (m, c) in self.cells(index).iter().enumerate() {
             let d = deviation(body, self.changes.rest.as_deref(), c, pose, u);
             let f = corners(&multiply(self.matrix(index, m, which), &d));
             self.add(c, pose.0, young * self.factor(c), f, out);
@@ -88,7 +128,7 @@ impl Clamps<'_> {
 
     /// Adds A K Aᵀ du of clamp `index`, with the matrices scaled by `young`.
     pub fn product(&self, index: usize, turn: DMat3, young: f64, du: &[DVec3], out: &mut [DVec3]) {
-        for (m, c) in self.plan.clamps[index].cells.iter().enumerate() {
+        for (m, c) in self.cells(index).iter().enumerate() {
             let nodes = &self.plan.body.cells[c.cell as usize].nodes;
             let d: [DVec3; 8] = nodes.map(|n| turn.transpose() * du[n as usize]);
             let f = corners(&multiply(self.matrix(index, m, Matrices::Stiffness), &flatten(&d)));
@@ -103,12 +143,12 @@ impl Clamps<'_> {
             let f = multiply(self.matrix(index, m, Matrices::Stiffness), &d);
             0.5 * young * self.factor(c) * d.iter().zip(&f).map(|(d, f)| d * f).sum::<f64>()
         };
-        self.plan.clamps[index].cells.iter().enumerate().map(energy).sum()
+        self.cells(index).iter().enumerate().map(energy).sum()
     }
 
     /// Matrix of cell `m` of clamp `index` in the clamp's frame, for E = 1 Pa, and the factor on E.
     pub fn stiffness(&self, index: usize, m: usize) -> (&M24, f64) {
-        (self.matrix(index, m, Matrices::Stiffness), self.factor(&self.plan.clamps[index].cells[m]))
+        (self.matrix(index, m, Matrices::Stiffness), self.factor(&self.cells(index)[m]))
     }
 
     /// Adds the derivative of the force of clamp `index` by the stiffness of its cells, `slope` per cell of the body.
@@ -119,7 +159,7 @@ impl Clamps<'_> {
 
     /// Adds the derivative of the force of clamp `index` by a change `dw` [m] of the stress-free shape: −A K dw.
     pub fn rest_column(&self, index: usize, turn: DMat3, young: f64, dw: &[DVec3], out: &mut [DVec3]) {
-        for (m, c) in self.plan.clamps[index].cells.iter().enumerate() {
+        for (m, c) in self.cells(index).iter().enumerate() {
             let d = flatten(&self.plan.body.cells[c.cell as usize].nodes.map(|n| dw[n as usize]));
             let f = corners(&multiply(self.matrix(index, m, Matrices::Stiffness), &d));
             self.add(c, turn, -young * self.factor(c), f, out);
@@ -137,9 +177,16 @@ impl Clamps<'_> {
         out: &mut [DVec3],
     ) {
         let (plan, grips) = (self.plan, Grips::new(self.plan, self.physics, elapsed));
-        let Some((da, db)) = grips.pose_slope(index, time, effect, slot) else { return };
         let pose = grips.pose(index, time);
-        for (m, c) in plan.clamps[index].cells.iter().enumerate() {
+        let Some(own) = self.grips.map(|g| &g[index]) else { return };
+        if let Some(slope) = changes::edge_slope(plan, self.physics, effect, slot) {
+            for (c, k) in own.cells.iter().zip(&own.by_edge).filter_map(|(c, k)| Some((c, k.as_ref()?))) {
+                let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
+                self.add(c, pose.0, young * self.factor(c) * slope, corners(&multiply(k, &d)), out);
+            }
+        }
+        let Some((da, db)) = grips.pose_slope(index, time, effect, slot) else { return };
+        for (m, c) in self.cells(index).iter().enumerate() {
             let (nodes, scale) = (&plan.body.cells[c.cell as usize].nodes, young * self.factor(c));
             let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
             let k = self.matrix(index, m, Matrices::Stiffness);
@@ -149,7 +196,7 @@ impl Clamps<'_> {
             self.add(c, da, scale, corners(&multiply(k, &d)), out);
             self.add(c, pose.0, scale, corners(&multiply(k, &flatten(&moved))), out);
             // The matrix: factor and layer.
-            if let Some(change) = grips.matrix_slope(self.elements, [index, m], [effect, slot]) {
+            if let Some(change) = grips.layered_slope(c, &own.stiff[m].k, self.elements.nu, [effect, slot]) {
                 self.add(c, pose.0, scale, corners(&multiply(&change, &d)), out);
             }
         }

@@ -56,7 +56,6 @@ impl HeldMoments {
 /// Adds the moments of `{φ < 0} ∩ cell ∩ region` to `held`, with the shape functions of the cell `basis` (see [`super::cut_cell`]).
 /// `full` says that the body is known to fill the cell, without surface.
 pub fn held_moments(lattice: &Lattice, cell: [i64; 3], basis: [i64; 3], full: bool, region: &ClipBox, held: &mut HeldMoments) {
-    let point = |c: [i64; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64);
     let (origin, shift) = (point(cell), point(cell) - point(basis));
     let mut sink = Clipped { region, h: lattice.h, origin, shift, held };
     if full {
@@ -64,6 +63,65 @@ pub fn held_moments(lattice: &Lattice, cell: [i64; 3], basis: [i64; 3], full: bo
     } else {
         walk(lattice, cell, &mut sink);
     }
+}
+
+impl std::ops::AddAssign<&HeldMoments> for HeldMoments {
+    fn add_assign(&mut self, other: &HeldMoments) {
+        for i in 0..8 {
+            self.surface_normal[i] += other.surface_normal[i];
+            for j in 0..8 {
+                self.surface_mass[i][j] += other.surface_mass[i][j];
+                self.volume_mass[i][j] += other.volume_mass[i][j];
+            }
+        }
+    }
+}
+
+/// The pieces of a cell inside the body and of the surface in it, kept so that many boxes can be held against them.
+#[derive(Clone, Debug, Default)]
+pub struct Pieces {
+    solids: Vec<[DVec3; 4]>,
+    faces: Vec<[DVec3; 3]>,
+}
+
+impl Pieces {
+    /// Cuts a cell; `full` as in [`held_moments`].
+    pub fn of(lattice: &Lattice, cell: [i64; 3], full: bool) -> Pieces {
+        let mut pieces = Pieces::default();
+        if full {
+            pieces.cube(DVec3::ZERO, DVec3::ONE);
+        } else {
+            walk(lattice, cell, &mut pieces);
+        }
+        pieces
+    }
+
+    /// What [`held_moments`] adds for the cell of edge `h` [m] that was cut.
+    pub fn held(&self, h: f64, cell: [i64; 3], basis: [i64; 3], region: &ClipBox) -> HeldMoments {
+        let mut held = HeldMoments::default();
+        let mut sink = Clipped { region, h, origin: point(cell), shift: point(cell) - point(basis), held: &mut held };
+        self.solids.iter().for_each(|t| sink.tetra(*t));
+        self.faces.iter().for_each(|t| sink.triangle(*t, 0));
+        held
+    }
+}
+
+impl Sink for Pieces {
+    fn cube(&mut self, lo: DVec3, hi: DVec3) {
+        self.solids.extend(kuhn(lo, hi));
+    }
+
+    fn tetra(&mut self, v: [DVec3; 4]) {
+        self.solids.push(v);
+    }
+
+    fn triangle(&mut self, v: [DVec3; 3], _octant: usize) {
+        self.faces.push(v);
+    }
+}
+
+fn point(c: [i64; 3]) -> DVec3 {
+    DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64)
 }
 
 struct Clipped<'a> {

@@ -28,6 +28,7 @@ mod tether;
 mod time_offset;
 mod uniform_force;
 
+mod clamp_edge;
 mod clamp_slip;
 mod compliant_clamp;
 mod creep;
@@ -169,6 +170,8 @@ pub enum Site {
     Rest(&'static dyn Field<3>),
     /// Every clamp: numbers as in [`crate::changes::HOLD`].
     Clamps(&'static dyn Field<HOLD>),
+    /// What every clamp holds: how far its edges are shifted along the body [m].
+    Edges(&'static dyn Field<1>),
 }
 
 /// All effects, in the order in which reports list them.
@@ -192,6 +195,7 @@ pub static ALL: &[Law] = &[
     rest_shape::LAW,
     compliant_clamp::LAW,
     clamp_slip::LAW,
+    clamp_edge::LAW,
     uniform_force::LAW,
     point_mass::LAW,
     tether::LAW,
