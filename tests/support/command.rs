@@ -1,6 +1,6 @@
 //! `palpate` run inside the test: arguments in, exit code, text and files out.
 
-use palpate::Interrupt;
+use palpate::{Interrupt, Liveliness};
 use std::path::Path;
 
 /// Exit code, stdout and stderr of one command line.
@@ -23,7 +23,7 @@ pub fn palpate(arguments: &[&str]) -> Answer {
 pub fn stopped(arguments: &[&str], interrupt: Interrupt) -> Answer {
     let (mut out, mut err) = (Vec::new(), Vec::new());
     let all = std::iter::once("palpate").chain(arguments.iter().copied());
-    let code = palpate::cli::run(all, &mut out, &mut err, interrupt, false);
+    let code = palpate::cli::run(all, &mut out, &mut err, interrupt, Liveliness::Silent);
     let text = |b: Vec<u8>| String::from_utf8(b).expect("the command line speaks UTF-8");
     Answer { code, out: text(out), err: text(err) }
 }

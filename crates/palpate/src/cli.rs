@@ -4,9 +4,9 @@ use crate::commands::{batch, diagnose, fit, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
+use crate::progress::{Liveliness, Track};
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ffi::OsString;
 use std::io::Write;
 
@@ -47,15 +47,21 @@ pub struct Console<'a> {
     out: &'a mut dyn Write,
     err: &'a mut dyn Write,
     talk: Talk,
-    draw: bool,
+    alive: Liveliness,
     /// Stops a long command in good order.
     pub interrupt: Interrupt,
 }
 
 impl Console<'_> {
-    /// The same talk to another place (a log), without progress bars.
+    /// The same talk to another place (a log), without progress.
     pub fn aside<'b>(&self, out: &'b mut dyn Write, err: &'b mut dyn Write) -> Console<'b> {
-        Console { out, err, talk: Talk { json: false, quiet: false }, draw: false, interrupt: self.interrupt.clone() }
+        Console {
+            out,
+            err,
+            talk: Talk { json: false, quiet: false },
+            alive: Liveliness::Silent,
+            interrupt: self.interrupt.clone(),
+        }
     }
 
     /// True when the result is to be JSON.
@@ -82,25 +88,20 @@ impl Console<'_> {
         }
     }
 
-    /// A progress bar on stderr; silent unless stderr is a terminal.
-    pub fn progress(&self, length: u64, what: &str) -> ProgressBar {
-        if self.talk.quiet || !self.draw {
-            return ProgressBar::hidden();
-        }
-        let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3}% {elapsed}/{duration} {msg}");
-        let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-        bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_prefix(what.to_string())
+    /// Progress of `what` over `length` units (0: unknown) on stderr.
+    pub fn progress(&self, length: u64, what: &str) -> Track {
+        Track::new(if self.talk.quiet { Liveliness::Silent } else { self.alive }, length, what)
     }
 }
 
-/// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress bars are drawn
-/// on the process's stderr when `draw` is set and it is a terminal; all else goes to `out` and `err`.
+/// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown
+/// on the process's stderr as `alive` says; all else goes to `out` and `err`.
 pub fn run<A: Into<OsString> + Clone>(
     arguments: impl IntoIterator<Item = A>,
     out: &mut dyn Write,
     err: &mut dyn Write,
     interrupt: Interrupt,
-    draw: bool,
+    alive: Liveliness,
 ) -> i32 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
@@ -114,7 +115,7 @@ pub fn run<A: Into<OsString> + Clone>(
             return 0;
         }
     };
-    let mut console = Console { out, err, talk: cli.talk, draw, interrupt };
+    let mut console = Console { out, err, talk: cli.talk, alive, interrupt };
     let done = match &cli.command {
         Command::Simulate(a) => simulate::run(a, &mut console),
         Command::Observe(a) => observe::run(a, &mut console),

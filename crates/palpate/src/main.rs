@@ -1,6 +1,6 @@
 //! `palpate`: see `palpate --help`.
 
-use palpate::Interrupt;
+use palpate::{Interrupt, Liveliness};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,7 +18,7 @@ fn main() {
     if let Err(e) = ctrlc::set_handler(handler) {
         eprintln!("warning: Ctrl-C will stop at once ({e})");
     }
-    let draw = std::io::stderr().is_terminal();
-    let code = palpate::cli::run(std::env::args_os(), &mut std::io::stdout(), &mut std::io::stderr(), interrupt, draw);
+    let alive = if std::io::stderr().is_terminal() { Liveliness::Bars } else { Liveliness::Lines };
+    let code = palpate::cli::run(std::env::args_os(), &mut std::io::stdout(), &mut std::io::stderr(), interrupt, alive);
     std::process::exit(code);
 }

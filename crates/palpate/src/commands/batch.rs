@@ -159,7 +159,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
             return Ok(Some(result));
         }
         let (backend, note) = choose(&a.choices, &experiment)?;
-        let bar = console.progress(rounds(&a.choices, &experiment), label);
+        let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
         // The journal of another problem is of no use; it is moved aside with the results.
@@ -169,8 +169,9 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         make_folder(&folder)?;
         write_file(&mark, |w| w.write_all(row.fingerprint.as_bytes()))?;
         let scenes = [scene.to_path_buf()];
-        let fitted = run_in(&scenes, &a.choices, backend, std::slice::from_ref(&experiment), &folder, resume, &bar, &mut quiet);
-        bar.finish_and_clear();
+        let fitted =
+            run_in(&scenes, &a.choices, backend, std::slice::from_ref(&experiment), &folder, resume, &mut track, &mut quiet);
+        track.finish();
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);
         row.message = fitted.warnings.first().cloned().unwrap_or_default();

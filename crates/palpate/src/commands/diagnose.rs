@@ -104,11 +104,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-diagnosis");
     make_folder(&folder)?;
-    let bar = console.progress(0, "diagnosing");
-    let mut hear = |what: &str| {
-        bar.tick();
-        bar.set_message(what.to_string());
-    };
+    let mut track = console.progress(0, "diagnosing");
+    let mut hear = |what: &str| track.at(0, what);
     let done = diagnose(
         &experiments,
         held_out.as_ref(),
@@ -121,7 +118,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             ..DiagnoseOptions::default()
         },
     )?;
-    bar.finish_and_clear();
+    track.finish();
     let result = write_all(a, &folder, &experiments, &done, backend)?;
     if console.json() {
         console.print(&result.to_string());

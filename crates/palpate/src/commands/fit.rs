@@ -7,9 +7,9 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted, fit};
 use crate::grid::grid_shift;
 use crate::options::{BackendName, out_folder};
+use crate::progress::Track;
 use crate::report::{FramePicture, ReportInput, history_csv, html, pictures, result_json, summary};
 use clap::{Args, ValueEnum};
-use indicatif::ProgressBar;
 use palpate_fit::Progress;
 use palpate_io::output::{make_folder, write_file};
 use palpate_model::scene::Optimizer;
@@ -196,9 +196,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let (backend, note) = choose(&a.choices, &experiments[0])?;
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    let bar = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
-    let (fitted, result) = run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &bar, console)?;
-    bar.finish_and_clear();
+    let mut track = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
+    let (fitted, result) = run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &mut track, console)?;
+    track.finish();
     console.warn(&fitted.warnings);
     if console.json() {
         console.print(&result.to_string());
@@ -222,7 +222,7 @@ pub fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
     iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
-/// Fits and writes everything into a folder; the progress goes to `bar`. Returns the fit and its `result.json`.
+/// Fits and writes everything into a folder; the progress goes to `track`. Returns the fit and its `result.json`.
 pub fn run_in(
     scenes: &[PathBuf],
     a: &Choices,
@@ -230,7 +230,7 @@ pub fn run_in(
     experiments: &[Experiment],
     folder: &Path,
     resume: bool,
-    bar: &ProgressBar,
+    track: &mut Track,
     console: &mut Console,
 ) -> Result<(Fitted, serde_json::Value), Error> {
     make_folder(folder)?;
@@ -244,8 +244,7 @@ pub fn run_in(
     let mut best = f64::INFINITY;
     let mut hear = |p: &Progress| {
         best = best.min(p.cost);
-        bar.inc(u64::from(p.iteration > 0));
-        bar.set_message(format!("best cost {best:.4}"));
+        track.on(u64::from(p.iteration > 0), &format!("best cost {best:.4}"));
     };
     let mut fitted = fit(
         experiments,

@@ -179,13 +179,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         sensor: Sensor { noise: a.noise, dropout: a.dropout, depth_scale: a.depth_scale, seed: a.seed },
     };
     let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
-    let bar = console.progress(1000, "observing");
+    let mut track = console.progress(1000, "observing");
     let interrupt = console.interrupt.clone();
     let recording = observe(&experiment, backend, &observers, |share| {
-        bar.set_position((share * 1000.0) as u64);
+        track.at((share * 1000.0) as u64, "");
         if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
-    bar.finish_and_clear();
+    track.finish();
     palpate_io::write_recording(&a.out, &recording)?;
 
     let readings: usize = recording.frames.iter().map(|f| f.readings().count()).sum();

@@ -124,7 +124,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
 
     // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
     // writing of what it has.
-    let bar = console.progress(plan.clock.steps as u64, "simulating");
+    let mut track = console.progress(plan.clock.steps as u64, "simulating");
     let mut states: Vec<(usize, Snapshot)> = Vec::new();
     let mut farthest: f64 = 0.0;
     let mut extent: Vec<(DVec3, DVec3)> = Vec::new();
@@ -136,11 +136,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             extent.push(points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p))));
             states.push((k, s));
         }
-        bar.set_position(k as u64);
+        track.at(k as u64, "");
         if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let interrupted = interrupt.is_raised();
-    bar.finish_and_clear();
+    track.finish();
     let seconds = clock.elapsed().as_secs_f64();
 
     let mut formats = a.format.clone();
@@ -156,14 +156,14 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         series: Vec::new(),
         files: 0,
     };
-    let bar = console.progress(states.len() as u64, "writing");
+    let mut track = console.progress(states.len() as u64, "writing");
     let mut written = 0;
     for (k, state) in &states {
         writer.write(*k, state)?;
         written += 1;
-        bar.inc(1);
+        track.on(1, "");
     }
-    bar.finish_and_clear();
+    track.finish();
     if !writer.series.is_empty() {
         palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
     }
