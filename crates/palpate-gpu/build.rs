@@ -3,12 +3,13 @@
 //!
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
-//! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number.
+//! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, and
+//! `effects/cells` for every law of cells.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, StorageAccess, TypeInner};
 use palpate_model::contact::DEFAULT_STIFFNESS;
-use palpate_model::effects::{self, Site, law};
+use palpate_model::effects::{self, Law, Site, cell, law};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -91,6 +92,9 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
     if file == "effects/points" {
         return include_points(shaders, variant, done, out);
     }
+    if file == "effects/cells" {
+        return include_cells(shaders, variant, done, out);
+    }
     let path = shaders.join(format!("{file}.wgsl"));
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     for line in text.lines() {
@@ -109,14 +113,8 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
 /// what.
 fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
     include(shaders, "shared/points", variant, done, out);
-    let mut cases = String::new();
-    for (number, law) in effects::ALL.iter().enumerate() {
-        if matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_)) {
-            let name = law.kind.replace('-', "_");
-            include(shaders, &format!("effects/{name}"), variant, done, out);
-            writeln!(cases, "        case {number}u: {{ return {name}(); }}").expect("a String takes all");
-        }
-    }
+    let acts = |law: &Law| matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_));
+    let cases = include_laws(shaders, variant, done, out, acts, "");
     let places = [
         ("COMMON", law::COMMON),
         ("MOST", law::MOST),
@@ -136,6 +134,36 @@ fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, ou
         "const DEFAULT_STIFFNESS = {DEFAULT_STIFFNESS:?};\nfn potential(law: u32) -> Dual {{\n    switch law {{\n{cases}        default: {{ return vec4(0.0); }}\n    }}\n}}\n"
     )
     .expect("a String takes all");
+}
+
+/// All laws of cells, the function `cell_law` that calls the one of a number in the table of effects, and the sizes of the input.
+fn include_cells(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    include(shaders, "shared/laws", variant, done, out);
+    let cases = include_laws(shaders, variant, done, out, |law| matches!(law.site, Site::Cells(_)), "which");
+    let (scalars, inputs) = (cell::ENERGY, cell::ENERGY + cell::MOST);
+    write!(
+        out,
+        "const SCALARS = {scalars}u;\nconst CELL_INPUTS = {inputs}u;\nfn cell_law(law: u32, which: u32) -> Dual {{\n    switch law {{\n{cases}        default: {{ return vec4(0.0); }}\n    }}\n}}\n"
+    )
+    .expect("a String takes all");
+}
+
+/// The laws that `acts` picks; returns the cases of a switch that call them.
+fn include_laws(
+    shaders: &Path,
+    variant: &str,
+    done: &mut BTreeSet<String>,
+    out: &mut String,
+    acts: impl Fn(&Law) -> bool,
+    arguments: &str,
+) -> String {
+    let mut cases = String::new();
+    for (number, law) in effects::ALL.iter().enumerate().filter(|(_, law)| acts(law)) {
+        let name = law.kind.replace('-', "_");
+        include(shaders, &format!("effects/{name}"), variant, done, out);
+        writeln!(cases, "        case {number}u: {{ return {name}({arguments}); }}").expect("a String takes all");
+    }
+    cases
 }
 
 /// What Rust must know of a linked pass.

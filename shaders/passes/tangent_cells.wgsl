@@ -1,7 +1,7 @@
 //! What a cell's tangent H_ij = R (s K_ij + Ω_i D_jᵀ + D_i Ω_jᵀ) Rᵀ is made of, beside K: R, G⁻¹ and R D_i per corner
 //! (corotation.rs: D = B + ½QΩ − s(N − ½TΩ); without B and Q where the convex part is wanted). 30 vectors per cell: no 24 × 24
 //! matrix is ever stored.
-// use shared/cells
+// use shared/rank_six
 // use shared/unstrained
 
 var<storage, read> next: array<vec4<f32>>;
@@ -28,37 +28,18 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let scale = mix.on_new * young;
     let matrix = matrix_at(m.slot, 0u, cell.kind);
     var pose: Pose;
-    var half = mat3x3<f32>();
     if is_lagged() {
         pose = held_pose(old_turn[p.member * shape.cells + e], d, sign);
     } else {
         pose = free_pose(d, sign);
     }
     pose.q = from_rest(pose.q, (p.member * shape.cells + e) * 8u + corner);
-    // N_i: column m is Σ_j K_ij (e_m × z_j).
-    let nx = stiff(matrix, corner, vec3(0.0, -pose.z.z, pose.z.y));
-    let ny = stiff(matrix, corner, vec3(pose.z.z, 0.0, -pose.z.x));
-    let nz = stiff(matrix, corner, vec3(-pose.z.y, pose.z.x, 0.0));
-    // T = ZᵀKZ: rows Σ z_i × N_i.
-    let tx = sum8(cross(pose.z, nx));
-    let ty = sum8(cross(pose.z, ny));
-    let tz = sum8(cross(pose.z, nz));
-    var q = mat3x3(tx, ty, tz) * scale;
     var before = vec3(0.0);
     if call.mode != 0u {
         before = mix.on_old * old_stress[(p.member * shape.cells + e) * 8u + corner].xyz;
     }
     let y = centred(scale * stiff(matrix, corner, pose.q) + before);
-    let f = force_body(pose, y, sign);
-    let bend = spin_stiffness(pose, y);
-    half = mat3x3(nx, ny, nz) * -scale;
-    if newton[p.member].convex == 0u {
-        half -= cross_matrix(f);
-        q += bend;
-    }
-    // Ω_i = −[b_i]× G⁻¹.
-    let omega = cross_matrix(sign * (-0.25 / shape.h)) * pose.g;
-    half += omega * (q * 0.5);
+    var half = rank_six(pose, matrix, corner, sign, scale, y, newton[p.member].convex != 0u);
     // A rotation that is given does not answer to the corners.
     if is_lagged() {
         half = mat3x3<f32>();

@@ -26,6 +26,16 @@ fn root(a: Dual) -> Dual {
     return chain(f, 0.5 / f, -0.25 / (f * a.x), a);
 }
 
+fn logarithm(a: Dual) -> Dual {
+    let d = 1.0 / a.x;
+    return chain(log(a.x), d, -d * d, a);
+}
+
+fn exponential(a: Dual) -> Dual {
+    let f = exp(a.x);
+    return chain(f, f, f, a);
+}
+
 fn sine(a: Dual) -> Dual {
     return chain(sin(a.x), cos(a.x), -sin(a.x), a);
 }

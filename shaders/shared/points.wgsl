@@ -5,6 +5,7 @@
 // use shared/contact
 // use shared/hyper
 // use shared/keys
+// use shared/effect_site
 
 // Sites of an effect.
 const AT_NODES = 0u;
@@ -19,26 +20,7 @@ const BY_OLD = 2u;
 const BACK = 3u;
 const COLUMN = 4u;
 
-const NONE = 0xffffffffu;
-
-struct EffectSite { // mirrored
-    // Number of the law, and where it acts.
-    law: u32,
-    site: u32,
-    // Its parameters: the first of a member, and how many.
-    first: u32,
-    count: u32,
-    // Rows of `effect_measures`: the nodes' measures, and their derivatives by the parameters (or NONE).
-    measures: u32,
-    slopes: u32,
-    // Parameters of all effects, and rows of `effect_measures`, of a member.
-    stride: u32,
-    rows: u32,
-}
-
 var<storage, read> effects: array<EffectSite>;
-// [B][stride].
-var<storage, read> effect_values: array<f32>;
 
 // The point, the same for all number types. Displacements are given as states have them: a large part and the rest.
 struct Spot {

@@ -66,7 +66,8 @@ struct Cell { // mirrored
     patch_end: u32,
     hold_start: u32,
     hold_end: u32,
-    pad: array<u32, 3>,
+    fraction: f32,
+    pad: array<u32, 2>,
 }
 
 struct Patch { // mirrored

@@ -15,7 +15,7 @@ pub(crate) fn step_adjoint(world: &World, k: usize, now: &State, next: &State, a
         s.solve();
         s.run(pass::HOLD_CELLS, ALL, Per::Hold, 5);
         s.couple_patches(effects::BACK, &[]);
-        s.run(pass::COUPLE_OLD, ALL, Per::Cell, 1);
+        s.couple_cells(1, &[]);
         s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
         s.press_nodes(ALL, effects::BACK, None, &adj_now.0.buffer, &[]);
         s.add_columns();
@@ -84,7 +84,7 @@ pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, o
             s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
             s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, 5, &[("probe", from)]);
             s.couple_patches(effects::BY_OLD, &[("probe", from)]);
-            s.run_with(pass::COUPLE_OLD, ALL, Per::Cell, 0, &[("probe", from)]);
+            s.couple_cells(0, &[("probe", from)]);
             s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
             s.press_nodes(ALL, effects::BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
             s.solve();

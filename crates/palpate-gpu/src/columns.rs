@@ -21,6 +21,9 @@ pub(crate) struct Column {
 const NO_HOLD: u32 = 6;
 /// A kind that no kernel knows: the column is zero.
 const NOTHING: u32 = 15;
+/// What cells and their laws depend on.
+const YOUNGS_MODULUS: u32 = 0;
+const POISSON_RATIO: u32 = 1;
 /// Kinds of parameters of effects.
 const EFFECT: u32 = 11;
 const MODULUS_SLOPE: u32 = 12;
@@ -54,8 +57,8 @@ impl Solve<'_, '_> {
         // Effects on points answer to these as well.
         let pressed = |kind, index, cells| Some(Column { kind, index, cells, press: Some((effects::column(kind, index), None)) });
         match key {
-            ParamKey::YoungsModulus => pressed(0, 0, Some([1, 2])),
-            ParamKey::PoissonRatio => column(1, 0, Some([NO_TOUCH, 3])),
+            ParamKey::YoungsModulus => pressed(YOUNGS_MODULUS, 0, Some([1, 2])),
+            ParamKey::PoissonRatio => column(POISSON_RATIO, 0, Some([NO_TOUCH, 3])),
             ParamKey::Density => column(2, 0, None),
             ParamKey::MassDamping if dynamic => column(3, 0, None),
             ParamKey::StiffnessDamping if dynamic => column(4, 0, Some([NO_TOUCH, NO_HOLD])),
@@ -97,6 +100,9 @@ impl Solve<'_, '_> {
                 _ => Column { kind: DENSITY_SLOPE, index: row, cells: None, press: None },
             });
         }
+        if let Some(law) = known.cell_law(effect) {
+            return Some(Column { kind: EFFECT, index: 16 * law + slot, cells: Some([NO_TOUCH, NO_HOLD]), press: None });
+        }
         if known.points.iter().all(|p| p.0 != effect) {
             return None;
         }
@@ -114,6 +120,9 @@ impl Solve<'_, '_> {
             }
             self.run(pass::HOLD_CELLS, ALL, Per::Hold, hold);
             self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + KINDS * c.index);
+            if [YOUNGS_MODULUS, POISSON_RATIO, EFFECT, MODULUS_SLOPE, AGING_SLOPE, REST_SLOPE].contains(&c.kind) {
+                self.laws(pass::COLUMN_LAWS, ALL, Per::Cell, c.kind + KINDS * c.index, &[]);
+            }
         }
         let flag = if c.cells.is_some() { FLAG } else { 0 };
         self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + KINDS * c.index + flag);

@@ -1,4 +1,4 @@
-//! Effects on the device. Laws of points are WGSL twins (`shaders/effects/`) that two passes call by number; stiffness and density that
+//! Effects on the device. Laws of points and cells are WGSL twins (`shaders/effects/`) that passes call by number; stiffness and density that
 //! vary over the body or in time do not depend on the states and are computed here, in f64, from the laws themselves; so are
 //! stress-free shapes (`rests`) and what effects make of clamps (`grips`).
 
@@ -12,9 +12,10 @@ use crate::pipelines::pass;
 use crate::recorder::Named;
 use crate::solve::{Per, Solve};
 use palpate_model::changes::{self, Changes};
+use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
 use palpate_model::plan::{Physics, Plan};
-use palpate_model::scene::InitialShape;
+use palpate_model::scene::{InitialShape, RotationUpdate};
 use std::collections::HashMap;
 
 /// Questions to a law, as `shared/points.wgsl` numbers them.
@@ -31,6 +32,10 @@ pub(crate) fn column(kind: u32, index: u32) -> u32 {
 const NODES: u32 = 0;
 const SURFACE: u32 = 1;
 const CONTACT: u32 = 2;
+const CELLS: u32 = 3;
+
+/// Most laws of cells of a plan (`shared/laws.wgsl`).
+const MOST_LAWS: usize = 16;
 
 /// Bits of `Shape::fields`.
 const MODULUS: u32 = 1;
@@ -46,6 +51,8 @@ const GRIPS: u32 = 64;
 pub(crate) struct Effects {
     /// Effects on points: number in the plan, and what the kernels know.
     pub(crate) points: Vec<(usize, EffectSite)>,
+    /// Effects on cells, likewise.
+    cells: Vec<(usize, EffectSite)>,
     /// First row of slopes of every effect that is computed here.
     fields: Vec<Option<u32>>,
     /// As `Shape` has them.
@@ -69,7 +76,7 @@ impl Effects {
     /// The effects of a plan.
     ///
     /// # Errors
-    /// One of them has no place on the device yet.
+    /// One of them has no place on the device.
     pub(crate) fn new(plan: &Plan) -> Result<Effects, GpuError> {
         let mut e = Effects { steps: plan.clock.steps, ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
@@ -97,18 +104,28 @@ impl Effects {
                     e.rest_rows += count;
                     None
                 }
-                Site::Clamps(_) if grips::known(plan, number, places.len()) => {
+                Site::Clamps(_) => {
                     e.bits |= GRIPS;
                     field = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
                     None
                 }
+                Site::Cells(_) if plan.solver.rotation == RotationUpdate::Lagged => {
+                    return Err(GpuError::Plan { what: format!("the effect `{}` together with lagged rotation", law.kind) });
+                }
+                Site::Cells(_) if e.cells.len() == MOST_LAWS => {
+                    return Err(GpuError::Plan { what: format!("more than {MOST_LAWS} laws of cells") });
+                }
+                Site::Cells(_) => Some(CELLS),
                 // The observer's business.
                 Site::Clock | Site::Marker | Site::Readings(_) => None,
                 _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
             };
             e.fields.push(field);
-            if let Some(site) = site {
+            if let Some(site) = site.filter(|s| *s == CELLS) {
+                let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
+                e.cells.push((number, EffectSite { law, site, first: e.stride, count, ..EffectSite::default() }));
+            } else if let Some(site) = site {
                 e.bits |= if site == NODES { 0 } else { PATCHES };
                 let slopes = if shares(plan, law, &plan.theta[places]).is_some() { e.rows + 1 } else { u32::MAX };
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
@@ -121,15 +138,31 @@ impl Effects {
             e.stride += count;
         }
         e.matrix_rows = grips::matrix_rows(plan, &e.grip_rows);
-        for (_, p) in &mut e.points {
+        for (_, p) in e.points.iter_mut().chain(&mut e.cells) {
             (p.stride, p.rows) = (e.stride, e.rows);
         }
+        e.bits |= scalars(plan) << 8 | (e.cells.len() as u32) << 12;
         Ok(e)
     }
 
     /// What the kernels know of the effects on points.
     pub(crate) fn sites(&self) -> Vec<EffectSite> {
         self.points.iter().map(|p| p.1).collect()
+    }
+
+    /// What the kernels know of the effects on cells.
+    pub(crate) fn cell_sites(&self) -> Vec<EffectSite> {
+        self.cells.iter().map(|c| c.1).collect()
+    }
+
+    /// Place of an effect among those on cells.
+    pub(crate) fn cell_law(&self, effect: usize) -> Option<u32> {
+        self.cells.iter().position(|c| c.0 == effect).map(|k| k as u32)
+    }
+
+    /// True when some effect acts on cells.
+    pub(crate) fn on_cells(&self) -> bool {
+        !self.cells.is_empty()
     }
 
     /// True when some effect acts on patches.
@@ -250,6 +283,12 @@ impl Effects {
         }
         out
     }
+}
+
+/// Number of scalars that the energies of a plan's laws of cells depend on; 0 without such laws.
+fn scalars(plan: &Plan) -> u32 {
+    let needs = |law: &Law| if let Site::Cells(cell) = law.site { cell.needs(Part::Energy) } else { 0 };
+    plan.layout.effects().map(|(law, _)| needs(law)).max().unwrap_or(0) as u32
 }
 
 /// Shares of the nodes in a load that they carry together, with derivatives.

@@ -127,7 +127,8 @@ impl Geometry {
                     patch_end: if touched { body.patches.partition_point(|p| p.cell <= number) as u32 } else { 0 },
                     hold_start: holds.partition_point(|h| cell_of(h) < number) as u32,
                     hold_end: holds.partition_point(|h| cell_of(h) <= number) as u32,
-                    pad: [0; 3],
+                    fraction: cell.fraction as f32,
+                    pad: [0; 2],
                 }
             })
             .collect();
@@ -222,6 +223,7 @@ impl Geometry {
         buffers.insert("places", gpu.upload("places", &contributions.concat())?);
         buffers.insert("ghosts", gpu.upload("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>())?);
         buffers.insert("effects", gpu.upload("effects", &effects.sites())?);
+        buffers.insert("cell_effects", gpu.upload("cell_effects", &effects.cell_sites())?);
         buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
         Ok(Geometry { shape, classes, holds, effects })
     }

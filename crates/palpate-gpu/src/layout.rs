@@ -72,7 +72,8 @@ pub struct Shape {
     /// 1 with a ghost penalty.
     pub ghosts: u32,
     /// 1: effects vary the stiffness over the body, 2: the density, 4: effects act on patches, 8: the stiffness varies in time, 16: the stress-free
-    /// shape is another, 32: and the body starts in it, 64: effects act on clamps.
+    /// shape is another, 32: and the body starts in it, 64: effects act on clamps. Bits 8 to 11: number of scalars that
+    /// laws of cells depend on; from bit 12 on how many such laws there are.
     pub fields: u32,
     /// Rows of the slopes of such fields, per member.
     pub slope_rows: u32,
@@ -122,13 +123,13 @@ pub struct Plane {
     pub pad: [f32; 2],
 }
 
-/// An effect on points: its law, where it acts, and where its numbers lie.
+/// An effect on points or cells: its law, where it acts, and where its numbers lie.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct EffectSite {
     /// Place of the law in the table of effects.
     pub law: u32,
-    /// 0 = nodes, 1 = surface, 2 = surface and planes.
+    /// 0 = nodes, 1 = surface, 2 = surface and planes, 3 = cells.
     pub site: u32,
     /// First of its parameters among a member's.
     pub first: u32,
@@ -160,8 +161,10 @@ pub struct Cell {
     pub hold_start: u32,
     /// One past the last.
     pub hold_end: u32,
+    /// Part of its volume that is filled.
+    pub fraction: f32,
     /// Fills up.
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 /// A surface patch.

@@ -117,7 +117,21 @@ impl<'a, 'r> Solve<'a, 'r> {
         // The clamps' old force; its weight is zero where it does not act.
         self.run(pass::HOLD_CELLS, ALL, Per::Hold, 1);
         self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
+        self.laws(pass::PRESS_LAWS, ALL, Per::Cell, 1, &[]);
         self.run(pass::GATHER_OLD, ALL, Per::Node, 0);
+    }
+
+    /// A pass of the laws of cells, where there are any.
+    pub(crate) fn laws(&mut self, pass: usize, section: u32, per: Per, extra: u32, more: &Named) {
+        if self.world.geometry.effects.on_cells() {
+            self.run_with(pass, section, per, extra, more);
+        }
+    }
+
+    /// Forces of the cells and of their laws at the new state.
+    pub(crate) fn press_cells(&mut self, section: u32) {
+        self.run(pass::PRESS_CELLS, section, Per::Cell, 0);
+        self.laws(pass::PRESS_LAWS, section, Per::Cell, 0, &[]);
     }
 
     /// Tangent, matrix and preconditioner of the members of a section, at the new state.
@@ -128,7 +142,9 @@ impl<'a, 'r> Solve<'a, 'r> {
             self.press_patches(section, effects::STIFFNESS, None, &[]);
         }
         self.run(pass::TANGENT_CELLS, section, Per::Cell, 0);
+        self.laws(pass::TANGENT_LAWS, section, Per::Cell, 0, &[]);
         self.run(pass::GATHER_MATRIX, section, Per::Block, 0);
+        self.laws(pass::GATHER_LAWS, section, Per::Block, 0, &[]);
         self.press_nodes(section, effects::STIFFNESS, None, &self.world.buffers["column"], &[]);
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
     }
@@ -144,7 +160,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             self.run(pass::TOUCH_PATCHES, TRIAL, Per::Patch, 0);
             self.press_patches(TRIAL, effects::FORCE, None, &[]);
             self.run(pass::HOLD_CELLS, TRIAL, Per::Hold, 0);
-            self.run(pass::PRESS_CELLS, TRIAL, Per::Cell, 0);
+            self.press_cells(TRIAL);
             self.run(pass::GATHER_RESIDUAL, TRIAL, Per::Node, 0);
             self.press_nodes(TRIAL, effects::FORCE, None, &self.world.buffers["residual"], &[]);
             self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, 0);
@@ -201,6 +217,12 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.prepare();
         self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
         self.assemble(ALL);
+    }
+
+    /// Derivative of the cells' force by the old state, times a vector (`back` 0), or its transpose (1).
+    pub(crate) fn couple_cells(&mut self, back: u32, more: &Named) {
+        self.run_with(pass::COUPLE_OLD, ALL, Per::Cell, back, more);
+        self.laws(pass::COUPLE_LAWS, ALL, Per::Cell, back, more);
     }
 
     /// What effects on patches have to say of the old state, for `couple_old`.

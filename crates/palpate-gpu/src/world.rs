@@ -46,7 +46,7 @@ pub struct World {
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 23] = [
+const WORK: [Work; 24] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -62,6 +62,7 @@ const WORK: [Work; 23] = [
     ("values", |s| 9 * s.blocks, 4),
     ("tangents", |s| 30 * s.cells, VECTOR),
     ("cell_force", |s| 8 * s.cells, VECTOR),
+    ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
     ("cell_support", |s| 8 * s.cells, VECTOR),
     ("old_stress", |s| 8 * s.cells, VECTOR),
     ("old_turn", |s| s.cells, VECTOR),
@@ -71,6 +72,14 @@ const WORK: [Work; 23] = [
     ("cg_parts", |s| 2 * s.nodes.div_ceil(32), 4),
     ("newton", |_| 1, size_of::<Newton>() as u64),
 ];
+
+/// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
+fn modes(fields: u32) -> u32 {
+    match (fields >> 8) & 15 {
+        0 => 0,
+        n => 1 + 8 * (n + 1) + 2 * n,
+    }
+}
 
 /// Sections of the roster, and kinds of items, of `list_members`.
 pub(crate) const SECTIONS: usize = 4;
@@ -115,8 +124,8 @@ impl World {
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
         };
-        if world.geometry.effects.on_nodes() {
-            // What effects add to the nodes' blocks is in the matrix alone.
+        if world.geometry.effects.on_nodes() || world.geometry.effects.on_cells() {
+            // What effects add to blocks is in the matrix alone.
             world.product = Product::Matrix;
         } else if many && tuning.product.is_none() {
             world.product = tuning::faster(&mut world)?;

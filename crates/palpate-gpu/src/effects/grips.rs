@@ -36,16 +36,6 @@ fn device_pose(at: impl Fn(f64) -> Pose, time: f64) -> ClampPose {
     }
 }
 
-/// Numbers of a clamp's field (`palpate_model::changes::HOLD`) that the device knows: factor, layer, offset, rotation.
-const KNOWN: usize = 8;
-
-/// True when effect `number` changes of the clamps only what the device knows of them.
-pub(super) fn known(plan: &Plan, number: usize, count: usize) -> bool {
-    let (physics, spot) = (Physics::new(&plan.layout, &plan.theta), Spot::of(plan));
-    let mut slopes = (0..count).filter_map(|slot| changes::hold_slope(plan, &physics, &spot, number, slot));
-    slopes.all(|s| s.iter().skip(KNOWN).all(|v| *v == 0.0))
-}
-
 /// Rows of the parameters that change the clamps' matrices, at the plan's own parameters or a little beyond.
 pub(super) fn matrix_rows(plan: &Plan, rows: &[[usize; 2]]) -> Vec<usize> {
     let spot = Spot::of(plan);

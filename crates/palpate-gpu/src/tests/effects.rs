@@ -18,10 +18,14 @@ use palpate_model::scene::{RotationUpdate, Scene};
 use std::collections::HashMap;
 
 /// Random numbers in [low, high): a linear congruential generator (Knuth's constants).
-struct Noise(u64);
+pub(super) struct Noise(u64);
 
 impl Noise {
-    fn uniform(&mut self, low: f64, high: f64) -> f64 {
+    pub(super) fn new(seed: u64) -> Noise {
+        Noise(seed)
+    }
+
+    pub(super) fn uniform(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -150,7 +154,7 @@ fn every_law_of_points_agrees_with_its_twin() {
             Site::Surface(p) | Site::Contact(p) => (p, true),
             _ => continue,
         };
-        let mut noise = Noise(5 + number as u64);
+        let mut noise = Noise::new(5 + number as u64);
         let probes: Vec<Probe> =
             std::iter::repeat_with(|| probe(law, &mut noise)).filter(|p| !point.skips(&p.place, &p.z)).take(100).collect();
         let right: Vec<Vec<f64>> = probes.iter().map(|p| exact(point, p)).collect();
@@ -169,7 +173,7 @@ fn every_law_of_points_agrees_with_its_twin() {
 }
 
 /// A scene with an effect of this kind.
-fn with(scene: &mut Scene, kind: &str, values: &[(&str, &[f64])]) {
+pub(super) fn with(scene: &mut Scene, kind: &str, values: &[(&str, &[f64])]) {
     let law = effects::find(kind).unwrap_or_else(|| panic!("{kind}"));
     let mut effect = Effect::absent(law);
     for (key, numbers) in values {
@@ -181,7 +185,7 @@ fn with(scene: &mut Scene, kind: &str, values: &[(&str, &[f64])]) {
 
 /// Two members with all derivatives by the numbers of effects and by what effects change the derivative of; every effect's first
 /// number, wrong by `fault`, must show.
-fn compare(plan: &Plan, fault: f64) {
+pub(super) fn compare(plan: &Plan, fault: f64) {
     let Some(gpu) = device(None) else { return };
     let own = |k: &ParamKey| match *k {
         ParamKey::Effect { law, slot, .. } => {
@@ -326,7 +330,16 @@ fn evaluations_of_a_body_of_another_shape_in_soft_slipping_clamps_agree() {
 fn an_effect_without_a_place_on_the_device_is_refused_by_name() {
     let Some(gpu) = device(None) else { return };
     let mut s = ball(0.05);
+    let refusal = |s: &Scene| {
+        GpuBackend::on(gpu.clone()).build(&super::scenes::plan(s), 1).err().map(|e| e.to_string()).unwrap_or_default()
+    };
     with(&mut s, "strain-stiffening", &[]);
-    let e = GpuBackend::on(gpu).build(&super::scenes::plan(&s), 1).err().map(|e| e.to_string()).unwrap_or_default();
+    assert_eq!(refusal(&s), "");
+    s.solver.rotation = RotationUpdate::Lagged;
+    let e = refusal(&s);
     assert!(e.contains("`strain-stiffening`"), "{e}");
+    let mut s = held(0.05);
+    with(&mut s, "clamp-edge", &[]);
+    let e = refusal(&s);
+    assert!(e.contains("`clamp-edge`"), "{e}");
 }

@@ -36,6 +36,10 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),
         () if has("< KINDS") => 10,
         () if has("< INPUTS") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
+        () if has("< CELL_INPUTS") => (palpate_model::effects::cell::ENERGY + palpate_model::effects::cell::MOST) as u64,
+        () if has("< SCALARS") => palpate_model::effects::cell::ENERGY as u64,
+        // Laws of cells that the host lets into a plan.
+        () if has("< MOST_LAWS") => 16,
         () if has("< MOST;") => palpate_model::effects::law::MOST as u64,
         () if has("shape.chunk") => most.chunk,
         () if has("i < shape.nodes; i += 256u") => most.share(),

@@ -1,5 +1,6 @@
 //! Kernels against the CPU backend on small bodies.
 
+mod cell_laws;
 mod derivatives;
 mod effects;
 mod extremes;

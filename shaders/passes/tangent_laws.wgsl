@@ -1,0 +1,59 @@
+//! Adds the laws of cells to what tangent_cells left, and lists what else the tangent is made of: Σ ψ_kl r_k r_lᵀ + φ_dd r_d r_dᵀ with r the
+//! world-frame gradients of V s and V d. `law_modes` holds per cell: (factor of K, 0, E φ_dd/V, 0); r_k and r_d per corner; the matrix
+//! E θ ψ_kl/V, two vectors a row.
+// use effects/cells
+// use shared/rank_six
+// use shared/modes
+
+var<storage, read> newton: array<Newton>;
+var<storage, read_write> tangents: array<vec4<f32>>;
+var<storage, read_write> law_modes: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                @builtin(local_invocation_index) local: u32) {
+    let c = find_corner(group, groups, local);
+    let n = scalars();
+    let fresh = new_side(c);
+    let old = old_side(c);
+    let w = way_of(c, fresh, old);
+    // Every lane takes one row of ψ's second derivatives.
+    let row = min(c.number, n - 1u);
+    var ds = nowhere();
+    ds[row] = 1.0;
+    let r = ask(c, ENERGY_PART, fresh.s, ds, NONE, 0u);
+    let loss = loss_of(c, w, old, vec2(1.0, 0.0), NONE, 0u);
+    let scale = c.young * (c.mix.fresh * r.first[0] + loss.y);
+    let y = c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd);
+    let half = rank_six(fresh.pose, stiffness_of(c), c.number, c.sign, scale, centred(y), newton[c.member].convex != 0u);
+    let turned = fresh.pose.r * half;
+    let unit = c.young / volume_of(c);
+    let at = mode_at(c.member, c.cell, n);
+    let own = corner_mode(at, n, c.number);
+    let by_way = force(fresh.pose, w.kd, c.sign);
+    if c.live {
+        for (var k = 0u; k < 3u; k++) {
+            tangents[(c.member * shape.cells + c.cell) * 30u + 6u + 3u * c.number + k] += vec4(turned[k], 0.0);
+        }
+        law_modes[own + n] = vec4(by_way, 0.0);
+        if c.number == 0u {
+            law_modes[at] = vec4(scale, 0.0, unit * loss.z, 0.0);
+        }
+        if c.number < n {
+            let b = r.bend;
+            law_modes[row_mode(at, n, row)] = (unit * c.mix.fresh) * vec4(b[0], b[1], b[2], b[3]);
+            law_modes[row_mode(at, n, row) + 1u] = (unit * c.mix.fresh) * vec4(b[4], b[5], b[6], 0.0);
+        }
+    }
+    for (var k = 0u; k < SCALARS; k++) {
+        if k >= n {
+            break;
+        }
+        var one = nowhere();
+        one[k] = 1.0;
+        let by = force(fresh.pose, stress(c, fresh, one), c.sign);
+        if c.live {
+            law_modes[own + k] = vec4(by, 0.0);
+        }
+    }
+}

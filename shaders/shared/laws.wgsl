@@ -1,0 +1,206 @@
+//! Laws of cells: scalars of a cell's deformation, what laws say of them, and the body-frame forces that follow. Twin of
+//! palpate-cpu/src/passes/materials.rs and palpate-model/src/effects/cell.rs. Laws are the files of `effects/`; the build script links
+//! them with `cell_law`, which calls the one of a number, and with the sizes of the input. All laws of a plan act at once.
+// use shared/corner
+// use shared/hyper
+// use shared/effect_site
+
+// The two functions of a law: ψ of (a, ε), and φ of (d, a₀).
+const ENERGY_PART = 0u;
+const LOSS_PART = 1u;
+// The host lets no more into a plan.
+const MOST_LAWS = 16u;
+
+var<storage, read> cell_effects: array<EffectSite>;
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> next: array<vec4<f32>>;
+
+// The input, the change of it that derivatives are taken along, and 1/Δt.
+var<private> input: array<vec4<f32>, CELL_INPUTS>;
+var<private> along: array<f32, CELL_INPUTS>;
+var<private> step_rate: f32;
+
+fn density() -> Dual {
+    return input[0];
+}
+
+fn old_density() -> Dual {
+    return input[1];
+}
+
+// Mean strain: xx, yy, zz, yz, zx, xy.
+fn strain(i: u32) -> Dual {
+    return input[1u + i];
+}
+
+fn param(i: u32) -> Dual {
+    return input[SCALARS + i];
+}
+
+struct Answer {
+    value: f32,
+    // By the scalars.
+    first: array<f32, SCALARS>,
+    // Change of that along a change of the input.
+    bend: array<f32, SCALARS>,
+}
+
+// Scalars that the energies of this plan's laws depend on.
+fn scalars() -> u32 {
+    return (shape.fields >> 8u) & 15u;
+}
+
+// Asks the law of a number, with the input's values and `along` in place, for derivatives by the first `count` scalars.
+fn ask_law(law: u32, which: u32, count: u32) -> Answer {
+    var r: Answer;
+    for (var i = 0u; i < SCALARS; i++) {
+        if i >= count {
+            break;
+        }
+        for (var k = 0u; k < CELL_INPUTS; k++) {
+            input[k] = vec4(input[k].x, f32(k == i), along[k], 0.0);
+        }
+        let v = cell_law(law, which);
+        r.value = v.x;
+        r.first[i] = v.y;
+        r.bend[i] = v.w;
+    }
+    return r;
+}
+
+// Sum over the plan's laws at scalars `s` that change by `ds`, as does parameter `slot` of law `only`.
+fn ask(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, only: u32, slot: u32) -> Answer {
+    var sum: Answer;
+    var values = s;
+    var changes = ds;
+    // Dissipation is a function of the increment; what it takes from the old state is not differentiated.
+    let count = select(scalars(), 1u, which == LOSS_PART);
+    step_rate = 1.0 / shape.dt;
+    for (var k = 0u; k < MOST_LAWS; k++) {
+        if k >= (shape.fields >> 12u) {
+            break;
+        }
+        let effect = cell_effects[k];
+        for (var i = 0u; i < CELL_INPUTS; i++) {
+            if i < SCALARS {
+                input[i] = number(values[min(i, SCALARS - 1u)]);
+                along[i] = changes[min(i, SCALARS - 1u)];
+            } else {
+                let p = i - SCALARS;
+                input[i] = number(0.0);
+                if p < effect.count {
+                    input[i] = number(effect_values[c.member * effect.stride + effect.first + p]);
+                }
+                along[i] = f32(k == only && p == slot);
+            }
+        }
+        var r = ask_law(effect.law, which, count);
+        sum.value += r.value;
+        for (var i = 0u; i < SCALARS; i++) {
+            sum.first[i] += r.first[i];
+            sum.bend[i] += r.bend[i];
+        }
+    }
+    return sum;
+}
+
+// One state of a cell: pose, this lane's deformation and K q, and the scalars.
+struct Side {
+    pose: Pose,
+    q: vec3<f32>,
+    kq: vec3<f32>,
+    s: array<f32, SCALARS>,
+}
+
+fn volume_of(c: Corner) -> f32 {
+    return cells[c.cell].fraction * shape.h * shape.h * shape.h;
+}
+
+fn stiffness_of(c: Corner) -> u32 {
+    return matrix_at(c.m.slot, 0u, cells[c.cell].kind);
+}
+
+// Mean strain of a deformation, in places 1 to 6.
+fn strains(c: Corner, q: vec3<f32>) -> array<f32, SCALARS> {
+    let h = gradient_of(q, c.sign);
+    return array<f32, SCALARS>(0.0, h[0].x, h[1].y, h[2].z, 0.5 * (h[1].z + h[2].y), 0.5 * (h[2].x + h[0].z), 0.5 * (h[0].y + h[1].x));
+}
+
+// (a·b summed over the corners)/V.
+fn mean(c: Corner, a: vec3<f32>, b: vec3<f32>) -> f32 {
+    return sum8(vec3(dot(a, b), 0.0, 0.0)).x / volume_of(c);
+}
+
+fn side_at(c: Corner, u: vec3<f32>) -> Side {
+    var s: Side;
+    s.pose = free_pose(u, c.sign);
+    s.q = from_rest(s.pose.q, c.at);
+    s.kq = stiff(stiffness_of(c), c.number, s.q);
+    s.s = strains(c, s.q);
+    s.s[0] = max(0.5 * mean(c, s.q, s.kq), 0.0);
+    return s;
+}
+
+fn new_side(c: Corner) -> Side {
+    return side_at(c, (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz));
+}
+
+fn old_side(c: Corner) -> Side {
+    return side_at(c, (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz));
+}
+
+// Σ V ∇s_k c_k at this corner: the body-frame force for E = 1 that goes with coefficients c.
+fn stress(c: Corner, side: Side, k: array<f32, SCALARS>) -> vec3<f32> {
+    let sym = mat3x3(
+        vec3(k[1], 0.5 * k[6], 0.5 * k[5]),
+        vec3(0.5 * k[6], k[2], 0.5 * k[4]),
+        vec3(0.5 * k[5], 0.5 * k[4], k[3]),
+    );
+    return k[0] * side.kq + (volume_of(c) * 0.25 / shape.h) * (sym * c.sign);
+}
+
+// Change of the scalars with a change of q.
+fn scalar_rates(c: Corner, side: Side, dq: vec3<f32>) -> array<f32, SCALARS> {
+    var ds = strains(c, dq);
+    ds[0] = mean(c, side.kq, dq);
+    return ds;
+}
+
+// Derivative of the energy's force of one state, for E = 1, along a change of q.
+fn stress_rate(c: Corner, side: Side, dq: vec3<f32>) -> vec3<f32> {
+    let r = ask(c, ENERGY_PART, side.s, scalar_rates(c, side, dq), NONE, 0u);
+    return stress(c, side, r.bend) + r.first[0] * stiff(stiffness_of(c), c.number, dq);
+}
+
+// The increment of a step: K (q₁ − q₀) at this corner, and d.
+struct Way {
+    kd: vec3<f32>,
+    d: f32,
+}
+
+fn way_of(c: Corner, fresh: Side, old: Side) -> Way {
+    var w: Way;
+    let dq = fresh.q - old.q;
+    w.kd = stiff(stiffness_of(c), c.number, dq);
+    w.d = max(0.5 * mean(c, dq, w.kd), 0.0);
+    return w;
+}
+
+// φ with its first derivative by d, and the change of that along changes of d, a₀ and a parameter; nothing in a static problem.
+fn loss_of(c: Corner, w: Way, old: Side, change: vec2<f32>, only: u32, slot: u32) -> vec3<f32> {
+    if call.mode == 0u {
+        return vec3(0.0);
+    }
+    var s: array<f32, SCALARS>;
+    var ds: array<f32, SCALARS>;
+    s[0] = w.d;
+    s[1] = old.s[0];
+    ds[0] = change.x;
+    ds[1] = change.y;
+    let r = ask(c, LOSS_PART, s, ds, only, slot);
+    return vec3(r.value, r.first[0], r.bend[0]);
+}
+
+fn nowhere() -> array<f32, SCALARS> {
+    return array<f32, SCALARS>();
+}
