@@ -43,6 +43,17 @@ fn a_recorded_simulation_gives_its_stiffness_back() {
 }
 
 #[test]
+fn who_stops_at_once_is_told_that_nothing_was_found() {
+    let folder = observed(BALL);
+    let (scene, out) = (folder.path().join("fit.toml"), folder.path().join("out"));
+    for verb in ["fit", "diagnose"] {
+        let a = stopped(&[verb, arg(&scene), "--out", arg(&out)], Interrupt::after(0));
+        assert_eq!(a.code, INTERRUPTED, "{verb}: {}", a.err);
+        assert!(a.err.ends_with("error: interrupted: nothing was written\n"), "{verb}: {}", a.err);
+    }
+}
+
+#[test]
 fn an_interrupted_fit_resumes_to_the_same_result() {
     let folder = observed(BALL);
     let file = |name: &str| folder.path().join(name);

@@ -2,6 +2,7 @@
 
 mod blind;
 mod measured;
+mod stopping;
 
 use crate::cli::BLOCK;
 use serde_json::Value;

@@ -159,6 +159,9 @@ pub struct Diagnosis {
     pub design_effect: f64,
     /// True when it was stopped before its end.
     pub interrupted: bool,
+    /// True when that was before the baseline was fitted, or before it was known what cells and step explain: then it is not even sure that
+    /// something is missing.
+    pub unsure: bool,
 }
 
 impl Diagnosis {
@@ -171,6 +174,11 @@ impl Diagnosis {
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
         match self.verdict {
             Verdict::Adequate => format!("Nothing is missing that these data could show: {apart} ({}).", p(self.p_value)),
+            Verdict::Undecided if self.unsure => {
+                format!(
+                    "Nothing is decided: the diagnosis was interrupted before the baseline and its noise were known; so far {apart}."
+                )
+            }
             Verdict::Unexplained | Verdict::Undecided => {
                 let open = self.verdict == Verdict::Undecided;
                 let none = if open { "nothing helps so far" } else { "no known effect helps" };
@@ -208,14 +216,29 @@ impl Diagnosis {
                     .collect();
                 format!(
                     "The model lacks something{place}: {}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of \
-                     the gap on data left out.",
+                     the gap on data left out.{}",
                     what.join("; and "),
                     mm(self.before.rms),
                     mm(self.after.rms),
                     mm(self.after.noise),
-                    100.0 * self.gap_closed
+                    100.0 * self.gap_closed,
+                    self.unfinished()
                 )
             }
+        }
+    }
+
+    /// What was not tried to its end although an answer was found; empty when nothing is open.
+    fn unfinished(&self) -> String {
+        let known =
+            |k: &str| self.effects.iter().any(|e| e.accepted && (e.kind == k || e.indistinguishable_from.iter().any(|o| o == k)));
+        let open: Vec<&str> = self.not_tried.iter().filter_map(|n| n.split(": ").next()).filter(|k| !known(k)).collect();
+        let why = if self.interrupted { "was interrupted" } else { "ended" };
+        match open.len() {
+            0 if self.interrupted => " The search was interrupted.".into(),
+            0 => String::new(),
+            n if n <= 4 => format!(" The search {why} before it had tried to the end: {}.", open.join(", ")),
+            n => format!(" The search {why} before it had tried to the end: {} and {} more.", open[..3].join(", "), n - 3),
         }
     }
 }

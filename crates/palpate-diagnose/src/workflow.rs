@@ -142,10 +142,11 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         no_time: false,
     };
     let fields = s.finer(&baseline);
+    let unsure = s.lab.interrupted();
     let mut state = s.state(baseline.clone(), readings, fields, None)?;
     s.correlate(&mut state);
     let first = (state.readings.clone(), s.grid(&state));
-    let mut out = Progress::default();
+    let mut out = Progress { unsure, ..Progress::default() };
     let mut adequacy;
     let base = state.clone();
     loop {
@@ -196,6 +197,7 @@ struct Progress {
     blocks: Vec<Block>,
     p_value: f64,
     interrupted: bool,
+    unsure: bool,
 }
 
 fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {

@@ -197,6 +197,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
 fn failed(e: FitError) -> Error {
     match e {
         FitError::Journal(palpate_fit::JournalError::Content { .. }) | FitError::Residuals { .. } => Error::Input(e.to_string()),
+        FitError::Interrupted => Error::Interrupted,
         _ => Error::Failed(e.to_string()),
     }
 }

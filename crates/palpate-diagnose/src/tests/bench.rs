@@ -23,6 +23,10 @@ pub struct Bench {
     /// Hidden numbers: pattern's name and size.
     hidden: Vec<(String, f64)>,
     held: Vec<String>,
+    /// Kinds that there is no time to fit.
+    pub slow: Vec<&'static str>,
+    /// True once somebody has asked to stop.
+    pub stopped: bool,
 }
 
 /// A smooth pattern over place and time that a name stands for; a magnet pulls at one spot only.
@@ -97,7 +101,15 @@ impl Bench {
             held: held.clone(),
             contact: vec![vec![(0.5, 0.8)]],
         };
-        Bench { setting, rest, rough, hidden: hidden.iter().map(|h| (h.0.to_string(), h.1)).collect(), held }
+        Bench {
+            setting,
+            rest,
+            rough,
+            hidden: hidden.iter().map(|h| (h.0.to_string(), h.1)).collect(),
+            held,
+            slow: Vec::new(),
+            stopped: false,
+        }
     }
 
     /// Name of the pattern of the first number of an effect.
@@ -176,6 +188,9 @@ impl Laboratory for Bench {
 
     fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)], _: usize, _: f64) -> Vec<Result<Fit, LabError>> {
         let one = |(changes, values): &(Vec<Change>, Vec<f64>)| {
+            if changes.last().is_some_and(|c| self.slow.contains(&c.kind())) {
+                return Err(LabError::NoTime);
+            }
             let r = self.readings(changes, values, 0);
             let columns: Vec<Vec<f64>> =
                 (0..r.columns).map(|k| r.sensitivity.iter().skip(k).step_by(r.columns).copied().collect()).collect();
@@ -222,7 +237,7 @@ impl Laboratory for Bench {
     }
 
     fn interrupted(&self) -> bool {
-        false
+        self.stopped
     }
 
     fn say(&mut self, _: &str) {}

@@ -59,6 +59,28 @@ fn nothing_hidden_is_adequate() {
 }
 
 #[test]
+fn an_answer_says_what_there_was_no_time_for() {
+    let (a, b) = (Bench::first_pattern("uniform-force"), Bench::first_pattern("depth-bias"));
+    let mut bench = Bench::new(9, &[(&a, -2.0 * NOISE), (&b, 0.5 * NOISE)], false);
+    bench.slow = vec!["depth-bias"];
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", d.sentence());
+    assert!(d.sentence().ends_with("The search ended before it had tried to the end: depth-bias."), "{}", d.sentence());
+}
+
+#[test]
+fn who_stops_before_the_noise_is_known_is_told_no_more_than_that() {
+    let mut bench = Bench::new(9, &[(&Bench::first_pattern("uniform-force"), -2.0 * NOISE)], false);
+    let baseline = bench.baseline();
+    bench.stopped = true;
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!(d.verdict, Verdict::Undecided);
+    assert!(d.interrupted && d.unsure && d.effects.is_empty());
+    assert!(d.sentence().starts_with("Nothing is decided: the diagnosis was interrupted"), "{}", d.sentence());
+}
+
+#[test]
 fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
     let (mut alarms, mut factors) = (0, Vec::new());
     const RECORDINGS: u64 = 120;

@@ -97,6 +97,7 @@ impl Session<'_> {
             noise_ratio: self.noise_ratio,
             design_effect: self.design_effect,
             interrupted: out.interrupted,
+            unsure: out.unsure,
         }
     }
 

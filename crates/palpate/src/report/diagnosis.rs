@@ -115,6 +115,7 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         Verdict::Adequate => "Diagnosis: nothing is missing",
         Verdict::MissingEffect => "Diagnosis: an effect is missing",
         Verdict::Unexplained => "Diagnosis: something is missing that no known effect explains",
+        Verdict::Undecided if d.unsure => "Diagnosis: interrupted before anything was known",
         Verdict::Undecided => "Diagnosis: something is missing, and the search is not finished",
     };
     writeln!(
