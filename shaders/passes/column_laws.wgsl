@@ -16,38 +16,44 @@ fn column_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let old = old_side(c);
     let w = way_of(c, fresh, old);
     var young = c.young;
-    // Body-frame forces of the two poses for E = 1, the old one without its weight.
-    var y = vec3(0.0);
-    var y_old = vec3(0.0);
+    // How the parameter changes the scalars, K q of both states and of the increment, and which law's parameter it is.
+    var ds = nowhere();
+    var ds_old = nowhere();
+    var change = vec2(0.0);
+    var kq = vec3(0.0);
+    var kq_old = vec3(0.0);
+    var kd = vec3(0.0);
+    var law = NONE;
     if kind == POISSON_RATIO {
         let by_nu = matrix_at(c.m.slot, 1u, cells[c.cell].kind);
-        let kq = stiff(by_nu, c.number, fresh.q);
-        let kq_old = stiff(by_nu, c.number, old.q);
-        let kd = stiff(by_nu, c.number, fresh.q - old.q);
-        var ds = nowhere();
+        kq = stiff(by_nu, c.number, fresh.q);
+        kq_old = stiff(by_nu, c.number, old.q);
+        kd = stiff(by_nu, c.number, fresh.q - old.q);
         ds[0] = 0.5 * mean(c, fresh.q, kq);
-        let r = ask(c, ENERGY_PART, fresh.s, ds, NONE, 0u);
-        let change = vec2(0.5 * mean(c, fresh.q - old.q, kd), 0.5 * mean(c, old.q, kq_old));
-        let loss = loss_of(c, w, old, change, NONE, 0u);
-        y = c.mix.fresh * (stress(c, fresh, r.bend) + r.first[0] * kq) + loss.y * kd + loss.z * w.kd;
-        ds[0] = change.y;
-        let before = ask(c, ENERGY_PART, old.s, ds, NONE, 0u);
-        y_old = stress(c, old, before.bend) + before.first[0] * kq_old;
+        ds_old[0] = 0.5 * mean(c, old.q, kq_old);
+        change = vec2(0.5 * mean(c, fresh.q - old.q, kd), ds_old[0]);
     } else if kind == REST_SLOPE {
         let shifted = free_pose(rests[c.node].xyz - rests[c.first].xyz, c.sign);
         let dq = -strain_rate(shifted, rest_slope(index, c.node) - rest_slope(index, c.first), c.sign);
-        let loss = loss_of(c, w, old, vec2(0.0, mean(c, old.kq, dq)), NONE, 0u);
-        y = c.mix.fresh * stress_rate(c, fresh, dq) + loss.z * w.kd;
-        y_old = stress_rate(c, old, dq);
+        kq = stiff(stiffness_of(c), c.number, dq);
+        kq_old = kq;
+        ds = scalar_rates(c, fresh, dq);
+        ds_old = scalar_rates(c, old, dq);
+        // The increment does not see it: both states shift alike.
+        change.y = ds_old[0];
     } else if kind == EFFECT {
-        let law = index / 16u;
-        let slot = index % 16u;
-        let r = ask(c, ENERGY_PART, fresh.s, nowhere(), law, slot);
-        let loss = loss_of(c, w, old, vec2(0.0), law, slot);
-        y = c.mix.fresh * stress(c, fresh, r.bend) + loss.z * w.kd;
-        y_old = stress(c, old, ask(c, ENERGY_PART, old.s, nowhere(), law, slot).bend);
-    } else {
-        // Stiffness: the force is proportional to it.
+        law = index / 16u;
+    }
+    let r = ask(c, ENERGY_PART, fresh.s, ds, law, index % 16u);
+    let before = ask(c, ENERGY_PART, old.s, ds_old, law, index % 16u);
+    let loss = loss_of(c, w, old, change, law, index % 16u);
+    // Body-frame forces of the two poses for E = 1, the old one without its weight.
+    var y = c.mix.fresh * (stress(c, fresh, r.bend) + r.first[0] * kq) + loss.y * kd + loss.z * w.kd;
+    var y_old = stress(c, old, before.bend) + before.first[0] * kq_old;
+    if kind == YOUNGS_MODULUS || kind == MODULUS_SLOPE || kind == AGING_SLOPE {
+        // The force is proportional to the stiffness.
+        y = c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd;
+        y_old = stress(c, old, before.first);
         young = c.young / c.m.young;
         if kind == MODULUS_SLOPE {
             young = modulus_slope(c.m, c.member, c.cell, index);
@@ -55,10 +61,6 @@ fn column_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         if kind == AGING_SLOPE {
             young = aging_slope(c.m, c.member, c.cell, index);
         }
-        let r = ask(c, ENERGY_PART, fresh.s, nowhere(), NONE, 0u);
-        let loss = loss_of(c, w, old, vec2(0.0), NONE, 0u);
-        y = c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd;
-        y_old = stress(c, old, ask(c, ENERGY_PART, old.s, nowhere(), NONE, 0u).first);
     }
     let f = force(fresh.pose, young * y, c.sign) + force(old.pose, (young * c.mix.old) * y_old, c.sign);
     if c.live {

@@ -9,19 +9,20 @@ fn press_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
               @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
     let old = old_side(c);
-    var f = vec3(0.0);
-    var energy = 0.0;
-    if call.extra == 1u {
-        let r = ask(c, ENERGY_PART, old.s, nowhere(), NONE, 0u);
-        f = force(old.pose, (c.mix.old * c.young) * stress(c, old, r.first), c.sign);
-    } else {
-        let fresh = new_side(c);
-        let w = way_of(c, fresh, old);
-        let r = ask(c, ENERGY_PART, fresh.s, nowhere(), NONE, 0u);
-        let loss = loss_of(c, w, old, vec2(0.0), NONE, 0u);
-        f = force(fresh.pose, c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd), c.sign);
-        energy = c.young * volume_of(c) * (c.mix.fresh * r.value + loss.x) * 0.125;
+    var side = old;
+    var w: Way;
+    var loss = vec3(0.0);
+    var weight = c.mix.old;
+    if call.extra == 0u {
+        side = new_side(c);
+        w = way_of(c, side, old);
+        loss = loss_of(c, w, old, vec2(0.0), NONE, 0u);
+        weight = c.mix.fresh;
     }
+    let r = ask(c, ENERGY_PART, side.s, nowhere(), NONE, 0u);
+    let f = force(side.pose, c.young * (weight * stress(c, side, r.first) + loss.y * w.kd), c.sign);
+    // Of the old state's force the potential is linear; gather_residual knows it.
+    let energy = select(0.0, c.young * volume_of(c) * (weight * r.value + loss.x) * 0.125, call.extra == 0u);
     if c.live {
         cell_force[c.at] += vec4(f, energy);
     }

@@ -166,12 +166,6 @@ fn scalar_rates(c: Corner, side: Side, dq: vec3<f32>) -> array<f32, SCALARS> {
     return ds;
 }
 
-// Derivative of the energy's force of one state, for E = 1, along a change of q.
-fn stress_rate(c: Corner, side: Side, dq: vec3<f32>) -> vec3<f32> {
-    let r = ask(c, ENERGY_PART, side.s, scalar_rates(c, side, dq), NONE, 0u);
-    return stress(c, side, r.bend) + r.first[0] * stiff(stiffness_of(c), c.number, dq);
-}
-
 // The increment of a step: K (q₁ − q₀) at this corner, and d.
 struct Way {
     kd: vec3<f32>,
