@@ -196,7 +196,7 @@ fn check(plan: &Plan, fault: Option<f64>) {
             !matches!(ALL[usize::from(law)].params[usize::from(slot)].default, Unstated::Fixed(_))
         }
         ParamKey::YoungsModulus | ParamKey::Gravity(_) | ParamKey::Density | ParamKey::PoissonRatio => true,
-        ParamKey::PlaneHeight(_) | ParamKey::PlaneTheta(_) | ParamKey::TimeStart => true,
+        ParamKey::PlaneHeight(_) | ParamKey::PlaneTheta(_) | ParamKey::TimeStart | ParamKey::AngularVelocity(0) => true,
         _ => false,
     };
     let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
