@@ -1,6 +1,7 @@
 //! The order of questions: is something missing, where, what is it called, how sure, what else, how much of the gap closes; and again.
 
 mod bound;
+mod choose;
 mod conclude;
 mod race;
 mod rounds;
@@ -46,7 +47,7 @@ impl Default for Options {
             enough: 0.7,
             enough_of_several: 0.9,
             rounds: 3,
-            fits: 8,
+            fits: 12,
             bins: 8,
             windows: 5,
             seed: 1,
@@ -65,6 +66,8 @@ struct State {
     predicted: Vec<Predicted>,
     /// Residuals of data that no fit has seen, where there are any.
     held_out: Option<Readings>,
+    /// What finer computations would change in those residuals.
+    held_out_finer: Vec<Field>,
 }
 
 /// A variant of a candidate with its columns where it is absent.
@@ -144,6 +147,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let fields = s.finer(&baseline);
     let unsure = s.lab.interrupted();
     let mut state = s.state(baseline.clone(), readings, fields, None)?;
+    state.held_out_finer = s.lab.held_out_finer(&baseline).unwrap_or_default();
     s.correlate(&mut state);
     let first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress { unsure, ..Progress::default() };
@@ -183,7 +187,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         }
     }
     // Both levels in the noise as it is known at the end.
-    let before = s.level_of(&first.0, first.1);
+    let before = s.level_of(&first.0, first.1, &[]);
     Ok(s.conclude((base, before), state, &adequacy, out))
 }
 
@@ -230,7 +234,7 @@ impl Session<'_> {
             // A model that cannot follow the other recording is judged by this one.
             other => other.unwrap_or_default(),
         };
-        Ok(State { model, readings, table, fields, frame, predicted, held_out })
+        Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new() })
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

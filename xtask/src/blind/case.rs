@@ -54,9 +54,9 @@ pub struct Outcome {
     /// What came closest without being accepted, and the share of the gap that it closes.
     pub close: Vec<(String, f64)>,
     /// Probability of the baseline's residuals by chance.
-    pub p_value: f64,
+    pub p_value: Option<f64>,
     /// The same after what was added.
-    pub p_value_after: f64,
+    pub p_value_after: Option<f64>,
     /// Share of the found excess that lies where the hidden thing really acts.
     pub localisation: Option<f64>,
     /// Relative error of the hidden numbers, where named.
@@ -157,8 +157,8 @@ impl Case {
             named: Vec::new(),
             indistinguishable: Vec::new(),
             close: Vec::new(),
-            p_value: f64::NAN,
-            p_value_after: f64::NAN,
+            p_value: None,
+            p_value_after: None,
             localisation: None,
             parameter_error: None,
             gap_closed: 0.0,
@@ -218,7 +218,7 @@ impl Outcome {
         self.sentence = d.sentence();
         self.seconds = found.seconds;
         self.gap_closed = d.gap_closed;
-        (self.p_value, self.p_value_after) = (d.p_value, d.p_value_after);
+        (self.p_value, self.p_value_after) = (Some(d.p_value), Some(d.p_value_after));
         let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();
         self.named = accepted.iter().map(|e| e.kind.clone()).collect();
         self.indistinguishable = accepted.first().map(|e| e.indistinguishable_from.clone()).unwrap_or_default();

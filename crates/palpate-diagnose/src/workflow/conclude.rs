@@ -3,15 +3,18 @@
 use super::{Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
-use crate::laboratory::Readings;
-use crate::linear::Basis;
+use crate::laboratory::{Field, Readings};
+use crate::linear::{Basis, least_squares};
 use crate::null::{Adequacy, Block};
 use palpate_engine::Source;
+
+/// Ridge that keeps errors of the discretisation apart that look the same.
+const SMALL: f64 = 1e-3;
 
 impl Session<'_> {
     /// Distance of a model from the measurement, and what noise and discretisation explain of it.
     pub(super) fn level(&self, state: &State) -> Level {
-        self.level_of(&state.readings, self.grid(state))
+        self.level_of(&state.readings, self.grid(state), &[])
     }
 
     /// Mean square of the discretisation's error that refitting leaves, per residual [m²].
@@ -27,8 +30,9 @@ impl Session<'_> {
             .sum()
     }
 
-    /// The same with a mean square of discretisation per residual [m²].
-    pub(super) fn level_of(&self, readings: &Readings, grid: f64) -> Level {
+    /// The same with a mean square of discretisation per residual [m²], or with what finer computations would change: as much of each is
+    /// added, up to twice its size, as brings the residuals nearest to zero.
+    pub(super) fn level_of(&self, readings: &Readings, grid: f64, finer: &[Field]) -> Level {
         let (mut sum, mut n) = (0.0, 0.0);
         for r in readings.rows.iter().filter(|r| r.row.value.is_some()) {
             let point = matches!(r.row.source, Source::Point { .. });
@@ -37,7 +41,14 @@ impl Session<'_> {
             n += if point { 1.0 } else { 1.0 / 3.0 };
         }
         let noise = (sum / f64::max(n, 1.0)).sqrt();
-        Level { rms: rms(readings.rows.iter().map(|r| (r.row.source, r.row.value))), noise }
+        let columns: Vec<Vec<f64>> = finer.iter().map(|f| f.change.iter().map(|c| c.unwrap_or(0.0)).collect()).collect();
+        let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let mut y: Vec<f64> = readings.rows.iter().map(|r| r.row.value.unwrap_or(0.0)).collect();
+        for (x, c) in least_squares(&chosen, &y, SMALL).unwrap_or_default().into_iter().zip(&chosen) {
+            y.iter_mut().zip(*c).for_each(|(y, c)| *y += x.clamp(-2.0, 2.0) * c);
+        }
+        let values = readings.rows.iter().zip(y).map(|(r, y)| (r.row.source, r.row.value.map(|_| y)));
+        Level { rms: rms(values), noise }
     }
 
     /// The answer, from the baseline with its level, and the state that the rounds led to.

@@ -2,16 +2,10 @@
 
 use super::{Fitted, Session, State, Variant};
 use crate::change::Change;
-use crate::crossval::worse_by;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Readings};
 use crate::linear::dot;
 use crate::score::f_tail;
-
-/// Share of the gap by which candidates may differ and still count as equal.
-const TIE: f64 = 0.01;
-/// Share of the gap that an effect with fewer parameters may leave open and still be preferred.
-const SIMPLER: f64 = 0.03;
 
 impl Session<'_> {
     /// One round: the accepted effect with its state, or the candidates that came closest.
@@ -62,7 +56,8 @@ impl Session<'_> {
 
     /// What a fitted candidate is worth.
     fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
-        let new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
+        let mut new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
+        new.held_out_finer.clone_from(&state.held_out_finer);
         let squares = |s: &State| {
             let left = s.frame.left();
             dot(&left, &left)
@@ -80,37 +75,17 @@ impl Session<'_> {
         Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom })
     }
 
-    /// Distance of a model from the data that no fit has seen.
+    /// Distance of a model from the data that no fit has seen, but for errors of the discretisation.
     pub(super) fn held_out(&self, state: &State) -> Option<Level> {
-        state.held_out.as_ref().map(|r| self.level_of(r, 0.0))
+        state.held_out.as_ref().map(|r| self.level_of(r, 0.0, &state.held_out_finer))
     }
 
     /// Chooses among fitted candidates, best prediction first.
     #[expect(clippy::type_complexity, reason = "as `round`")]
     fn decide(&mut self, state: &State, fitted: Vec<Fitted>) -> Result<(Option<(Found, State)>, Vec<Found>), LabError> {
-        let passes = |f: &Fitted| f.p_value < self.options.significance && f.gain >= self.options.least_gain;
-        let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
-        let Some(best) = fitted.iter().position(passes) else {
+        let Some((winner, equal)) = self.choose(state, &fitted) else {
             return Ok((None, fitted.iter().take(3).map(|f| self.found(f, false)).collect()));
         };
-        let excess = |i: usize| {
-            let p = &fitted[i].state.predicted[0];
-            ((p.loss() - p.floor).max(0.0), p.floor)
-        };
-        // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
-        let as_close = |i: usize| excess(i).0 < 2.0 * excess(best).0 + 0.5 * excess(best).1;
-        // Candidates that predict as well as another, up to noise or up to a share of the gap.
-        let near = |i: usize, to: usize, share: f64| {
-            let (by, z) = worse_by(&self.cells, &fitted[to].state.predicted[0], &fitted[i].state.predicted[0]);
-            passes(&fitted[i]) && (by < share * whole || (z < 2.0 && as_close(i)))
-        };
-        let equal: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, best, TIE)).collect();
-        // The simplest explanation wins unless it is clearly worse: a freer one also fits what no model gets right.
-        let able: Vec<usize> = (0..fitted.len()).filter(|i| near(*i, best, SIMPLER)).collect();
-        let simplest = able.iter().copied().min_by_key(|i| (fitted[*i].freedom, *i)).unwrap_or(best);
-        // What the data cannot tell apart is named in the table's order: the plainer cause first.
-        let plain = |i: &&usize| fitted[**i].freedom == fitted[simplest].freedom && near(**i, simplest, TIE);
-        let winner = able.iter().filter(plain).copied().min_by_key(|i| fitted[*i].candidate).unwrap_or(simplest);
         let mut found = self.found(&fitted[winner], true);
         for &other in equal.iter().filter(|i| **i != winner) {
             let change = fitted[other].state.model.changes.last();
@@ -126,6 +101,7 @@ impl Session<'_> {
         let mut next = fitted.swap_remove(winner).state;
         // The discretisation errs in its own way with the effect in place.
         next.fields = self.finer(&next.model);
+        next.held_out_finer = self.lab.held_out_finer(&next.model).unwrap_or_default();
         self.remeasure(&mut next);
         Ok((Some((found, next)), Vec::new()))
     }

@@ -22,6 +22,10 @@ use std::time::Instant;
 
 /// Cells of the finer grid per cell along an edge: the cheapest that shows the error well.
 const FINER: f64 = 1.5;
+/// The error of the grid, which falls with the square of the cell, over what the finer grid changes.
+const GRID: f64 = 1.0 / (1.0 - 1.0 / (FINER * FINER));
+/// The error of the step, which falls with it, over what half the step changes.
+const STEP: f64 = 2.0;
 /// Most bytes of tangents of one simulation that computes the sensitivities of several hypotheses.
 const MEMORY: usize = 1 << 29;
 /// Newton's tolerance over the relative decrease of the cost that a fit is after: forces that are off by 1e-6 move costs by less than 1e-4.
@@ -267,6 +271,29 @@ fn many(base: &[Experiment], tries: &[Try], from: usize, limits: Limits) -> Vec<
     }
 }
 
+/// An experiment on finer cells, with the same step: that is halved by itself.
+fn finer(e: &Experiment) -> Result<Experiment, Error> {
+    let mut f = e.finer(FINER)?;
+    f.plan.clock = e.plan.clock;
+    f.plan.theta.clone_from(&e.plan.theta);
+    f.scene.fit.clone_from(&e.scene.fit);
+    Ok(f)
+}
+
+/// An experiment with half the step.
+fn halved(mut e: Experiment) -> Experiment {
+    e.plan.clock.step *= 0.5;
+    e.plan.clock.steps *= 2;
+    e
+}
+
+/// What a finer computation changed, carried on to the limit by a factor.
+fn difference(name: &'static str, fine: &Readings, coarse: &Readings, factor: f64) -> Field {
+    let both = fine.rows.iter().zip(coarse.rows.iter());
+    let change = both.map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
+    Field { name, change, rough: Field::REFINED }
+}
+
 impl Laboratory for Lab<'_> {
     fn setting(&self) -> &Setting {
         &self.setting
@@ -336,31 +363,15 @@ impl Laboratory for Lab<'_> {
         let none = ready.free.len();
         let coarse = linearise(&ready, values, none)?;
         if self.finer.is_none() {
-            let finer = |e: &Experiment| {
-                let mut f = e.finer(FINER)?;
-                // The grid alone; the step is halved by itself.
-                f.plan.clock = e.plan.clock;
-                f.plan.theta.clone_from(&e.plan.theta);
-                f.scene.fit.clone_from(&e.scene.fit);
-                Ok(f)
-            };
             self.finer = Some(self.base.iter().map(finer).collect::<Result<_, Error>>().map_err(lab_error)?);
         }
         let fine = prepare(self.finer.as_deref().unwrap_or(&[]), changes).map_err(lab_error)?;
-        let mut halved = prepare(&self.base, changes).map_err(lab_error)?;
-        for e in &mut halved.experiments {
-            e.plan.clock.step *= 0.5;
-            e.plan.clock.steps *= 2;
-        }
-        let difference = |name: &'static str, ready: &Prepared, factor: f64| -> Result<Field, LabError> {
-            let r = linearise(ready, values, none)?;
-            let change =
-                r.rows.iter().zip(coarse.rows.iter()).map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
-            Ok(Field { name, change, rough: Field::REFINED })
+        let mut short = prepare(&self.base, changes).map_err(lab_error)?;
+        short.experiments = short.experiments.into_iter().map(halved).collect();
+        let change = |name, ready: &Prepared, factor| -> Result<Field, LabError> {
+            Ok(difference(name, &linearise(ready, values, none)?, &coarse, factor))
         };
-        // Errors fall with the square of the cell and with the step: what is left after the refinement follows from what it changed.
-        let (grid, step) =
-            rayon::join(|| difference("grid", &fine, 1.0 / (1.0 - 1.0 / (FINER * FINER))), || difference("step", &halved, 2.0));
+        let (grid, step) = rayon::join(|| change("grid", &fine, GRID), || change("step", &short, STEP));
         let is_static = self.base.iter().all(|e| e.plan.clock.steps == 0);
         Ok(if is_static { vec![grid?] } else { vec![grid?, step?] })
     }
@@ -371,6 +382,17 @@ impl Laboratory for Lab<'_> {
 
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError> {
         self.held_out.map(|e| held_out(e, &self.base, self.backend, model)).transpose()
+    }
+
+    fn held_out_finer(&mut self, model: &Model) -> Result<Vec<Field>, LabError> {
+        let Some(e) = self.held_out else { return Ok(Vec::new()) };
+        let (base, backend) = (&self.base, self.backend);
+        let coarse = held_out(e, base, backend, model)?;
+        let mut fields = Vec::new();
+        for (name, e, factor) in [("grid", finer(e).map_err(lab_error)?, GRID), ("step", halved(e.clone()), STEP)] {
+            fields.push(difference(name, &held_out(&e, base, backend, model)?, &coarse, factor));
+        }
+        Ok(fields)
     }
 
     fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)> {

@@ -1,0 +1,45 @@
+//! Which of the fitted candidates is named, and which others are as good.
+
+use super::{Fitted, Session, State};
+use crate::crossval::{Predicted, worse_by};
+
+/// The share of the gap that one more number must close to be worth it; candidates that differ by less than twice as much count as equal.
+const PRICE: f64 = 5e-5;
+/// The same where no candidate explains the recording.
+const PRICE_OF_MISFIT: f64 = 5e-3;
+/// How many times what noise and discretisation explain the best candidate may leave to be an explanation.
+const MISFIT: f64 = 3.0;
+
+impl Session<'_> {
+    /// The candidate to be named and those that the data cannot tell from the best, itself among them; candidates come best prediction
+    /// first. `None` when none passes.
+    pub(super) fn choose(&self, state: &State, fitted: &[Fitted]) -> Option<(usize, Vec<usize>)> {
+        let passes = |i: usize| fitted[i].p_value < self.options.significance && fitted[i].gain >= self.options.least_gain;
+        let best = (0..fitted.len()).find(|i| passes(*i))?;
+        let predicted = |i: usize| -> &Predicted { &fitted[i].state.predicted[0] };
+        let excess = |i: usize| (predicted(i).loss() - predicted(i).floor).max(0.0);
+        let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
+        // Where even the best leaves much more than noise, something else is wrong as well, and small shares of the gap decide nothing.
+        let misfit = predicted(best).loss() / predicted(best).floor.max(1.0);
+        let share = if misfit <= MISFIT { PRICE } else { PRICE_OF_MISFIT } * whole;
+        // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
+        let as_close = |i: usize| excess(i) < 2.0 * excess(best) + 0.5 * predicted(best).floor;
+        let as_good = |i: &usize| {
+            let (by, z) = worse_by(&self.cells, predicted(best), predicted(*i));
+            passes(*i) && (by < 2.0 * share || (z < 2.0 && as_close(*i)))
+        };
+        let equal: Vec<usize> = (0..fitted.len()).filter(as_good).collect();
+        // Every number has its price: what it gains by chance (Schwarz, Ann. Stat. 6, 1978; in units of what the best leaves), and a share of
+        // the gap, because a freer effect also fits what no model gets right.
+        let price = (misfit.max(1.0) * (self.cells.len() as f64).ln()).max(share);
+        let worth = |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64;
+        let able = (0..fitted.len()).filter(|i| passes(*i));
+        let first = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
+        // What predicts the same with as many numbers is named in the table's order: the plainer cause first.
+        let like_first = |i: &usize| {
+            fitted[*i].freedom == fitted[first].freedom && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
+        };
+        let winner = able.filter(like_first).min_by_key(|i| fitted[*i].candidate).unwrap_or(first);
+        Some((winner, equal))
+    }
+}
