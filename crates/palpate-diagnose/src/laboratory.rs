@@ -40,6 +40,8 @@ pub struct Setting {
     pub held: Vec<String>,
     /// Per scene: times [s] during which the baseline touches a plane.
     pub contact: Vec<Vec<(f64, f64)>>,
+    /// Per scene: frames until the next of which the baseline moves by less than a tenth of the noise of a depth reading.
+    pub still: Vec<Vec<usize>>,
 }
 
 /// One number of a model.

@@ -13,6 +13,7 @@ mod locate;
 mod noise;
 mod null;
 mod score;
+mod still;
 mod workflow;
 
 pub use cells::Regions;

@@ -15,6 +15,7 @@ use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Block, Frame, extended, test};
 use crate::score::{Score, score};
+use crate::still::still_ratio;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +127,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     if cells.is_empty() {
         return Err(LabError::Failed("no part of the recording meets the simulated body: nothing can be diagnosed".into()));
     }
-    let noise_ratio = neighbour_ratio(&readings);
+    let noise_ratio = neighbour_ratio(&readings).max(still_ratio(&readings, &lab.setting().still));
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
         *sd *= if k.sensor < 1000 { noise_ratio } else { 1.0 };
     }
@@ -283,7 +284,8 @@ impl Session<'_> {
     /// Looks at the noise again after an effect was added: what the model missed before may have passed for noise, so that only a
     /// smaller estimate counts.
     fn settle(&mut self, state: &mut State) {
-        let ratio = neighbour_ratio(&state.readings).min(self.noise_ratio);
+        let still = still_ratio(&state.readings, &self.lab.setting().still);
+        let ratio = neighbour_ratio(&state.readings).max(still).min(self.noise_ratio);
         let old = self.design_effect.sqrt();
         for (sd, k) in self.cells.sd.iter_mut().zip(&self.cells.keys) {
             *sd *= if k.sensor < 1000 { ratio / self.noise_ratio } else { 1.0 } / old;

@@ -100,6 +100,7 @@ impl Bench {
             markers: 0,
             held: held.clone(),
             contact: vec![vec![(0.5, 0.8)]],
+            still: Vec::new(),
         };
         Bench {
             setting,

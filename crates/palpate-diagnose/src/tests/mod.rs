@@ -1,4 +1,5 @@
 //! The workflow on a laboratory whose physics is linear and known.
 
 mod bench;
+mod still;
 mod workflow;

@@ -3,7 +3,7 @@
 use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
-use super::others::{contact_times, held_out, separations};
+use super::others::{contact_times, held_out, separations, still_frames};
 use super::systematic::systematic;
 use crate::engine::Backend;
 use crate::error::Error;
@@ -62,6 +62,7 @@ impl<'a> Lab<'a> {
         let regions = Regions::new(&points, 4);
         let nearest = |c: &glam::DVec3| points.iter().copied().min_by(|a, b| a.distance(*c).total_cmp(&b.distance(*c)));
         let contact = base.iter().map(|e| contact_times(e, options.backend)).collect::<Result<_, _>>()?;
+        let still = base.iter().map(|e| still_frames(e, options.backend)).collect::<Result<_, _>>()?;
         let most = |f: fn(&Experiment) -> usize| base.iter().map(f).max().unwrap_or(0);
         let setting = Setting {
             center: body.center,
@@ -73,6 +74,7 @@ impl<'a> Lab<'a> {
             markers: most(|e| e.plan.observation.markers.len()),
             held: held(base),
             contact,
+            still,
         };
         let checkpoint = Checkpoint::open(options.checkpoints.as_ref().map(|(f, r)| (f.as_path(), *r)))?;
         Ok(Lab {

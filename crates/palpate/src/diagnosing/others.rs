@@ -40,6 +40,29 @@ pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64
     Ok(out)
 }
 
+/// Frames until the next of which no point of the simulated body moves by more than a tenth of the noise of a depth reading.
+pub(super) fn still_frames(e: &Experiment, backend: Backend) -> Result<Vec<usize>, Error> {
+    let o = &e.plan.observation;
+    let times: Vec<f64> = o.frames.iter().map(|f| f.time).collect();
+    if times.len() < 3 || o.cameras.is_empty() {
+        return Ok(Vec::new());
+    }
+    let start = palpate_model::plan::Physics::new(&e.plan.layout, &e.plan.theta).start;
+    let mut ways = vec![0.0; times.len() - 1];
+    let mut last: Option<(f64, Vec<DVec3>)> = None;
+    backend.visit(&e.plan, &e.plan.theta, |_, s, _| {
+        let now = start + s.time;
+        if let Some((before, u)) = &last {
+            let way = u.iter().zip(&s.displacement).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            let within = |w: &[f64]| w[0] < now && w[1] > *before;
+            ways.iter_mut().zip(times.windows(2)).filter(|(_, w)| within(w)).for_each(|(sum, _)| *sum += way);
+        }
+        last = Some((now, s.displacement));
+        ControlFlow::Continue(())
+    })?;
+    Ok((0..ways.len()).filter(|f| ways[*f] < 0.1 * o.depth_noise).collect())
+}
+
 /// Residuals of a recording that no fit has seen: what describes the body comes from the model, what belongs to the recording (how the
 /// motion starts) keeps its scene's values, or is fitted where that scene or the model leaves it free.
 pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, model: &Model) -> Result<Readings, LabError> {
