@@ -127,6 +127,8 @@ pub struct Diagnosis {
     pub p_value: f64,
     /// The same for the corrected model.
     pub p_value_after: f64,
+    /// How large that structure is before and after: root mean square of blocks' means, as far as the null does not reach [m].
+    pub structure: (f64, f64),
     /// The fitted model of the scene as it is.
     pub baseline: Model,
     /// Its distance from the measurement.
@@ -173,7 +175,14 @@ impl Diagnosis {
         let p = |p: f64| if p <= 0.002 { "p ≤ 0.002".to_string() } else { format!("p = {p:.3}") };
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
         match self.verdict {
-            Verdict::Adequate => format!("Nothing is missing that these data could show: {apart} ({}).", p(self.p_value)),
+            Verdict::Adequate => {
+                // A right model's residuals, or structure that is real but too small to look for its cause.
+                let small = match self.p_value <= 0.01 && self.structure.0 > 0.0 {
+                    true => format!("; structure of {} is too small to count", mm(self.structure.0)),
+                    false => String::new(),
+                };
+                format!("Nothing is missing that these data could show: {apart} ({}{small}).", p(self.p_value))
+            }
             Verdict::Undecided if self.unsure => {
                 format!(
                     "Nothing is decided: the diagnosis was interrupted before the baseline and its noise were known; so far {apart}."

@@ -72,6 +72,17 @@ pub struct Model {
     pub errors: Vec<Option<f64>>,
 }
 
+/// Where the fit of a hypothesis starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// What is changed.
+    pub changes: Vec<Change>,
+    /// Values of all free numbers.
+    pub values: Vec<f64>,
+    /// Longest first step, as the fit before it said ([`Fit::reach`]); infinite where there was none.
+    pub reach: f64,
+}
+
 /// A fit of a hypothesis, finished or not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
@@ -81,6 +92,8 @@ pub struct Fit {
     pub cost: f64,
     /// By how much it lowered the cost it started from.
     pub gained: f64,
+    /// Longest step that it would try next.
+    pub reach: f64,
     /// False when more iterations would go on.
     pub settled: bool,
 }
@@ -134,9 +147,9 @@ pub trait Laboratory {
     fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError>;
     /// Cost per scalar residual of each set of changes at these values; infinite where there is none.
     fn costs(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<f64>;
-    /// Fits each set of changes, starting from these values, for so many iterations at most and until an iteration lowers the cost by less than
+    /// Fits each hypothesis from its start for so many iterations at most and until an iteration lowers the cost by less than
     /// this share of it; one answer each.
-    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>>;
+    fn fit(&mut self, tries: &[Start], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>>;
     /// Residuals and derivatives of each set of changes at these values.
     fn linearise(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Readings, LabError>>;
     /// As [`Laboratory::linearise`], with derivatives by the numbers from place `from` on alone.

@@ -16,6 +16,9 @@ use std::collections::BTreeMap;
 /// Recordings drawn from the null.
 pub const DRAWS: usize = 499;
 
+/// Standard deviations of the null beyond which a block shows structure: two hundred blocks reach three of them once by chance.
+const CLEAR: f64 = 3.0;
+
 /// A linearised model in its cells, extended by one pseudo-reading per field of discretisation.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -76,6 +79,8 @@ pub struct Block {
 pub struct Adequacy {
     /// Probability of such structure, or more, when nothing is missing.
     pub p_value: f64,
+    /// How large the structure is: root mean square over cells of their blocks' mean residuals, as far as the null does not reach [m].
+    pub structure: f64,
     /// The blocks.
     pub blocks: Vec<Block>,
 }
@@ -94,6 +99,18 @@ pub fn blocks(cells: &Cells, bins: usize) -> Vec<Block> {
 /// Mean over a block of its residuals in units of their noise, times √n.
 fn sum(block: &Block, y: &[f64]) -> f64 {
     block.cells.iter().map(|i| y[*i]).sum::<f64>() / (block.cells.len() as f64).sqrt()
+}
+
+/// Mean over a block of its residuals [m].
+fn mean(block: &Block, cells: &Cells, y: &[f64]) -> f64 {
+    block.cells.iter().map(|i| y[*i] * cells.sd[*i]).sum::<f64>() / block.cells.len() as f64
+}
+
+/// Mean square over cells of what their blocks' mean residuals show beyond the null [m²].
+fn excess(blocks: &[Block], cells: &Cells, y: &[f64]) -> f64 {
+    let beyond = |b: &Block| (1.0 - (CLEAR / b.z).powi(2)).max(0.0);
+    let squares = blocks.iter().map(|b| b.cells.len() as f64 * mean(b, cells, y).powi(2) * beyond(b));
+    squares.sum::<f64>() / (cells.len() as f64).max(1.0)
 }
 
 /// One draw of residuals that a right model would leave.
@@ -129,6 +146,7 @@ pub fn test(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64
     for (b, sd) in blocks.iter_mut().zip(&sd) {
         b.z = sum(b, &left) / sd;
     }
+    let structure = excess(&blocks, cells, &left).sqrt();
     // Two questions at once: structure spread over many blocks, and structure in one.
     let both = |z: &mut dyn Iterator<Item = f64>| z.fold([0.0f64, 0.0], |[s, m], z| [s + z * z, m.max(z.abs())]);
     let observed = both(&mut blocks.iter().map(|b| b.z));
@@ -137,5 +155,5 @@ pub fn test(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64
     let least = |v: &[f64; 2]| share(0, v[0]).min(share(1, v[1]));
     let mine = least(&observed);
     let as_small = drawn.iter().filter(|d| least(d) <= mine).count();
-    Adequacy { p_value: (1 + as_small) as f64 / (DRAWS + 1) as f64, blocks }
+    Adequacy { p_value: (1 + as_small) as f64 / (DRAWS + 1) as f64, structure, blocks }
 }

@@ -13,15 +13,19 @@ use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Readings};
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
-use crate::null::{Block, Frame, extended, test};
+use crate::null::{Adequacy, Block, Frame, extended, test};
 use crate::score::{Score, score};
 use crate::still::still_ratio;
+use palpate_engine::Source;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// False-alarm rate of the question whether something is missing.
     pub significance: f64,
+    /// Smallest structure of residuals that counts, over the noise of single readings. Thousands of readings make a tenth of their noise
+    /// significant, but no model of a body is that good.
+    pub least_structure: f64,
     /// Smallest share of the gap that an effect must close on data left out.
     pub least_gain: f64,
     /// Share of the gap that all accepted effects together must close, unless nothing remains.
@@ -44,6 +48,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             significance: 0.01,
+            least_structure: 0.25,
             least_gain: 0.3,
             enough: 0.7,
             enough_of_several: 0.9,
@@ -158,11 +163,11 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         adequacy = test(&s.cells, &state.frame, &s.noise, options.bins, options.seed);
         if out.places.is_none() {
             out.places = Some(locate(&s.cells, &adequacy, s.lab.setting()));
-            out.p_value = adequacy.p_value;
+            (out.p_value, out.structure) = (adequacy.p_value, adequacy.structure);
             out.blocks.clone_from(&adequacy.blocks);
         }
         out.interrupted = s.lab.interrupted();
-        if adequacy.p_value > options.significance || out.accepted.len() >= options.rounds || out.interrupted {
+        if !s.is_missing(&adequacy, &state) || out.accepted.len() >= options.rounds || out.interrupted {
             break;
         }
         if s.lab.out_of_time() {
@@ -201,6 +206,7 @@ struct Progress {
     /// The baseline's residuals in blocks.
     blocks: Vec<Block>,
     p_value: f64,
+    structure: f64,
     interrupted: bool,
     unsure: bool,
 }
@@ -236,6 +242,22 @@ impl Session<'_> {
             other => other.unwrap_or_default(),
         };
         Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new() })
+    }
+
+    /// Root mean square noise of single residuals [m].
+    fn reading_noise(&self, readings: &Readings) -> f64 {
+        let known = readings.rows.iter().filter(|r| r.row.value.is_some());
+        let (sum, n) = known.fold((0.0, 0.0), |(sum, n), r| {
+            let ratio = if matches!(r.row.source, Source::Point { .. }) { self.noise_ratio } else { 1.0 };
+            (sum + (ratio * r.row.noise * r.row.along_sight).powi(2), n + 1.0)
+        });
+        (sum / f64::max(n, 1.0)).sqrt()
+    }
+
+    /// True when residuals have structure that is neither chance nor too small to count.
+    fn is_missing(&self, found: &Adequacy, state: &State) -> bool {
+        let least = self.options.least_structure * self.reading_noise(&state.readings);
+        found.p_value <= self.options.significance && found.structure >= least
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -74,6 +74,8 @@ pub struct Run {
     pub iterations: usize,
     /// Evaluations used.
     pub evaluations: usize,
+    /// Longest step that Gauss–Newton would try next ([`Settings::first_step`]).
+    pub reach: f64,
     /// How it ended.
     pub status: Status,
 }
@@ -134,6 +136,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
             cost: s.outcome.cost,
             iterations: s.outcome.iterations,
             evaluations: s.outcome.evaluations,
+            reach: s.outcome.reach,
             status: s.outcome.status.clone(),
         })
         .collect();

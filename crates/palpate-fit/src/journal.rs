@@ -159,7 +159,12 @@ fn describe(problem: &Problem, settings: &Settings) -> Value {
         .collect();
     let scenes: Vec<Value> =
         problem.scenes().iter().map(|s| json!({ "fingerprint": s.fingerprint, "theta": to_hex(&s.base) })).collect();
-    let steps = json!([settings.max_step, format!("{:?}", settings.rprop), format!("{:?}", settings.tolerance)]);
+    let steps = json!([
+        settings.max_step,
+        settings.first_step.to_string(),
+        format!("{:?}", settings.rprop),
+        format!("{:?}", settings.tolerance)
+    ]);
     json!({
         "format": FORMAT,
         "optimizer": format!("{:?}", settings.optimizer),

@@ -131,6 +131,7 @@ pub fn run(
                             start_cost: f64::INFINITY,
                             iterations: 0,
                             evaluations: 0,
+                            reach: f64::INFINITY,
                             status: Status::Failed("the optimiser broke off".into()),
                             sample: None,
                         };

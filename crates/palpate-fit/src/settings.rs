@@ -17,6 +17,8 @@ pub struct Settings {
     pub tolerance: Tolerance,
     /// Longest step of any optimiser along one axis of z; 1.5 is a factor 4.5 in a parameter fitted as its logarithm.
     pub max_step: f64,
+    /// The same for the first step of Gauss–Newton, where a search goes on that has found shorter ones to be long enough.
+    pub first_step: f64,
     /// Steps of Rprop.
     pub rprop: RpropSteps,
     /// What is known about the measurement's errors.
@@ -33,6 +35,7 @@ impl Settings {
             seed: 1,
             tolerance: Tolerance::default(),
             max_step: 1.5,
+            first_step: f64::INFINITY,
             rprop: RpropSteps::default(),
             errors: ErrorModel::default(),
         }

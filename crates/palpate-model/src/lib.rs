@@ -14,6 +14,7 @@ pub mod effects;
 pub mod element;
 pub mod elements;
 pub mod extension;
+pub mod front;
 pub mod grid;
 pub mod grips;
 pub mod instant;

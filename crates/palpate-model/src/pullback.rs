@@ -9,7 +9,8 @@ use glam::{DMat3, DVec3};
 pub const TURNED_AWAY: f64 = 0.3;
 /// Next to a sharp edge noise puts points closest to the side that the camera does not see; calling them unmatched would make the
 /// cost jump by a whole band. Such a point lies near a visible side as well: going towards the camera by `1.5 |φ|` and so many
-/// standard deviations of the noise leaves the body. Inside a thin part, near its back, it does not.
+/// standard deviations of the noise leaves the body. Inside a thin part, near its back, it does not: then it belongs to the front
+/// ([`crate::front`]).
 pub const NOISE_REACH: f64 = 4.0;
 
 /// Local coordinates ξ of world point `p` in the trilinear cell with corners `x`, by Newton's method; `None` when `p` is not in

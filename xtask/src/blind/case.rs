@@ -57,6 +57,9 @@ pub struct Outcome {
     pub p_value: Option<f64>,
     /// The same after what was added.
     pub p_value_after: Option<f64>,
+    /// Size of residuals' structure before and after [m].
+    #[serde(default)]
+    pub structure: (f64, f64),
     /// Share of the found excess that lies where the hidden thing really acts.
     pub localisation: Option<f64>,
     /// Relative error of the hidden numbers, where named.
@@ -159,6 +162,7 @@ impl Case {
             close: Vec::new(),
             p_value: None,
             p_value_after: None,
+            structure: (0.0, 0.0),
             localisation: None,
             parameter_error: None,
             gap_closed: 0.0,
@@ -219,6 +223,7 @@ impl Outcome {
         self.seconds = found.seconds;
         self.gap_closed = d.gap_closed;
         (self.p_value, self.p_value_after) = (Some(d.p_value), Some(d.p_value_after));
+        self.structure = d.structure;
         let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();
         self.named = accepted.iter().map(|e| e.kind.clone()).collect();
         self.indistinguishable = accepted.first().map(|e| e.indistinguishable_from.clone()).unwrap_or_default();

@@ -13,12 +13,14 @@ pub fn line(o: &Outcome) -> String {
     let slack = o.slack_points.map_or(String::new(), |s| format!(", slack points at it by {s:.2}"));
     let why = if o.verdict == "failed" { format!(" {}", o.sentence) } else { String::new() };
     format!(
-        "{:.1} σ: {} {}{more}{close}, p {:.3} → {:.3}, place {}, parameter off {}, gap closed {:.2}{slack}, {:.0} s, score {}{why}",
+        "{:.1} σ: {} {}{more}{close}, p {:.3} → {:.3}, structure {:.2} → {:.2} mm, place {}, parameter off {}, gap closed {:.2}{slack}, {:.0} s, score {}{why}",
         o.strength,
         o.verdict,
         o.named.join(" + "),
         o.p_value.unwrap_or(f64::NAN),
         o.p_value_after.unwrap_or(f64::NAN),
+        1e3 * o.structure.0,
+        1e3 * o.structure.1,
         percent(o.localisation),
         percent(o.parameter_error),
         o.gap_closed,

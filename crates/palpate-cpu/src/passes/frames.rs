@@ -5,7 +5,7 @@
 
 use crate::linear::vector::Nodes;
 use crate::passes::markers::Carried;
-use crate::passes::matching::{BandLookup, Match, PointHash, extend, extend_transposed, match_points};
+use crate::passes::matching::{BandLookup, Match, PointHash, Seen, extend, extend_transposed, match_points};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, ResidualRow, Rows, Source};
 use palpate_model::effects::sensors::Sensors;
@@ -49,13 +49,17 @@ pub fn compare(look: Look, lookup: &BandLookup, hash: &PointHash, u: &[DVec3]) -
     let Look { plan, sensors, frame } = look;
     let (body, obs) = (&*plan.body, &*plan.observation);
     let f = &obs.frames[frame];
+    let recorded = (f.points.as_slice(), obs.cameras.as_slice());
+    let reach = (plan.band, obs.depth_noise);
     let matches = if f.points.is_empty() {
         Vec::new()
     } else if let Some(points) = sensors.points(&obs.cameras, &f.points) {
         let hash = PointHash::new(&points, body.grid.h);
-        match_points(body, &extend(body, u), &hash, &points, &sensors.cameras(&obs.cameras), lookup, obs.depth_noise)
+        let seen = Seen { points: &points, cameras: &sensors.cameras(&obs.cameras), recorded };
+        match_points(body, &extend(body, u), &hash, seen, lookup, reach)
     } else {
-        match_points(body, &extend(body, u), hash, &f.points, &obs.cameras, lookup, obs.depth_noise)
+        let seen = Seen { points: &f.points, cameras: &obs.cameras, recorded };
+        match_points(body, &extend(body, u), hash, seen, lookup, reach)
     };
     let per_point = 1.0 / (obs.depth_noise * obs.depth_noise);
     // A point without a match costs what one at the edge of the band costs.

@@ -6,6 +6,7 @@
 use crate::passes::cells::Corners;
 use glam::DVec3;
 use palpate_model::body::Body;
+use palpate_model::front::Sight;
 use palpate_model::grid::shape_functions;
 use palpate_model::observation::{Camera, ObservedPoint};
 use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, jacobian, pull_back, triquadratic};
@@ -25,10 +26,11 @@ impl BandLookup {
         BandLookup(cells)
     }
 
-    /// True when a place of the rest configuration lies in the body.
-    fn inside(&self, body: &Body, place: DVec3) -> bool {
-        let cell = body.grid.locate(place).map(|(ijk, xi)| (self.0[body.grid.index(ijk)], xi));
-        cell.is_some_and(|(c, xi)| c != u32::MAX && triquadratic(&body.band.cells[c as usize].sdf, xi).0 < 0.0)
+    /// Distance of a place of the rest configuration from the surface [m] with its derivative by ξ, in the band.
+    fn distance(&self, body: &Body, place: DVec3) -> Option<(f64, DVec3)> {
+        let (ijk, xi) = body.grid.locate(place)?;
+        let cell = self.0[body.grid.index(ijk)];
+        (cell != u32::MAX).then(|| triquadratic(&body.band.cells[cell as usize].sdf, xi))
     }
 }
 
@@ -136,18 +138,29 @@ pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
     out
 }
 
+/// Points of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The points, as a member's measurement effects understand them.
+    pub points: &'a [ObservedPoint],
+    /// The cameras, likewise.
+    pub cameras: &'a [Camera],
+    /// Both as the recording has them: lines of sight along which a front is looked for do not depend on any parameter.
+    pub recorded: (&'a [ObservedPoint], &'a [Camera]),
+}
+
 /// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
-/// surface faces its camera come first (a hidden side counts where a visible one is near; `noise` [m] of a reading); then the smallest |φ| wins, then the lowest
-/// cell number. Ordered by point.
+/// surface faces its camera come first. A point nearest to a hidden side keeps it where a visible one is near (`noise` [m] of a
+/// reading), and belongs to the front otherwise, up to the `band` [m]. Then the smallest |φ| wins, then the lowest cell number. Ordered by point.
 pub fn match_points(
     body: &Body,
     u: &[DVec3],
     hash: &PointHash,
-    points: &[ObservedPoint],
-    cameras: &[Camera],
+    seen: Seen,
     lookup: &BandLookup,
-    noise: f64,
+    (band, noise): (f64, f64),
 ) -> Vec<Match> {
+    let Seen { points, cameras, recorded } = seen;
     let n = body.nodes.len();
     let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
     let candidates: Vec<Vec<(bool, Match)>> = body
@@ -167,16 +180,23 @@ pub fn match_points(
                     return;
                 }
                 if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
-                    let sight = (seen.position - cameras[seen.camera as usize].center).normalize_or_zero();
-                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
-                    let towards_camera = || {
-                        let way = 1.5 * place.phi.abs() + NOISE_REACH * noise;
-                        let lowest = body.grid.position(cell.lattice);
-                        lowest + body.grid.h * (place.xi - way * (jacobian(&x, place.xi).inverse() * sight))
+                    let from = |points: &[ObservedPoint], cameras: &[Camera]| {
+                        (points[p as usize].position - cameras[seen.camera as usize].center).normalize_or_zero()
                     };
-                    if faces || !lookup.inside(body, towards_camera()) {
-                        found.push((faces, Match { point: p, cell: c as u32, place }));
-                    }
+                    let sight = from(points, cameras);
+                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
+                    let lowest = body.grid.position(cell.lattice);
+                    let distance = |xi: DVec3| lookup.distance(body, lowest + body.grid.h * xi);
+                    let way = 1.5 * place.phi.abs() + NOISE_REACH * noise;
+                    let before = place.xi - way * (jacobian(&x, place.xi).inverse() * sight);
+                    let place = if faces || distance(before).is_none_or(|d| d.0 >= 0.0) {
+                        Some(place)
+                    } else {
+                        // Inside a thin part, near its back.
+                        let line = Sight { x: &x, point: seen.position, direction: from(recorded.0, recorded.1) };
+                        line.front((way, before), (body.grid.h, band), distance)
+                    };
+                    found.extend(place.map(|place| (faces, Match { point: p, cell: c as u32, place })));
                 }
             });
             found

@@ -120,7 +120,7 @@ impl Bench {
 
     pub fn baseline(&mut self) -> Model {
         let start = self.numbers(&[]).unwrap().iter().map(|n| n.start).collect();
-        self.fit(&[(Vec::new(), start)], 1, 0.0).remove(0).unwrap().model
+        self.fit(&[Start { changes: Vec::new(), values: start, reach: f64::INFINITY }], 1, 0.0).remove(0).unwrap().model
     }
 
     fn all_names(&self, changes: &[Change]) -> Vec<String> {
@@ -187,8 +187,8 @@ impl Laboratory for Bench {
         tries.iter().map(|(c, v)| self.readings(c, v, v.len()).cost).collect()
     }
 
-    fn fit(&mut self, tries: &[(Vec<Change>, Vec<f64>)], _: usize, _: f64) -> Vec<Result<Fit, LabError>> {
-        let one = |(changes, values): &(Vec<Change>, Vec<f64>)| {
+    fn fit(&mut self, tries: &[Start], _: usize, _: f64) -> Vec<Result<Fit, LabError>> {
+        let one = |Start { changes, values, .. }: &Start| {
             if changes.last().is_some_and(|c| self.slow.contains(&c.kind())) {
                 return Err(LabError::NoTime);
             }
@@ -205,6 +205,7 @@ impl Laboratory for Bench {
                 model: Model { changes: changes.clone(), numbers: self.numbers(changes)?, errors, values },
                 cost,
                 gained: 0.0,
+                reach: f64::INFINITY,
                 settled: true,
             })
         };

@@ -68,7 +68,7 @@ impl Session<'_> {
         };
         let gap = b * b - noise * noise;
         let gap_closed = if gap > 0.0 { (1.0 - (a * a - noise * noise).max(0.0) / gap).clamp(0.0, 1.0) } else { 0.0 };
-        let adequate = adequacy.p_value > self.options.significance;
+        let adequate = !self.is_missing(adequacy, &state);
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,
             (true, 1) => Verdict::MissingEffect,
@@ -92,6 +92,7 @@ impl Session<'_> {
             verdict,
             p_value: out.p_value,
             p_value_after: adequacy.p_value,
+            structure: (out.structure, adequacy.structure),
             baseline: baseline.clone(),
             before,
             places: if verdict == Verdict::Adequate { Vec::new() } else { out.places.unwrap_or_default() },

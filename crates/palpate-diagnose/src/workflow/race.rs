@@ -3,7 +3,7 @@
 
 use super::{Session, State, Variant};
 use crate::change::Change;
-use crate::laboratory::{Fit, LabError};
+use crate::laboratory::{Fit, LabError, Start};
 use crate::linear::least_squares;
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
@@ -19,10 +19,14 @@ const MOVES: f64 = 0.3;
 const RIDGE: f64 = 1e-3;
 
 impl Session<'_> {
-    /// Fits variants side by side; those that arrived, the lowest cost first, at most one for each candidate.
-    pub(super) fn race<'v>(&mut self, state: &State, tries: &[&'v Variant]) -> Result<Vec<(&'v Variant, Fit)>, LabError> {
-        let mut jobs = self.starts(state, tries);
-        let mut running: Vec<(&Variant, Option<Fit>)> = tries.iter().map(|v| (*v, None)).collect();
+    /// Fits variants side by side, each from the state that it was scored at; those that arrived, the lowest cost first, at most one for each candidate.
+    pub(super) fn race<'v>(
+        &mut self,
+        state: &State,
+        tries: &[(&State, &'v Variant)],
+    ) -> Result<Vec<(&'v Variant, Fit)>, LabError> {
+        let mut jobs = self.starts(tries);
+        let mut running: Vec<(&Variant, Option<Fit>)> = tries.iter().map(|(_, v)| (*v, None)).collect();
         for (lap, (iterations, tolerance, lag)) in LAPS.into_iter().enumerate() {
             let last = lap + 1 == LAPS.len();
             let goes_on = |i: &usize| last || running[*i].1.as_ref().is_none_or(|f| !f.settled);
@@ -32,7 +36,8 @@ impl Session<'_> {
             for (&i, answer) in open.iter().zip(answers) {
                 match answer {
                     Ok(fit) => {
-                        jobs[i].1.clone_from(&fit.model.values);
+                        jobs[i].values.clone_from(&fit.model.values);
+                        jobs[i].reach = fit.reach;
                         // A lap that gained nothing leaves what was reached before.
                         match &mut running[i].1 {
                             Some(before) if before.cost < fit.cost => before.gained = 0.0,
@@ -67,15 +72,16 @@ impl Session<'_> {
     }
 
     /// Where each fit starts: along the linear estimate, as far as that lowers the cost.
-    fn starts(&mut self, state: &State, tries: &[&Variant]) -> Vec<(Vec<Change>, Vec<f64>)> {
-        let mut jobs: Vec<_> = tries.iter().map(|v| start(state, v, STARTS[0])).collect();
+    fn starts(&mut self, tries: &[(&State, &Variant)]) -> Vec<Start> {
+        let mut jobs: Vec<_> = tries.iter().map(|(from, v)| start(from, v, STARTS[0])).collect();
         let mut open: Vec<usize> = (0..jobs.len()).collect();
         self.lab.say(&format!("looking for starts of {} candidates", jobs.len()));
         for share in &STARTS[1..] {
-            let costs = self.lab.costs(&open.iter().map(|i| jobs[*i].clone()).collect::<Vec<_>>());
-            let kept: Vec<bool> = costs.iter().map(|c| *c < state.readings.cost).collect();
+            let places: Vec<_> = open.iter().map(|i| (jobs[*i].changes.clone(), jobs[*i].values.clone())).collect();
+            let costs = self.lab.costs(&places);
+            let kept: Vec<bool> = open.iter().zip(costs).map(|(i, c)| c < tries[*i].0.readings.cost).collect();
             open = open.into_iter().zip(kept).filter(|(_, kept)| !kept).map(|(i, _)| i).collect();
-            open.iter().for_each(|i| jobs[*i] = start(state, tries[*i], *share));
+            open.iter().for_each(|i| jobs[*i] = start(tries[*i].0, tries[*i].1, *share));
         }
         jobs
     }
@@ -91,7 +97,7 @@ impl Session<'_> {
 }
 
 /// A candidate at a share of its linear estimate, with the fitted numbers where they best go with it.
-fn start(state: &State, v: &Variant, share: f64) -> (Vec<Change>, Vec<f64>) {
+fn start(state: &State, v: &Variant, share: f64) -> Start {
     let mut changes = state.model.changes.clone();
     changes.push(v.change.clone());
     let step = |k: usize| share * v.score.step[k].clamp(v.bounds[k].0, v.bounds[k].1);
@@ -105,5 +111,6 @@ fn start(state: &State, v: &Variant, share: f64) -> (Vec<Change>, Vec<f64>) {
         let most = MOVES * v.abs().max(n.scale);
         (v + d.clamp(-most, most)).clamp(n.bounds.0, n.bounds.1)
     });
-    (changes, own.chain((0..v.start.len()).map(|k| v.start[k] + step(k))).collect())
+    let values = own.chain((0..v.start.len()).map(|k| v.start[k] + step(k))).collect();
+    Start { changes, values, reach: f64::INFINITY }
 }

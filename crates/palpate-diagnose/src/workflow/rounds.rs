@@ -3,9 +3,12 @@
 use super::{Fitted, Session, State, Variant};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
-use crate::laboratory::{LabError, Model, Readings};
+use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::linear::dot;
 use crate::score::f_tail;
+
+/// Change of a fitted number, relative to its size, from which on the scene's own value counts as another place to start from.
+const FAR: f64 = 0.3;
 
 impl Session<'_> {
     /// One round: the accepted effect with its state, or the candidates that came closest.
@@ -18,7 +21,7 @@ impl Session<'_> {
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
         let mut seen: Vec<usize> = Vec::new();
-        let mut tries: Vec<&Variant> = Vec::new();
+        let mut tries: Vec<(&State, &Variant)> = Vec::new();
         let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
         for v in &variants {
             let before = seen.iter().filter(|c| **c == v.candidate).count();
@@ -30,8 +33,12 @@ impl Session<'_> {
             // The best start of a candidate, and a second one where it acts at an unknown place.
             let starts = if v.amplitudes.iter().all(|a| *a) { 1 } else { 2 };
             if before < starts && tries.len() < fits + fits / 2 {
-                tries.push(v);
+                tries.push((state, v));
             }
+        }
+        let home = if round == 1 { self.home(state)? } else { None };
+        if let Some((home, variants)) = &home {
+            tries.extend(variants.iter().map(|v| (home, v)));
         }
         let arrived = self.race(state, &tries)?;
         let jobs: Vec<(Vec<Change>, Vec<f64>)> =
@@ -52,6 +59,31 @@ impl Session<'_> {
             mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
         }
         self.decide(state, fitted)
+    }
+
+    /// The scene as it was given, with the candidates that promise most there, where the baseline has moved far from it: the numbers that
+    /// make up best for what is missing may lie where nothing else can be seen any more.
+    fn home(&mut self, state: &State) -> Result<Option<(State, Vec<Variant>)>, LabError> {
+        let model = &state.model;
+        let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > FAR * n.start.abs().max(n.scale);
+        if !model.values.iter().zip(&model.numbers).any(far) {
+            return Ok(None);
+        }
+        let values: Vec<f64> = model.numbers.iter().map(|n| n.start).collect();
+        let Some(Ok(readings)) = self.lab.linearise(&[(model.changes.clone(), values.clone())]).pop() else { return Ok(None) };
+        let table = self.cells.table(&readings, Some(&state.table));
+        let frame = self.frame(&table, &state.fields);
+        let home = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
+        let mut variants = self.variants(&home)?;
+        variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        let mut seen = Vec::new();
+        variants.retain(|v| {
+            let first = !seen.contains(&v.candidate);
+            seen.push(v.candidate);
+            first
+        });
+        variants.truncate(self.options.fits / 2);
+        Ok(Some((home, variants)))
     }
 
     /// What a fitted candidate is worth.

@@ -19,7 +19,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
     let tolerance = search.settings.tolerance.clone();
     let mut damping = None;
     let mut growth = 2.0;
-    let mut longest = search.settings.max_step;
+    let mut longest = search.settings.max_step.min(search.settings.first_step);
     loop {
         if at.curvature.len() != q * q {
             return Ok(Status::Failed("no sensitivities were computed".into()));
@@ -65,6 +65,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
             // A failure says nothing about the curvature, only that the step was too long.
             longest = length * if trial.failure.is_some() { 0.25 } else { 0.5 };
         }
+        search.reach = longest;
         search.iterated(at.cost, &z);
     }
 }

@@ -117,6 +117,8 @@ pub struct Search<'a> {
     pub upper: &'a [f64],
     /// Limits and tolerances.
     pub settings: &'a Settings,
+    /// Longest step that would be tried next.
+    pub reach: f64,
     best: Option<(Vec<f64>, Sample)>,
     start_cost: f64,
     evaluations: usize,
@@ -136,6 +138,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// Evaluations used.
     pub evaluations: usize,
+    /// Longest step that Gauss–Newton would try next, for [`Settings::first_step`] of a search that goes on from here.
+    pub reach: f64,
     /// How it ended.
     pub status: Status,
     /// Cost and derivatives at z, as far as the optimiser asked for them; `None` if no point could be evaluated.
@@ -157,6 +161,7 @@ impl<'a> Search<'a> {
             lower,
             upper,
             settings,
+            reach: settings.first_step,
             best: None,
             start_cost: f64::INFINITY,
             evaluations: 0,
@@ -183,10 +188,10 @@ impl<'a> Search<'a> {
                 walk.unwrap_or(Status::Interrupted)
             }
         };
-        let Search { start_cost, iterations, evaluations, best, .. } = self;
+        let Search { start_cost, iterations, evaluations, reach, best, .. } = self;
         let (z, sample) = best.map_or((start, None), |(z, s)| (z, Some(s)));
         let cost = sample.as_ref().map_or(f64::INFINITY, |s| s.cost);
-        Outcome { z, cost, start_cost, iterations, evaluations, status, sample }
+        Outcome { z, cost, start_cost, iterations, evaluations, reach, status, sample }
     }
 
     /// Evaluates a point. Whatever is not a number counts as a failed point with infinite cost.

@@ -15,6 +15,7 @@ pub(super) struct Done {
     pub errors: Vec<Option<f64>>,
     pub cost: f64,
     pub gained: f64,
+    pub reach: f64,
     pub settled: bool,
 }
 
@@ -49,7 +50,15 @@ impl Checkpoint {
     /// Keeps a fit. A disk that is full costs the checkpoint, not the diagnosis.
     pub fn keep(&mut self, key: String, fit: &Fit) {
         let (values, errors) = (fit.model.values.clone(), fit.model.errors.clone());
-        let done = Done { key: key.clone(), values, errors, cost: fit.cost, gained: fit.gained, settled: fit.settled };
+        let done = Done {
+            key: key.clone(),
+            values,
+            errors,
+            cost: fit.cost,
+            gained: fit.gained,
+            reach: fit.reach.min(f64::MAX),
+            settled: fit.settled,
+        };
         if let (Some(path), Ok(line)) = (&self.path, serde_json::to_string(&done)) {
             let file = std::fs::OpenOptions::new().append(true).create(true).open(path);
             let _ = file.and_then(|mut f| writeln!(f, "{line}"));

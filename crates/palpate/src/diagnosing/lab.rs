@@ -11,7 +11,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{errors, fingerprint};
 use crate::interrupt::Interrupt;
 use palpate_cpu::CpuBackend;
-use palpate_diagnose::{Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting};
+use palpate_diagnose::{Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting, Start};
 use palpate_engine::Rollout;
 use palpate_fit::{FitScene, Hooks, Problem, Progress, Settings, Status, Tolerance, Want};
 use palpate_model::scene::Optimizer;
@@ -90,10 +90,10 @@ impl<'a> Lab<'a> {
         })
     }
 
-    fn key(&self, changes: &[Change], start: &[f64], effort: (usize, f64)) -> String {
+    fn key(&self, start: &Start, effort: (usize, f64)) -> String {
         let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
         let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
-        format!("{prints:?} {theta:?} {changes:?} {start:?} {effort:?}")
+        format!("{prints:?} {theta:?} {start:?} {effort:?}")
     }
 }
 
@@ -157,13 +157,14 @@ fn fit(
     base: &[Experiment],
     backend: Backend,
     limits: Limits,
-    (changes, start): &Try,
+    Start { changes, values, reach }: &Start,
     (iterations, tolerance): (usize, f64),
 ) -> Result<Fit, LabError> {
     limits.check()?;
-    let (mut problem, numbers) = problem(base, backend, (changes, start), NEWTON * tolerance)?;
+    let (mut problem, numbers) = problem(base, backend, (changes, values), NEWTON * tolerance)?;
     let settings = Settings {
         iterations,
+        first_step: *reach,
         // Of ten thousand readings a share of 2e-4 of the cost is that of two. Steps count as its square root.
         tolerance: Tolerance { cost: tolerance, gradient: tolerance, step: 0.1 * tolerance.sqrt() },
         errors: errors(base),
@@ -186,9 +187,10 @@ fn fit(
         values: result.parameters.iter().map(|p| p.value).collect(),
         errors: result.parameters.iter().map(|p| p.standard_error).collect(),
     };
-    let unsettled = matches!(result.runs[result.best].status, Status::IterationLimit | Status::Interrupted);
+    let run = &result.runs[result.best];
+    let unsettled = matches!(run.status, Status::IterationLimit | Status::Interrupted);
     let gained = first.map_or(0.0, |f| (f - result.cost).max(0.0));
-    Ok(Fit { model, cost: result.cost, gained, settled: !unsettled })
+    Ok(Fit { model, cost: result.cost, gained, reach: run.reach, settled: !unsettled })
 }
 
 /// Residuals of every scene, with derivatives by the numbers from `from` on. Always the reference backend: statistics want its precision.
@@ -311,16 +313,16 @@ impl Laboratory for Lab<'_> {
         tries.par_iter().map(|t| cost(base, backend, limits, t).unwrap_or(f64::INFINITY)).collect()
     }
 
-    fn fit(&mut self, tries: &[Try], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>> {
+    fn fit(&mut self, tries: &[Start], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>> {
         let effort = (iterations, tolerance);
         let known: Vec<Option<Result<Fit, LabError>>> = tries
             .iter()
-            .map(|(c, start)| {
-                let done = self.checkpoint.find(&self.key(c, start, effort))?;
+            .map(|start| {
+                let done = self.checkpoint.find(&self.key(start, effort))?;
                 let (values, errors) = (done.values.clone(), done.errors.clone());
-                let (cost, gained, settled) = (done.cost, done.gained, done.settled);
-                let model = |numbers| Model { changes: c.clone(), numbers, values, errors };
-                Some(self.numbers(c).map(|n| Fit { model: model(n), cost, gained, settled }))
+                let (cost, gained, reach, settled) = (done.cost, done.gained, done.reach, done.settled);
+                let model = |numbers| Model { changes: start.changes.clone(), numbers, values, errors };
+                Some(self.numbers(&start.changes).map(|n| Fit { model: model(n), cost, gained, reach, settled }))
             })
             .collect();
         let (base, backend) = (&self.base, self.backend);
@@ -334,7 +336,7 @@ impl Laboratory for Lab<'_> {
         let in_time = !self.out_of_time();
         for (t, a) in tries.iter().zip(&answers) {
             if let (Ok(f), true) = (a, in_time) {
-                let key = self.key(&t.0, &t.1, effort);
+                let key = self.key(t, effort);
                 self.checkpoint.keep(key, f);
             }
         }

@@ -62,6 +62,7 @@ pub fn diagnosis_json(done: &Diagnosed) -> Value {
         "sentence": d.sentence(),
         "p_value": d.p_value,
         "p_value_after": d.p_value_after,
+        "structure": { "before": finite(d.structure.0), "after": finite(d.structure.1) },
         "baseline": level(&d.before),
         "where": d.places.iter().map(|p| json!({
             "scene": p.scene, "time": [p.time.0, p.time.1], "region": p.region, "share": finite(p.share), "p_value": p.p_value,
