@@ -39,29 +39,33 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Scor
     let own = |k: usize| dot(&bent[k], &bent[k]) > 1e-8 * dot(&columns[k], &columns[k]);
     let mut active: Vec<usize> = (0..columns.len()).filter(|k| own(*k)).collect();
     let mut out = Score { step: vec![0.0; columns.len()], p_value: 1.0, ..Score::default() };
-    while !active.is_empty() {
+    // Residuals with the changes that reached a bound.
+    let mut y = y;
+    let mut held = Vec::new();
+    loop {
         let chosen: Vec<&[f64]> = active.iter().map(|k| bent[*k].as_slice()).collect();
-        let Some(x) = least_squares(&chosen, &y, RIDGE) else { return out };
-        // A change beyond its bound is taken back, and the others are fitted again.
+        let solve = |ridge: f64| if chosen.is_empty() { Some(Vec::new()) } else { least_squares(&chosen, &y, ridge) };
+        let Some(x) = solve(RIDGE) else { return out };
+        // A change beyond its bound stays there, and the others are fitted again.
         let outside = |i: usize| x[i] < bounds[active[i]].0 || x[i] > bounds[active[i]].1;
         if let Some(worst) = (0..active.len()).find(|i| outside(*i)) {
-            active.remove(worst);
+            let k = active.remove(worst);
+            let at = x[worst].clamp(bounds[k].0, bounds[k].1);
+            out.step[k] = at;
+            y.iter_mut().zip(&bent[k]).for_each(|(y, c)| *y += at * c);
+            held.extend((at != 0.0).then_some(k));
             continue;
         }
-        let mut left = y.clone();
-        for (x, c) in x.iter().zip(&chosen) {
-            left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c);
-        }
-        out.gain = (total - dot(&left, &left)).max(0.0);
         let remains = |x: &[f64]| {
             let mut left = y.clone();
             x.iter().zip(&chosen).for_each(|(x, c)| left.iter_mut().zip(*c).for_each(|(l, c)| *l += x * c));
             dot(&left, &left)
         };
+        out.gain = (total - remains(&x)).max(0.0);
         let near = |s: &Vec<f64>| total - remains(s) >= STEP_GAIN * out.gain;
-        let start = STEP_RIDGES.iter().filter_map(|r| least_squares(&chosen, &y, *r)).find(near).unwrap_or(x);
+        let start = STEP_RIDGES.iter().filter_map(|r| solve(*r)).find(near).unwrap_or(x);
         active.iter().zip(&start).for_each(|(k, x)| out.step[*k] = *x);
-        out.freedom = Basis::new(active.iter().map(|k| &bent[*k])).rank();
+        out.freedom = Basis::new(active.iter().chain(&held).map(|k| &bent[*k])).rank();
         break;
     }
     out.share = if total > 0.0 { out.gain / total } else { 0.0 };

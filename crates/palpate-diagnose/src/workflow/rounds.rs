@@ -65,7 +65,8 @@ impl Session<'_> {
     /// make up best for what is missing may lie where nothing else can be seen any more.
     fn home(&mut self, state: &State) -> Result<Option<(State, Vec<Variant>)>, LabError> {
         let model = &state.model;
-        let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > FAR * n.start.abs().max(n.scale);
+        let size = |n: &Number| if n.start == 0.0 { n.scale } else { n.start.abs() };
+        let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > FAR * size(n);
         if !model.values.iter().zip(&model.numbers).any(far) {
             return Ok(None);
         }
