@@ -118,6 +118,8 @@ struct Session<'a> {
 
 /// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
 const FIRST_STARTS: usize = 8;
+/// Share of the baseline's readings that a model must meet for its residuals to tell of the noise.
+const KEPT: f64 = 0.95;
 /// The share of the best candidate's gain that is within reach.
 const REACH: f64 = 0.6;
 
@@ -179,7 +181,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             Ok((Some((found, next)), _)) => {
                 out.accepted.push(found);
                 state = next;
-                s.settle(&mut state);
+                s.settle(&mut state, met(&base.readings));
             }
             Ok((None, close)) => {
                 out.close = close;
@@ -209,6 +211,11 @@ struct Progress {
     structure: f64,
     interrupted: bool,
     unsure: bool,
+}
+
+/// Readings that met the simulated body.
+fn met(readings: &Readings) -> usize {
+    readings.rows.iter().filter(|r| r.row.value.is_some()).count()
 }
 
 fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
@@ -304,8 +311,12 @@ impl Session<'_> {
     }
 
     /// Looks at the noise again after an effect was added: what the model missed before may have passed for noise, so that only a
-    /// smaller estimate counts.
-    fn settle(&mut self, state: &mut State) {
+    /// smaller estimate counts. `before` readings met the baseline.
+    fn settle(&mut self, state: &mut State, before: usize) {
+        // A model that follows fewer readings may follow the quiet ones.
+        if (met(&state.readings) as f64) < KEPT * before as f64 {
+            return;
+        }
         let still = still_ratio(&state.readings, &self.lab.setting().still);
         let ratio = neighbour_ratio(&state.readings).max(still).min(self.noise_ratio);
         let old = self.design_effect.sqrt();

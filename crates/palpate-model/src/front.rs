@@ -43,7 +43,7 @@ impl Sight<'_> {
             }
             let step = j.inverse() * r;
             xi -= step;
-            if !((xi - 0.5).abs().max_element() < FAR) {
+            if !xi.is_finite() || (xi - 0.5).abs().max_element() >= FAR {
                 return None;
             }
             if step.abs().max_element() < 1e-13 {
