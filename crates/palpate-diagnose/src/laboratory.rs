@@ -72,6 +72,13 @@ pub struct Model {
     pub errors: Vec<Option<f64>>,
 }
 
+impl Model {
+    /// One of its numbers, as an answer states it.
+    pub fn found(&self, k: usize) -> crate::diagnosis::FoundNumber {
+        (self.numbers[k].path.clone(), self.values[k], self.errors[k], self.numbers[k].unit.clone())
+    }
+}
+
 /// Where the fit of a hypothesis starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {

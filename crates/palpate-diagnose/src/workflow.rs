@@ -3,6 +3,7 @@
 mod bound;
 mod choose;
 mod conclude;
+mod prune;
 mod race;
 mod rounds;
 
@@ -180,7 +181,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         match s.round(&state, out.accepted.len() + 1) {
             Ok((Some((found, next)), _)) => {
                 out.accepted.push(found);
-                state = next;
+                state = s.prune(next, &mut out.accepted);
                 s.settle(&mut state, met(&base.readings));
             }
             Ok((None, close)) => {

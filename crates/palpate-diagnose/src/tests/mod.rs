@@ -1,5 +1,5 @@
 //! The workflow on a laboratory whose physics is linear and known.
 
-mod bench;
+pub mod bench;
 mod still;
 mod workflow;

@@ -10,6 +10,18 @@ const PRICE_OF_MISFIT: f64 = 5e-3;
 /// How many times what noise and discretisation explain the best candidate may leave to be an explanation.
 const MISFIT: f64 = 3.0;
 
+/// What a number must gain to be worth it, between a model `best` and one without it that leaves `whole`: what it gains by chance (Schwarz,
+/// Ann. Stat. 6, 1978; in units of what the best leaves), and a share of the gap, because a freer effect also fits what no model gets right.
+pub(super) fn price(cells: usize, best: &Predicted, whole: &Predicted) -> f64 {
+    let misfit = best.loss() / best.floor.max(1.0);
+    (misfit.max(1.0) * (cells as f64).ln()).max(share(misfit) * (whole.loss() - whole.floor).max(0.0))
+}
+
+/// Where even the best leaves much more than noise, something else is wrong as well, and small shares of the gap decide nothing.
+fn share(misfit: f64) -> f64 {
+    if misfit <= MISFIT { PRICE } else { PRICE_OF_MISFIT }
+}
+
 impl Session<'_> {
     /// The candidate to be named and those that the data cannot tell from the best, itself among them; candidates come best prediction
     /// first. `None` when none passes.
@@ -19,9 +31,7 @@ impl Session<'_> {
         let predicted = |i: usize| -> &Predicted { &fitted[i].state.predicted[0] };
         let excess = |i: usize| (predicted(i).loss() - predicted(i).floor).max(0.0);
         let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
-        // Where even the best leaves much more than noise, something else is wrong as well, and small shares of the gap decide nothing.
-        let misfit = predicted(best).loss() / predicted(best).floor.max(1.0);
-        let share = if misfit <= MISFIT { PRICE } else { PRICE_OF_MISFIT } * whole;
+        let share = share(predicted(best).loss() / predicted(best).floor.max(1.0)) * whole;
         // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
         let as_close = |i: usize| excess(i) < 2.0 * excess(best) + 0.5 * predicted(best).floor;
         let as_good = |i: &usize| {
@@ -29,9 +39,8 @@ impl Session<'_> {
             passes(*i) && (by < 2.0 * share || (z < 2.0 && as_close(*i)))
         };
         let equal: Vec<usize> = (0..fitted.len()).filter(as_good).collect();
-        // Every number has its price: what it gains by chance (Schwarz, Ann. Stat. 6, 1978; in units of what the best leaves), and a share of
-        // the gap, because a freer effect also fits what no model gets right.
-        let price = (misfit.max(1.0) * (self.cells.len() as f64).ln()).max(share);
+        // Every number has its price.
+        let price = price(self.cells.len(), predicted(best), &state.predicted[0]);
         let worth = |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64;
         let able = (0..fitted.len()).filter(|i| passes(*i));
         let first = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);

@@ -143,11 +143,10 @@ impl Session<'_> {
         let model = &f.state.model;
         let change = model.changes.last();
         let own = model.values.len() - f.freedom;
-        let number = |k: usize| (model.numbers[k].path.clone(), model.values[k], model.errors[k], model.numbers[k].unit.clone());
         Found {
             kind: change.map_or("", Change::kind).into(),
             sentence: change.map_or("", Change::sentence).into(),
-            parameters: (own..model.values.len()).map(number).collect(),
+            parameters: (own..model.values.len()).map(|k| model.found(k)).collect(),
             p_value: f.p_value,
             held_out_gain: f.gain.clamp(0.0, 1.0),
             accepted,

@@ -1,0 +1,124 @@
+//! Backward elimination: what was accepted first may be a stand-in for what was found later.
+
+use super::choose::price;
+use super::{Session, State};
+use crate::change::Change;
+use crate::diagnosis::Found;
+use crate::laboratory::{LabError, Start};
+
+/// Iterations and tolerance of a fit without an effect: as of the last lap of a race.
+const EFFORT: (usize, f64) = (20, 2e-6);
+
+impl Session<'_> {
+    /// Leaves out every effect but the newest in turn, fits the others again, and drops it when the recording is predicted as well without it, but for
+    /// the price of its numbers. `accepted` are the effects of the state's changes, in their order.
+    pub(super) fn prune(&mut self, mut state: State, accepted: &mut Vec<Found>) -> State {
+        let first = state.model.changes.len() - accepted.len();
+        let mut k = 0;
+        // Asked to stop: what is left is there to be shown.
+        while k + 1 < accepted.len() && !self.lab.interrupted() {
+            self.lab.say(&format!("is {} still needed?", accepted[k].kind));
+            if let Ok(Some(less)) = self.without(&state, first + k) {
+                state = less;
+                accepted.remove(k);
+            } else {
+                k += 1;
+            }
+        }
+        let places = self.places(&state.model.changes).unwrap_or_default();
+        for (found, place) in accepted.iter_mut().zip(places.into_iter().skip(first)) {
+            found.parameters = place.map(|i| state.model.found(i)).collect();
+        }
+        state
+    }
+
+    /// The state without one of its changes, if that one is not worth its numbers.
+    fn without(&mut self, state: &State, k: usize) -> Result<Option<State>, LabError> {
+        let places = self.places(&state.model.changes)?;
+        let freedom = places[k].len();
+        let mut changes = state.model.changes.clone();
+        changes.remove(k);
+        let kept = (0..state.model.values.len()).filter(|i| !places[k].contains(i));
+        let values = kept.map(|i| state.model.values[i]).collect();
+        let start = Start { changes, values, reach: f64::INFINITY };
+        let fit = super::one(self.lab.fit(&[start], EFFORT.0, EFFORT.1))?;
+        let readings = super::one(self.lab.linearise(&[(fit.model.changes.clone(), fit.model.values.clone())]))?;
+        let mut less = self.state(fit.model, readings, state.fields.clone(), Some(&state.table))?;
+        less.held_out_finer.clone_from(&state.held_out_finer);
+        let (with, without) = (&state.predicted[0], &less.predicted[0]);
+        let price = price(self.cells.len(), with, without);
+        let worse_elsewhere = self.held_out(&less).zip(self.held_out(state)).is_some_and(|(a, b)| {
+            // Data that no fit has seen decide where there are any: a tenth of their noise is no loss.
+            a.rms * a.rms > b.rms * b.rms + 0.01 * b.noise * b.noise
+        });
+        Ok((without.loss() - with.loss() < price * freedom as f64 && !worse_elsewhere).then_some(less))
+    }
+
+    /// Where the numbers of every change stand among all.
+    fn places(&self, changes: &[Change]) -> Result<Vec<std::ops::Range<usize>>, LabError> {
+        let ends =
+            (0..=changes.len()).map(|n| Ok(self.lab.numbers(&changes[..n])?.len())).collect::<Result<Vec<_>, LabError>>()?;
+        Ok(ends.windows(2).map(|w| w[0]..w[1]).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cells::Cells;
+    use crate::crossval::foldings;
+    use crate::laboratory::Laboratory;
+    use crate::tests::bench::{Bench, NOISE};
+    use palpate_model::effects::{Effect, find};
+
+    /// Kinds that are left of two that were accepted, and the stated number of the last.
+    fn left(hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
+        let mut bench = Bench::new(11, hidden, false);
+        let effect = |kind: &str| Change::Effect(Effect::absent(find(kind).unwrap()));
+        let changes = vec![effect("depth-bias"), effect("air-drag")];
+        let values = bench.numbers(&changes).unwrap().iter().map(|n| n.start).collect();
+        let start = Start { changes, values, reach: f64::INFINITY };
+        let model = bench.fit(&[start], 1, 0.0).remove(0).unwrap().model;
+        let readings = bench.linearise(&[(model.changes.clone(), model.values.clone())]).remove(0).unwrap();
+        let cells = Cells::new(&readings);
+        let options = crate::Options::default();
+        let mut s = Session {
+            folds: foldings(&cells),
+            lab: &mut bench,
+            options: &options,
+            cells,
+            noise_ratio: 1.0,
+            design_effect: 1.0,
+            noise: Default::default(),
+            scored: None,
+            tried: Vec::new(),
+            not_tried: Vec::new(),
+            no_time: false,
+        };
+        let state = s.state(model, readings, Vec::new(), None).unwrap();
+        let found = |kind: &str| Found {
+            kind: kind.into(),
+            sentence: String::new(),
+            parameters: Vec::new(),
+            p_value: 0.0,
+            held_out_gain: 1.0,
+            accepted: true,
+            indistinguishable_from: Vec::new(),
+            separated_by: None,
+        };
+        let mut accepted = vec![found("depth-bias"), found("air-drag")];
+        let state = s.prune(state, &mut accepted);
+        assert_eq!(state.model.changes.len(), accepted.len());
+        (accepted.iter().map(|f| f.kind.clone()).collect(), accepted.last().unwrap().parameters[0].1)
+    }
+
+    #[test]
+    fn what_a_later_effect_explains_is_dropped_and_what_is_needed_stays() {
+        let (bias, drag) = (Bench::first_pattern("depth-bias"), Bench::first_pattern("air-drag"));
+        let (kinds, number) = left(&[(&drag, -1.5 * NOISE)]);
+        assert_eq!(kinds, ["air-drag"]);
+        // Noise leaves 1/√5760 of 1 mm on the amplitude.
+        assert!((number / (1.5 * NOISE) - 1.0).abs() < 0.05, "{number}");
+        assert_eq!(left(&[(&drag, -1.5 * NOISE), (&bias, 1.5 * NOISE)]).0, ["depth-bias", "air-drag"]);
+    }
+}
