@@ -4,42 +4,14 @@
 //! both compute the same bits.
 // use shared/candidates
 
-var<storage, read> cameras: array<vec4<f32>>;
-// Numbers of the band cells by lattice place.
-var<storage, read> band_lookup: array<u32>;
 var<storage, read_write> keys: array<atomic<u32>>;
 var<storage, read_write> owners: array<atomic<u32>>;
 
-const HIDDEN = 0x80000000u;
-const NOBODY = 0xffffffffu;
-
-// True when a place of the rest shape, in units of a cell's ξ, lies in the body.
-fn in_body(cell: u32, xi: vec3<f32>) -> bool {
-    let last = vec3(f32(sight.lattice[0]), f32(sight.lattice[1]), f32(sight.lattice[2])) - vec3(1.0);
-    let place = vec3<f32>(band_cells[cell].lattice) + xi;
-    if !(all(place >= vec3(0.0)) && all(place <= last)) {
-        return false;
-    }
-    let corner = min(floor(place), last - vec3(1.0));
-    let ijk = vec3<u32>(corner);
-    let other = band_lookup[ijk.x + sight.lattice[0] * (ijk.y + sight.lattice[1] * ijk.z)];
-    if other == NOBODY {
-        return false;
-    }
-    return triquadratic(other, place - corner).w < 0.0;
-}
-
-// Order of a place: the smaller the better; NOBODY when the camera cannot have seen it. A non-negative float's bits grow with it.
-fn key_of(cell: u32, found: Pulled, sight_line: vec3<f32>) -> u32 {
+// Order of a place: the smaller the better. A non-negative float's bits grow with it.
+fn key_of(found: Pulled, line: vec3<f32>) -> u32 {
     let size = bitcast<u32>(abs(found.phi)) & 0x7fffffffu;
-    if dot(found.gradient, sight_line) <= sight.turned_away * length(found.gradient) {
-        return size;
-    }
-    let way = 1.5 * abs(found.phi) + sight.reach;
-    if in_body(cell, found.xi - way * (found.inverse * sight_line)) {
-        return NOBODY;
-    }
-    return size | HIDDEN;
+    let faces = dot(found.gradient, line) <= sight.turned_away * length(found.gradient);
+    return select(size | HIDDEN, size, faces);
 }
 
 @compute @workgroup_size(64)
@@ -71,14 +43,11 @@ fn match_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                 if !found.holds {
                     continue;
                 }
-                // Cameras are counted from the body's origin, points from the frame's.
-                let line = (p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - cameras[u32(p.w)].xyz;
-                let size = length(line);
-                let key = key_of(cell, found, select(vec3(0.0), line / size, size > 0.0));
+                let key = key_of(found, line_of_sight(p, shot));
                 let at = s.slot * sight.points + (i - shot.point_start);
                 if call.mode == 0u {
                     atomicMin(&keys[at], key);
-                } else if key != NOBODY && atomicLoad(&keys[at]) == key {
+                } else if atomicLoad(&keys[at]) == key {
                     atomicMin(&owners[at], cell);
                 }
             }

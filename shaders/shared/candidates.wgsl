@@ -5,6 +5,10 @@
 // Frame's points in the order of their cubes: position from the frame's origin [m], camera.
 var<storage, read> points: array<vec4<f32>>;
 var<storage, read> cube_starts: array<u32>;
+var<storage, read> cameras: array<vec4<f32>>;
+
+// In keys of matches: the side is one that the camera cannot see.
+const HIDDEN = 0x80000000u;
 
 struct Cubes {
     low: vec3<u32>,
@@ -27,4 +31,12 @@ fn row_of(c: Cubes, shot: Shot, y: u32, z: u32) -> vec2<u32> {
 
 fn in_box(e: Hexahedron, y: vec3<f32>) -> bool {
     return all(y >= e.low) && all(y <= e.high);
+}
+
+// Direction from its camera to a point of `points`, zero for a camera in the point.
+fn line_of_sight(p: vec4<f32>, shot: Shot) -> vec3<f32> {
+    // Cameras are counted from the body's origin, points from the frame's.
+    let line = (p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - cameras[u32(p.w)].xyz;
+    let size = length(line);
+    return select(vec3(0.0), line / size, size > 0.0);
 }

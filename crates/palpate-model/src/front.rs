@@ -53,6 +53,21 @@ impl Sight<'_> {
         Some(xi)
     }
 
+    /// The side of a point that lies nearest to a hidden one, at `place`: that one where `way` [m] towards the camera leads out of the body
+    /// or cannot be told; else the front, as [`Sight::front`] says.
+    pub fn side(
+        &self,
+        place: Pullback,
+        way: f64,
+        sizes: (f64, f64),
+        distance: impl Fn(DVec3) -> Option<(f64, DVec3)>,
+    ) -> Option<Pullback> {
+        match self.at(way, place.xi).filter(|xi| distance(*xi).is_some_and(|d| d.0 < 0.0)) {
+            Some(start) => self.front((way, start), sizes, distance),
+            None => Some(place),
+        }
+    }
+
     /// Where the body ends on the way to the camera, from a place inside it that lies `from` [m] before the point; `None` beyond `band` [m], or
     /// where that cannot be said. `distance` is φ [m] with its derivative by ξ, `None` where it is not known; `h` is the cells' size [m].
     pub fn front(

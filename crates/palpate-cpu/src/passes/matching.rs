@@ -9,7 +9,7 @@ use palpate_model::body::Body;
 use palpate_model::front::Sight;
 use palpate_model::grid::shape_functions;
 use palpate_model::observation::{Camera, ObservedPoint};
-use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, jacobian, pull_back, triquadratic};
+use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back, triquadratic};
 use rayon::prelude::*;
 
 /// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
@@ -150,8 +150,8 @@ pub struct Seen<'a> {
 }
 
 /// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
-/// surface faces its camera come first. A point nearest to a hidden side keeps it where a visible one is near (`noise` [m] of a
-/// reading), and belongs to the front otherwise, up to the `band` [m]. Then the smallest |φ| wins, then the lowest cell number. Ordered by point.
+/// surface faces its camera come first; then the smallest |φ| wins, then the lowest cell number. A point nearest to a hidden side keeps
+/// it where a visible one is near (`noise` [m] of a reading), and belongs to the front otherwise, up to the `band` [m]. Ordered by point.
 pub fn match_points(
     body: &Body,
     u: &[DVec3],
@@ -160,9 +160,14 @@ pub fn match_points(
     lookup: &BandLookup,
     (band, noise): (f64, f64),
 ) -> Vec<Match> {
-    let Seen { points, cameras, recorded } = seen;
     let n = body.nodes.len();
     let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
+    let corners = |nodes: &[u32; 8]| -> Corners { nodes.map(|a| rest(a) + u[a as usize]) };
+    let line = |(points, cameras): (&[ObservedPoint], &[Camera]), p: u32| {
+        let seen = &points[p as usize];
+        (seen.position - cameras[seen.camera as usize].center).normalize_or_zero()
+    };
+    let moved = (seen.points, seen.cameras);
     let candidates: Vec<Vec<(bool, Match)>> = body
         .band
         .cells
@@ -170,44 +175,42 @@ pub fn match_points(
         .with_min_len(256)
         .enumerate()
         .map(|(c, cell)| {
-            let x: Corners = cell.nodes.map(|a| rest(a) + u[a as usize]);
+            let x = corners(&cell.nodes);
             let min = x.iter().copied().fold(x[0], DVec3::min);
             let max = x.iter().copied().fold(x[0], DVec3::max);
             let mut found = Vec::new();
             hash.visit(min, max, |p| {
-                let seen = &points[p as usize];
-                if seen.position.cmplt(min).any() || seen.position.cmpgt(max).any() {
+                let point = seen.points[p as usize].position;
+                if point.cmplt(min).any() || point.cmpgt(max).any() {
                     return;
                 }
-                if let Some(place) = pull_back(&x, &cell.sdf, seen.position) {
-                    let from = |points: &[ObservedPoint], cameras: &[Camera]| {
-                        (points[p as usize].position - cameras[seen.camera as usize].center).normalize_or_zero()
-                    };
-                    let sight = from(points, cameras);
-                    let faces = place.gradient.dot(sight) <= TURNED_AWAY * place.gradient.length();
-                    let lowest = body.grid.position(cell.lattice);
-                    let distance = |xi: DVec3| lookup.distance(body, lowest + body.grid.h * xi);
-                    let way = 1.5 * place.phi.abs() + NOISE_REACH * noise;
-                    let before = place.xi - way * (jacobian(&x, place.xi).inverse() * sight);
-                    let place = if faces || distance(before).is_none_or(|d| d.0 >= 0.0) {
-                        Some(place)
-                    } else {
-                        // Inside a thin part, near its back.
-                        let line = Sight { x: &x, point: seen.position, direction: from(recorded.0, recorded.1) };
-                        line.front((way, before), (body.grid.h, band), distance)
-                    };
-                    found.extend(place.map(|place| (faces, Match { point: p, cell: c as u32, place })));
+                if let Some(place) = pull_back(&x, &cell.sdf, point) {
+                    let faces = place.gradient.dot(line(moved, p)) <= TURNED_AWAY * place.gradient.length();
+                    found.push((faces, Match { point: p, cell: c as u32, place }));
                 }
             });
             found
         })
         .collect();
-    let mut best: Vec<Option<(bool, Match)>> = vec![None; points.len()];
+    let mut best: Vec<Option<(bool, Match)>> = vec![None; seen.points.len()];
     for (faces, m) in candidates.into_iter().flatten() {
         let slot = &mut best[m.point as usize];
         if slot.is_none_or(|(f, b)| (faces && !f) || (faces == f && m.place.phi.abs() < b.place.phi.abs())) {
             *slot = Some((faces, m));
         }
     }
-    best.into_iter().flatten().map(|(_, m)| m).collect()
+    let side = |best: Option<(bool, Match)>| {
+        let (faces, m) = best?;
+        if faces {
+            return Some(m);
+        }
+        let cell = &body.band.cells[m.cell as usize];
+        let (x, lowest) = (corners(&cell.nodes), body.grid.position(cell.lattice));
+        let distance = |xi: DVec3| lookup.distance(body, lowest + body.grid.h * xi);
+        let way = 1.5 * m.place.phi.abs() + NOISE_REACH * noise;
+        let sight = Sight { x: &x, point: seen.points[m.point as usize].position, direction: line(seen.recorded, m.point) };
+        let place = sight.side(m.place, way, (body.grid.h, band), distance)?;
+        Some(Match { place, ..m })
+    };
+    best.into_par_iter().with_min_len(1024).filter_map(side).collect()
 }

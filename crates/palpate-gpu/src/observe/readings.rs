@@ -1,5 +1,6 @@
 //! Effects on the measurement: the clock's shift, markers' offsets, and, for depth readings, true points and cameras of every member with
 //! the points' derivatives, computed in double precision when a batch is set. Without the latter all members share the recording's points.
+//! Fronts are looked for along lines of sight as the recording has them (`shared/front.wgsl`), which effects do not move.
 
 use super::shots::{Shots, split};
 use crate::error::GpuError;
@@ -76,7 +77,25 @@ pub(super) fn upload<M: Maker>(
     buffers.insert("points", gpu.upload("points", &shots.points)?);
     buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
     buffers.insert("reading_slopes", gpu.upload("reading_slopes", &slopes(plan, sensors, shots))?);
+    buffers.insert("recorded_lines", gpu.upload("recorded_lines", &recorded_lines(plan, shots))?);
     Ok(())
+}
+
+/// Directions from cameras to points as the recording has them, in the device's order; none where no reading is moved.
+fn recorded_lines(plan: &Plan, shots: &Shots) -> Vec<[f32; 4]> {
+    if places(plan).is_empty() {
+        return Vec::new();
+    }
+    let obs = &plan.observation;
+    let mut out = Vec::with_capacity(shots.points.len());
+    for (number, shot) in shots.shots.iter().enumerate() {
+        let points = &obs.frames[number % obs.frames.len()].points;
+        out.extend(shots.point_order[shot.point_start as usize..][..shot.point_count as usize].iter().map(|&p| {
+            let seen = &points[p as usize];
+            split((seen.position - obs.cameras[seen.camera as usize].center).normalize_or_zero())[0]
+        }));
+    }
+    out
 }
 
 /// ∂(true point)/∂θ of every point in the device's order, `[points][K]`.
