@@ -8,6 +8,8 @@
 mod extension_tests;
 #[cfg(test)]
 mod fault_tests;
+#[cfg(test)]
+mod front_tests;
 mod looks;
 mod readings;
 mod results;

@@ -177,6 +177,19 @@ mod tests {
     }
 
     #[test]
+    fn the_side_is_kept_where_the_way_leads_out_of_the_body() {
+        let (x, point) = (cell(), DVec3::new(0.4, 0.5, 0.2));
+        let direction = DVec3::new(0.2, 0.1, -1.0).normalize();
+        let (sight, front) = (Sight { x: &x, point, direction }, looked(&x, point));
+        let place = Pullback { xi: sight.at(0.0, DVec3::splat(0.5)).unwrap(), phi: -0.1, gradient: DVec3::NEG_Z };
+        let side = |way: f64| sight.side(place, way, (1.0, 4.0), plane).unwrap();
+        assert_eq!(side(1.01 * -front.phi), place);
+        // A root good to 1e-14 of a cell, from another start.
+        let found = side(0.99 * -front.phi);
+        assert!((found.phi - front.phi).abs() < 1e-12 && (found.xi - front.xi).length() < 1e-12);
+    }
+
+    #[test]
     fn a_front_beyond_the_band_is_none() {
         let (x, point) = (cell(), DVec3::new(0.4, 0.5, 0.2));
         let sight = Sight { x: &x, point, direction: DVec3::NEG_Z };

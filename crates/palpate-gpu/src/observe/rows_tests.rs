@@ -12,7 +12,7 @@ use palpate_model::plan::Plan;
 
 /// Numbers that differ, over what they may be: distances by a thousandth of the noise (rounding is 1e-7 of a cell), places by as much
 /// of a cell, derivatives by a thousandth of the largest of their column.
-fn apart(a: &Linearised, b: &Linearised, plan: &Plan) -> [f64; 3] {
+pub(super) fn apart(a: &Linearised, b: &Linearised, plan: &Plan) -> [f64; 3] {
     let q = b.directions.len();
     assert_eq!((a.rows.residuals.len(), a.rows.sensitivity.len()), (b.rows.residuals.len(), b.rows.sensitivity.len()));
     let mut worst = [0.0f64; 3];
@@ -101,7 +101,7 @@ fn markers_that_sit_elsewhere_are_those_of_the_cpu() {
     assert!(apart(&wrong, &lin, &plan)[0] > 1e-3);
 }
 
-fn effect(kind: &str, values: &[(usize, f64)]) -> Effect {
+pub(super) fn effect(kind: &str, values: &[(usize, f64)]) -> Effect {
     let mut effect = Effect::absent(find(kind).unwrap_or_else(|| panic!("{kind}")));
     values.iter().for_each(|(slot, v)| effect.values[*slot] = Some(*v));
     effect

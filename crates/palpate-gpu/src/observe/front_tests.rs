@@ -1,0 +1,95 @@
+//! Points that belong to the front of a thin plate, against the CPU: the plate has swung less far than the one that was recorded, so that
+//! points of the side which it swung away from lie behind its middle.
+
+use super::rollout_tests::{differences, seen, watched};
+use super::rows_tests::{apart, effect};
+use crate::GpuBackend;
+use crate::tests::scenes::{device, held};
+use glam::DVec3;
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout};
+use palpate_model::effects::Effect;
+use palpate_model::kernel;
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::{Analytic, BodySource, InitialShape};
+
+/// Thickness of the plate and size of a cell [m].
+const THICK: f64 = 0.02;
+
+/// A plate held at its top that swings along x, seen from both sides.
+fn plate(effects: Vec<Effect>) -> Plan {
+    let mut s = held(THICK);
+    let (min, max) = (DVec3::new(-0.009, -0.03, 0.0), DVec3::new(THICK - 0.009, 0.03, 0.1));
+    s.object.source = BodySource::Analytic(Analytic::Box { min, max });
+    (s.planes, s.masses) = (Vec::new(), Vec::new());
+    s.initial.state = InitialShape::Rest;
+    s.initial.velocity = DVec3::new(1.0, 0.0, 0.0);
+    s.time.steps = 3;
+    s.observation = watched();
+    s.effects = effects;
+    seen(&s)
+}
+
+/// Rows of fronts: no place of the plate lies deeper in it than half its thickness.
+fn fronts(l: &Linearised) -> Vec<usize> {
+    let deep = |r: f64| r < -0.55 * THICK;
+    (0..l.rows.residuals.len()).filter(|i| l.rows.residuals[*i].value.is_some_and(deep)).collect()
+}
+
+fn check(plan: &Plan, keys: &[usize]) {
+    let Some(gpu) = device(None) else { return };
+    let speed = plan.layout.index(ParamKey::Velocity(0));
+    let directions = [keys, &[plan.layout.index(ParamKey::YoungsModulus), speed]].concat();
+    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let rows: Vec<Vec<f64>> = [0.5, 0.3]
+        .map(|factor| {
+            let mut row = plan.theta.clone();
+            row[speed] *= factor;
+            row
+        })
+        .to_vec();
+    let batch = ParamBatch::from_rows(&rows);
+    let mut cpu = Rollout::new(CpuBackend, plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let found = rollout.evaluate(&batch, &request);
+    for ((a, b), row) in found.iter().zip(&cpu.evaluate(&batch, &request)).zip(&rows) {
+        assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
+        let off = differences(a, b, &directions);
+        assert!(off.is_empty(), "{off:#?}");
+        let right = cpu.linearise(row, &directions).unwrap_or_else(|e| panic!("{e}"));
+        let lin = rollout.linearise(row, &directions).unwrap_or_else(|e| panic!("{e}"));
+        let places = fronts(&right);
+        let d = apart(&lin, &right, plan);
+        println!("{} fronts of {} points: {d:?}", places.len(), b.matched);
+        assert!(places.len() > 20, "{}", places.len());
+        assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
+
+        // Fronts that are wrong by one percent show, in residuals, derivatives and the cost.
+        let mut wrong = lin.clone();
+        places.iter().for_each(|i| wrong.rows.residuals[*i].value = right.rows.residuals[*i].value.map(|r| 1.01 * r));
+        assert!(apart(&wrong, &right, plan)[0] > 1e-3);
+        let (mut wrong, q) = (lin.clone(), directions.len());
+        places.iter().for_each(|i| wrong.rows.sensitivity[i * q..(i + 1) * q].iter_mut().for_each(|d| *d *= 1.01));
+        assert!(apart(&wrong, &right, plan)[2] > 1e-3);
+        let (mut wrong, noise) = (a.clone(), plan.observation.depth_noise);
+        let more = |r: f64| kernel::cost(1.01 * r, plan.band) - kernel::cost(r, plan.band);
+        let by_fronts: f64 = places.iter().filter_map(|i| right.rows.residuals[*i].value).map(more).sum();
+        wrong.cost += by_fronts / (noise * noise * plan.observation.residuals() as f64);
+        assert_eq!(differences(&wrong, b, &directions).len(), 1, "1 % was not seen");
+    }
+}
+
+#[test]
+fn fronts_of_a_thin_plate_are_those_of_the_cpu_and_one_percent_shows() {
+    check(&plate(Vec::new()), &[]);
+}
+
+/// Fronts are looked for along the recorded line of sight, whatever the effects on readings say.
+#[test]
+fn fronts_with_a_camera_that_stood_elsewhere_are_those_of_the_cpu() {
+    let plan = plate(vec![effect("camera-pose", &[(0, 1.0), (2, 0.01), (6, 0.01)])]);
+    let turned = |k: &ParamKey| matches!(*k, ParamKey::Effect { slot: 6, .. });
+    let keys: Vec<usize> = (0..plan.layout.len()).filter(|p| turned(&plan.layout.keys[*p])).collect();
+    check(&plan, &keys);
+}
