@@ -159,6 +159,8 @@ pub struct Diagnosis {
     pub noise_ratio: f64,
     /// Factor by which correlation between readings raises the variance of means.
     pub design_effect: f64,
+    /// True when what is left still has structure that counts.
+    pub remains: bool,
     /// True when it was stopped before its end.
     pub interrupted: bool,
     /// True when that was before the baseline was fitted, or before it was known what cells and step explain: then it is not even sure that
@@ -225,16 +227,26 @@ impl Diagnosis {
                     .collect();
                 format!(
                     "The model lacks something{place}: {}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of \
-                     the gap on data left out.{}",
+                     the gap on data left out.{}{}",
                     what.join("; and "),
                     mm(self.before.rms),
                     mm(self.after.rms),
                     mm(self.after.noise),
                     100.0 * self.gap_closed,
+                    if self.remains { self.caution() } else { String::new() },
                     self.unfinished()
                 )
             }
         }
+    }
+
+    /// What keeps the answer from being the whole one.
+    fn caution(&self) -> String {
+        format!(
+            " What is left still has structure ({:.3} mm, p = {:.3}): something else is missing as well, or this is only the nearest that is known.",
+            self.structure.1 * 1e3,
+            self.p_value_after
+        )
     }
 
     /// What was not tried to its end although an answer was found; empty when nothing is open.

@@ -75,7 +75,7 @@ pub fn small(hidden: Option<&str>, magnet: bool, seed: u64) -> Option<Case> {
         (true, false) => "null",
     };
     let name = hidden.first().map_or(group, |h| TABLE[h.0].name);
-    let magnet = magnet.then_some((DVec3::new(0.05, 0.075, 0.07), STRONG));
+    let magnet = magnet.then_some((DVec3::new(0.08, 0.065, 0.04), STRONG));
     Some(Case { name: format!("{name} pebble {seed}"), scene: "pebble", group, hidden, magnet, seed })
 }
 

@@ -71,7 +71,8 @@ impl Session<'_> {
         let adequate = !self.is_missing(adequacy, &state);
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,
-            (true, 1) => Verdict::MissingEffect,
+            // What follows one recording and not the other has only bent to it.
+            (true, 1) if held_out.is_none() || gap_closed >= self.options.enough => Verdict::MissingEffect,
             (false, 1) if gap_closed >= self.options.enough => Verdict::MissingEffect,
             (_, 2..) if gap_closed >= self.options.enough_of_several => Verdict::MissingEffect,
             // What was not tried may explain it.
@@ -108,6 +109,7 @@ impl Session<'_> {
             slack,
             noise_ratio: self.noise_ratio,
             design_effect: self.design_effect,
+            remains: !adequate,
             interrupted: out.interrupted,
             unsure: out.unsure,
         }

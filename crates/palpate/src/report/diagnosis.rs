@@ -85,6 +85,7 @@ pub fn diagnosis_json(done: &Diagnosed) -> Value {
         "map": d.map.iter().map(|m| json!({
             "scene": m.scene, "region": m.place.to_array(), "time": [m.time.0, m.time.1], "before": finite(m.before), "after": finite(m.after),
         })).collect::<Vec<_>>(),
+        "something_remains": d.remains,
         "interrupted": d.interrupted,
         "seconds": done.seconds,
     })
