@@ -7,7 +7,7 @@ use crate::diagnosis::Found;
 use crate::laboratory::{LabError, Start};
 
 /// Iterations and tolerance of a fit without an effect: as of the last lap of a race.
-const EFFORT: (usize, f64) = (20, 2e-6);
+const EFFORT: (usize, f64) = (20, 2e-5);
 
 impl Session<'_> {
     /// Leaves out every effect but the newest in turn, fits the others again, and drops it when the recording is predicted as well without it, but for

@@ -8,7 +8,7 @@ use crate::linear::least_squares;
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
 /// behind after it and still go on. The last lap brings what is compared to its optimum.
-const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.05), (20, 2e-6, 1.0)];
+const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.05), (40, 2e-5, 1.0)];
 /// A fit may gain as many times again what it gained in a lap.
 const STAMINA: f64 = 2.0;
 /// Shares of the linear estimate that a fit may start from: the first at which the cost is lower than without.
