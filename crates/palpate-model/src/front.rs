@@ -8,7 +8,7 @@
 //! derivatives of a [`Pullback`] with gradient −G / (G·s).
 
 use crate::grid::shape_functions;
-use crate::pullback::{Pullback, jacobian};
+use crate::pullback::{Pullback, TURNED_AWAY, jacobian};
 use glam::DVec3;
 
 /// Steps of the search per cell.
@@ -54,7 +54,8 @@ impl Sight<'_> {
     }
 
     /// The side of a point that lies nearest to a hidden one, at `place`: that one where `way` [m] towards the camera leads out of the body
-    /// or cannot be told; else the front, as [`Sight::front`] says.
+    /// or cannot be told, or the front is seen at a grazing angle, where a small error of the body is a long way; else the front, as
+    /// [`Sight::front`] says.
     pub fn side(
         &self,
         place: Pullback,
@@ -63,7 +64,12 @@ impl Sight<'_> {
         distance: impl Fn(DVec3) -> Option<(f64, DVec3)>,
     ) -> Option<Pullback> {
         match self.at(way, place.xi).filter(|xi| distance(*xi).is_some_and(|d| d.0 < 0.0)) {
-            Some(start) => self.front((way, start), sizes, distance),
+            Some(start) => {
+                let front = self.front((way, start), sizes, distance)?;
+                // Its gradient is G / |G·s|.
+                let grazes = front.gradient.length() * TURNED_AWAY > 1.0;
+                Some(if grazes { place } else { front })
+            }
             None => Some(place),
         }
     }
@@ -105,7 +111,6 @@ impl Sight<'_> {
             let newton = t + phi / slope;
             let settled = (newton - t).abs() < 1e-14 * h;
             if settled || beyond - inside < 1e-15 * h {
-                // Seen from the side, the front says nothing.
                 let faces = slope < 0.0 && t < band;
                 return faces.then(|| Pullback { xi, phi: -t, gradient: gradient / -slope });
             }
@@ -196,5 +201,20 @@ mod tests {
         let start = sight.at(0.0, DVec3::splat(0.5)).unwrap();
         assert!(sight.front((0.0, start), (1.0, 0.2), plane).is_none());
         assert!(sight.front((0.0, start), (1.0, 4.0), |_| None).is_none());
+    }
+    #[test]
+    fn a_front_at_a_grazing_angle_leaves_the_hidden_side() {
+        let (x, point) = (cell(), DVec3::new(0.45, 0.55, 0.6));
+        let hidden = |sight: &Sight| Pullback { xi: sight.at(0.0, DVec3::splat(0.5)).unwrap(), phi: -0.01, gradient: DVec3::X };
+        let side = |direction: DVec3| {
+            let sight = Sight { x: &x, point, direction: direction.normalize() };
+            let place = hidden(&sight);
+            assert!(plane(place.xi).unwrap().0 < 0.0, "the point is inside");
+            (place, sight.side(place, 0.0, (1.0, 4.0), plane).unwrap())
+        };
+        let (place, grazing) = side(DVec3::new(0.9, 0.1, -0.4));
+        assert_eq!(grazing, place);
+        let (place, steep) = side(DVec3::new(0.2, 0.1, -1.0));
+        assert!(steep != place && steep.phi < 0.0 && steep.gradient.length() < 1.0 / TURNED_AWAY);
     }
 }

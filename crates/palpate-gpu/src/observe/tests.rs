@@ -20,7 +20,7 @@ use palpate_model::scene::{Analytic, BodySource, CostKind, ObservationSpec, Reso
 
 /// Cost, sums and derivatives agree to this much of their size. Rounding of φ is some 1e-7 of a cell, 1e-6 of a residual of a tenth
 /// of a cell; where a thousand terms of both signs nearly cancel, ten to a hundred times that.
-const AGREEMENT: f64 = 5e-5;
+const AGREEMENT: f64 = 1e-4;
 
 /// Reproducible numbers in [-1, 1].
 pub(super) struct Noise(pub(super) u64);
