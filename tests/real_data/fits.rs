@@ -127,8 +127,9 @@ fn hanging_cantilever_and_the_bias_of_its_sensor() {
     assert!(rms < 2.3e-3, "{rms}");
 
     let (_, raw_rms, unmatched, points, warnings) = hanging(&data, "cantilever-ecoflex-hanging-raw");
-    assert!(raw_rms > 2.0 * rms && unmatched * 5 > points, "{raw_rms} {unmatched} of {points}");
-    assert!(warnings.iter().any(|w| w.contains("met no part")), "{warnings:?}");
+    // Points 23 mm too deep lie behind a bar of 30 mm, but are known to show its front.
+    assert!(raw_rms > 5.0 * rms && unmatched * 10 < points, "{raw_rms} {unmatched} of {points}");
+    assert!(warnings.iter().any(|w| w.contains("something in the model is missing or wrong")), "{warnings:?}");
 }
 
 #[test]
