@@ -35,6 +35,14 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!v.is_empty()).then(|| if v.len() % 2 == 1 { v[v.len() / 2] } else { 0.5 * (v[v.len() / 2 - 1] + v[v.len() / 2]) })
 }
 
+/// Strength below which nothing is to be seen, in standard deviations: some effects cannot be made stronger in a scene within what they allow.
+const FAINT: f64 = 2.0;
+
+/// The group that a case counts for.
+fn group_of(o: &Outcome) -> &str {
+    if !o.hidden.is_empty() && o.strength > 0.0 && o.strength < FAINT { "faint" } else { &o.group }
+}
+
 /// Prints everything.
 pub fn print(all: &[&Outcome]) {
     let mut matrix: BTreeMap<(String, String), usize> = BTreeMap::new();
@@ -53,8 +61,8 @@ pub fn print(all: &[&Outcome]) {
             .to_vec(),
     ];
     let number = |x: Option<f64>| x.map_or("–".to_string(), |v| format!("{v:.2}"));
-    for group in ["strong", "weak", "pair", "magnet", "null"] {
-        let of: Vec<&&Outcome> = all.iter().filter(|o| o.group == group).collect();
+    for group in ["strong", "weak", "faint", "pair", "magnet", "null"] {
+        let of: Vec<&&Outcome> = all.iter().filter(|o| group_of(o) == group).collect();
         if of.is_empty() {
             continue;
         }
