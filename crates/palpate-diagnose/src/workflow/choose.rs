@@ -1,6 +1,6 @@
 //! Which of the fitted candidates is named, and which others are as good.
 
-use super::{Fitted, Session, State};
+use super::{Fitted, Session, State, met};
 use crate::crossval::{Predicted, worse_by};
 
 /// The share of the gap that one more number must close to be worth it; candidates that differ by less than twice as much count as equal.
@@ -12,9 +12,9 @@ const MISFIT: f64 = 3.0;
 
 /// What a number must gain to be worth it, between a model `best` and one without it that leaves `whole`: what it gains by chance (Schwarz,
 /// Ann. Stat. 6, 1978; in units of what the best leaves), and a share of the gap, because a freer effect also fits what no model gets right.
-pub(super) fn price(cells: usize, best: &Predicted, whole: &Predicted) -> f64 {
+pub(super) fn price(readings: usize, best: &Predicted, whole: &Predicted) -> f64 {
     let misfit = best.loss() / best.floor.max(1.0);
-    (misfit.max(1.0) * (cells as f64).ln()).max(share(misfit) * (whole.loss() - whole.floor).max(0.0))
+    (misfit.max(1.0) * (readings.max(1) as f64).ln()).max(share(misfit) * (whole.loss() - whole.floor).max(0.0))
 }
 
 /// Where even the best leaves much more than noise, something else is wrong as well, and small shares of the gap decide nothing.
@@ -33,14 +33,13 @@ impl Session<'_> {
         let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
         let share = share(predicted(best).loss() / predicted(best).floor.max(1.0)) * whole;
         // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
-        let as_close = |i: usize| excess(i) < 2.0 * excess(best) + 0.5 * predicted(best).floor;
-        let as_good = |i: &usize| {
-            let (by, z) = worse_by(&self.cells, predicted(best), predicted(*i));
-            passes(*i) && (by < 2.0 * share || (z < 2.0 && as_close(*i)))
+        let as_close = |i: usize, to: usize| excess(i) < 2.0 * excess(to) + 0.5 * predicted(to).floor;
+        let as_good = |i: usize, to: usize| {
+            let (by, z) = worse_by(&self.cells, predicted(to), predicted(i));
+            passes(i) && (by < 2.0 * share || (z < 2.0 && as_close(i, to)))
         };
-        let equal: Vec<usize> = (0..fitted.len()).filter(as_good).collect();
         // Every number has its price.
-        let price = price(self.cells.len(), predicted(best), &state.predicted[0]);
+        let price = price(met(&state.readings), predicted(best), &state.predicted[0]);
         let worth = |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64;
         let able = (0..fitted.len()).filter(|i| passes(*i));
         let first = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
@@ -49,6 +48,8 @@ impl Session<'_> {
             fitted[*i].freedom == fitted[first].freedom && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
         };
         let winner = able.filter(like_first).min_by_key(|i| fitted[*i].candidate).unwrap_or(first);
+        // Of what is as good as the best, or as what is named.
+        let equal = (0..fitted.len()).filter(|i| as_good(*i, best) || as_good(*i, winner)).collect();
         Some((winner, equal))
     }
 }

@@ -36,6 +36,10 @@ impl Session<'_> {
     fn without(&mut self, state: &State, k: usize) -> Result<Option<State>, LabError> {
         let places = self.places(&state.model.changes)?;
         let freedom = places[k].len();
+        // With enough numbers anything is followed: a freer effect does not take the place of a plainer one.
+        if places.last().is_some_and(|newest| newest.len() > freedom) {
+            return Ok(None);
+        }
         let mut changes = state.model.changes.clone();
         changes.remove(k);
         let kept = (0..state.model.values.len()).filter(|i| !places[k].contains(i));
@@ -46,7 +50,7 @@ impl Session<'_> {
         let mut less = self.state(fit.model, readings, state.fields.clone(), Some(&state.table))?;
         less.held_out_finer.clone_from(&state.held_out_finer);
         let (with, without) = (&state.predicted[0], &less.predicted[0]);
-        let price = price(self.cells.len(), with, without);
+        let price = price(super::met(&state.readings), with, without);
         let worse_elsewhere = self.held_out(&less).zip(self.held_out(state)).is_some_and(|(a, b)| {
             // Data that no fit has seen decide where there are any: a tenth of their noise is no loss.
             a.rms * a.rms > b.rms * b.rms + 0.01 * b.noise * b.noise
