@@ -30,6 +30,11 @@ impl Predicted {
     pub fn loss(&self) -> f64 {
         self.y.iter().map(|y| y * y).sum()
     }
+
+    /// What of it the right model would not leave, not negative.
+    pub fn excess(&self) -> f64 {
+        (self.loss() - self.floor).max(0.0)
+    }
 }
 
 /// Ways to leave data out: by time, or by region of the body in a recording of one instant; and by camera where several saw the body.

@@ -170,11 +170,11 @@ pub trait Laboratory {
     }
     /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none.
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError>;
-    /// What finer computations would change in those residuals; none where there are no such data.
+    /// What finer computations would change in those residuals, `coarse` as [`Laboratory::held_out`] gave them for the same model.
     ///
     /// # Errors
     /// The finer scene cannot be computed.
-    fn held_out_finer(&mut self, _model: &Model) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(&mut self, _model: &Model, _coarse: &Readings) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
     /// How far [m] two models are apart in other measurements: description and root mean square distance.

@@ -13,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
 
 /// Median of χ² with one degree of freedom.
-const MEDIAN: f64 = 0.454_936;
+pub const MEDIAN: f64 = 0.454_936;
 
 /// Fewest differences of an image from which its noise is estimated.
 const FEWEST: usize = 30;

@@ -5,12 +5,11 @@
 
 use crate::laboratory::{Reading, Readings};
 use crate::linear::quantile;
+use crate::noise::MEDIAN;
 use palpate_engine::Source;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Median of χ² with one degree of freedom.
-const MEDIAN: f64 = 0.454_936;
 /// Readings, one after another in the image, that are looked up together in another frame: a few rows of a small image.
 const BLOCK: usize = 48;
 /// By how many readings a block may be further on in the next frame than the one before it: so many come and go at a silhouette.

@@ -11,7 +11,7 @@ use crate::cells::{Cells, Table};
 use crate::change::{Candidate, Change, candidates};
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
-use crate::laboratory::{Field, LabError, Laboratory, Model, Readings};
+use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
@@ -135,7 +135,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     if cells.is_empty() {
         return Err(LabError::Failed("no part of the recording meets the simulated body: nothing can be diagnosed".into()));
     }
-    let noise_ratio = neighbour_ratio(&readings).max(still_ratio(&readings, &lab.setting().still));
+    let noise_ratio = noise_over_stated(lab, &readings);
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
         *sd *= if k.sensor < 1000 { noise_ratio } else { 1.0 };
     }
@@ -156,7 +156,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let fields = s.finer(&baseline);
     let unsure = s.lab.interrupted();
     let mut state = s.state(baseline.clone(), readings, fields, None)?;
-    state.held_out_finer = s.lab.held_out_finer(&baseline).unwrap_or_default();
+    state.held_out_finer = s.held_out_finer(&state);
     s.correlate(&mut state);
     let first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress { unsure, ..Progress::default() };
@@ -214,6 +214,17 @@ struct Progress {
     unsure: bool,
 }
 
+/// Noise of single depth readings over the stated one, by whichever look at it finds more.
+fn noise_over_stated(lab: &dyn Laboratory, readings: &Readings) -> f64 {
+    neighbour_ratio(readings).max(still_ratio(readings, &lab.setting().still))
+}
+
+/// Keeps the first entry of every candidate.
+fn keep_first<T>(entries: &mut Vec<T>, candidate: impl Fn(&T) -> usize) {
+    let mut seen = std::collections::BTreeSet::new();
+    entries.retain(|e| seen.insert(candidate(e)));
+}
+
 /// Readings that met the simulated body.
 fn met(readings: &Readings) -> usize {
     readings.rows.iter().filter(|r| r.row.value.is_some()).count()
@@ -252,14 +263,30 @@ impl Session<'_> {
         Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new() })
     }
 
+    /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.
+    fn beside(&mut self, state: &State, model: Model, readings: Readings) -> Result<State, LabError> {
+        let mut new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
+        new.held_out_finer.clone_from(&state.held_out_finer);
+        Ok(new)
+    }
+
+    /// What finer computations would change in a state's residuals of data that no fit has seen.
+    fn held_out_finer(&mut self, state: &State) -> Vec<Field> {
+        let coarse = state.held_out.as_ref();
+        coarse.and_then(|r| self.lab.held_out_finer(&state.model, r).ok()).unwrap_or_default()
+    }
+
     /// Root mean square noise of single residuals [m].
     fn reading_noise(&self, readings: &Readings) -> f64 {
         let known = readings.rows.iter().filter(|r| r.row.value.is_some());
-        let (sum, n) = known.fold((0.0, 0.0), |(sum, n), r| {
-            let ratio = if matches!(r.row.source, Source::Point { .. }) { self.noise_ratio } else { 1.0 };
-            (sum + (ratio * r.row.noise * r.row.along_sight).powi(2), n + 1.0)
-        });
+        let (sum, n) = known.fold((0.0, 0.0), |(sum, n), r| (sum + self.variance(r), n + 1.0));
         (sum / f64::max(n, 1.0)).sqrt()
+    }
+
+    /// Variance of a residual by noise alone [m²].
+    fn variance(&self, r: &Reading) -> f64 {
+        let ratio = if matches!(r.row.source, Source::Point { .. }) { self.noise_ratio } else { 1.0 };
+        (ratio * r.row.noise * r.row.along_sight).powi(2)
     }
 
     /// True when residuals have structure that is neither chance nor too small to count.
@@ -318,8 +345,7 @@ impl Session<'_> {
         if (met(&state.readings) as f64) < KEPT * before as f64 {
             return;
         }
-        let still = still_ratio(&state.readings, &self.lab.setting().still);
-        let ratio = neighbour_ratio(&state.readings).max(still).min(self.noise_ratio);
+        let ratio = noise_over_stated(self.lab, &state.readings).min(self.noise_ratio);
         let old = self.design_effect.sqrt();
         for (sd, k) in self.cells.sd.iter_mut().zip(&self.cells.keys) {
             *sd *= if k.sensor < 1000 { ratio / self.noise_ratio } else { 1.0 } / old;

@@ -1,8 +1,8 @@
 //! Clamps: Nitsche's forces on the held regions, as effects change them (compliance, slip, edge), with all their derivatives.
 //!
 //! A clamp wants its points at A X + b. Effects turn and move that pose, put a compliant layer between body and clamp and shift the edge
-//! of what is held; a body
-//! whose stiffness varies is held as stiffly as it is itself, and one with another stress-free shape X + W is held in that shape.
+//! of what is held; a body whose stiffness varies is held as stiffly as it is itself, and one with another stress-free shape X + W is
+//! held in that shape.
 
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};

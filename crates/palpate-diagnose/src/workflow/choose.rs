@@ -13,13 +13,18 @@ const MISFIT: f64 = 3.0;
 /// What a number must gain to be worth it, between a model `best` and one without it that leaves `whole`: what it gains by chance (Schwarz,
 /// Ann. Stat. 6, 1978; in units of what the best leaves), and a share of the gap, because a freer effect also fits what no model gets right.
 pub(super) fn price(readings: usize, best: &Predicted, whole: &Predicted) -> f64 {
-    let misfit = best.loss() / best.floor.max(1.0);
-    (misfit.max(1.0) * (readings.max(1) as f64).ln()).max(share(misfit) * (whole.loss() - whole.floor).max(0.0))
+    (misfit(best).max(1.0) * (readings.max(1) as f64).ln()).max(share(best, whole))
 }
 
-/// Where even the best leaves much more than noise, something else is wrong as well, and small shares of the gap decide nothing.
-fn share(misfit: f64) -> f64 {
-    if misfit <= MISFIT { PRICE } else { PRICE_OF_MISFIT }
+/// What the best leaves, over what noise and discretisation explain.
+fn misfit(best: &Predicted) -> f64 {
+    best.loss() / best.floor.max(1.0)
+}
+
+/// The least part of the gap that counts. Where even the best leaves much more than noise, something else is wrong as well, and small
+/// shares decide nothing.
+fn share(best: &Predicted, whole: &Predicted) -> f64 {
+    whole.excess() * if misfit(best) <= MISFIT { PRICE } else { PRICE_OF_MISFIT }
 }
 
 impl Session<'_> {
@@ -29,11 +34,9 @@ impl Session<'_> {
         let passes = |i: usize| fitted[i].p_value < self.options.significance && fitted[i].gain >= self.options.least_gain;
         let best = (0..fitted.len()).find(|i| passes(*i))?;
         let predicted = |i: usize| -> &Predicted { &fitted[i].state.predicted[0] };
-        let excess = |i: usize| (predicted(i).loss() - predicted(i).floor).max(0.0);
-        let whole = (state.predicted[0].loss() - state.predicted[0].floor).max(0.0);
-        let share = share(predicted(best).loss() / predicted(best).floor.max(1.0)) * whole;
+        let share = share(predicted(best), &state.predicted[0]);
         // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
-        let as_close = |i: usize, to: usize| excess(i) < 2.0 * excess(to) + 0.5 * predicted(to).floor;
+        let as_close = |i: usize, to: usize| predicted(i).excess() < 2.0 * predicted(to).excess() + 0.5 * predicted(to).floor;
         let as_good = |i: usize, to: usize| {
             let (by, z) = worse_by(&self.cells, predicted(to), predicted(i));
             passes(i) && (by < 2.0 * share || (z < 2.0 && as_close(i, to)))

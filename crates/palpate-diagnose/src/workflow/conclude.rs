@@ -35,10 +35,8 @@ impl Session<'_> {
     pub(super) fn level_of(&self, readings: &Readings, grid: f64, finer: &[Field]) -> Level {
         let (mut sum, mut n) = (0.0, 0.0);
         for r in readings.rows.iter().filter(|r| r.row.value.is_some()) {
-            let point = matches!(r.row.source, Source::Point { .. });
-            let ratio = if point { self.noise_ratio } else { 1.0 };
-            sum += (ratio * r.row.noise * r.row.along_sight).powi(2) + grid;
-            n += if point { 1.0 } else { 1.0 / 3.0 };
+            sum += self.variance(r) + grid;
+            n += if matches!(r.row.source, Source::Point { .. }) { 1.0 } else { 1.0 / 3.0 };
         }
         let noise = (sum / f64::max(n, 1.0)).sqrt();
         let columns: Vec<Vec<f64>> = finer.iter().map(|f| f.change.iter().map(|c| c.unwrap_or(0.0)).collect()).collect();

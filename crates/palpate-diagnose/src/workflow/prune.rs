@@ -6,7 +6,7 @@ use crate::change::Change;
 use crate::diagnosis::Found;
 use crate::laboratory::{LabError, Start};
 
-/// Iterations and tolerance of a fit without an effect: as of the last lap of a race.
+/// Iterations and tolerance of a fit without an effect, which starts from a fit with it.
 const EFFORT: (usize, f64) = (20, 2e-5);
 
 impl Session<'_> {
@@ -47,8 +47,7 @@ impl Session<'_> {
         let start = Start { changes, values, reach: f64::INFINITY };
         let fit = super::one(self.lab.fit(&[start], EFFORT.0, EFFORT.1))?;
         let readings = super::one(self.lab.linearise(&[(fit.model.changes.clone(), fit.model.values.clone())]))?;
-        let mut less = self.state(fit.model, readings, state.fields.clone(), Some(&state.table))?;
-        less.held_out_finer.clone_from(&state.held_out_finer);
+        let less = self.beside(state, fit.model, readings)?;
         let (with, without) = (&state.predicted[0], &less.predicted[0]);
         let price = price(super::met(&state.readings), with, without);
         let worse_elsewhere = self.held_out(&less).zip(self.held_out(state)).is_some_and(|(a, b)| {

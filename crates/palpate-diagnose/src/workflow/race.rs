@@ -1,7 +1,7 @@
 //! Candidates race: all are fitted for an iteration, and only those within reach of the leader go on (successive halving; Jamieson &
 //! Talwalkar, *AISTATS* 2016).
 
-use super::{Session, State, Variant};
+use super::{Session, State, Variant, keep_first};
 use crate::change::Change;
 use crate::laboratory::{Fit, LabError, Start};
 use crate::linear::least_squares;
@@ -61,13 +61,7 @@ impl Session<'_> {
         }
         let mut arrived: Vec<(&Variant, Fit)> = running.into_iter().filter_map(|(v, f)| Some((v, f?))).collect();
         arrived.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        let mut seen = Vec::new();
-        arrived.retain(|(v, _)| {
-            !seen.contains(&v.candidate) && {
-                seen.push(v.candidate);
-                true
-            }
-        });
+        keep_first(&mut arrived, |(v, _)| v.candidate);
         Ok(arrived)
     }
 

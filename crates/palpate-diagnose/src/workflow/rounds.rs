@@ -1,6 +1,6 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
-use super::{Fitted, Session, State, Variant};
+use super::{Fitted, Session, State, Variant, keep_first};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
@@ -77,20 +77,14 @@ impl Session<'_> {
         let home = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
         let mut variants = self.variants(&home)?;
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
-        let mut seen = Vec::new();
-        variants.retain(|v| {
-            let first = !seen.contains(&v.candidate);
-            seen.push(v.candidate);
-            first
-        });
+        keep_first(&mut variants, |v| v.candidate);
         variants.truncate(self.options.fits / 2);
         Ok(Some((home, variants)))
     }
 
     /// What a fitted candidate is worth.
     fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
-        let mut new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
-        new.held_out_finer.clone_from(&state.held_out_finer);
+        let new = self.beside(state, model, readings)?;
         let squares = |s: &State| {
             let left = s.frame.left();
             dot(&left, &left)
@@ -134,7 +128,7 @@ impl Session<'_> {
         let mut next = fitted.swap_remove(winner).state;
         // The discretisation errs in its own way with the effect in place.
         next.fields = self.finer(&next.model);
-        next.held_out_finer = self.lab.held_out_finer(&next.model).unwrap_or_default();
+        next.held_out_finer = self.held_out_finer(&next);
         self.remeasure(&mut next);
         Ok((Some((found, next)), Vec::new()))
     }

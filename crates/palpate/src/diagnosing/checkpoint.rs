@@ -56,6 +56,7 @@ impl Checkpoint {
             errors,
             cost: fit.cost,
             gained: fit.gained,
+            // JSON has no infinity.
             reach: fit.reach.min(f64::MAX),
             settled: fit.settled,
         };

@@ -388,13 +388,12 @@ impl Laboratory for Lab<'_> {
         self.held_out.map(|e| held_out(e, &self.base, self.backend, model)).transpose()
     }
 
-    fn held_out_finer(&mut self, model: &Model) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(&mut self, model: &Model, coarse: &Readings) -> Result<Vec<Field>, LabError> {
         let Some(e) = self.held_out else { return Ok(Vec::new()) };
         let (base, backend) = (&self.base, self.backend);
-        let coarse = held_out(e, base, backend, model)?;
         let mut fields = Vec::new();
         for (name, e, factor) in [("grid", finer(e).map_err(lab_error)?, GRID), ("step", halved(e.clone()), STEP)] {
-            fields.push(difference(name, &held_out(&e, base, backend, model)?, &coarse, factor));
+            fields.push(difference(name, &held_out(&e, base, backend, model)?, coarse, factor));
         }
         Ok(fields)
     }
