@@ -119,14 +119,14 @@ fn side_of(e: Hexahedron, cell: u32, y: vec3<f32>, p: Pulled, line: vec3<f32>) -
         let newton = t + r.d.w / slope;
         if abs(newton - t) < SETTLED * sight.h || beyond - inside < SETTLED * sight.h {
             t = clamp(newton, inside, beyond);
-            // At a grazing angle a small error of the body is a long way.
-            if -slope < sight.turned_away * length(gradient) {
-                if slope < 0.0 && t < sight.band {
-                    return p;
-                }
+            if !(slope < 0.0 && t < sight.band) {
                 break;
             }
-            front.holds = slope < 0.0 && t < sight.band;
+            // At a grazing angle a small error of the body is a long way.
+            if -slope < sight.turned_away * length(gradient) {
+                return p;
+            }
+            front.holds = true;
             front.xi = xi;
             front.phi = -t;
             front.gradient = gradient / -slope;

@@ -92,7 +92,7 @@ impl Solve<'_, '_> {
                     let cells = Some([NO_TOUCH, HOLD_REST + 256 * row]);
                     Column { kind: REST_SLOPE, index: row, cells, press: None }
                 }
-                Site::Clamps(_) => {
+                Site::Clamps(_) | Site::Edges(_) => {
                     let matrix = known.matrix_row(row).map_or(0, |k| (k + 1) << 16);
                     let cells = Some([NO_TOUCH, HOLD_GRIP + 256 * row + matrix]);
                     Column { kind: NOTHING, index: 0, cells, press: None }

@@ -104,7 +104,7 @@ impl Effects {
                     e.rest_rows += count;
                     None
                 }
-                Site::Clamps(_) => {
+                Site::Clamps(_) | Site::Edges(_) => {
                     e.bits |= GRIPS;
                     field = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
@@ -119,7 +119,6 @@ impl Effects {
                 Site::Cells(_) => Some(CELLS),
                 // The observer's business.
                 Site::Clock | Site::Marker | Site::Readings(_) => None,
-                _ => return Err(GpuError::Plan { what: format!("the effect `{}`", law.kind) }),
             };
             e.fields.push(field);
             if let Some(site) = site.filter(|s| *s == CELLS) {

@@ -5,6 +5,7 @@ use crate::error::GpuError;
 use crate::layout::{Cell, Mass, Patch, Shape};
 use crate::memory::Maker;
 use palpate_model::elements::Classes;
+use palpate_model::grips::within_reach;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::Plan;
 use palpate_model::scene::RotationUpdate;
@@ -80,8 +81,8 @@ fn check_loops(most: &Most) -> Result<(), GpuError> {
 pub(crate) struct Geometry {
     pub(crate) shape: Shape,
     pub(crate) classes: Classes,
-    /// (clamp, cell of the clamp) of every clamp cell in the device's order.
-    pub(crate) holds: Vec<(usize, usize)>,
+    /// (clamp, cell of the body) of every clamp cell in the device's order: all that a member may hold.
+    pub(crate) holds: Vec<(usize, u32)>,
     pub(crate) effects: Effects,
 }
 
@@ -110,10 +111,9 @@ impl Geometry {
         let classes = Classes::new(body);
         let blocks = pattern.blocks.columns.len();
 
-        let mut holds: Vec<(usize, usize)> =
-            plan.clamps.iter().enumerate().flat_map(|(c, s)| (0..s.cells.len()).map(move |m| (c, m))).collect();
-        let cell_of = |&(c, m): &(usize, usize)| plan.clamps[c].cells[m].cell;
-        holds.sort_by_key(|h| (cell_of(h), *h));
+        let reach = |(i, s)| within_reach(plan, s).into_iter().map(move |cell| (i, cell));
+        let mut holds: Vec<(usize, u32)> = plan.clamps.iter().enumerate().flat_map(reach).collect();
+        holds.sort_by_key(|(i, cell)| (*cell, *i));
         let cells: Vec<Cell> = body
             .cells
             .iter()
@@ -125,8 +125,8 @@ impl Geometry {
                     kind: classes.of_cell[e],
                     patch_start: body.patches.partition_point(|p| p.cell < number) as u32,
                     patch_end: if touched { body.patches.partition_point(|p| p.cell <= number) as u32 } else { 0 },
-                    hold_start: holds.partition_point(|h| cell_of(h) < number) as u32,
-                    hold_end: holds.partition_point(|h| cell_of(h) <= number) as u32,
+                    hold_start: holds.partition_point(|h| h.1 < number) as u32,
+                    hold_end: holds.partition_point(|h| h.1 <= number) as u32,
                     fraction: cell.fraction as f32,
                     pad: [0; 2],
                 }
@@ -162,7 +162,7 @@ impl Geometry {
             }
         }
         let to_u32 = |v: &[usize]| -> Vec<u32> { v.iter().map(|x| *x as u32).collect() };
-        let hold_sites: Vec<[u32; 2]> = holds.iter().map(|h| [cell_of(h), h.0 as u32]).collect();
+        let hold_sites: Vec<[u32; 2]> = holds.iter().map(|(i, cell)| [*cell, *i as u32]).collect();
 
         let most = Most {
             members: members as u64,

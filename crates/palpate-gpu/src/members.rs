@@ -94,7 +94,7 @@ impl Batch {
         }
         if geometry.effects.on_clamps() {
             let own: Vec<&Elements> = members.iter().map(|m| &self.elements[m.slot as usize]).collect();
-            let grips = geometry.effects.grips(plan, &self.physics, &own, &geometry.holds);
+            let grips = geometry.effects.grips(plan, &self.physics, &own, &geometry.holds)?;
             buffers.insert("hold_elements", gpu.upload("hold_elements", &grips)?);
         }
         Ok(())
@@ -120,8 +120,10 @@ impl Batch {
                 self.elements.push(e);
                 continue;
             }
-            geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k));
-            geometry.holds.iter().for_each(|h| push(&mut holds, &e.clamps[h.0][h.1].k_nu));
+            let stated = |(i, cell): &(usize, u32)| &e.clamps[*i][plan.clamps[*i].cells.partition_point(|c| c.cell < *cell)];
+            let held: Vec<_> = geometry.holds.iter().map(stated).collect();
+            held.iter().for_each(|m| push(&mut holds, &m.k));
+            held.iter().for_each(|m| push(&mut holds, &m.k_nu));
         }
         buffers.insert("elements", gpu.upload("elements", &cells)?);
         if !geometry.effects.on_clamps() {

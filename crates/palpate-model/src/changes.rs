@@ -183,6 +183,16 @@ pub fn edge(plan: &Plan, physics: &Physics) -> Option<f64> {
     effects(&plan.layout, physics).filter_map(shift).reduce(|a, b| a + b)
 }
 
+/// The furthest [`edge`] within the bounds of the effects' numbers.
+pub fn furthest_edge(plan: &Plan) -> Option<f64> {
+    let spot = Spot::of(plan);
+    let most = |(law, _): (&'static Law, _)| {
+        let Site::Edges(field) = law.site else { return None };
+        Some(field.at(&spot, &law.params.iter().map(|p| p.upper).collect::<Vec<f64>>())[0])
+    };
+    plan.layout.effects().filter_map(most).reduce(|a, b| a + b)
+}
+
 /// Derivative of [`edge`] by number `slot` of effect `effect`; `None` for other effects.
 pub fn edge_slope(plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<f64> {
     let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;

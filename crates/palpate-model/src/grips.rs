@@ -1,14 +1,16 @@
 //! How effects make clamps hold: pose and matrices of a member's clamps with their derivatives, for every backend.
 //!
-//! The numbers of [`crate::changes::HOLD`] turn and move the pose of a clamp and put a compliant layer between body and clamp.
+//! The numbers of [`crate::changes::HOLD`] turn and move the pose of a clamp and put a compliant layer between body and clamp; a shift
+//! of its edge makes it hold other cells ([`crate::clamp_edge`]).
 
 use crate::changes::{self, HOLD};
+use crate::clamp_edge::{self, Held};
 use crate::corotation::M24;
 use crate::effects::field::Spot;
 use crate::effects::{Law, Site};
 use crate::element::CellMatrices;
-use crate::elements::{Elements, layer_matrix, layered};
-use crate::plan::{ClampCell, Physics, Plan, clamp_pose};
+use crate::elements::{Elements, clamp_matrices, layer_matrix, layered};
+use crate::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
 use glam::{DMat3, DVec3};
 
 /// Rotation and translation of a clamp: a point X is wanted at A X + b.
@@ -32,7 +34,7 @@ fn three(hold: &[f64; HOLD], at: usize) -> DVec3 {
 }
 
 fn on_clamps(law: &Law) -> bool {
-    matches!(law.site, Site::Clamps(_))
+    matches!(law.site, Site::Clamps(_) | Site::Edges(_))
 }
 
 /// True when some effect acts on clamps.
@@ -80,26 +82,16 @@ impl<'a> Grips<'a> {
         Some((a * turn, a * (three(&slope, 2) - turn * self.spot.anchor)))
     }
 
-    /// Matrices of cell `m` of clamp `index` with the layer that effects put in (constant in time).
-    pub fn matrices(&self, elements: &Elements, index: usize, m: usize) -> CellMatrices {
-        self.layered(&self.plan.clamps[index].cells[m], &elements.clamps[index][m], elements.nu)
-    }
-
-    /// The same of any held cell, from its matrices without layer.
-    pub fn layered(&self, c: &ClampCell, cell: &CellMatrices, nu: f64) -> CellMatrices {
+    /// Matrices of a held cell with the layer that effects put in (constant in time), from those without.
+    fn layered(&self, c: &ClampCell, cell: &CellMatrices, nu: f64) -> CellMatrices {
         let hold = changes::hold(self.plan, self.physics, &self.spot);
         let [k3, k3_nu] = self.layer(c, nu);
         let make = |k: &M24, k3: &M24| Box::new(layered(k, k3, self.plan.body.grid.h, hold[1], false).map(|v| hold[0] * v));
         CellMatrices { k: make(&cell.k, &k3), k_nu: make(&cell.k_nu, &k3_nu) }
     }
 
-    /// Derivative of the stiffness in [`Grips::matrices`] by number `slot` of effect `effect`; `None` where there is none.
-    pub fn matrix_slope(&self, elements: &Elements, [index, m]: [usize; 2], by: [usize; 2]) -> Option<Box<M24>> {
-        self.layered_slope(&self.plan.clamps[index].cells[m], &elements.clamps[index][m].k, elements.nu, by)
-    }
-
-    /// The same of any held cell, from its stiffness without layer.
-    pub fn layered_slope(&self, c: &ClampCell, k: &M24, nu: f64, [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
+    /// Derivative of the stiffness in [`Grips::layered`] by number `slot` of effect `effect`; `None` where there is none.
+    fn layered_slope(&self, c: &ClampCell, k: &M24, nu: f64, [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
         let slope = changes::hold_slope(self.plan, self.physics, &self.spot, effect, slot)?;
         if slope[0] == 0.0 && slope[1] == 0.0 {
             return None;
@@ -112,5 +104,64 @@ impl<'a> Grips<'a> {
 
     fn layer(&self, c: &ClampCell, nu: f64) -> [Box<M24>; 2] {
         layer_matrix(c, self.plan.body.cells[c.cell as usize].fraction, nu)
+    }
+}
+
+/// One clamp of one member, cell by cell.
+#[derive(Debug)]
+pub struct Grip {
+    /// What is held, in increasing order of cells.
+    pub cells: Vec<ClampCell>,
+    /// Matrices of the cells, layer included.
+    pub matrices: Vec<CellMatrices>,
+    /// Those without layer.
+    stiff: Vec<CellMatrices>,
+    /// Derivative of the stiffness by the shift of the edge [1/m]; `None` away from the edge.
+    by_edge: Vec<Option<Box<M24>>>,
+}
+
+impl Grip {
+    /// Every clamp with the layers that effects put in and the edges that they shift, or `None` when no effect acts on clamps.
+    /// `elements` are those at the member's Poisson's ratio.
+    pub fn all(plan: &Plan, physics: &Physics, elements: &Elements) -> Option<Vec<Grip>> {
+        let shift = changes::edge(plan, physics);
+        let grips = Grips::new(plan, physics, 0.0);
+        acted(plan).then(|| (0..plan.clamps.len()).map(|i| grips.grip(i, shift, elements)).collect())
+    }
+
+    /// Derivative of the stiffness of held cell `m` by number `slot` of effect `effect`; `None` where there is none.
+    pub fn matrix_slope(&self, grips: &Grips, m: usize, nu: f64, [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
+        match changes::edge_slope(grips.plan, grips.physics, effect, slot) {
+            Some(slope) => self.by_edge[m].as_ref().map(|k| Box::new(k.map(|v| slope * v))),
+            None => grips.layered_slope(&self.cells[m], &self.stiff[m].k, nu, [effect, slot]),
+        }
+    }
+}
+
+impl Grips<'_> {
+    fn grip(&self, index: usize, shift: Option<f64>, elements: &Elements) -> Grip {
+        let (clamp, body, nu) = (&self.plan.clamps[index], &self.plan.body, elements.nu);
+        let held = match shift {
+            Some(shift) => clamp.edge.cells(body, &clamp.cells, shift),
+            None => clamp.cells.iter().map(|c| Held { now: c.clone(), near: None }).collect(),
+        };
+        let stiff: Vec<CellMatrices> = held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect();
+        let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect();
+        let by_edge = |(held, now): (&Held, &CellMatrices)| {
+            let (further, step) = held.near.as_ref()?;
+            let [next, second] = [0, 1].map(|i| self.layered(&further[i], &clamp_matrices(body, &further[i], nu), nu).k);
+            Some(Box::new(std::array::from_fn(|i| clamp_edge::slope(now.k[i], next[i], second[i], *step))))
+        };
+        let by_edge = held.iter().zip(&matrices).map(by_edge).collect();
+        Grip { cells: held.into_iter().map(|h| h.now).collect(), matrices, stiff, by_edge }
+    }
+}
+
+/// Cells that a clamp holds at some shift of its edge within the bounds of the effects that shift it, in increasing order; those that it
+/// holds as stated where no effect does.
+pub fn within_reach(plan: &Plan, clamp: &ClampSite) -> Vec<u32> {
+    match changes::furthest_edge(plan) {
+        Some(shift) => clamp.edge.cells(&plan.body, &clamp.cells, shift).iter().map(|h| h.now.cell).collect(),
+        None => clamp.cells.iter().map(|c| c.cell).collect(),
     }
 }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use palpate_model::changes::{self, Changes};
 use palpate_model::corotation::CellPose;
 use palpate_model::elements::Elements;
-use palpate_model::grips::Pose;
+use palpate_model::grips::{Grip, Pose};
 use palpate_model::plan::{Physics, Plan};
 
 /// What a member's effects make of the body; all empty without such effects.
@@ -21,7 +21,7 @@ pub struct Altered {
     /// Every cell in the stress-free shape.
     pub rest: Option<Vec<CellPose>>,
     /// Clamps with compliant layers and moved edges.
-    pub grips: Option<Vec<clamps::Grip>>,
+    pub grips: Option<Vec<Grip>>,
     /// Laws of cells.
     pub laws: Vec<CellActing>,
 }
@@ -35,7 +35,7 @@ impl Altered {
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
             body.cells.iter().map(|c| CellPose::new(&c.nodes.map(at), h)).collect()
         });
-        Altered { changes, rest, grips: clamps::grips(plan, physics, elements), laws: cell_laws(plan, physics) }
+        Altered { changes, rest, grips: Grip::all(plan, physics, elements), laws: cell_laws(plan, physics) }
     }
 }
 

@@ -7,13 +7,11 @@
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
 use palpate_model::body::Body;
-use palpate_model::changes::{self, Changes};
-use palpate_model::clamp_edge::{self, Held};
+use palpate_model::changes::Changes;
 use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
-use palpate_model::element::CellMatrices;
-use palpate_model::elements::{Elements, clamp_matrices};
-use palpate_model::grips::{self, Grips, Pose};
-use palpate_model::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
+use palpate_model::elements::Elements;
+use palpate_model::grips::{Grip, Grips, Pose};
+use palpate_model::plan::{ClampCell, Physics, Plan, clamp_pose};
 
 /// A member's clamps.
 #[derive(Clone, Copy)]
@@ -30,19 +28,6 @@ pub struct Clamps<'a> {
     pub grips: Option<&'a [Grip]>,
 }
 
-/// A clamp as effects change it; everything cell by cell.
-#[derive(Debug)]
-pub struct Grip {
-    /// What is held.
-    cells: Vec<ClampCell>,
-    /// Matrices without layer.
-    stiff: Vec<CellMatrices>,
-    /// Matrices.
-    matrices: Vec<CellMatrices>,
-    /// Their derivative by the shift of the edge [1/m]; `None` away from the edge.
-    by_edge: Vec<Option<Box<M24>>>,
-}
-
 /// Where a clamp cell's points are wanted, seen from the clamp: displacement W of the stress-free shape.
 fn wanted(rest: Option<&[DVec3]>, node: u32) -> DVec3 {
     rest.map_or(DVec3::ZERO, |w| w[node as usize])
@@ -54,33 +39,6 @@ fn deviation(body: &Body, rest: Option<&[DVec3]>, c: &ClampCell, (a, b): Pose, u
         let x = body.nodes[n as usize];
         a.transpose() * (x + u[n as usize] - b) - x - wanted(rest, n)
     }))
-}
-
-/// Every clamp with the layers that effects put in and the edges that they shift, or `None` when no effect acts on clamps.
-pub fn grips(plan: &Plan, physics: &Physics, elements: &Elements) -> Option<Vec<Grip>> {
-    let shift = changes::edge(plan, physics);
-    if !grips::acted(plan) && shift.is_none() {
-        return None;
-    }
-    let (body, nu) = (&plan.body, elements.nu);
-    let grips = Grips::new(plan, physics, 0.0);
-    let by_edge = |(held, now): (&Held, &CellMatrices)| {
-        let (further, step) = held.near.as_ref()?;
-        let [next, second] = [0, 1].map(|i| grips.layered(&further[i], &clamp_matrices(body, &further[i], nu), nu).k);
-        Some(Box::new(std::array::from_fn(|i| clamp_edge::slope(now.k[i], next[i], second[i], *step))))
-    };
-    let grip = |clamp: &ClampSite| {
-        let held = match shift {
-            Some(shift) => clamp.edge.cells(body, &clamp.cells, shift),
-            None => clamp.cells.iter().map(|c| Held { now: c.clone(), near: None }).collect(),
-        };
-        let stiff: Vec<CellMatrices> = held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect();
-        let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| grips.layered(&h.now, k, nu)).collect();
-        let by_edge = held.iter().zip(&matrices).map(by_edge).collect();
-        let cells = held.into_iter().map(|h| h.now).collect();
-        Grip { cells, stiff, matrices, by_edge }
-    };
-    Some(plan.clamps.iter().map(grip).collect())
 }
 
 impl<'a> Clamps<'a> {
@@ -179,24 +137,20 @@ impl<'a> Clamps<'a> {
         let (plan, grips) = (self.plan, Grips::new(self.plan, self.physics, elapsed));
         let pose = grips.pose(index, time);
         let Some(own) = self.grips.map(|g| &g[index]) else { return };
-        if let Some(slope) = changes::edge_slope(plan, self.physics, effect, slot) {
-            for (c, k) in own.cells.iter().zip(&own.by_edge).filter_map(|(c, k)| Some((c, k.as_ref()?))) {
-                let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
-                self.add(c, pose.0, young * self.factor(c) * slope, corners(&multiply(k, &d)), out);
-            }
-        }
-        let Some((da, db)) = grips.pose_slope(index, time, effect, slot) else { return };
-        for (m, c) in self.cells(index).iter().enumerate() {
+        let moves = grips.pose_slope(index, time, effect, slot);
+        for (m, c) in own.cells.iter().enumerate() {
             let (nodes, scale) = (&plan.body.cells[c.cell as usize].nodes, young * self.factor(c));
             let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
             let k = self.matrix(index, m, Matrices::Stiffness);
-            // The pose: dA K d + A K (dAᵀ(x − b) − Aᵀ db).
-            let moved =
-                nodes.map(|n| da.transpose() * (plan.body.nodes[n as usize] + u[n as usize] - pose.1) - pose.0.transpose() * db);
-            self.add(c, da, scale, corners(&multiply(k, &d)), out);
-            self.add(c, pose.0, scale, corners(&multiply(k, &flatten(&moved))), out);
-            // The matrix: factor and layer.
-            if let Some(change) = grips.layered_slope(c, &own.stiff[m].k, self.elements.nu, [effect, slot]) {
+            if let Some((da, db)) = moves {
+                // The pose: dA K d + A K (dAᵀ(x − b) − Aᵀ db).
+                let moved = nodes
+                    .map(|n| da.transpose() * (plan.body.nodes[n as usize] + u[n as usize] - pose.1) - pose.0.transpose() * db);
+                self.add(c, da, scale, corners(&multiply(k, &d)), out);
+                self.add(c, pose.0, scale, corners(&multiply(k, &flatten(&moved))), out);
+            }
+            // The matrix: factor, layer and edge.
+            if let Some(change) = own.matrix_slope(&grips, m, self.elements.nu, [effect, slot]) {
                 self.add(c, pose.0, scale, corners(&multiply(&change, &d)), out);
             }
         }

@@ -1,12 +1,13 @@
 //! What effects make of clamps, computed on the host: poses over time, matrices, and the derivatives of both.
 
 use super::{Effects, GRIPS};
+use crate::error::GpuError;
 use crate::layout::{ClampPose, HoldSlope};
 use glam::{DMat3, DVec3};
 use palpate_model::changes;
 use palpate_model::effects::field::Spot;
 use palpate_model::elements::Elements;
-use palpate_model::grips::{Grips, Pose};
+use palpate_model::grips::{Grip, Grips, Pose};
 use palpate_model::plan::{Physics, Plan, clamp_pose};
 
 /// Numbers of a [`HoldSlope`].
@@ -43,7 +44,8 @@ pub(super) fn matrix_rows(plan: &Plan, rows: &[[usize; 2]]) -> Vec<usize> {
     let mut beyond = physics.clone();
     beyond.effects.iter_mut().flatten().for_each(|p| *p += 1e-3);
     let changes = |p: &Physics, [effect, slot]: [usize; 2]| {
-        changes::hold_slope(plan, p, &spot, effect, slot).is_some_and(|s| s[0] != 0.0 || s[1] != 0.0)
+        changes::edge_slope(plan, p, effect, slot).is_some()
+            || changes::hold_slope(plan, p, &spot, effect, slot).is_some_and(|s| s[0] != 0.0 || s[1] != 0.0)
     };
     (0..rows.len()).filter(|r| changes(&physics, rows[*r]) || changes(&beyond, rows[*r])).collect()
 }
@@ -99,26 +101,43 @@ impl Effects {
         bytemuck::cast_slice(&out).to_vec()
     }
 
-    /// Clamp matrices of all members, `[B][K, dK/dν][clamp cell]`, then the slopes of K, `[rows][B][clamp cell]`; `holds` are the
-    /// clamp cells in the device's order, `elements` those at each member's Poisson's ratio.
-    pub(crate) fn grips(&self, plan: &Plan, batch: &[Physics], elements: &[&Elements], holds: &[(usize, usize)]) -> Vec<f32> {
+    /// Clamp matrices of all members, `[B][K, dK/dν][clamp cell]`, then the slopes of K, `[rows][B][clamp cell]`; `holds` are (clamp,
+    /// cell of the body) in the device's order, `elements` those at each member's Poisson's ratio. What a member does not hold is zero.
+    ///
+    /// # Errors
+    /// A member's clamp reaches beyond what the bounds of the effects on its edge allow.
+    pub(crate) fn grips(
+        &self,
+        plan: &Plan,
+        batch: &[Physics],
+        elements: &[&Elements],
+        holds: &[(usize, u32)],
+    ) -> Result<Vec<f32>, GpuError> {
+        const NONE: [f64; 576] = [0.0; 576];
         let mut out = Vec::new();
-        let mut put = |m: &[f64]| out.extend(m.iter().map(|x| *x as f32));
+        let mut put = |m: Option<&[f64; 576]>| out.extend(m.unwrap_or(&NONE).iter().map(|x| *x as f32));
+        let mut all: Vec<Vec<Grip>> = Vec::new();
         for (physics, elements) in batch.iter().zip(elements) {
-            let grips = Grips::new(plan, physics, 0.0);
-            let all: Vec<_> = holds.iter().map(|h| grips.matrices(elements, h.0, h.1)).collect();
-            all.iter().for_each(|m| put(&*m.k));
-            all.iter().for_each(|m| put(&*m.k_nu));
+            let grips = Grip::all(plan, physics, elements).unwrap_or_default();
+            if grips.iter().map(|g| g.cells.len()).sum::<usize>() > found(&grips, holds).flatten().count() {
+                return Err(GpuError::Plan { what: "a clamp's edge beyond the bounds of `clamp-edge`".to_string() });
+            }
+            found(&grips, holds).for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k)));
+            found(&grips, holds).for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k_nu)));
+            all.push(grips);
         }
         for row in &self.matrix_rows {
-            for (physics, elements) in batch.iter().zip(elements) {
+            for ((physics, elements), own) in batch.iter().zip(elements).zip(&all) {
                 let grips = Grips::new(plan, physics, 0.0);
-                for (index, m) in holds {
-                    let slope = grips.matrix_slope(elements, [*index, *m], self.grip_rows[*row]);
-                    put(slope.as_deref().unwrap_or(&[0.0; 576]));
-                }
+                let slope = |(i, m): (usize, usize)| own[i].matrix_slope(&grips, m, elements.nu, self.grip_rows[*row]);
+                found(own, holds).for_each(|at| put(at.and_then(slope).as_deref()));
             }
         }
-        out
+        Ok(out)
     }
+}
+
+/// Where a member's clamps have each of the device's clamp cells: clamp and number among its cells.
+fn found<'a>(grips: &'a [Grip], holds: &'a [(usize, u32)]) -> impl Iterator<Item = Option<(usize, usize)>> + 'a {
+    holds.iter().map(|(i, cell)| Some((*i, grips[*i].cells.binary_search_by_key(cell, |c| c.cell).ok()?)))
 }
