@@ -1,5 +1,7 @@
-//! Solves a balance by Newton's method with the exact symmetric tangent and a line search on the potential.
+//! Solves a balance by Newton's method with the exact symmetric tangent and a line search on the potential. Close to the solution a tangent
+//! serves as long as it brings the residual down fast enough.
 
+use crate::linear::cholesky::Factor;
 use crate::linear::coarse::Level;
 use crate::linear::jacobi::BlockJacobi;
 use crate::linear::matrix::Matrix;
@@ -9,21 +11,32 @@ use crate::passes::balance::{Balance, States};
 use crate::passes::posed::{Before, Curvature, Posed};
 use glam::DVec3;
 use palpate_engine::{Failure, FailureKind};
+use palpate_model::body::Body;
 
 /// A failure without its time.
 pub type Reason = (FailureKind, String);
 
 /// Accuracy that linear solves for derivatives cannot usefully pass in f64.
 const FINEST: f64 = 1e-12;
-/// Accuracy of a Newton direction far from the solution: contact and rotation leave more error than this anyway.
+/// Accuracy of the first Newton direction: that of the tangent at the guess.
+const FIRST: f64 = 0.03;
+/// Accuracy of a later one far from the solution: contact and rotation leave more error than this anyway.
 const COARSEST: f64 = 0.1;
 
 /// Newton iterations of a time step that share the second level of the preconditioner: the body barely moves between them.
 const REFRESH: usize = 8;
 
 /// A step of Newton's method that leaves less than this part of the residual shows that the tangent hardly changes any more: the
-/// next direction of a time step takes it over. A static problem factorises anyway.
+/// next direction takes it over.
 const KEEP: f64 = 0.02;
+/// The same of a tangent that is factorised: a factor costs as much as several solves with the residuals between them.
+/// Where one does not bring the residual down as much, none is kept for the rest of the solve.
+const KEEP_FACTOR: f64 = 0.3;
+/// Residual, over the forces, from which on a factor may serve again: further away contact sets in from one step to the next, and an old
+/// tangent does not know of it.
+const CLOSE: f64 = 0.01;
+/// Share of the tolerance that steps with a factor from before must reach.
+const STRICT: f64 = 0.01;
 
 /// Attaches the time of the simulation to a reason.
 pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
@@ -55,6 +68,25 @@ fn task<'a>(
     Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits }
 }
 
+/// A tangent made ready for directions.
+#[derive(Debug)]
+pub struct TangentStiffness {
+    diagonal: BlockJacobi,
+    /// Mean stiffness of every node [N/m].
+    stiffness: Vec<f64>,
+    /// Its factor where solves are direct. Where they are not, the matrix is what it was made from.
+    factor: Option<Factor>,
+}
+
+impl TangentStiffness {
+    /// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
+    fn rounding(&self, body: &Body, u: &[DVec3]) -> f64 {
+        let squares = self.stiffness.iter().zip(body.nodes.iter().zip(u)).map(|(k, (x, u))| k * (*x + *u).length_squared());
+        // Each of the 81 products of a row rounds once; their errors add like a random walk.
+        9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
+    }
+}
+
 /// What a solve keeps of its cells.
 struct Cells {
     before: Before,
@@ -79,8 +111,8 @@ pub fn solve(
     let mut residual = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
     let (mut scale, mut level) = (None, None);
     let mut history: Vec<f64> = Vec::new();
-    let mut forcing = COARSEST;
-    let mut kept = None;
+    let mut forcing = FIRST;
+    let (mut kept, mut misled): (Option<TangentStiffness>, bool) = (None, false);
     for _ in 0..most {
         if !is_finite(&residual) {
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
@@ -89,16 +121,29 @@ pub fn solve(
         if purpose == Purpose::Static || history.len().is_multiple_of(REFRESH) {
             level = None;
         }
-        let (direction, norm, diagonal) =
-            direction(balance, solvers, matrix, purpose, s, &cells, &residual, forcing, tolerance, &mut scale, &mut level, kept)?;
-        let Some(direction) = direction else { return Ok(()) };
-        history.push(norm);
-        let after;
-        (residual, after) = line_search(balance, &diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
-        if after <= tolerance * scale.unwrap_or(0.0) {
+        // Steps with the last tangent converge linearly: they stop at the tolerance, where Newton's pass it by far.
+        let again = kept.as_ref().is_some_and(|t| t.factor.is_some());
+        let aim = if again { STRICT * tolerance } else { tolerance };
+        let (direction, norm, tangent) =
+            direction(balance, solvers, matrix, purpose, s, &cells, &residual, forcing, aim, &mut scale, &mut level, kept)?;
+        let (after, done) = match direction {
+            None => (norm, true),
+            Some(direction) => {
+                history.push(norm);
+                let after;
+                (residual, after) = line_search(balance, &tangent.diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
+                (after, after <= aim * scale.unwrap_or(0.0))
+            }
+        };
+        if done {
             return Ok(());
         }
-        kept = (purpose != Purpose::Static && after <= KEEP * norm).then_some(diagonal);
+        misled |= again && after > KEEP_FACTOR * norm;
+        let serves = match tangent.factor {
+            Some(_) => !misled && after <= KEEP_FACTOR * norm && after <= CLOSE * scale.unwrap_or(0.0),
+            None => purpose != Purpose::Static && after <= KEEP * norm,
+        };
+        kept = serves.then_some(tangent);
         // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
         forcing = (0.9 * (after / norm).powi(2)).clamp(1e-4, COARSEST);
     }
@@ -114,20 +159,9 @@ pub fn solve(
     ))
 }
 
-/// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
-fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
-    let body = &balance.plan.body;
-    let squares = balance.pattern.blocks.diagonal.iter().zip(body.nodes.iter().zip(u)).map(|(&k, (x, u))| {
-        let d = matrix.values[k];
-        (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0 * (*x + *u).length_squared()
-    });
-    // Each of the 81 products of a row rounds once; their errors add like a random walk.
-    9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
-}
-
-/// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and what it is measured with. Where
-/// the exact tangent is not positive definite one that is gives a descent direction instead. With the diagonal of an earlier tangent
-/// in `kept`, the matrix is that tangent and stays.
+/// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and the tangent. Where the exact one is
+/// not positive definite one that is gives a descent direction instead. With an earlier tangent in `kept`, that one is used, and the
+/// matrix stays.
 fn direction(
     balance: &Balance,
     solvers: &Solvers,
@@ -140,37 +174,49 @@ fn direction(
     tolerance: f64,
     scale: &mut Option<f64>,
     level: &mut Option<Level>,
-    mut kept: Option<BlockJacobi>,
-) -> Result<(Option<Nodes>, f64, BlockJacobi), Reason> {
+    mut kept: Option<TangentStiffness>,
+) -> Result<(Option<Nodes>, f64, TangentStiffness), Reason> {
+    let body = &balance.plan.body;
     for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
         let last = curvature == Curvature::Convex;
-        let diagonal = match kept.take() {
-            Some(diagonal) => diagonal,
+        let mut tangent = match kept.take() {
+            Some(tangent) => tangent,
             None => {
                 balance.tangent_from(s, &cells.posed, curvature, matrix);
-                match BlockJacobi::new(&balance.pattern.blocks, matrix) {
-                    Ok(diagonal) => diagonal,
+                let rows = &balance.pattern.blocks;
+                match BlockJacobi::new(rows, matrix) {
+                    Ok(diagonal) => TangentStiffness { diagonal, stiffness: matrix.diagonal_means(rows), factor: None },
                     Err(_) if !last => continue,
                     Err(a) => return Err(not_positive(a)),
                 }
             }
         };
+        let diagonal = &tangent.diagonal;
         let reference = *scale.get_or_insert_with(|| balance.scale(s, &cells.before, &cells.posed, |f| diagonal.norm(f)));
         let norm = diagonal.norm(residual);
-        if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
-            return Ok((None, norm, diagonal));
+        if norm <= tolerance * reference || norm <= tangent.rounding(body, s.u1) {
+            return Ok((None, norm, tangent));
         }
-        // CG may leave a third of what is allowed: the residual after the step decides.
-        let absolute = 0.3 * tolerance * reference;
-        let digits = if purpose == Purpose::Static { Digits::All } else { Digits::Few };
-        let task = task(balance, matrix, &diagonal, s.u1, purpose, digits);
-        let solved = solvers.prepare(task, level).and_then(|prepared| {
-            let mut d = vec![DVec3::ZERO; residual.len()];
-            let minus: Nodes = residual.iter().map(|r| -*r).collect();
-            prepared.solve(&minus, &mut d, forcing, absolute).map(|()| d)
-        });
+        let mut d: Nodes = residual.iter().map(|r| -*r).collect();
+        let solved = match &tangent.factor {
+            Some(factor) => {
+                factor.solve(&mut [&mut d]);
+                Ok(d)
+            }
+            None => {
+                // CG may leave a third of what is allowed: the residual after the step decides.
+                let absolute = 0.3 * tolerance * reference;
+                let digits = if purpose == Purpose::Static { Digits::All } else { Digits::Few };
+                let prepared = solvers.prepare(task(balance, matrix, diagonal, s.u1, purpose, digits), level);
+                let solved = prepared.and_then(|p| p.solve(&mut d, forcing, absolute).map(|()| p.into_factor()));
+                solved.map(|factor| {
+                    tangent.factor = factor;
+                    d
+                })
+            }
+        };
         match solved {
-            Ok(d) if is_finite(&d) => return Ok((Some(d), norm, diagonal)),
+            Ok(d) if is_finite(&d) => return Ok((Some(d), norm, tangent)),
             Ok(_) => return Err((FailureKind::NotFinite, "displacement of a Newton step".into())),
             Err(Trouble::Indefinite(_)) if !last => {}
             Err(t) => return Err(trouble(t)),

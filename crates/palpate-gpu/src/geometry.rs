@@ -154,13 +154,8 @@ impl Geometry {
         for list in &contributions {
             place_rows.push(place_rows[place_rows.len() - 1] + list.len() as u32);
         }
-        const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
         let mut ghosts = vec![0.0f64; blocks];
-        for (line, at) in body.ghosts.iter().zip(&places.ghosts) {
-            for (k, block) in at.iter().enumerate() {
-                ghosts[*block as usize] += line.weight * STENCIL[k / 3] * STENCIL[k % 3];
-            }
-        }
+        places.ghosts.iter().for_each(|(block, factor)| ghosts[*block as usize] = *factor);
         let to_u32 = |v: &[usize]| -> Vec<u32> { v.iter().map(|x| *x as u32).collect() };
         let hold_sites: Vec<[u32; 2]> = holds.iter().map(|(i, cell)| [*cell, *i as u32]).collect();
 

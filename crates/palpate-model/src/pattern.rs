@@ -2,6 +2,7 @@
 
 use crate::body::Body;
 use crate::plan::Plan;
+use std::collections::BTreeMap;
 
 /// Block-compressed rows over the simulation nodes (3 × 3 blocks), with the places where cells, ghost lines and point
 /// masses add. The pattern is symmetric and every row's columns increase.
@@ -113,8 +114,8 @@ impl Pattern {
 pub struct Places {
     /// Per cell, the 64 blocks of its nodes.
     pub cells: Vec<[u32; 64]>,
-    /// Per ghost line, the 9 blocks of its nodes.
-    pub ghosts: Vec<[u32; 9]>,
+    /// Blocks that ghost lines add to, increasing, and the factor on the identity there: the sum over its lines.
+    pub ghosts: Vec<(u32, f64)>,
     /// Per point mass, the 64 blocks of its nodes.
     pub masses: Vec<[u32; 64]>,
 }
@@ -124,13 +125,22 @@ impl Places {
     pub fn new(plan: &Plan, pattern: &Pattern) -> Places {
         Places {
             cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
-            ghosts: plan
-                .body
-                .ghosts
-                .iter()
-                .map(|g| std::array::from_fn(|k| pattern.blocks.find(g.nodes[k / 3], g.nodes[k % 3]) as u32))
-                .collect(),
+            ghosts: ghosts(&plan.body, pattern),
             masses: plan.masses.iter().map(|m| pattern.blocks8(&m.nodes)).collect(),
         }
     }
+}
+
+/// The ghost penalty's matrix for a unit scale, block by block.
+fn ghosts(body: &Body, pattern: &Pattern) -> Vec<(u32, f64)> {
+    const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
+    let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
+    for line in &body.ghosts {
+        for (i, a) in line.nodes.iter().enumerate() {
+            for (j, b) in line.nodes.iter().enumerate() {
+                *sums.entry(pattern.blocks.find(*a, *b) as u32).or_default() += line.weight * STENCIL[i] * STENCIL[j];
+            }
+        }
+    }
+    sums.into_iter().collect()
 }

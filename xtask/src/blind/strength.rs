@@ -17,6 +17,8 @@ use std::path::Path;
 
 /// Most simulations of a search for an amplitude.
 const TRIES: usize = 10;
+/// Largest amplitude: effects beyond so many times their typical size are not what anybody would look for.
+const MOST: f64 = 30.0;
 /// Relative accuracy of the strength; strengths of 3 and 10 stay far apart.
 const NEAR: f64 = 0.12;
 
@@ -126,7 +128,8 @@ impl Ruler {
                         // Of what sets in all at once, as a wall that is touched or not.
                         _ if bracketed && !(low..high).contains(&next) => (low * high).sqrt(),
                         _ if next >= ceiling => 0.5 * (a + ceiling),
-                        _ => next,
+                        _ if a >= MOST && next >= MOST => break,
+                        _ => next.min(MOST),
                     };
                 }
                 Err(e) => {

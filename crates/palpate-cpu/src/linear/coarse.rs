@@ -165,18 +165,24 @@ pub struct TwoLevel<'a> {
     pub level: &'a Level,
 }
 
-impl Precondition for TwoLevel<'_> {
-    fn apply(&self, r: &[DVec3], z: &mut [DVec3]) {
-        self.jacobi.apply(r, z);
-        let c = self.coarsening;
-        let mut coarse = vec![DVec3::ZERO; 2 * c.groups.len()];
-        for (g, nodes) in c.groups.iter().enumerate() {
+impl TwoLevel<'_> {
+    /// Translation and rotation of every group that the coarse solve answers with.
+    fn coarse(&self, r: &[DVec3]) -> Vec<DVec3> {
+        let mut out = vec![DVec3::ZERO; 2 * self.coarsening.groups.len()];
+        for (g, nodes) in self.coarsening.groups.iter().enumerate() {
             for &i in nodes {
-                coarse[2 * g] += r[i as usize];
-                coarse[2 * g + 1] += self.level.arms[i as usize].cross(r[i as usize]);
+                out[2 * g] += r[i as usize];
+                out[2 * g + 1] += self.level.arms[i as usize].cross(r[i as usize]);
             }
         }
-        self.level.factor.solve(&mut [&mut coarse]);
+        self.level.factor.solve(&mut [&mut out]);
+        out
+    }
+}
+
+impl Precondition for TwoLevel<'_> {
+    fn apply(&self, r: &[DVec3], z: &mut [DVec3]) {
+        let (c, ((), coarse)) = (self.coarsening, rayon::join(|| self.jacobi.apply(r, z), || self.coarse(r)));
         for (i, z) in z.iter_mut().enumerate() {
             let g = c.group_of[i] as usize;
             *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.level.arms[i]);

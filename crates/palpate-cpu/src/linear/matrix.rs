@@ -18,8 +18,12 @@ pub trait Operator {
     fn multiply(&self, x: &[DVec3], y: &mut [DVec3]);
 }
 
-/// Rows that one task multiplies in a row.
-const ROWS: usize = 512;
+/// Blocks that one task copies in a row.
+const BLOCKS: usize = 8192;
+/// Rows of a matrix that one thread multiplies faster than two would meet.
+const FEW: usize = 1024;
+/// Rows that one task multiplies in a row: few enough that two threads finish together.
+const ROWS: usize = 128;
 
 /// A copy of a matrix for many products: columns of blocks padded to four numbers, one vector register each.
 ///
@@ -35,7 +39,7 @@ impl<'a, T: Copy + Default + Send + Sync> Packed<'a, T> {
     /// Copies a matrix, number by number.
     pub fn new(rows: &'a BlockRows, matrix: &Matrix, number: impl Fn(f64) -> T + Sync) -> Packed<'a, T> {
         let mut blocks = vec![[T::default(); 12]; matrix.values.len()];
-        blocks.par_chunks_mut(16 * ROWS).zip(matrix.values.par_chunks(16 * ROWS)).for_each(|(blocks, values)| {
+        blocks.par_chunks_mut(BLOCKS).zip(matrix.values.par_chunks(BLOCKS)).for_each(|(blocks, values)| {
             for (block, value) in blocks.iter_mut().zip(values) {
                 for (c, column) in [value.x_axis, value.y_axis, value.z_axis].into_iter().enumerate() {
                     for r in 0..3 {
@@ -78,7 +82,7 @@ impl<T: Copy + Into<f64> + Send + Sync> Operator for Packed<'_, T> {
                 },
             );
         };
-        if y.len() <= 2 * ROWS {
+        if y.len() <= FEW {
             y.chunks_mut(ROWS).enumerate().for_each(some);
         } else {
             y.par_chunks_mut(ROWS).enumerate().for_each(some);
@@ -87,6 +91,12 @@ impl<T: Copy + Into<f64> + Send + Sync> Operator for Packed<'_, T> {
 }
 
 impl Matrix {
+    /// Means of the diagonal entries of the diagonal blocks `[N]`.
+    pub fn diagonal_means(&self, rows: &BlockRows) -> Vec<f64> {
+        let mean = |d: &DMat3| (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0;
+        rows.diagonal.iter().map(|&k| mean(&self.values[k])).collect()
+    }
+
     /// Inverses of the diagonal blocks `[N]`; the error is the number of the first block that is not positive definite.
     pub fn diagonal_inverses(&self, rows: &BlockRows) -> Result<Vec<DMat3>, usize> {
         rows.diagonal

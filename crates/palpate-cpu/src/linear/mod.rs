@@ -134,22 +134,28 @@ impl Solvers {
 }
 
 impl Prepared<'_> {
-    /// Solves A x = b; `x` comes in as a guess (used by CG only).
-    pub fn solve(&self, b: &[DVec3], x: &mut [DVec3], relative: f64, absolute: f64) -> Result<(), Trouble> {
+    /// Solves A x = b in place.
+    pub fn solve(&self, b: &mut Vec<DVec3>, relative: f64, absolute: f64) -> Result<(), Trouble> {
         match self {
-            Prepared::Direct(factor) => {
-                x.copy_from_slice(b);
-                factor.solve(&mut [x]);
-                Ok(())
-            }
+            Prepared::Direct(factor) => factor.solve(&mut [b]),
             Prepared::Iterative(matrix, precondition) => {
-                match conjugate_gradient::solve(matrix.as_ref(), precondition.as_ref(), b, x, relative, absolute, MOST_ITERATIONS)
-                {
-                    CgEnd::Converged(_) => Ok(()),
-                    CgEnd::Unconverged(left) => Err(Trouble::Unconverged(left)),
-                    CgEnd::Indefinite => Err(Trouble::Indefinite("a direction of negative curvature".into())),
+                let mut x = vec![DVec3::ZERO; b.len()];
+                let (matrix, precondition) = (matrix.as_ref(), precondition.as_ref());
+                match conjugate_gradient::solve(matrix, precondition, b, &mut x, relative, absolute, MOST_ITERATIONS) {
+                    CgEnd::Converged(_) => *b = x,
+                    CgEnd::Unconverged(left) => return Err(Trouble::Unconverged(left)),
+                    CgEnd::Indefinite => return Err(Trouble::Indefinite("a direction of negative curvature".into())),
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// The factor, where there is one.
+    pub fn into_factor(self) -> Option<Factor> {
+        match self {
+            Prepared::Direct(factor) => Some(factor),
+            Prepared::Iterative(..) => None,
         }
     }
 
@@ -160,12 +166,7 @@ impl Prepared<'_> {
                 factor.solve(&mut columns.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
                 Ok(())
             }
-            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| {
-                let mut x = vec![DVec3::ZERO; b.len()];
-                self.solve(b, &mut x, relative, 0.0)?;
-                *b = x;
-                Ok(())
-            }),
+            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| self.solve(b, relative, 0.0)),
         }
     }
 }

@@ -273,12 +273,8 @@ impl<'a> Balance<'a> {
         let (plan, pattern, physics) = (self.plan, self.pattern, self.physics);
         let values = &mut matrix.values;
         let ghost = self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.rate);
-        const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
-        for (g, line) in plan.body.ghosts.iter().enumerate() {
-            for k in 0..9 {
-                let s = ghost * line.weight * STENCIL[k / 3] * STENCIL[k % 3];
-                add_to_diagonal(&mut values[self.places.ghosts[g][k] as usize], s);
-            }
+        for (block, factor) in &self.places.ghosts {
+            add_to_diagonal(&mut values[*block as usize], ghost * factor);
         }
         if let Some(t) = self.inertia {
             let factor = t.displacement + physics.mass_damping * t.rate;

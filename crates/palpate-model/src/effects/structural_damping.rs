@@ -25,7 +25,7 @@ pub(super) const LAW: Law = Law {
 const PARAMS: [EffectParam; 1] = [number(
     "loss",
     "1",
-    [0.0, 3.0, 0.1],
+    [0.0, 1.5, 0.1],
     Unstated::Absent(0.0),
     "opposing stress over elastic stress; the damping ratio is this over π",
 )];
