@@ -144,6 +144,12 @@ pub struct Field {
 impl Field {
     /// Share of the discretisation's error that its estimate from one refinement misses.
     pub const REFINED: f64 = 0.3;
+
+    /// Mean square of the changes that can be said [m²].
+    pub fn mean_square(&self) -> f64 {
+        let known = || self.change.iter().flatten();
+        known().map(|c| c * c).sum::<f64>() / known().count().max(1) as f64
+    }
 }
 
 /// Whoever simulates and fits.

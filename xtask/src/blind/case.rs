@@ -66,6 +66,9 @@ pub struct Outcome {
     pub parameter_error: Option<f64>,
     /// Share of the gap closed on the held-out recording.
     pub gap_closed: f64,
+    /// Distance on the held-out recording before and after, and what noise and discretisation explain of it [m].
+    #[serde(default)]
+    pub held_out: Option<[f64; 3]>,
     /// Cosine between the mean slack force and the direction to the magnet.
     pub slack_points: Option<f64>,
     /// Wall-clock time of the diagnosis [s].
@@ -116,11 +119,11 @@ impl Case {
                 s.effects = Magnet { place, force: a * MAGNET }.apply(s)?.effects;
                 Ok(())
             };
-            Ok(ruler.amplitude(target, put)?.0)
+            ruler.amplitude(target, put)
         });
         let effect = |(k, target): &(usize, f64)| -> Result<f64, Error> {
             let h: &Hidden = &TABLE[*k];
-            Ok(ruler.amplitude(*target, |s, a| h.apply(s, a).map(|_| ()))?.0)
+            ruler.amplitude(*target, |s, a| h.apply(s, a).map(|_| ()))
         };
         self.hidden.iter().map(effect).chain(magnet).collect()
     }
@@ -140,7 +143,7 @@ impl Case {
     }
 
     fn moved(&self, ruler: &Ruler, amplitudes: &[f64]) -> Result<Vec<Moved>, Error> {
-        ruler.moved(|s| {
+        ruler.left(|s| {
             let hidden = self.hide(s, amplitudes)?.0;
             *s = Scene { observation: s.observation.clone(), fit: s.fit.clone(), ..hidden };
             Ok(())
@@ -166,6 +169,7 @@ impl Case {
             localisation: None,
             parameter_error: None,
             gap_closed: 0.0,
+            held_out: None,
             slack_points: None,
             seconds: 0.0,
             sentence: String::new(),
@@ -237,6 +241,7 @@ impl Outcome {
         self.sentence = d.sentence();
         self.seconds = found.seconds;
         self.gap_closed = d.gap_closed;
+        self.held_out = d.held_out.map(|(before, after)| [before.rms, after.rms, after.noise]);
         (self.p_value, self.p_value_after) = (Some(d.p_value), Some(d.p_value_after));
         self.structure = d.structure;
         let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();

@@ -161,7 +161,7 @@ pub fn run(options: &Options) -> Result<(), String> {
         known.retain(|o| !wanted.iter().any(|c| c.name == o.name));
     }
     for (i, c) in wanted.iter().enumerate() {
-        if known.iter().any(|o| o.name == c.name) {
+        if !options.strengths && known.iter().any(|o| o.name == c.name) {
             continue;
         }
         println!("{}/{} {}", i + 1, wanted.len(), c.name);

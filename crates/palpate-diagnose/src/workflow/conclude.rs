@@ -31,9 +31,10 @@ impl Session<'_> {
     }
 
     /// The same with a mean square of discretisation per residual [m²], or with what finer computations would change: as much of each is
-    /// added, up to twice its size, as brings the residuals nearest to zero.
+    /// added, up to twice its size, as brings the residuals nearest to zero, and the share of it that is not known stays.
     pub(super) fn level_of(&self, readings: &Readings, grid: f64, finer: &[Field]) -> Level {
         let (mut sum, mut n) = (0.0, 0.0);
+        let grid = grid + finer.iter().map(|f| f.rough.powi(2) * f.mean_square()).sum::<f64>();
         for r in readings.rows.iter().filter(|r| r.row.value.is_some()) {
             sum += self.variance(r) + grid;
             n += if matches!(r.row.source, Source::Point { .. }) { 1.0 } else { 1.0 / 3.0 };
