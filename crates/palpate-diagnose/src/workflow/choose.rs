@@ -45,7 +45,11 @@ impl Session<'_> {
         let price = price(met(&state.readings), predicted(best), &state.predicted[0]);
         let worth = |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64;
         let able = (0..fitted.len()).filter(|i| passes(*i));
-        let first = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
+        let leader = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
+        // Of what the data cannot tell from that, the plainest (Breiman et al., Classification and Regression Trees, 1984: one standard error).
+        let plainer = |i: &usize| fitted[*i].freedom < fitted[leader].freedom && as_good(*i, leader) && as_good(*i, best);
+        let by_freedom = |a: &usize, b: &usize| fitted[*a].freedom.cmp(&fitted[*b].freedom).then(worth(a).total_cmp(&worth(b)));
+        let first = able.clone().filter(plainer).min_by(by_freedom).unwrap_or(leader);
         // What predicts the same with as many numbers is named in the table's order: the plainer cause first.
         let like_first = |i: &usize| {
             fitted[*i].freedom == fitted[first].freedom && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
