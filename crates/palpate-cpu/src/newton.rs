@@ -11,7 +11,6 @@ use crate::passes::balance::{Balance, States};
 use crate::passes::posed::{Before, Curvature, Posed};
 use glam::DVec3;
 use palpate_engine::{Failure, FailureKind};
-use palpate_model::body::Body;
 
 /// A failure without its time.
 pub type Reason = (FailureKind, String);
@@ -68,23 +67,11 @@ fn task<'a>(
     Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits }
 }
 
-/// A tangent made ready for directions.
-#[derive(Debug)]
-pub struct TangentStiffness {
+/// A tangent made ready for directions; the matrix is what it was made from.
+struct TangentStiffness {
     diagonal: BlockJacobi,
-    /// Mean stiffness of every node [N/m].
-    stiffness: Vec<f64>,
-    /// Its factor where solves are direct. Where they are not, the matrix is what it was made from.
+    /// Its factor where solves are direct.
     factor: Option<Factor>,
-}
-
-impl TangentStiffness {
-    /// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
-    fn rounding(&self, body: &Body, u: &[DVec3]) -> f64 {
-        let squares = self.stiffness.iter().zip(body.nodes.iter().zip(u)).map(|(k, (x, u))| k * (*x + *u).length_squared());
-        // Each of the 81 products of a row rounds once; their errors add like a random walk.
-        9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
-    }
 }
 
 /// What a solve keeps of its cells.
@@ -126,16 +113,11 @@ pub fn solve(
         let aim = if again { STRICT * tolerance } else { tolerance };
         let (direction, norm, tangent) =
             direction(balance, solvers, matrix, purpose, s, &cells, &residual, forcing, aim, &mut scale, &mut level, kept)?;
-        let (after, done) = match direction {
-            None => (norm, true),
-            Some(direction) => {
-                history.push(norm);
-                let after;
-                (residual, after) = line_search(balance, &tangent.diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
-                (after, after <= aim * scale.unwrap_or(0.0))
-            }
-        };
-        if done {
+        let Some(direction) = direction else { return Ok(()) };
+        history.push(norm);
+        let after;
+        (residual, after) = line_search(balance, &tangent.diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
+        if after <= aim * scale.unwrap_or(0.0) {
             return Ok(());
         }
         misled |= again && after > KEEP_FACTOR * norm;
@@ -159,6 +141,17 @@ pub fn solve(
     ))
 }
 
+/// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
+fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
+    let body = &balance.plan.body;
+    let squares = balance.pattern.blocks.diagonal.iter().zip(body.nodes.iter().zip(u)).map(|(&k, (x, u))| {
+        let d = matrix.values[k];
+        (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0 * (*x + *u).length_squared()
+    });
+    // Each of the 81 products of a row rounds once; their errors add like a random walk.
+    9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
+}
+
 /// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and the tangent. Where the exact one is
 /// not positive definite one that is gives a descent direction instead. With an earlier tangent in `kept`, that one is used, and the
 /// matrix stays.
@@ -176,16 +169,14 @@ fn direction(
     level: &mut Option<Level>,
     mut kept: Option<TangentStiffness>,
 ) -> Result<(Option<Nodes>, f64, TangentStiffness), Reason> {
-    let body = &balance.plan.body;
     for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
         let last = curvature == Curvature::Convex;
         let mut tangent = match kept.take() {
             Some(tangent) => tangent,
             None => {
                 balance.tangent_from(s, &cells.posed, curvature, matrix);
-                let rows = &balance.pattern.blocks;
-                match BlockJacobi::new(rows, matrix) {
-                    Ok(diagonal) => TangentStiffness { diagonal, stiffness: matrix.diagonal_means(rows), factor: None },
+                match BlockJacobi::new(&balance.pattern.blocks, matrix) {
+                    Ok(diagonal) => TangentStiffness { diagonal, factor: None },
                     Err(_) if !last => continue,
                     Err(a) => return Err(not_positive(a)),
                 }
@@ -194,7 +185,7 @@ fn direction(
         let diagonal = &tangent.diagonal;
         let reference = *scale.get_or_insert_with(|| balance.scale(s, &cells.before, &cells.posed, |f| diagonal.norm(f)));
         let norm = diagonal.norm(residual);
-        if norm <= tolerance * reference || norm <= tangent.rounding(body, s.u1) {
+        if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
             return Ok((None, norm, tangent));
         }
         let mut d: Nodes = residual.iter().map(|r| -*r).collect();

@@ -54,6 +54,10 @@ fn density_law(law: &Law) -> Option<&'static dyn Field<1>> {
     if let Site::Density(f) = law.site { Some(f) } else { None }
 }
 
+fn edge_law(law: &Law) -> Option<&'static dyn Field<1>> {
+    if let Site::Edges(f) = law.site { Some(f) } else { None }
+}
+
 fn rest_law(law: &Law) -> Option<&'static dyn Field<3>> {
     if let Site::Rest(f) = law.site { Some(f) } else { None }
 }
@@ -179,22 +183,18 @@ pub fn hold_slope(plan: &Plan, physics: &Physics, spot: &Spot, effect: usize, sl
 /// How far effects shift the clamps' edges [m]; `None` where no effect does, be it by nothing.
 pub fn edge(plan: &Plan, physics: &Physics) -> Option<f64> {
     let spot = Spot::of(plan);
-    let shift = |(_, law, p): Numbered| if let Site::Edges(f) = law.site { Some(f.at(&spot, p)[0]) } else { None };
-    effects(&plan.layout, physics).filter_map(shift).reduce(|a, b| a + b)
+    effects(&plan.layout, physics).filter_map(|(_, law, p)| Some(edge_law(law)?.at(&spot, p)[0])).reduce(|a, b| a + b)
 }
 
 /// The furthest [`edge`] within the bounds of the effects' numbers.
 pub fn furthest_edge(plan: &Plan) -> Option<f64> {
     let spot = Spot::of(plan);
-    let most = |(law, _): (&'static Law, _)| {
-        let Site::Edges(field) = law.site else { return None };
-        Some(field.at(&spot, &law.params.iter().map(|p| p.upper).collect::<Vec<f64>>())[0])
-    };
-    plan.layout.effects().filter_map(most).reduce(|a, b| a + b)
+    let upper = |law: &Law| law.params.iter().map(|p| p.upper).collect::<Vec<f64>>();
+    plan.layout.effects().filter_map(|(law, _)| Some(edge_law(law)?.at(&spot, &upper(law))[0])).reduce(|a, b| a + b)
 }
 
 /// Derivative of [`edge`] by number `slot` of effect `effect`; `None` for other effects.
 pub fn edge_slope(plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<f64> {
     let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
-    if let Site::Edges(field) = law.site { Some(field.slope(&Spot::of(plan), p, slot)[0]) } else { None }
+    Some(edge_law(law)?.slope(&Spot::of(plan), p, slot)[0])
 }

@@ -202,6 +202,7 @@ mod tests {
         assert!(sight.front((0.0, start), (1.0, 0.2), plane).is_none());
         assert!(sight.front((0.0, start), (1.0, 4.0), |_| None).is_none());
     }
+
     #[test]
     fn a_front_at_a_grazing_angle_leaves_the_hidden_side() {
         let (x, point) = (cell(), DVec3::new(0.45, 0.55, 0.6));

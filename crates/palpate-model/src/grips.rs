@@ -129,12 +129,20 @@ impl Grip {
         acted(plan).then(|| (0..plan.clamps.len()).map(|i| grips.grip(i, shift, elements)).collect())
     }
 
-    /// Derivative of the stiffness of held cell `m` by number `slot` of effect `effect`; `None` where there is none.
-    pub fn matrix_slope(&self, grips: &Grips, m: usize, nu: f64, [effect, slot]: [usize; 2]) -> Option<Box<M24>> {
-        match changes::edge_slope(grips.plan, grips.physics, effect, slot) {
+    /// Derivative of the stiffness by number `slot` of effect `effect`, as a function of the held cell's number, `None` where a cell has
+    /// none; `None` altogether for effects that leave clamps alone.
+    pub fn matrix_slopes<'a>(
+        &'a self,
+        grips: &'a Grips,
+        nu: f64,
+        [effect, slot]: [usize; 2],
+    ) -> Option<impl Fn(usize) -> Option<Box<M24>> + 'a> {
+        let edge = changes::edge_slope(grips.plan, grips.physics, effect, slot);
+        let acts = edge.is_some() || changes::hold_slope(grips.plan, grips.physics, &grips.spot, effect, slot).is_some();
+        acts.then_some(move |m: usize| match edge {
             Some(slope) => self.by_edge[m].as_ref().map(|k| Box::new(k.map(|v| slope * v))),
             None => grips.layered_slope(&self.cells[m], &self.stiff[m].k, nu, [effect, slot]),
-        }
+        })
     }
 }
 
@@ -145,7 +153,10 @@ impl Grips<'_> {
             Some(shift) => clamp.edge.cells(body, &clamp.cells, shift),
             None => clamp.cells.iter().map(|c| Held { now: c.clone(), near: None }).collect(),
         };
-        let stiff: Vec<CellMatrices> = held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect();
+        let stiff: Vec<CellMatrices> = match shift {
+            Some(_) => held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect(),
+            None => elements.clamps[index].clone(),
+        };
         let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect();
         let by_edge = |(held, now): (&Held, &CellMatrices)| {
             let (further, step) = held.near.as_ref()?;

@@ -61,7 +61,7 @@ impl Ruler {
         let e = Experiment::new(scene.clone(), String::new(), Vec::new())?;
         let paths = scene.fit.iter().flat_map(|f| &f.parameters);
         let free: Vec<usize> = paths.flat_map(|p| e.plan().layout.resolve(&p.path)).collect();
-        let l = linearise(&e, &free)?;
+        let l = linearise(&e, &e.plan().theta, &free)?;
         let q = free.len();
         let column = |k: usize| -> Vec<f64> {
             let of = |(i, r): (usize, &ResidualRow)| r.value.map_or(0.0, |_| l.rows.sensitivity[i * q + k] / r.noise);
@@ -89,12 +89,13 @@ impl Ruler {
         let e = self.changed(change)?;
         let options = FitOptions { starts: Some(1), iterations: Some(REFIT), ..FitOptions::default() };
         let theta = fit(std::slice::from_ref(&e), options)?.result.theta.remove(0);
-        self.compare(Rollout::new(CpuBackend, e.plan(), 1)?.linearise(&theta, &[])?)
+        Ok(self.compare(&linearise(&e, &theta, &[])?))
     }
 
     /// The same to first order.
     fn moved(&self, change: impl FnOnce(&mut Scene) -> Result<(), Error>) -> Result<Vec<Moved>, Error> {
-        self.compare(linearise(&self.changed(change)?, &[])?)
+        let e = self.changed(change)?;
+        Ok(self.compare(&linearise(&e, &e.plan().theta, &[])?))
     }
 
     fn changed(&self, change: impl FnOnce(&mut Scene) -> Result<(), Error>) -> Result<Experiment, Error> {
@@ -103,7 +104,7 @@ impl Ruler {
         Experiment::new(scene, String::new(), Vec::new())
     }
 
-    fn compare(&self, l: Linearised) -> Result<Vec<Moved>, Error> {
+    fn compare(&self, l: &Linearised) -> Vec<Moved> {
         let difference = |(a, b): (&ResidualRow, &ResidualRow)| match (a.value, b.value) {
             (Some(a), Some(v)) => (a - v) / b.noise,
             _ => 0.0,
@@ -111,7 +112,7 @@ impl Ruler {
         let mut d: Vec<f64> = l.rows.residuals.iter().zip(&self.rows).map(difference).collect();
         project(&self.free, &mut d);
         let moved = |((change, r), time): ((f64, &ResidualRow), &f64)| Moved { rest: r.rest, time: *time, change };
-        Ok(d.into_iter().zip(&self.rows).zip(&self.times).map(moved).collect())
+        d.into_iter().zip(&self.rows).zip(&self.times).map(moved).collect()
     }
 
     /// Amplitude at which an effect has a strength, as nearly as it can be reached within the allowed values.
@@ -188,9 +189,9 @@ impl Ruler {
     }
 }
 
-/// Residuals of an experiment with its own values, and their derivatives along some places in θ.
-fn linearise(e: &Experiment, directions: &[usize]) -> Result<Linearised, Error> {
-    Ok(Rollout::new(CpuBackend, e.plan(), 1)?.linearise(&e.plan().theta, directions)?)
+/// Residuals of an experiment at θ, and their derivatives along some places in it.
+fn linearise(e: &Experiment, theta: &[f64], directions: &[usize]) -> Result<Linearised, Error> {
+    Ok(Rollout::new(CpuBackend, e.plan(), 1)?.linearise(theta, directions)?)
 }
 
 fn project(basis: &[Vec<f64>], v: &mut [f64]) {

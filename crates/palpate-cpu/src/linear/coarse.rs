@@ -182,7 +182,8 @@ impl TwoLevel<'_> {
 
 impl Precondition for TwoLevel<'_> {
     fn apply(&self, r: &[DVec3], z: &mut [DVec3]) {
-        let (c, ((), coarse)) = (self.coarsening, rayon::join(|| self.jacobi.apply(r, z), || self.coarse(r)));
+        let c = self.coarsening;
+        let ((), coarse) = rayon::join(|| self.jacobi.apply(r, z), || self.coarse(r));
         for (i, z) in z.iter_mut().enumerate() {
             let g = c.group_of[i] as usize;
             *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.level.arms[i]);

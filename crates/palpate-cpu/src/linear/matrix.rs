@@ -91,12 +91,6 @@ impl<T: Copy + Into<f64> + Send + Sync> Operator for Packed<'_, T> {
 }
 
 impl Matrix {
-    /// Means of the diagonal entries of the diagonal blocks `[N]`.
-    pub fn diagonal_means(&self, rows: &BlockRows) -> Vec<f64> {
-        let mean = |d: &DMat3| (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0;
-        rows.diagonal.iter().map(|&k| mean(&self.values[k])).collect()
-    }
-
     /// Inverses of the diagonal blocks `[N]`; the error is the number of the first block that is not positive definite.
     pub fn diagonal_inverses(&self, rows: &BlockRows) -> Result<Vec<DMat3>, usize> {
         rows.diagonal

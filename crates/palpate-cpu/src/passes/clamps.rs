@@ -137,12 +137,13 @@ impl<'a> Clamps<'a> {
         let (plan, grips) = (self.plan, Grips::new(self.plan, self.physics, elapsed));
         let pose = grips.pose(index, time);
         let Some(own) = self.grips.map(|g| &g[index]) else { return };
+        let Some(change) = own.matrix_slopes(&grips, self.elements.nu, [effect, slot]) else { return };
         let moves = grips.pose_slope(index, time, effect, slot);
         for (m, c) in own.cells.iter().enumerate() {
             let (nodes, scale) = (&plan.body.cells[c.cell as usize].nodes, young * self.factor(c));
             let d = deviation(&plan.body, self.changes.rest.as_deref(), c, pose, u);
-            let k = self.matrix(index, m, Matrices::Stiffness);
             if let Some((da, db)) = moves {
+                let k = self.matrix(index, m, Matrices::Stiffness);
                 // The pose: dA K d + A K (dAᵀ(x − b) − Aᵀ db).
                 let moved = nodes
                     .map(|n| da.transpose() * (plan.body.nodes[n as usize] + u[n as usize] - pose.1) - pose.0.transpose() * db);
@@ -150,7 +151,7 @@ impl<'a> Clamps<'a> {
                 self.add(c, pose.0, scale, corners(&multiply(k, &flatten(&moved))), out);
             }
             // The matrix: factor, layer and edge.
-            if let Some(change) = own.matrix_slope(&grips, m, self.elements.nu, [effect, slot]) {
+            if let Some(change) = change(m) {
                 self.add(c, pose.0, scale, corners(&multiply(&change, &d)), out);
             }
         }

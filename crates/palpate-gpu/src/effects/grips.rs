@@ -116,21 +116,23 @@ impl Effects {
         const NONE: [f64; 576] = [0.0; 576];
         let mut out = Vec::new();
         let mut put = |m: Option<&[f64; 576]>| out.extend(m.unwrap_or(&NONE).iter().map(|x| *x as f32));
-        let mut all: Vec<Vec<Grip>> = Vec::new();
+        let mut all = Vec::new();
         for (physics, elements) in batch.iter().zip(elements) {
             let grips = Grip::all(plan, physics, elements).unwrap_or_default();
-            if grips.iter().map(|g| g.cells.len()).sum::<usize>() > found(&grips, holds).flatten().count() {
+            let places = places(&grips, holds);
+            if grips.iter().map(|g| g.cells.len()).sum::<usize>() > places.iter().flatten().count() {
                 return Err(GpuError::Plan { what: "a clamp's edge beyond the bounds of `clamp-edge`".to_string() });
             }
-            found(&grips, holds).for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k)));
-            found(&grips, holds).for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k_nu)));
-            all.push(grips);
+            places.iter().for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k)));
+            places.iter().for_each(|at| put(at.map(|(i, m)| &*grips[i].matrices[m].k_nu)));
+            all.push((grips, places));
         }
         for row in &self.matrix_rows {
-            for ((physics, elements), own) in batch.iter().zip(elements).zip(&all) {
+            for ((physics, elements), (own, places)) in batch.iter().zip(elements).zip(&all) {
                 let grips = Grips::new(plan, physics, 0.0);
-                let slope = |(i, m): (usize, usize)| own[i].matrix_slope(&grips, m, elements.nu, self.grip_rows[*row]);
-                found(own, holds).for_each(|at| put(at.and_then(slope).as_deref()));
+                let slopes: Vec<_> = own.iter().map(|g| g.matrix_slopes(&grips, elements.nu, self.grip_rows[*row])).collect();
+                let slope = |(i, m): (usize, usize)| slopes[i].as_ref().and_then(|of| of(m));
+                places.iter().for_each(|at| put(at.and_then(slope).as_deref()));
             }
         }
         Ok(out)
@@ -138,6 +140,6 @@ impl Effects {
 }
 
 /// Where a member's clamps have each of the device's clamp cells: clamp and number among its cells.
-fn found<'a>(grips: &'a [Grip], holds: &'a [(usize, u32)]) -> impl Iterator<Item = Option<(usize, usize)>> + 'a {
-    holds.iter().map(|(i, cell)| Some((*i, grips[*i].cells.binary_search_by_key(cell, |c| c.cell).ok()?)))
+fn places(grips: &[Grip], holds: &[(usize, u32)]) -> Vec<Option<(usize, usize)>> {
+    holds.iter().map(|(i, cell)| Some((*i, grips[*i].cells.binary_search_by_key(cell, |c| c.cell).ok()?))).collect()
 }
