@@ -13,6 +13,9 @@ struct BandCell { // mirrored
 var<storage, read> band_cells: array<BandCell>;
 var<storage, read> band_sdf: array<f32>;
 
+// Quadratic pieces per axis of a cell's distances, and samples: every piece has three, neighbours share one.
+override sdf_pieces: u32 = 2u;
+
 // Relative rounding of a position is 6e-8 of the cell; so much slack in ξ leaves no gap between neighbours, and a point that two
 // of them hold has the same distance in both up to that slack.
 const SLACK = 4e-6;
@@ -129,7 +132,7 @@ fn pull_back(e: Hexahedron, cell: u32, y: vec3<f32>, slack: f32) -> Pulled {
     p.xi = xi;
     if p.holds {
         p.inverse = inverse_of(j, det);
-        let d = triquadratic(cell, xi);
+        let d = distance_at(cell, xi);
         p.phi = d.w;
         p.gradient = transpose(p.inverse) * d.xyz;
     }
@@ -144,6 +147,10 @@ fn quadratic_slope(t: f32) -> vec3<f32> {
     return vec3(4.0 * t - 3.0, 4.0 - 8.0 * t, 4.0 * t - 1.0);
 }
 
+fn sdf_samples() -> u32 {
+    return 2u * sdf_pieces + 1u;
+}
+
 // (∂/∂ξ, value) along one row of three.
 fn sdf_row(at: u32, b: vec3<f32>, s: vec3<f32>) -> vec2<f32> {
     let v = vec3(band_sdf[at], band_sdf[at + 1u], band_sdf[at + 2u]);
@@ -153,23 +160,29 @@ fn sdf_row(at: u32, b: vec3<f32>, s: vec3<f32>) -> vec2<f32> {
 // (∂/∂ξ, ∂/∂η, value) in one plane of nine.
 fn sdf_plane(at: u32, bx: vec3<f32>, sx: vec3<f32>, by: vec3<f32>, sy: vec3<f32>) -> vec3<f32> {
     let r0 = sdf_row(at, bx, sx);
-    let r1 = sdf_row(at + 3u, bx, sx);
-    let r2 = sdf_row(at + 6u, bx, sx);
+    let r1 = sdf_row(at + sdf_samples(), bx, sx);
+    let r2 = sdf_row(at + 2u * sdf_samples(), bx, sx);
     let v = vec3(r0.y, r1.y, r2.y);
     return vec3(dot(by, vec3(r0.x, r1.x, r2.x)), dot(sy, v), dot(by, v));
 }
 
-// Gradient by ξ and, last, value of the triquadratic interpolant of a cell's distances.
-fn triquadratic(cell: u32, xi: vec3<f32>) -> vec4<f32> {
-    let bx = quadratic_basis(xi.x);
-    let by = quadratic_basis(xi.y);
-    let bz = quadratic_basis(xi.z);
-    let sx = quadratic_slope(xi.x);
-    let sy = quadratic_slope(xi.y);
-    let sz = quadratic_slope(xi.z);
-    let p0 = sdf_plane(27u * cell, bx, sx, by, sy);
-    let p1 = sdf_plane(27u * cell + 9u, bx, sx, by, sy);
-    let p2 = sdf_plane(27u * cell + 18u, bx, sx, by, sy);
+// Gradient by ξ and, last, the value of a cell's distances: a quadratic in each of its pieces.
+fn distance_at(cell: u32, xi: vec3<f32>) -> vec4<f32> {
+    let pieces = f32(sdf_pieces);
+    let piece = clamp(floor(pieces * xi), vec3(0.0), vec3(pieces - 1.0));
+    let x = pieces * xi - piece;
+    let bx = quadratic_basis(x.x);
+    let by = quadratic_basis(x.y);
+    let bz = quadratic_basis(x.z);
+    let sx = pieces * quadratic_slope(x.x);
+    let sy = pieces * quadratic_slope(x.y);
+    let sz = pieces * quadratic_slope(x.z);
+    let n = sdf_samples();
+    let k = 2u * vec3<u32>(piece);
+    let at = n * n * n * cell + k.x + n * (k.y + n * k.z);
+    let p0 = sdf_plane(at, bx, sx, by, sy);
+    let p1 = sdf_plane(at + n * n, bx, sx, by, sy);
+    let p2 = sdf_plane(at + 2u * n * n, bx, sx, by, sy);
     let v = vec3(p0.z, p1.z, p2.z);
     return vec4(dot(bz, vec3(p0.x, p1.x, p2.x)), dot(bz, vec3(p0.y, p1.y, p2.y)), dot(sz, v), dot(bz, v));
 }

@@ -141,7 +141,7 @@ fn hanging_cantilever_of_two_materials() {
     // Stated about the fitted bent shape: 0.67 mm in the median, nine tenths below 1.6 mm.
     assert!(rms < 1.6e-3 && unmatched * 20 < points, "{rms} {unmatched} of {points}");
 
-    let (_, raw_rms, raw_unmatched, ..) = hanging(&data, "cantilever-two-materials-hanging-raw");
+    let (_, raw_rms, ..) = hanging(&data, "cantilever-two-materials-hanging-raw");
     // Half of the body is read 23 mm too deep.
-    assert!(raw_rms > 1.5 * rms && raw_unmatched > 5 * unmatched, "{raw_rms} {raw_unmatched}");
+    assert!(raw_rms > 5.0 * rms, "{raw_rms} {rms}");
 }

@@ -50,6 +50,7 @@ pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
 fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_width" => palpate_model::contact::WIDTH,
+        "sdf_pieces" => palpate_model::distances::PIECES as f64,
         "smallest_pair" => palpate_model::rotation::SMALLEST_PAIR,
         "newton_determinant" => palpate_model::rotation::NEWTON_DETERMINANT,
         _ => return None,

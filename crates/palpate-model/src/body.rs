@@ -5,6 +5,7 @@ mod build;
 pub use build::{BodyError, MAX_CELLS, SUBDIVISIONS};
 pub(crate) use build::{Parts, build_parts, world_cell};
 
+use crate::distances::Distances;
 use crate::grid::Grid;
 use glam::DVec3;
 
@@ -103,7 +104,6 @@ pub struct BandCell {
     pub lattice: [usize; 3],
     /// Extended node numbers of the eight corners.
     pub nodes: [u32; 8],
-    /// Signed distance [m] at the 27 points of the half-step lattice in the cell (x fastest), negative inside;
-    /// interpolated triquadratically.
-    pub sdf: [f64; 27],
+    /// Signed distance [m] at the lattice of [`crate::distances`] in the cell, negative inside.
+    pub sdf: Distances,
 }

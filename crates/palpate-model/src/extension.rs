@@ -4,6 +4,7 @@
 //! Rigid motion (and any affine motion) is therefore continued exactly, and the adjoint is the transposed weights.
 
 use crate::body::{Band, BandCell, Body};
+use crate::distances::SAMPLES;
 use crate::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::Shape;
 use glam::{DMat3, DVec3};
@@ -204,7 +205,7 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
     for c in &body.cells {
         active[grid.index(c.lattice)] = true;
     }
-    // No point of a cell is farther than this from its middle, or (half as far) from the nearest of its 27 lattice points.
+    // No point of a cell is farther than this from its middle, or (over the steps) from the nearest of its samples.
     let reach = 0.5 * 3f64.sqrt() * h;
     let cells = grid.size.map(|n| n - 1);
     let slabs: Vec<Vec<[usize; 3]>> = (0..cells[2])
@@ -224,12 +225,15 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
         .collect();
     let candidates: Vec<[usize; 3]> = slabs.into_iter().flatten().collect();
 
-    // Distances on the half-step lattice, every point once.
-    let fine = Grid { offset: grid.offset.map(|o| 2 * o), size: grid.size.map(|n| 2 * n - 1), h: 0.5 * h };
+    // Distances at the samples, every point once.
+    const STEPS: usize = SAMPLES - 1;
+    let fine =
+        Grid { offset: grid.offset.map(|o| STEPS as i32 * o), size: grid.size.map(|n| STEPS * (n - 1) + 1), h: h / STEPS as f64 };
     let mut wanted = vec![false; fine.len()];
     let points = |c: [usize; 3]| {
         let fine = &fine;
-        (0..27).map(move |q| fine.index([2 * c[0] + q % 3, 2 * c[1] + q / 3 % 3, 2 * c[2] + q / 9]))
+        let place = move |q: usize| [q % SAMPLES, q / SAMPLES % SAMPLES, q / SAMPLES / SAMPLES];
+        (0..SAMPLES.pow(3)).map(move |q| fine.index(std::array::from_fn(|a| STEPS * c[a] + place(q)[a])))
     };
     for &c in &candidates {
         points(c).for_each(|i| wanted[i] = true);
@@ -242,7 +246,7 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
 
     let kept: Vec<[usize; 3]> = candidates
         .into_iter()
-        .filter(|&c| active[grid.index(c)] || points(c).any(|i| distance[i] <= width + 0.5 * reach))
+        .filter(|&c| active[grid.index(c)] || points(c).any(|i| distance[i] <= width + reach / STEPS as f64))
         .collect();
     let mut number = lookup.number.clone();
     for &c in &kept {
@@ -275,7 +279,7 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
     band.cells = kept
         .into_iter()
         .map(|c| {
-            let mut sdf = [0.0; 27];
+            let mut sdf = [0.0; SAMPLES.pow(3)];
             for (s, i) in sdf.iter_mut().zip(points(c)) {
                 *s = distance[i];
             }

@@ -10,6 +10,7 @@ pub mod clamp_edge;
 pub mod contact;
 pub mod corotation;
 pub mod cut;
+pub mod distances;
 pub mod effects;
 pub mod element;
 pub mod elements;

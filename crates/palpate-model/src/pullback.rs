@@ -1,6 +1,7 @@
 //! Pulling an observed point back into the rest shape: which place of a deformed cell it is, and how far that place is
 //! from the rest surface (sparse surface constraint; Weiss et al. 2020, section 5.1).
 
+use crate::distances::{Distances, interpolate};
 use crate::grid::{shape_functions, shape_gradients};
 use glam::{DMat3, DVec3};
 
@@ -59,26 +60,6 @@ pub fn jacobian(x: &[DVec3; 8], xi: DVec3) -> DMat3 {
     j
 }
 
-/// Value and gradient by ξ of the triquadratic interpolant of 27 values on the half-step lattice of a cell (x fastest).
-pub fn triquadratic(values: &[f64; 27], xi: DVec3) -> (f64, DVec3) {
-    let basis = |t: f64| [(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)];
-    let slope = |t: f64| [4.0 * t - 3.0, 4.0 - 8.0 * t, 4.0 * t - 1.0];
-    let (bx, by, bz) = (basis(xi.x), basis(xi.y), basis(xi.z));
-    let (sx, sy, sz) = (slope(xi.x), slope(xi.y), slope(xi.z));
-    let mut value = 0.0;
-    let mut gradient = DVec3::ZERO;
-    for c in 0..3 {
-        for b in 0..3 {
-            for a in 0..3 {
-                let v = values[a + 3 * b + 9 * c];
-                value += v * bx[a] * by[b] * bz[c];
-                gradient += v * DVec3::new(sx[a] * by[b] * bz[c], bx[a] * sy[b] * bz[c], bx[a] * by[b] * sz[c]);
-            }
-        }
-    }
-    (value, gradient)
-}
-
 /// Where an observed point lies in a deformed cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pullback {
@@ -91,15 +72,16 @@ pub struct Pullback {
 }
 
 /// Pulls a point back through a deformed cell; `None` when the point is not in it.
-pub fn pull_back(x: &[DVec3; 8], sdf: &[f64; 27], p: DVec3) -> Option<Pullback> {
+pub fn pull_back(x: &[DVec3; 8], sdf: &Distances, p: DVec3) -> Option<Pullback> {
     let xi = invert_trilinear(x, p)?;
-    let (phi, by_xi) = triquadratic(sdf, xi);
+    let (phi, by_xi) = interpolate(sdf, xi);
     Some(Pullback { xi, phi, gradient: jacobian(x, xi).inverse().transpose() * by_xi })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distances::SAMPLES;
     use crate::grid::CORNERS;
 
     fn deformed(seed: u64) -> [DVec3; 8] {
@@ -114,9 +96,10 @@ mod tests {
         std::array::from_fn(|i| turn * (DVec3::from_array(CORNERS[i].map(f64::from)) + 0.5 * DVec3::new(next(), next(), next())))
     }
 
-    fn sdf() -> [f64; 27] {
+    fn sdf() -> Distances {
         std::array::from_fn(|k| {
-            let p = DVec3::new((k % 3) as f64, (k / 3 % 3) as f64, (k / 9) as f64) * 0.5;
+            let n = SAMPLES;
+            let p = DVec3::new((k % n) as f64, (k / n % n) as f64, (k / n / n) as f64) / (n - 1) as f64;
             (p - DVec3::new(-0.7, 0.1, 0.3)).length() - 1.0
         })
     }

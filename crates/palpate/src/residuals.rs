@@ -16,6 +16,7 @@ use crate::render::{DepthImage, Pinhole, rasterise};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Snapshot};
 use palpate_io::recording::RecordedCamera;
+use palpate_model::distances::interpolate;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -202,31 +203,16 @@ fn grid_error(plan: &Plan, surface: &Embedding) -> f64 {
         let Some((ijk, xi)) = grid.locate(*p) else { continue };
         let number = cell_at[grid.index(ijk)];
         if number != u32::MAX {
-            sum += triquadratic(&plan.body.band.cells[number as usize].sdf, xi).powi(2);
+            sum += interpolate(&plan.body.band.cells[number as usize].sdf, xi).0.powi(2);
             n += 1;
         }
     }
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
-/// Value at `xi` ∈ [0, 1]³ of the polynomial of degree 2 in each variable through 27 values at 0, ½, 1 (x fastest).
-fn triquadratic(values: &[f64; 27], xi: DVec3) -> f64 {
-    let basis = |t: f64| [(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)];
-    let [x, y, z] = xi.to_array().map(basis);
-    (0..27).map(|q| values[q] * x[q % 3] * y[q / 3 % 3] * z[q / 9]).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn triquadratic_interpolation_reproduces_products_of_squares() {
-        let f = |p: DVec3| 1.0 + p.x * p.x * p.y - 2.0 * p.z * p.z * p.y * p.y * p.x + p.z;
-        let values = std::array::from_fn(|q| f(DVec3::new((q % 3) as f64, (q / 3 % 3) as f64, (q / 9) as f64) * 0.5));
-        let p = DVec3::new(0.3, 0.8, 0.55);
-        assert!((triquadratic(&values, p) - f(p)).abs() < 1e-14);
-    }
 
     #[test]
     fn a_spread_has_both_ends() {

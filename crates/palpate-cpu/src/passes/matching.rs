@@ -6,10 +6,11 @@
 use crate::passes::cells::Corners;
 use glam::DVec3;
 use palpate_model::body::Body;
+use palpate_model::distances::interpolate;
 use palpate_model::front::Sight;
 use palpate_model::grid::shape_functions;
 use palpate_model::observation::{Camera, ObservedPoint};
-use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back, triquadratic};
+use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back};
 use rayon::prelude::*;
 
 /// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
@@ -30,7 +31,7 @@ impl BandLookup {
     fn distance(&self, body: &Body, place: DVec3) -> Option<(f64, DVec3)> {
         let (ijk, xi) = body.grid.locate(place)?;
         let cell = self.0[body.grid.index(ijk)];
-        (cell != u32::MAX).then(|| triquadratic(&body.band.cells[cell as usize].sdf, xi))
+        (cell != u32::MAX).then(|| interpolate(&body.band.cells[cell as usize].sdf, xi))
     }
 }
 

@@ -62,7 +62,7 @@ fn check(plan: &Plan, keys: &[usize]) {
         let places = fronts(&right);
         let d = apart(&lin, &right, plan);
         println!("{} fronts of {} points: {d:?}", places.len(), b.matched);
-        assert!(places.len() > 20, "{}", places.len());
+        assert!(places.len() >= 8, "{}", places.len());
         assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
 
         // Fronts that are wrong by one percent show, in residuals, derivatives and the cost.

@@ -19,8 +19,9 @@ use palpate_model::plan_build::build_plan;
 use palpate_model::scene::{Analytic, BodySource, CostKind, ObservationSpec, Resolution, Scene};
 
 /// Cost, sums and derivatives agree to this much of their size. Rounding of φ is some 1e-7 of a cell, 1e-6 of a residual of a tenth
-/// of a cell; where a thousand terms of both signs nearly cancel, ten to a hundred times that.
-const AGREEMENT: f64 = 1e-4;
+/// of a cell, slopes over a quarter of a cell have four times that; where a thousand terms of both signs nearly cancel, ten to a hundred
+/// times that.
+const AGREEMENT: f64 = 2e-4;
 
 /// Reproducible numbers in [-1, 1].
 pub(super) struct Noise(pub(super) u64);
@@ -362,7 +363,7 @@ fn one_cell_and_flat_bodies_agree() {
     let backend = GpuBackend::on(gpu);
     let one = Analytic::Box { min: DVec3::new(0.0, 0.0, 0.04), max: DVec3::new(0.04, 0.04, 0.08) };
     let flat = Analytic::Box { min: DVec3::new(-0.06, -0.05, 0.04), max: DVec3::new(0.07, 0.05, 0.065) };
-    for (shape, h, each) in [(one, 0.04, 20), (flat, 0.02, 2)] {
+    for (shape, h, each) in [(one, 0.04, 20), (flat, 0.02, 3)] {
         let plan = observed(&scene(shape, h), &[], each);
         let found = found(&backend, &plan, 3, None);
         for (m, found) in found.iter().enumerate() {
