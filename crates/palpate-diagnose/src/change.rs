@@ -1,6 +1,6 @@
 //! What a hypothesis changes in a scene: an effect added, or numbers freed that the scene holds fixed. Both compete on equal terms.
 
-use crate::laboratory::Setting;
+use crate::laboratory::{Setting, Wall};
 use glam::DVec3;
 use palpate_model::effects::{ALL, Effect, EffectParam, Family, Numbered, Trial, Unstated};
 use palpate_model::params::ParamKey;
@@ -54,6 +54,16 @@ impl Change {
             }
             Change::Freed { paths, .. } => (0..paths.len()).collect(),
         }
+    }
+
+    /// Sizes of the free numbers that show whether the change helps, where small ones do not tell.
+    pub fn blunt(&self) -> Option<Vec<f64>> {
+        let Change::Effect(e) = self else { return None };
+        let size = |s: usize| match e.law().params[s].default {
+            Unstated::Absent(_) => e.law().params[s].typical,
+            _ => 0.0,
+        };
+        (e.law().trial == Trial::Walls).then(|| self.free_slots().into_iter().map(size).collect())
     }
 
     /// Which of [`Change::free_slots`] have a derivative at "absent": amplitudes, or all freed numbers.
@@ -115,13 +125,19 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
             for (v, p) in effect.values.iter_mut().zip(l.params) {
                 match p.default {
                     Unstated::Choice(_) => *v = Some(choice as f64),
-                    Unstated::Center | Unstated::OnBody => *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))]),
+                    Unstated::Center | Unstated::Reference | Unstated::OnBody => {
+                        *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))])
+                    }
                     // A load at a place acts there as sharply as the grid allows.
                     Unstated::Fixed(_) if p.key == "radius" => *v = Some(setting.spot),
                     _ => {}
                 }
             }
-            let variants = if l.trial == Trial::Starts { spread(&effect, setting) } else { vec![effect] };
+            let variants = match l.trial {
+                Trial::Walls if !setting.walls.is_empty() => at_walls(&effect, &setting.walls),
+                Trial::Starts | Trial::Walls => spread(&effect, setting),
+                Trial::Score | Trial::Never => vec![effect],
+            };
             out.push(Candidate { variants: variants.into_iter().map(Change::Effect).collect() });
         }
     }
@@ -196,6 +212,24 @@ fn spread(effect: &Effect, setting: &Setting) -> Vec<Effect> {
     out
 }
 
+/// A plane at each of these places.
+fn at_walls(effect: &Effect, walls: &[Wall]) -> Vec<Effect> {
+    let at = |wall: &Wall| {
+        let mut e = effect.clone();
+        let n = wall.normal;
+        for (v, p) in e.values.iter_mut().zip(effect.law().params) {
+            match p.key {
+                "azimuth" => *v = Some(n.y.atan2(n.x)),
+                "elevation" => *v = Some(n.z.clamp(-1.0, 1.0).asin()),
+                "distance" => *v = Some(wall.distance),
+                _ => {}
+            }
+        }
+        e
+    };
+    walls.iter().map(at).collect()
+}
+
 /// The slack effect over windows of time that add up to one: `windows` hats between `from` and `to` [s]; empty when the table has none.
 pub fn slack(setting: &Setting, from: f64, to: f64, windows: usize) -> Vec<Change> {
     let Some(law) = ALL.iter().position(|l| l.family == Family::Slack) else { return Vec::new() };
@@ -219,4 +253,31 @@ pub fn slack(setting: &Setting, from: f64, to: f64, windows: usize) -> Vec<Chang
 /// Paths of a scene's numbers by their keys that a diagnosis may free: everything but the effects.
 pub fn can_be_freed(key: ParamKey) -> bool {
     !matches!(key, ParamKey::Effect { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laboratory::Laboratory;
+    use crate::tests::bench::Bench;
+
+    #[test]
+    fn a_plane_is_tried_where_the_measured_body_stops() {
+        let normal = DVec3::new(0.3, -0.5, 0.81).normalize();
+        let mut setting = Bench::new(1, &[], false).setting().clone();
+        setting.walls = vec![Wall { normal, distance: 0.07 }];
+        let planes = candidates(&setting).into_iter().find(|c| c.kind() == "second-plane").unwrap();
+        let [Change::Effect(e)] = &planes.variants[..] else { panic!("{planes:?}") };
+        let value = |key: &str| e.law().params.iter().position(|p| p.key == key).and_then(|s| e.values[s]).unwrap();
+        let (azimuth, elevation) = (value("azimuth"), value("elevation"));
+        let (c, s) = (elevation.cos(), elevation.sin());
+        assert!((DVec3::new(c * azimuth.cos(), c * azimuth.sin(), s) - normal).length() < 1e-12);
+        assert_eq!(value("distance"), 0.07);
+        // Stiffness, distance and two angles: the point that distances are counted from stays.
+        assert_eq!(planes.variants[0].free_slots().len(), 4);
+        assert_eq!(planes.variants[0].blunt().map(|sizes| sizes.len()), Some(4));
+        // Without such planes it is tried all around.
+        setting.walls.clear();
+        assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));
+    }
 }

@@ -42,6 +42,17 @@ pub struct Setting {
     pub contact: Vec<Vec<(f64, f64)>>,
     /// Per scene: frames until the next of which the baseline moves by less than a tenth of the noise of a depth reading.
     pub still: Vec<Vec<usize>>,
+    /// Planes that the measured body does not cross and the baseline does.
+    pub walls: Vec<Wall>,
+}
+
+/// A plane beside the measured body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// Normal, towards the body.
+    pub normal: DVec3,
+    /// Distance from the body's centre [m], against the normal.
+    pub distance: f64,
 }
 
 /// One number of a model.
@@ -51,7 +62,8 @@ pub struct Number {
     pub path: String,
     /// SI unit, `1` for none.
     pub unit: String,
-    /// Value where it starts: of a freed number the scene's, of an effect's what its change says.
+    /// Value where it starts: of a number that the scene leaves free the middle of its starts, of a freed one the scene's, of an effect's what
+    /// its change says.
     pub start: f64,
     /// Smallest and largest allowed value.
     pub bounds: (f64, f64),

@@ -6,18 +6,18 @@ mod conclude;
 mod prune;
 mod race;
 mod rounds;
+mod variants;
 
 use crate::cells::{Cells, Table};
-use crate::change::{Candidate, Change, candidates};
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
-use crate::score::{Score, score};
 use crate::still::still_ratio;
 use palpate_engine::Source;
+use variants::Variant;
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,19 +77,6 @@ struct State {
     held_out_finer: Vec<Field>,
 }
 
-/// A variant of a candidate with its columns where it is absent.
-struct Variant {
-    candidate: usize,
-    change: Change,
-    /// Of every free number of the change, `[k][m]`.
-    columns: Vec<Vec<f64>>,
-    /// Which of them count at "absent".
-    amplitudes: Vec<bool>,
-    start: Vec<f64>,
-    bounds: Vec<(f64, f64)>,
-    score: Score,
-}
-
 /// A fitted candidate.
 struct Fitted {
     /// Its number in the table of candidates.
@@ -117,13 +104,8 @@ struct Session<'a> {
     no_time: bool,
 }
 
-/// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
-const FIRST_STARTS: usize = 8;
 /// Share of the baseline's readings that a model must meet for its residuals to tell of the noise.
 const KEPT: f64 = 0.95;
-/// The share of the best candidate's gain that is within reach.
-const REACH: f64 = 0.6;
-
 /// Diagnoses a scene from its fitted baseline.
 ///
 /// # Errors
@@ -359,80 +341,5 @@ impl Session<'_> {
         let new = self.design_effect.sqrt();
         self.cells.sd.iter_mut().for_each(|s| *s *= new);
         self.remeasure(state);
-    }
-
-    /// Variants of every candidate, scored where it is absent: of effects at an unknown place first a few, the others only of those that
-    /// promise much.
-    fn variants(&mut self, state: &State) -> Result<Vec<Variant>, LabError> {
-        self.lab.say("scoring candidates");
-        let all = candidates(self.lab.setting());
-        let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(FIRST_STARTS).max(1) };
-        let split = |(n, c): (usize, &Candidate)| -> Vec<(bool, usize, Change)> {
-            let by = stride(c);
-            c.variants.iter().enumerate().map(|(i, v)| (i % by == 0, n, v.clone())).collect()
-        };
-        let (first, later): (Vec<_>, Vec<_>) = all.iter().enumerate().flat_map(split).partition(|(first, ..)| *first);
-        let mut scored = self.scored(state, first)?;
-        let best = scored.iter().map(|v| v.score.gain).fold(0.0, f64::max);
-        let within = |n: usize| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
-        let more: Vec<_> = later.into_iter().filter(|(_, n, _)| within(*n)).collect();
-        scored.extend(self.scored(state, more)?);
-        Ok(scored)
-    }
-
-    /// These variants (which pass, number of their candidate, change), scored where they are absent.
-    fn scored(&mut self, state: &State, wanted: Vec<(bool, usize, Change)>) -> Result<Vec<Variant>, LabError> {
-        let mut tries = Vec::new();
-        let mut out: Vec<Variant> = Vec::new();
-        let own = state.model.values.len();
-        for (_, candidate, change) in wanted {
-            let same =
-                |x: &Change| matches!((x, &change), (Change::Freed { name: a, .. }, Change::Freed { name: b, .. }) if a == b);
-            if state.model.changes.iter().any(same) {
-                continue;
-            }
-            let mut changes = state.model.changes.clone();
-            changes.push(change.clone());
-            let numbers = self.lab.numbers(&changes)?;
-            let mut values = state.model.values.clone();
-            values.extend(numbers[own..].iter().map(|n| n.start));
-            out.push(Variant {
-                candidate,
-                columns: Vec::new(),
-                amplitudes: change.amplitudes(),
-                change,
-                start: values[own..].to_vec(),
-                bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
-                score: Score::default(),
-            });
-            tries.push((changes, values));
-        }
-        let answers = self.lab.linearise_new(&tries, own);
-        let mut kept = Vec::new();
-        for (mut v, answer) in out.into_iter().zip(answers) {
-            match answer {
-                Ok(readings) => {
-                    v.columns = self.cells.table(&readings, None).columns;
-                    v.score = self.score(state, &v);
-                    kept.push(v);
-                }
-                Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                Err(LabError::Failed(_)) => {}
-                Err(LabError::NoTime) => self.missed(&v.change, &LabError::NoTime),
-            }
-        }
-        Ok(kept)
-    }
-
-    fn score(&self, state: &State, v: &Variant) -> Score {
-        let n = state.frame.fields.len();
-        let chosen: Vec<usize> = (0..v.columns.len()).filter(|k| v.amplitudes[*k]).collect();
-        let columns: Vec<Vec<f64>> = chosen.iter().map(|k| extended(&v.columns[*k], n)).collect();
-        let bounds: Vec<(f64, f64)> = chosen.iter().map(|k| v.bounds[*k]).collect();
-        let mut s = score(&state.frame, &columns, &bounds);
-        let mut step = vec![0.0; v.columns.len()];
-        chosen.iter().zip(&s.step).for_each(|(k, x)| step[*k] = *x);
-        s.step = step;
-        s
     }
 }

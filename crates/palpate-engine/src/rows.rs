@@ -47,6 +47,8 @@ pub struct ResidualRow {
     /// Change of the residual per metre that the point moves away from its camera along the line of sight (1 for coordinates): noise
     /// along the line of sight reaches the residual multiplied by it.
     pub along_sight: f64,
+    /// ∂r by the measured place in the world; zero for a point that met nothing.
+    pub by_place: DVec3,
 }
 
 /// Residuals of one or several frames with their sensitivities.

@@ -41,7 +41,7 @@ the effect before it compares (in reverse order of the scene); `palpate observe`
 fn trial(law: &Law) -> &'static str {
     match law.trial {
         Trial::Score => "by its derivative where it is absent",
-        Trial::Starts => "by short fits from several starts",
+        Trial::Starts | Trial::Walls => "by short fits from several starts",
         Trial::Never => "not by itself",
     }
 }

@@ -144,8 +144,7 @@ impl Case {
 
     fn moved(&self, ruler: &Ruler, amplitudes: &[f64]) -> Result<Vec<Moved>, Error> {
         ruler.left(|s| {
-            let hidden = self.hide(s, amplitudes)?.0;
-            *s = Scene { observation: s.observation.clone(), fit: s.fit.clone(), ..hidden };
+            *s = self.hide(s, amplitudes)?.0;
             Ok(())
         })
     }
@@ -203,9 +202,17 @@ impl Case {
         let moved = self.moved(&ruler, &out.amplitudes)?;
         out.strength = rms(&moved);
         let numbers = self.hide(&setup.truth(false)?, &out.amplitudes)?.1;
-        let options =
-            DiagnoseOptions { backend: Backend::Cpu, budget: Some(budget), on_progress: Some(say), ..DiagnoseOptions::default() };
+        let options = DiagnoseOptions {
+            backend: Backend::Cpu,
+            budget: Some(budget),
+            on_progress: Some(&mut *say),
+            ..DiagnoseOptions::default()
+        };
         let found = diagnose(&[seen], Some(&held_out), options)?;
+        for t in found.diagnosis.tried.iter().filter(|t| t.held_out_gain.is_some() || t.promised > 0.3) {
+            let gain = t.held_out_gain.map_or("not judged".into(), |g| format!("closes {g:.3}"));
+            say(&format!("round {}: {} promised {:.3}, {gain}", t.round, t.kind, t.promised));
+        }
         out.compare(&found, &moved, &numbers);
         if let (Some((place, _)), Some(slack)) = (self.magnet, &found.diagnosis.slack) {
             let force = slack.windows.iter().map(|w| w.values.iter().take(3).copied().collect::<Vec<f64>>());

@@ -1,9 +1,10 @@
 //! How far a hidden effect moves readings, in standard deviations, once everything that is free has been fitted again; and the amplitude
 //! at which it moves them by so much.
 //!
-//! The diagnosis' own grid without noise: r(a) are the residuals of a recording with nothing hidden against the scene with amplitude a.
-//! The columns S of the free numbers are projected out of d = (r(a) − r(0))/σ, which is what refitting them absorbs to first order. The
-//! strength is the root mean square of what is left when they are really fitted again, which first order only leads to.
+//! The diagnosis' own grid without noise. To first order: r(a) are the residuals of a recording with nothing hidden against the scene with
+//! amplitude a, and the columns S of the free numbers, projected out of d = (r(a) − r(0))/σ, are what refitting them absorbs. The strength is
+//! the root mean square of what is left of a recording with amplitude a when the scene without it is really fitted, which first order only
+//! leads to.
 
 use super::record::{Maker, record, truth};
 use super::scenes::Setup;
@@ -13,7 +14,7 @@ use palpate_cpu::CpuBackend;
 use palpate_engine::{Linearised, ResidualRow, Rollout};
 use palpate_io::write_recording;
 use palpate_model::scene::Scene;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most simulations of a search for an amplitude.
 const TRIES: usize = 10;
@@ -29,7 +30,9 @@ const MOST: f64 = 10.0;
 const NEAR: f64 = 0.12;
 
 /// The ruler of a scene: its residuals with nothing hidden, and what its free numbers absorb.
-pub struct Ruler {
+pub struct Ruler<'a> {
+    setup: &'a Setup,
+    folder: PathBuf,
     scene: Scene,
     rows: Vec<ResidualRow>,
     times: Vec<f64>,
@@ -48,16 +51,17 @@ pub struct Moved {
     pub change: f64,
 }
 
-impl Ruler {
-    /// Makes the ruler of a setup; its recording is kept in `folder`.
+impl<'a> Ruler<'a> {
+    /// Makes the ruler of a setup; its recordings are kept in `folder`.
     ///
     /// # Errors
     /// The scene cannot be simulated.
-    pub fn new(setup: &Setup, folder: &Path) -> Result<Ruler, Error> {
+    pub fn new(setup: &'a Setup, folder: &Path) -> Result<Ruler<'a>, Error> {
         let maker = Maker::own();
         let recording = record(setup, &truth(&setup.truth(false)?, &maker)?, &maker)?;
-        write_recording(folder, &recording).map_err(|e| Error::Failed(e.to_string()))?;
-        let scene = setup.parse(&setup.text(folder), false)?;
+        let plain = folder.join("plain");
+        write_recording(&plain, &recording).map_err(|e| Error::Failed(e.to_string()))?;
+        let scene = setup.parse(&setup.text(&plain), false)?;
         let e = Experiment::new(scene.clone(), String::new(), Vec::new())?;
         let paths = scene.fit.iter().flat_map(|f| &f.parameters);
         let free: Vec<usize> = paths.flat_map(|p| e.plan().layout.resolve(&p.path)).collect();
@@ -78,18 +82,28 @@ impl Ruler {
             }
         }
         let times = l.rows.residuals.iter().map(|r| e.plan().observation.frames[r.frame].time).collect();
-        Ok(Ruler { scene, rows: l.rows.residuals, times, free: basis })
+        Ok(Ruler { setup, folder: folder.to_path_buf(), scene, rows: l.rows.residuals, times, free: basis })
     }
 
-    /// What a changed scene moves, with the free numbers really fitted again.
+    /// What the scene without a change leaves of a recording with it, once the free numbers are fitted to that.
     ///
     /// # Errors
     /// It cannot be simulated.
     pub fn left(&self, change: impl FnOnce(&mut Scene) -> Result<(), Error>) -> Result<Vec<Moved>, Error> {
-        let e = self.changed(change)?;
+        let mut hidden = self.setup.truth(false)?;
+        change(&mut hidden)?;
+        let maker = Maker::own();
+        let recording = record(self.setup, &truth(&hidden, &maker)?, &maker)?;
+        let place = self.folder.join("changed");
+        write_recording(&place, &recording).map_err(|e| Error::Failed(e.to_string()))?;
+        let scene = self.setup.parse(&self.setup.text(&place), false)?;
+        let e = Experiment::new(scene, String::new(), Vec::new())?;
         let options = FitOptions { starts: Some(1), iterations: Some(REFIT), ..FitOptions::default() };
         let theta = fit(std::slice::from_ref(&e), options)?.result.theta.remove(0);
-        Ok(self.compare(&linearise(&e, &theta, &[])?))
+        let rows = linearise(&e, &theta, &[])?.rows.residuals;
+        let time = |r: &ResidualRow| e.plan().observation.frames[r.frame].time;
+        let moved = |r: &ResidualRow| Moved { rest: r.rest, time: time(r), change: r.value.map_or(0.0, |v| v / r.noise) };
+        Ok(rows.iter().map(moved).collect())
     }
 
     /// The same to first order.

@@ -165,6 +165,7 @@ pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visi
                 weight: kernel::weight(m.place.phi, plan.band),
                 rest: body.grid.position(body.band.cells[m.cell as usize].lattice) + body.grid.h * m.place.xi,
                 along_sight: m.place.gradient.dot(sight),
+                by_place: m.place.gradient,
             };
             visit(row, &d);
         }
@@ -176,7 +177,8 @@ pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visi
                 *d = c[usize::from(a)];
             }
             let value = Some(r[usize::from(a)]);
-            visit(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0 }, &d);
+            let by_place = -DVec3::AXES[usize::from(a)];
+            visit(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0, by_place }, &d);
         }
     };
     for m in &f.markers {
@@ -211,6 +213,7 @@ pub fn all_rows(look: Look, compared: &Compared, u: &[DVec3], along: Along) -> R
         weight: 0.0,
         rest: points[n].position,
         along_sight: 0.0,
+        by_place: DVec3::ZERO,
     };
     let mut add = |row: ResidualRow, d: &[f64]| {
         out.residuals.push(row);

@@ -101,6 +101,7 @@ impl Bench {
             held: held.clone(),
             contact: vec![vec![(0.5, 0.8)]],
             still: Vec::new(),
+            walls: Vec::new(),
         };
         Bench {
             setting,
@@ -148,6 +149,7 @@ impl Bench {
                     weight: 1.0,
                     rest: *p,
                     along_sight: 1.0,
+                    by_place: DVec3::X,
                 };
                 out.cost += 0.5 * (value / NOISE).powi(2) / (FRAMES * POINTS) as f64;
                 rows.push(Reading { scene: 0, time, row });

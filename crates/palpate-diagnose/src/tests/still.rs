@@ -41,6 +41,7 @@ fn seen(sd: f64, run: usize, motion: impl Fn(f64, usize) -> f64) -> Readings {
                 weight: 1.0,
                 rest: DVec3::new(x, y, noise),
                 along_sight: 1.0,
+                by_place: DVec3::X,
             };
             rows.push(Reading { scene: 0, time: frame as f64 / 30.0, row });
             point += 1;

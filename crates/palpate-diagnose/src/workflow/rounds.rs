@@ -7,7 +7,8 @@ use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::linear::dot;
 use crate::score::f_tail;
 
-/// Change of a fitted number, relative to its size, from which on the scene's own value counts as another place to start from.
+/// Change of a fitted number, relative to its size, from which on the value that the baseline's fit started from counts as another place to
+/// start from.
 const FAR: f64 = 0.3;
 
 impl Session<'_> {
@@ -61,7 +62,7 @@ impl Session<'_> {
         self.decide(state, fitted)
     }
 
-    /// The scene as it was given, with the candidates that promise most there, where the baseline has moved far from it: the numbers that
+    /// The scene where the baseline's fit started, with the candidates that promise most there, where that is far away: the numbers that
     /// make up best for what is missing may lie where nothing else can be seen any more.
     fn home(&mut self, state: &State) -> Result<Option<(State, Vec<Variant>)>, LabError> {
         let model = &state.model;

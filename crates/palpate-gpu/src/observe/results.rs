@@ -126,7 +126,8 @@ pub(crate) fn rows(
             let [x, y, z, phi, gx, gy, gz, cell] = found[place];
             let source = Source::Point { point: p as u32, camera: seen.camera };
             let (noise, value) = (obs.depth_noise, f64::from(phi));
-            let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest: seen.position, along_sight: 0.0 };
+            let (rest, by_place) = (seen.position, DVec3::ZERO);
+            let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest, along_sight: 0.0, by_place };
             let row = body.band.cells.get(cell.to_bits() as usize).map_or(bare, |cell| {
                 let truth = o.sensors[member].truth(&obs.cameras[seen.camera as usize], seen);
                 let sight = DVec3::from_array(truth.ray()).normalize_or_zero();
@@ -136,6 +137,7 @@ pub(crate) fn rows(
                     weight: kernel::weight(value, world.plan.band),
                     rest: body.grid.position(cell.lattice) + body.grid.h * DVec3::new(x.into(), y.into(), z.into()),
                     along_sight: gradient.dot(sight),
+                    by_place: gradient,
                     ..bare
                 }
             });
@@ -145,7 +147,8 @@ pub(crate) fn rows(
             for a in 0..3u8 {
                 let place = points + 3 * place + usize::from(a);
                 let value = Some(f64::from(values[place][0]));
-                add(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0 }, place);
+                let by_place = -DVec3::AXES[usize::from(a)];
+                add(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0, by_place }, place);
             }
         };
         let markers = f.markers.len();

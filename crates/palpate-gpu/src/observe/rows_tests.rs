@@ -19,7 +19,7 @@ pub(super) fn apart(a: &Linearised, b: &Linearised, plan: &Plan) -> [f64; 3] {
     for (x, y) in a.rows.residuals.iter().zip(&b.rows.residuals) {
         assert_eq!((x.frame, x.source, x.noise, x.value.is_some()), (y.frame, y.source, y.noise, y.value.is_some()));
         let value = (x.value.unwrap_or(0.0) - y.value.unwrap_or(0.0)).abs() / y.noise;
-        let kind = (x.weight - y.weight).abs().max((x.along_sight - y.along_sight).abs());
+        let kind = (x.weight - y.weight).abs().max((x.along_sight - y.along_sight).abs()).max((x.by_place - y.by_place).length());
         worst[0] = worst[0].max(value).max(kind);
         worst[1] = worst[1].max((x.rest - y.rest).length() / plan.body.grid.h);
     }

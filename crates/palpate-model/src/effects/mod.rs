@@ -116,6 +116,8 @@ pub enum Unstated {
     Fixed(f64),
     /// This component of the body's centre of mass [m].
     Center,
+    /// The same, for a point that others are counted from: a diagnosis leaves it there.
+    Reference,
     /// The same, for a place that only makes sense on the body: a diagnosis looks for it in the box around the rest shape.
     OnBody,
     /// Must be stated (a diagnosis starts it at this value).
@@ -140,6 +142,8 @@ pub enum Trial {
     Score,
     /// Flat or not smooth at "absent", or it acts at an unknown place: short fits from spread starts.
     Starts,
+    /// The same, from planes that the measured body does not cross and the simulated one does (`azimuth`, `elevation` and `distance` from its centre).
+    Walls,
     /// Not tried by itself.
     Never,
 }
@@ -311,7 +315,7 @@ impl Unstated {
         match self {
             Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Stated(v) => Some(v),
             Unstated::Choice(_) => Some(0.0),
-            Unstated::Center | Unstated::OnBody => None,
+            Unstated::Center | Unstated::Reference | Unstated::OnBody => None,
         }
     }
 }

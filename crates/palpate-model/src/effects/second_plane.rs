@@ -14,7 +14,7 @@ pub(super) const LAW: Law = Law {
     family: Family::Contact,
     sentence: "the body touches something flat that the scene does not know",
     params: &PARAMS,
-    trial: Trial::Starts,
+    trial: Trial::Walls,
     site: Site::Surface(&SecondPlane),
 };
 
@@ -31,9 +31,9 @@ const PARAMS: [EffectParam; 7] = [
     ),
     number("azimuth", "rad", [-TAU, TAU, 0.5], Unstated::Stated(0.0), "angle of the normal in the x-y plane, from x towards y"),
     number("elevation", "rad", [-TAU, TAU, 0.5], Unstated::Stated(0.0), "angle of the normal above the x-y plane"),
-    EffectParam { default: Unstated::Center, ..component("point", 0, "m", 0.01, POINT) },
-    EffectParam { default: Unstated::Center, ..component("point", 1, "m", 0.01, POINT) },
-    EffectParam { default: Unstated::Center, ..component("point", 2, "m", 0.01, POINT) },
+    EffectParam { default: Unstated::Reference, ..component("point", 0, "m", 0.01, POINT) },
+    EffectParam { default: Unstated::Reference, ..component("point", 1, "m", 0.01, POINT) },
+    EffectParam { default: Unstated::Reference, ..component("point", 2, "m", 0.01, POINT) },
 ];
 
 struct SecondPlane;

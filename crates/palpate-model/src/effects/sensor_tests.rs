@@ -24,7 +24,7 @@ fn effects(laws: &[usize], noise: &mut Noise) -> (Layout, Vec<f64>) {
             let p = &ALL[usize::from(law)].params[usize::from(slot)];
             match p.default {
                 Unstated::Choice(_) => 0.0,
-                Unstated::Center | Unstated::OnBody => noise.uniform(-0.02, 0.02),
+                Unstated::Center | Unstated::Reference | Unstated::OnBody => noise.uniform(-0.02, 0.02),
                 // Never the wrong half space.
                 Unstated::Stated(v) => v + 0.5 * noise.uniform(-1.0, 1.0),
                 Unstated::Fixed(v) => v,

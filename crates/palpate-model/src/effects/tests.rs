@@ -41,7 +41,9 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
     for (p, v) in law.params.iter().zip(&mut z[COMMON..]) {
         *v = match p.default {
             // Places: somewhere near the point.
-            Unstated::Center | Unstated::OnBody => old[usize::from(p.axis.unwrap_or(0))] + 0.01 * noise.uniform(-1.0, 1.0),
+            Unstated::Center | Unstated::Reference | Unstated::OnBody => {
+                old[usize::from(p.axis.unwrap_or(0))] + 0.01 * noise.uniform(-1.0, 1.0)
+            }
             _ => (p.typical * noise.uniform(0.3, 1.5)).clamp(p.lower.max(-1e9), p.upper.min(1e9)),
         };
     }

@@ -16,6 +16,8 @@ pub(super) struct Prepared {
     pub experiments: Vec<Experiment>,
     pub names: Vec<FreeNumber>,
     pub free: Vec<FreeParameter>,
+    /// How many of them the scenes themselves leave free: the first ones.
+    pub given: usize,
 }
 
 /// A number that belongs to one recording, never to the body.
@@ -56,6 +58,7 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
     let several = base.len() > 1;
     let mut experiments = base.to_vec();
     let (known, _, _) = free_parameters(base)?;
+    let given = known.len();
     let mut order: Vec<String> = known.iter().map(FreeNumber::label).collect();
     for change in changes {
         match change {
@@ -95,7 +98,7 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
     let mut both: Vec<(FreeNumber, FreeParameter)> = names.into_iter().zip(free).collect();
     both.sort_by_key(|(n, _)| order.iter().position(|o| *o == n.label()).unwrap_or(usize::MAX));
     let (names, free) = both.into_iter().unzip();
-    Ok(Prepared { experiments, names, free })
+    Ok(Prepared { experiments, names, free, given })
 }
 
 /// Largest displacement gradient of a rest shape that could be mistaken for the one given: a strain of 30 %, or a turn of 17°.
@@ -141,15 +144,25 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
 }
 
 impl Prepared {
+    /// Values that the experiments have of the free numbers.
+    pub fn own_values(&self) -> Vec<f64> {
+        let own = |s: &Slot| self.experiments[s.scene].plan.theta[s.place] / s.factor;
+        self.free.iter().map(|f| own(&f.slots[0])).collect()
+    }
+
     /// The free numbers.
     pub fn numbers(&self) -> Vec<Number> {
-        let own = |s: &Slot| self.experiments[s.scene].plan.theta[s.place] / s.factor;
-        let number = |(n, f): (&FreeNumber, &FreeParameter)| {
-            let start = own(&f.slots[0]);
+        let own = self.own_values();
+        let number = |(k, (n, f)): (usize, (&FreeNumber, &FreeParameter))| {
+            let guess = match f.transform {
+                Transform::Log => (f.start.0 * f.start.1).sqrt(),
+                _ => 0.5 * (f.start.0 + f.start.1),
+            };
+            let start = if k < self.given { guess } else { own[k] };
             let scale = if f.transform == Transform::Log && start > 0.0 { start } else { f.typical };
             Number { path: n.label(), unit: f.unit.clone(), start, bounds: f.bounds, scale }
         };
-        self.names.iter().zip(&self.free).map(number).collect()
+        self.names.iter().zip(&self.free).enumerate().map(number).collect()
     }
 
     /// θ of a scene at values of the free numbers.

@@ -5,6 +5,7 @@ use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
 use super::others::{contact_times, held_out, separations, still_frames};
 use super::systematic::systematic;
+use super::walls::walls;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -75,6 +76,7 @@ impl<'a> Lab<'a> {
             held: held(base),
             contact,
             still,
+            walls: walls(base).unwrap_or_default(),
         };
         let checkpoint = Checkpoint::open(options.checkpoints.as_ref().map(|(f, r)| (f.as_path(), *r)))?;
         Ok(Lab {

@@ -5,6 +5,7 @@ mod hypothesis;
 mod lab;
 mod others;
 mod systematic;
+mod walls;
 
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;
@@ -101,12 +102,12 @@ pub fn diagnose(
         let deadline = options.budget.map(|b| clock + b);
         let mut lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
         let numbers = lab.numbers(&[]).map_err(failed)?;
+        let values = hypothesis::prepare(known, &[])?.own_values();
         let errors = numbers.iter().map(|n| {
             let parameters = free.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
             parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
         });
-        let model =
-            Model { changes: Vec::new(), values: numbers.iter().map(|n| n.start).collect(), errors: errors.collect(), numbers };
+        let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
         palpate_diagnose::diagnose(&mut lab, model, &options.statistics).map_err(failed)
     })??;
     let model = &diagnosis.model;
