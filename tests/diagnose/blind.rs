@@ -35,6 +35,13 @@ fn a_load_is_named() {
 }
 
 #[test]
+fn a_wall_is_named() {
+    let o = outcome(Some("second-plane"), false, 11);
+    assert_eq!((o.verdict.as_str(), o.score()), ("missing-effect", 1.0), "{o:?}");
+    assert!(o.gap_closed > 0.9, "{o:?}");
+}
+
+#[test]
 fn a_measurement_effect_is_named() {
     let o = outcome(Some("depth-bias"), false, 11);
     // One camera sees this ball from about one distance, where a bias and a scale of depth read the same: named first, or as just as good.

@@ -20,6 +20,7 @@ pub use cells::Regions;
 pub use change::{Candidate, Change, can_be_freed, candidates};
 pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
+pub use linear::least_squares;
 pub use locate::Place;
 pub use workflow::{Options, diagnose};
 

@@ -7,8 +7,7 @@ use crate::engine::Backend;
 use crate::experiment::Experiment;
 use crate::residuals::visit_frames;
 use glam::DVec3;
-use palpate_diagnose::{LabError, Readings, Wall};
-use palpate_engine::Source;
+use palpate_diagnose::{LabError, Reading, Readings, Wall, least_squares};
 
 /// Directions that are looked into, evenly over the sphere.
 const DIRECTIONS: usize = 200;
@@ -18,6 +17,14 @@ const PLACES: usize = 400;
 const BEYOND: usize = 5;
 /// Standard deviations of a reading by which the simulated body must go through.
 const DEPTH: f64 = 3.0;
+/// Mean distance between readings and the simulated body, in cells, up to which they tell where the measured one is.
+const NEAR: f64 = 0.5;
+/// Fewest readings that tell where a body is.
+const FEWEST: usize = 12;
+/// Ridge on how the body deforms, relative to what readings tell of it.
+const RIDGE: f64 = 1.0;
+/// Ridge on where it is as a whole: a camera may see one side only.
+const SMALL: f64 = 1e-3;
 /// Planes that are returned at most, and the cosine between normals above which the deeper one stands for both.
 const MOST: usize = 8;
 const ALIKE: f64 = 0.9;
@@ -45,7 +52,6 @@ pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
 /// Walls that the simulation with these values crosses, and how deep [m].
 fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabError> {
     let readings = linearise(ready, values, ready.free.len())?;
-    let shifts = shifts(ready, &readings);
     let noise = readings.rows.iter().map(|r| r.row.noise).fold(0.0, f64::max);
     let center = ready.experiments[0].plan.body.center;
     // Where the measured body is, and where the simulated one.
@@ -54,16 +60,12 @@ fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabErro
         let patches = &e.plan.body.patches;
         let places = patches.iter().step_by(patches.len().div_ceil(PLACES).max(1)).map(|p| p.point).collect();
         let surface = Embedding::new(&e.plan.body, places);
+        let shifts = shifts(e, scene, &readings);
         visit_frames(&e.plan, Backend::Cpu, &ready.theta(scene, values), |frame, displacement, _| {
+            let Some(shift) = &shifts[frame] else { return };
             for (rest, x) in surface.rest.iter().zip(surface.deform(&displacement())) {
-                // What was measured nearest to a place says how it moved, also on the side that nobody sees.
-                let near = |a: &&(DVec3, DVec3), b: &&(DVec3, DVec3)| {
-                    a.0.distance_squared(*rest).total_cmp(&b.0.distance_squared(*rest))
-                };
-                if let Some((_, by)) = shifts[scene][frame].iter().min_by(near) {
-                    simulated.push(x - center);
-                    measured.push(x + by - center);
-                }
+                simulated.push(x - center);
+                measured.push(x + shift.at(*rest) - center);
             }
         })
         .map_err(lab_error)?;
@@ -85,20 +87,105 @@ fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabErro
     Ok((0..DIRECTIONS).map(wall).filter(|(depth, _)| *depth > DEPTH * noise).collect())
 }
 
-/// By scene and frame: rest place of every reading, and how far [m] the measured body is from the simulated one there.
-fn shifts(ready: &Prepared, readings: &Readings) -> Vec<Vec<Vec<(DVec3, DVec3)>>> {
-    let frames = |e: &Experiment| vec![Vec::new(); e.plan.observation.frames.len()];
-    let mut out: Vec<Vec<Vec<(DVec3, DVec3)>>> = ready.experiments.iter().map(frames).collect();
-    for (i, r) in readings.rows.iter().enumerate() {
-        let value = |i: usize| readings.rows.get(i).and_then(|r| r.row.value);
-        let Some(residual) = value(i) else { continue };
-        let by = match r.row.source {
-            Source::Point { .. } => residual * r.row.by_place / r.row.by_place.length_squared().max(f64::MIN_POSITIVE),
-            // Its three coordinates follow each other.
-            Source::Marker { axis: 0, .. } => -DVec3::from_array(std::array::from_fn(|a| value(i + a).unwrap_or(0.0))),
-            Source::Marker { .. } | Source::Node { .. } => continue,
-        };
-        out[r.scene][r.row.frame].push((r.row.rest, by));
+/// How far [m] the measured body is from the simulated one, affine in the rest place: readings say it along their normals alone, and nothing of
+/// the side that nobody sees.
+struct Shift {
+    center: DVec3,
+    size: f64,
+    coefficients: Vec<f64>,
+}
+
+impl Shift {
+    fn basis(&self, rest: DVec3) -> [f64; 4] {
+        let x = (rest - self.center) / self.size;
+        [1.0, x.x, x.y, x.z]
     }
-    out
+
+    fn at(&self, rest: DVec3) -> DVec3 {
+        let parts = self.basis(rest).into_iter().zip(self.coefficients.chunks(3));
+        parts.map(|(b, c)| b * DVec3::from_slice(c)).sum()
+    }
+}
+
+/// The shift of every frame of a scene, where most readings met the body.
+fn shifts(e: &Experiment, scene: usize, readings: &Readings) -> Vec<Option<Shift>> {
+    let (low, high) = e.shape().bounds();
+    let frames = e.plan.observation.frames.len();
+    let mut rows: Vec<Vec<&Reading>> = vec![Vec::new(); frames];
+    readings.rows.iter().filter(|r| r.scene == scene).for_each(|r| rows[r.row.frame].push(r));
+    let shift = |rows: Vec<&Reading>| {
+        let met: Vec<_> = rows.iter().filter_map(|r| Some((r.row, r.row.value?, r.row.by_place.length()))).collect();
+        // Far from the body readings tell little of where it is.
+        let away = met.iter().map(|(_, value, _)| value.abs()).sum::<f64>() / met.len().max(1) as f64;
+        if met.len() < FEWEST || 2 * met.len() < rows.len() || away > NEAR * e.plan.body.grid.h {
+            return None;
+        }
+        let mut shift = Shift { center: 0.5 * (low + high), size: (high - low).length(), coefficients: Vec::new() };
+        let y: Vec<f64> = met.iter().map(|(_, value, steep)| -value / steep).collect();
+        let column = |k: usize| -> Vec<f64> {
+            met.iter().map(|(row, _, steep)| shift.basis(row.rest)[k / 3] * row.by_place[k % 3] / steep).collect()
+        };
+        let columns: Vec<Vec<f64>> = (0..12).map(column).collect();
+        // As one piece first; how it deforms is told less well.
+        let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let whole = least_squares(&chosen[..3], &y, SMALL)?;
+        let left = |i: usize| y[i] + whole.iter().zip(&columns).map(|(t, c)| t * c[i]).sum::<f64>();
+        shift.coefficients = least_squares(&chosen, &(0..y.len()).map(left).collect::<Vec<f64>>(), RIDGE)?;
+        shift.coefficients.iter_mut().zip(whole).for_each(|(c, t)| *c += t);
+        Some(shift)
+    };
+    rows.into_iter().map(shift).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::{Pinhole, Sensor};
+    use crate::synthetic::{Observers, observe};
+    use std::ops::ControlFlow;
+
+    const BALL: &str = r#"
+format = "scene/1"
+[object]
+shape = { ball = { radius = 0.05, center = [0, 0, 0.06] } }
+cell_size = 0.03
+[material]
+density = 1000.0
+youngs_modulus = 2.0e4
+poisson_ratio = 0.4
+[time]
+step = 0.01
+steps = 20
+"#;
+
+    fn experiment(text: &str) -> Experiment {
+        let scene = palpate_io::parse_scene(text, "scene.toml").unwrap().value;
+        Experiment::new(scene, String::new(), Vec::new()).unwrap()
+    }
+
+    #[test]
+    fn a_floor_that_the_scene_does_not_know_lies_under_the_measured_body() {
+        let floor = "[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n";
+        let truth = experiment(&format!("{BALL}{floor}"));
+        let observers = Observers {
+            cameras: vec!["eye=0.1,-0.6,0.2 target=0,0,0.04 fov=24 size=24x24".parse::<Pinhole>().unwrap()],
+            markers: Vec::new(),
+            times: (1..=10).map(|k| 0.02 * f64::from(k)).collect(),
+            sensor: Sensor { noise: 5e-4, dropout: 0.0, depth_scale: 5e-5, seed: 1 },
+        };
+        let recording = observe(&truth, Backend::Cpu, &observers, |_| ControlFlow::Continue(())).unwrap();
+        let folder = std::env::temp_dir().join(format!("palpate-walls-{}", std::process::id()));
+        palpate_io::write_recording(&folder, &recording).unwrap();
+        let seen = format!("[observation]\nrecording = {:?}\ncost = \"sparse-surface\"\n", folder.display().to_string());
+        let found = walls(&[experiment(&format!("{BALL}{seen}"))]);
+        let known = walls(&[experiment(&format!("{BALL}{floor}{seen}"))]);
+        std::fs::remove_dir_all(&folder).unwrap();
+        // Who knows the floor does not go through it.
+        assert_eq!(known, Ok(Vec::new()));
+        let wall = found.unwrap()[0];
+        assert!(wall.normal.z > 0.95, "{wall:?}");
+        // The floor is 60 mm below the centre. The ball flattens by up to a third of its radius there, which a shift as one piece takes for a
+        // lower floor; from one cell away a fit finds it.
+        assert!((0.055..0.08).contains(&wall.distance), "{wall:?}");
+    }
 }
