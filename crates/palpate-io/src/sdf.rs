@@ -19,6 +19,8 @@ pub struct SdfGrid {
     pub values: Vec<f64>,
     /// Edge of a cell [m].
     pub h: f64,
+    /// Corners of a box around the body [m]: every closest point asks for them.
+    extent: (DVec3, DVec3),
 }
 
 /// Reads `int32` resolution, `int32[3]` offset, `int32[3]` size, then `float32` values in cells (little-endian, x fastest).
@@ -47,14 +49,42 @@ pub fn read_sdf(path: impl AsRef<Path>, scale: f64) -> Result<SdfGrid, InputErro
     if let Some(i) = values.iter().position(|v| !v.is_finite()) {
         return Err(InputError::file(path, format!("value {i} is not finite")));
     }
-    Ok(SdfGrid { resolution, offset: [words[1], words[2], words[3]], size, values, h: scale / f64::from(resolution) })
+    let (offset, h) = ([words[1], words[2], words[3]], scale / f64::from(resolution));
+    let mut grid = SdfGrid { resolution, offset, size, values, h, extent: Default::default() };
+    grid.extent = grid.measured();
+    Ok(grid)
 }
 
 impl SdfGrid {
     /// Sets every |φ| < 0.1 cells to 0, so that no cell is cut to a sliver (the rule of the Sparse Surface Constraints code).
     pub fn snapped(mut self) -> SdfGrid {
         self.values.iter_mut().filter(|v| v.abs() < 0.1).for_each(|v| *v = 0.0);
+        self.extent = self.measured();
         self
+    }
+
+    /// Corners of a box around the body [m].
+    fn measured(&self) -> (DVec3, DVec3) {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for c in self.active_cells() {
+            // The surface inside a cell lies between its inside corners and where edges leave the body.
+            let corners = cube(c);
+            for a in corners {
+                let fa = self.values[self.index(a)];
+                if fa < 0.0 {
+                    let pa = self.position(a);
+                    (min, max) = (min.min(pa), max.max(pa));
+                    for b in corners {
+                        let fb = self.values[self.index(b)];
+                        if fb >= 0.0 && (0..3).filter(|i| a[*i] != b[*i]).count() == 1 {
+                            let p = pa.lerp(self.position(b), fa / (fa - fb));
+                            (min, max) = (min.min(p), max.max(p));
+                        }
+                    }
+                }
+            }
+        }
+        (min, max)
     }
 
     /// Number of a node in `values`.
@@ -100,26 +130,7 @@ impl Shape for SdfGrid {
     }
 
     fn bounds(&self) -> (DVec3, DVec3) {
-        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for c in self.active_cells() {
-            // The surface inside a cell lies between its inside corners and where edges leave the body.
-            let corners = cube(c);
-            for a in corners {
-                let fa = self.values[self.index(a)];
-                if fa < 0.0 {
-                    let pa = self.position(a);
-                    (min, max) = (min.min(pa), max.max(pa));
-                    for b in corners {
-                        let fb = self.values[self.index(b)];
-                        if fb >= 0.0 && (0..3).filter(|i| a[*i] != b[*i]).count() == 1 {
-                            let p = pa.lerp(self.position(b), fa / (fa - fb));
-                            (min, max) = (min.min(p), max.max(p));
-                        }
-                    }
-                }
-            }
-        }
-        (min, max)
+        self.extent
     }
 
     /// Marching tetrahedra on the lattice's own cells: a closed surface where the body stays inside the lattice. `edge` is not
