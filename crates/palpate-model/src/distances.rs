@@ -7,10 +7,17 @@ use glam::DVec3;
 
 /// Quadratic pieces per axis of a cell.
 pub const PIECES: usize = 2;
+/// Steps between samples along an edge of a cell.
+pub const STEPS: usize = 2 * PIECES;
 /// Samples per axis of a cell: every piece has three, neighbours share one.
-pub const SAMPLES: usize = 2 * PIECES + 1;
+pub const SAMPLES: usize = STEPS + 1;
 /// Signed distances [m] at the samples of a cell, x fastest, negative inside.
 pub type Distances = [f64; SAMPLES * SAMPLES * SAMPLES];
+
+/// Place of a sample in its cell, in steps.
+pub fn place(sample: usize) -> [usize; 3] {
+    [sample % SAMPLES, sample / SAMPLES % SAMPLES, sample / SAMPLES / SAMPLES]
+}
 
 /// Piece that a coordinate lies in, and the coordinate in it, 0 to 1 inside the cell.
 fn piece(x: f64) -> (usize, f64) {
@@ -47,8 +54,7 @@ mod tests {
 
     /// Samples of a field in a cell of edge one.
     fn sampled(f: impl Fn(DVec3) -> f64) -> Distances {
-        let at = |q: usize| DVec3::new((q % SAMPLES) as f64, (q / SAMPLES % SAMPLES) as f64, (q / SAMPLES / SAMPLES) as f64);
-        std::array::from_fn(|q| f(at(q) / (2 * PIECES) as f64))
+        std::array::from_fn(|q| f(DVec3::from_array(place(q).map(|x| x as f64)) / STEPS as f64))
     }
 
     fn places() -> impl Iterator<Item = DVec3> {
@@ -90,6 +96,6 @@ mod tests {
         let edge = |p: DVec3| (p.x - 0.45).max(p.y - 0.55);
         let values = sampled(edge);
         let worst = places().map(|p| (interpolate(&values, p).0 - edge(p)).abs()).fold(0.0, f64::max);
-        assert!(worst < 0.2 / (2 * PIECES) as f64, "{worst}");
+        assert!(worst < 0.2 / STEPS as f64, "{worst}");
     }
 }

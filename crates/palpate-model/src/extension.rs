@@ -4,7 +4,7 @@
 //! Rigid motion (and any affine motion) is therefore continued exactly, and the adjoint is the transposed weights.
 
 use crate::body::{Band, BandCell, Body};
-use crate::distances::SAMPLES;
+use crate::distances::{SAMPLES, STEPS, place};
 use crate::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::Shape;
 use glam::{DMat3, DVec3};
@@ -226,13 +226,11 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
     let candidates: Vec<[usize; 3]> = slabs.into_iter().flatten().collect();
 
     // Distances at the samples, every point once.
-    const STEPS: usize = SAMPLES - 1;
     let fine =
         Grid { offset: grid.offset.map(|o| STEPS as i32 * o), size: grid.size.map(|n| STEPS * (n - 1) + 1), h: h / STEPS as f64 };
     let mut wanted = vec![false; fine.len()];
     let points = |c: [usize; 3]| {
         let fine = &fine;
-        let place = move |q: usize| [q % SAMPLES, q / SAMPLES % SAMPLES, q / SAMPLES / SAMPLES];
         (0..SAMPLES.pow(3)).map(move |q| fine.index(std::array::from_fn(|a| STEPS * c[a] + place(q)[a])))
     };
     for &c in &candidates {

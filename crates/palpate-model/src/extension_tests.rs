@@ -67,7 +67,7 @@ fn band_holds_every_point_near_the_surface() {
                 let cell = &band.cells[find(c).expect("a point in the band lies in a band cell")];
                 inside += 1;
                 // The nearest of the samples is off by at most the distance to it.
-                let steps = (SAMPLES - 1) as f64;
+                let steps = STEPS as f64;
                 let nearest = (0..3).map(|a| ((steps * xi[a]).round() as usize) * SAMPLES.pow(a as u32)).sum::<usize>();
                 assert!((cell.sdf[nearest] - shape.signed_distance(p)).abs() <= 0.9 * h / steps);
             }
@@ -79,7 +79,7 @@ fn band_holds_every_point_near_the_surface() {
                 let n = c.nodes[i] as usize;
                 let y = if n < body.nodes.len() { body.nodes[n] } else { band.nodes[n - body.nodes.len()] };
                 assert_eq!(x, y);
-                let q = (0..3).map(|a| o[a] as usize * (SAMPLES - 1) * SAMPLES.pow(a as u32)).sum::<usize>();
+                let q = (0..3).map(|a| o[a] as usize * STEPS * SAMPLES.pow(a as u32)).sum::<usize>();
                 assert!((c.sdf[q] - shape.signed_distance(x)).abs() < 1e-12);
             }
         }

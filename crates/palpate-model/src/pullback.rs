@@ -81,7 +81,7 @@ pub fn pull_back(x: &[DVec3; 8], sdf: &Distances, p: DVec3) -> Option<Pullback> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::distances::SAMPLES;
+    use crate::distances::{STEPS, place};
     use crate::grid::CORNERS;
 
     fn deformed(seed: u64) -> [DVec3; 8] {
@@ -98,8 +98,7 @@ mod tests {
 
     fn sdf() -> Distances {
         std::array::from_fn(|k| {
-            let n = SAMPLES;
-            let p = DVec3::new((k % n) as f64, (k / n % n) as f64, (k / n / n) as f64) / (n - 1) as f64;
+            let p = DVec3::from_array(place(k).map(|x| x as f64)) / STEPS as f64;
             (p - DVec3::new(-0.7, 0.1, 0.3)).length() - 1.0
         })
     }

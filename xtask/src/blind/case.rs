@@ -2,12 +2,11 @@
 
 use super::hidden::{Hidden, Number, TABLE, same};
 use super::magnet::Magnet;
-use super::record::{Maker, record, truth};
+use super::record::{Maker, observed};
 use super::scenes::{Setup, setup};
 use super::strength::{Moved, Ruler, rms};
 use glam::DVec3;
 use palpate::{Backend, DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
-use palpate_io::write_recording;
 use palpate_model::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -228,10 +227,7 @@ impl Case {
         let (scene, _) = self.hide(&setup.truth(other)?, amplitudes)?;
         let maker = Maker::other(2 * self.seed + u64::from(other));
         let place = folder.join(if other { "other" } else { "seen" });
-        let recording = record(setup, &truth(&scene, &maker)?, &maker)?;
-        write_recording(&place, &recording).map_err(|e| Error::Failed(e.to_string()))?;
-        let text = setup.text(&place);
-        Experiment::new(setup.parse(&text, other)?, text, Vec::new())
+        observed(setup, &scene, &maker, &place, other)
     }
 }
 

@@ -5,8 +5,10 @@ use palpate::render::Sensor;
 use palpate::synthetic::{Observers, observe};
 use palpate::{Backend, Error, Experiment};
 use palpate_io::recording::Recording;
+use palpate_io::write_recording;
 use palpate_model::scene::{Element, Scene};
 use std::ops::ControlFlow;
+use std::path::Path;
 
 /// Metres per count: rounding stays far below the noise.
 const DEPTH_SCALE: f64 = 5e-5;
@@ -52,6 +54,18 @@ pub fn truth(scene: &Scene, maker: &Maker) -> Result<Experiment, Error> {
     });
     let e = Experiment::new(scene, String::new(), Vec::new())?;
     if maker.refine == 1.0 { Ok(e) } else { e.refined(maker.refine) }
+}
+
+/// The experiment that a setup's diagnosis is given: the setup's own scene, or that of its other recording, with a recording of a true one,
+/// kept in `folder`.
+///
+/// # Errors
+/// The true scene cannot be built, simulated or written, or nothing is seen.
+pub fn observed(setup: &Setup, hidden: &Scene, maker: &Maker, folder: &Path, other: bool) -> Result<Experiment, Error> {
+    let recording = record(setup, &truth(hidden, maker)?, maker)?;
+    write_recording(folder, &recording).map_err(|e| Error::Failed(e.to_string()))?;
+    let text = setup.text(folder);
+    Experiment::new(setup.parse(&text, other)?, text, Vec::new())
 }
 
 /// Records a true experiment as the cameras and markers of its setup see it.

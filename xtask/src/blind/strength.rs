@@ -6,13 +6,12 @@
 //! the root mean square of what is left of a recording with amplitude a when the scene without it is really fitted, which first order only
 //! leads to.
 
-use super::record::{Maker, record, truth};
+use super::record::{Maker, observed};
 use super::scenes::Setup;
 use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, fit};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Linearised, ResidualRow, Rollout};
-use palpate_io::write_recording;
 use palpate_model::scene::Scene;
 use std::path::{Path, PathBuf};
 
@@ -57,12 +56,8 @@ impl<'a> Ruler<'a> {
     /// # Errors
     /// The scene cannot be simulated.
     pub fn new(setup: &'a Setup, folder: &Path) -> Result<Ruler<'a>, Error> {
-        let maker = Maker::own();
-        let recording = record(setup, &truth(&setup.truth(false)?, &maker)?, &maker)?;
-        let plain = folder.join("plain");
-        write_recording(&plain, &recording).map_err(|e| Error::Failed(e.to_string()))?;
-        let scene = setup.parse(&setup.text(&plain), false)?;
-        let e = Experiment::new(scene.clone(), String::new(), Vec::new())?;
+        let e = observed(setup, &setup.truth(false)?, &Maker::own(), &folder.join("plain"), false)?;
+        let scene = e.scene().clone();
         let paths = scene.fit.iter().flat_map(|f| &f.parameters);
         let free: Vec<usize> = paths.flat_map(|p| e.plan().layout.resolve(&p.path)).collect();
         let l = linearise(&e, &e.plan().theta, &free)?;
@@ -92,12 +87,7 @@ impl<'a> Ruler<'a> {
     pub fn left(&self, change: impl FnOnce(&mut Scene) -> Result<(), Error>) -> Result<Vec<Moved>, Error> {
         let mut hidden = self.setup.truth(false)?;
         change(&mut hidden)?;
-        let maker = Maker::own();
-        let recording = record(self.setup, &truth(&hidden, &maker)?, &maker)?;
-        let place = self.folder.join("changed");
-        write_recording(&place, &recording).map_err(|e| Error::Failed(e.to_string()))?;
-        let scene = self.setup.parse(&self.setup.text(&place), false)?;
-        let e = Experiment::new(scene, String::new(), Vec::new())?;
+        let e = observed(self.setup, &hidden, &Maker::own(), &self.folder.join("changed"), false)?;
         let options = FitOptions { starts: Some(1), iterations: Some(REFIT), ..FitOptions::default() };
         let theta = fit(std::slice::from_ref(&e), options)?.result.theta.remove(0);
         let rows = linearise(&e, &theta, &[])?.rows.residuals;

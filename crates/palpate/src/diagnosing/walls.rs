@@ -34,8 +34,10 @@ const ALIKE: f64 = 0.9;
 pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
     let ready = prepare(base, &[]).map_err(lab_error)?;
     let starts: Vec<f64> = ready.numbers().iter().map(|n| n.start).collect();
+    let mut all = vec![ready.own_values(), starts];
+    all.dedup();
     let mut found = Vec::new();
-    for values in [ready.own_values(), starts] {
+    for values in all {
         // A start that cannot be simulated shows nothing.
         found.extend(crossed(&ready, &values).unwrap_or_default());
     }
@@ -159,8 +161,7 @@ steps = 20
 "#;
 
     fn experiment(text: &str) -> Experiment {
-        let scene = palpate_io::parse_scene(text, "scene.toml").unwrap().value;
-        Experiment::new(scene, String::new(), Vec::new()).unwrap()
+        Experiment::from_toml(text, "scene.toml").unwrap()
     }
 
     #[test]
