@@ -1,26 +1,19 @@
 //! Nearly empty cells spoil neither conditioning nor solution: a face slides through a cell.
 
+use super::effects_materials::effect;
 use faer::{Mat, Side};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, ParamBatch};
+use palpate_model::plan::Plan;
 use palpate_model::scene::*;
 use support::scenes;
 
 const H: f64 = 0.01;
 
-/// Condition number of the Jacobi-scaled stiffness, and the sag of the top face over that of a column of its height, for a
-/// block of 2 × 2 cells that ends a fraction `cut` into its third layer.
-fn block(cut: f64, ghost: f64) -> (f64, f64) {
-    let top = (2.0 + cut) * H;
-    let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(2.0 * H, 2.0 * H, top) }, H);
-    s.clamps = vec![scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5))];
-    s.gravity = DVec3::new(0.0, 0.0, -1.0);
-    s.material.poisson_ratio = 0.3;
-    s.initial.state = InitialShape::StaticEquilibrium;
-    s.time.steps = 0;
-    s.solver.ghost = ghost;
-    let plan = scenes::plan(&s);
+/// Plan of a scene at rest under its loads, eigenvalues of its Jacobi-scaled stiffness there, and displacement.
+fn spectrum(s: &Scene) -> (Plan, Vec<f64>, Vec<DVec3>) {
+    let plan = scenes::plan(s);
     let backend = CpuBackend;
     let mut world = backend.build(&plan, 1).unwrap();
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
@@ -41,6 +34,21 @@ fn block(cut: f64, ghost: f64) -> (f64, f64) {
     let scaled = Mat::from_fn(n, n, |i, j| a[(i, j)] / (d[i] * d[j]));
     let eigen = scaled.self_adjoint_eigenvalues(Side::Lower).unwrap();
     let u = backend.read_state(&world, &state, 0).0;
+    (plan, eigen, u)
+}
+
+/// Condition number of the Jacobi-scaled stiffness, and the sag of the top face over that of a column of its height, for a
+/// block of 2 × 2 cells that ends a fraction `cut` into its third layer.
+fn block(cut: f64, ghost: f64) -> (f64, f64) {
+    let top = (2.0 + cut) * H;
+    let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(2.0 * H, 2.0 * H, top) }, H);
+    s.clamps = vec![scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5))];
+    s.gravity = DVec3::new(0.0, 0.0, -1.0);
+    s.material.poisson_ratio = 0.3;
+    s.initial.state = InitialShape::StaticEquilibrium;
+    s.time.steps = 0;
+    s.solver.ghost = ghost;
+    let (plan, eigen, u) = spectrum(&s);
     let body = &plan.body;
     // Mean sag over the top face, from the patches that lie in it.
     let (mut sag, mut area) = (0.0, 0.0);
@@ -49,7 +57,7 @@ fn block(cut: f64, ghost: f64) -> (f64, f64) {
         sag -= p.area * (0..8).map(|i| p.weights[i] * u[nodes[i] as usize].z).sum::<f64>();
         area += p.area;
     }
-    (eigen[n - 1] / eigen[0], sag / area / (1000.0 * top * top / (2.0 * 5000.0)))
+    (eigen[eigen.len() - 1] / eigen[0], sag / area / (1000.0 * top * top / (2.0 * 5000.0)))
 }
 
 #[test]
@@ -68,4 +76,26 @@ fn condition_and_solution_are_bounded_as_a_face_slides_through_a_cell() {
     }
     // The test can fail: without the penalty a thin layer is many orders softer than the rest.
     assert!(block(1e-3, 0.0).0 > 10.0 * block(1e-3, Solver::default().ghost).0);
+}
+
+#[test]
+fn a_clamp_keeps_the_stiffness_positive_wherever_its_faces_cut_the_lattice() {
+    let mut table = Vec::new();
+    for layer in [0.0, 0.0015, 0.02] {
+        for edge in [0.0, 0.02, 0.05, 0.1, 0.3, 0.5, 0.9, 0.97, 0.99] {
+            let mut s = scenes::body(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, -0.002, 0.06) }, 0.022);
+            let at = 0.022 * (1.0 + edge);
+            s.clamps = vec![scenes::clamp(DVec3::new(-0.1, at, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+            s.initial.state = InitialShape::StaticEquilibrium;
+            s.time.steps = 0;
+            s.material.youngs_modulus = 1e5;
+            if layer > 0.0 {
+                s.effects = vec![effect("compliant-clamp", &[("layer", &[layer])])];
+            }
+            let eigen = spectrum(&s).1;
+            println!("layer {layer} m, edge at {edge} of a cell: {:.1e} to {:.1e}", eigen[0], eigen[eigen.len() - 1]);
+            table.push(eigen[0]);
+        }
+    }
+    assert!(table.iter().all(|e| *e > 1e-5), "{table:?}");
 }

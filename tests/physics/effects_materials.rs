@@ -16,7 +16,7 @@ const DENSITY: f64 = 1000.0;
 const GRAVITY: f64 = 0.1;
 
 /// An effect of a kind with some of its numbers; a vector's components follow each other.
-fn effect(kind: &str, values: &[(&str, &[f64])]) -> Effect {
+pub(super) fn effect(kind: &str, values: &[(&str, &[f64])]) -> Effect {
     let law = effects::find(kind).unwrap_or_else(|| panic!("no effect {kind}"));
     let mut e = Effect::absent(law);
     for (key, numbers) in values {
@@ -267,8 +267,8 @@ fn an_edge_further_along_is_a_clamp_that_reaches_further() {
     for shift in [0.005, -0.005] {
         let (found, moved) = (cantilever(0.025, shift), cantilever(0.025 + shift, 0.0));
         println!("cantilever {shift}: {found:e}, moved box {moved:e}, without {even:e}");
-        // The same integrals in another order; Newton stops at 1e-8 of the forces.
-        assert!((found / moved - 1.0).abs() < 1e-6, "{shift}: {found:e}, with a moved box {moved:e}");
+        // What the edge frees turns with the clamp instead of with the cell: off by the square of the angle, 0.01 here.
+        assert!((found / moved - 1.0).abs() < 1e-5, "{shift}: {found:e}, with a moved box {moved:e}");
         assert!((found / even - 1.0).abs() > 0.05, "{shift}: the edge matters");
     }
 }

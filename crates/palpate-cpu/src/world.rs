@@ -66,7 +66,7 @@ impl World {
         let plan = plan.clone();
         let pattern = Pattern::new(&plan.body);
         let places = Places::new(&plan, &pattern);
-        let classes = Classes::new(&plan.body);
+        let classes = Classes::new(&plan);
         let hashes = plan.observation.frames.iter().map(|f| PointHash::new(&f.points, plan.body.grid.h)).collect();
         let residuals = plan.observation.residuals();
         let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };

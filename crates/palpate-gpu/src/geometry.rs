@@ -108,7 +108,7 @@ impl Geometry {
         let n = body.nodes.len();
         let pattern = Pattern::new(body);
         let places = Places::new(plan, &pattern);
-        let classes = Classes::new(body);
+        let classes = Classes::new(plan);
         let blocks = pattern.blocks.columns.len();
 
         let reach = |(i, s)| within_reach(plan, s).into_iter().map(move |cell| (i, cell));
@@ -127,7 +127,7 @@ impl Geometry {
                     patch_end: if touched { body.patches.partition_point(|p| p.cell <= number) as u32 } else { 0 },
                     hold_start: holds.partition_point(|h| h.1 < number) as u32,
                     hold_end: holds.partition_point(|h| h.1 <= number) as u32,
-                    fraction: cell.fraction as f32,
+                    fraction: classes.fractions[e] as f32,
                     pad: [0; 2],
                 }
             })
@@ -188,7 +188,7 @@ impl Geometry {
             planes: plan.planes.len() as u32,
             masses: masses.len() as u32,
             parameters: plan.layout.len() as u32,
-            classes: classes.weights.len() as u32,
+            classes: classes.classes.len() as u32,
             lagged: u32::from(plan.solver.rotation == RotationUpdate::Lagged),
             h: body.grid.h as f32,
             dt: plan.clock.step as f32,

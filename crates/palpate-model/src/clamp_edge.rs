@@ -5,8 +5,9 @@
 
 use crate::body::{Body, world_cell};
 use crate::cut::{ClipBox, HeldMoments, Lattice, Pieces};
+use crate::held::Pins;
 use crate::plan::ClampCell;
-use crate::plan_build::mean_gradient;
+
 use crate::shape::Shape;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -57,6 +58,26 @@ pub fn slope(now: f64, next: f64, second: f64, step: f64) -> f64 {
     (4.0 * next - 3.0 * now - second) / (2.0 * step)
 }
 
+/// Sets the pins of what is held, now and with the edge further out.
+fn pin(body: &Body, held: &mut [Held], step: f64) {
+    let at = |h: &Held, i: usize| match (&h.near, i) {
+        (Some((further, _)), 1..) => further[i - 1].clone(),
+        _ => h.now.clone(),
+    };
+    let pins = [0, 1, 2].map(|i| Pins::new(body, &held.iter().map(|h| at(h, i)).collect::<Vec<_>>()));
+    for h in held.iter_mut() {
+        let [now, next, second] = [0, 1, 2].map(|i| pins[i].of(body, h.now.cell));
+        h.now.pins = now;
+        // Pins change in cells, too, that only neighbour one that the edge is near to.
+        if h.near.is_none() && (next != now || second != now) {
+            h.near = Some((Box::new([h.now.clone(), h.now.clone()]), step));
+        }
+        if let Some((further, _)) = &mut h.near {
+            (further[0].pins, further[1].pins) = (next, second);
+        }
+    }
+}
+
 impl Edge {
     /// The edges of a box.
     pub(crate) fn new(shape: Arc<dyn Shape>, subdivisions: usize, region: ClipBox, merged: Vec<([usize; 3], u32)>) -> Edge {
@@ -101,21 +122,16 @@ impl Edge {
             let Some(([now, next, second], near)) = moments else {
                 return stated(cell).map(|c| Held { now: c.clone(), near: None });
             };
-            let gradient = mean_gradient(&body.cells[cell as usize], h);
-            let make = |m: HeldMoments| ClampCell {
-                cell,
-                surface_normal: m.surface_normal,
-                surface_mass: m.surface_mass,
-                volume_mass: m.volume_mass,
-                mean_gradient: gradient,
-            };
+            let make = |m: HeldMoments| ClampCell::new(body, cell, &m);
             // An edge that does not move leaves everything as the plan says, to the last bit.
             let unmoved = || stated(cell).cloned().unwrap_or_else(|| make(HeldMoments::default()));
             let now = if shift == 0.0 { unmoved() } else { make(now) };
             let near = near.then(|| (Box::new([make(next), make(second)]), step));
             Some(Held { now, near })
         };
-        all.into_iter().filter_map(finish).collect()
+        let mut held: Vec<Held> = all.into_iter().filter_map(finish).collect();
+        pin(body, &mut held, step);
+        held
     }
 
     /// The box with its moving faces shifted outwards.

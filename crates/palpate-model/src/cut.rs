@@ -143,19 +143,7 @@ impl Sink for Sum {
         if volume == 0.0 {
             return;
         }
-        let v = v.map(|p| p + self.shift - 0.5);
-        for (b, w) in &TETRA {
-            let p = v[0] * b[0] + v[1] * b[1] + v[2] * b[2] + v[3] * b[3];
-            let w = w * volume;
-            let (x, y) = ([1.0, p.x, p.x * p.x], [1.0, p.y, p.y * p.y]);
-            for (c, z) in [w, w * p.z, w * p.z * p.z].into_iter().enumerate() {
-                for (b, y) in y.into_iter().enumerate() {
-                    for (a, x) in x.into_iter().enumerate() {
-                        self.moments[a + 3 * b + 9 * c] += x * y * z;
-                    }
-                }
-            }
-        }
+        add_moments(&mut self.moments, v.map(|p| p + self.shift - 0.5), volume);
     }
 
     fn triangle(&mut self, v: [DVec3; 3], octant: usize) {
@@ -176,6 +164,22 @@ impl Sink for Sum {
             let n = shape_functions(v[0] * b[0] + v[1] * b[1] + v[2] * b[2]);
             for i in 0..8 {
                 o.weights[i] += w * area * n[i];
+            }
+        }
+    }
+}
+
+/// Adds the integrals of the monomials of degree ≤ 2 per variable over a tetrahedron.
+fn add_moments(moments: &mut [f64; 27], v: [DVec3; 4], volume: f64) {
+    for (b, w) in &TETRA {
+        let p = v[0] * b[0] + v[1] * b[1] + v[2] * b[2] + v[3] * b[3];
+        let w = w * volume;
+        let (x, y) = ([1.0, p.x, p.x * p.x], [1.0, p.y, p.y * p.y]);
+        for (c, z) in [w, w * p.z, w * p.z * p.z].into_iter().enumerate() {
+            for (b, y) in y.into_iter().enumerate() {
+                for (a, x) in x.into_iter().enumerate() {
+                    moments[a + 3 * b + 9 * c] += x * y * z;
+                }
             }
         }
     }

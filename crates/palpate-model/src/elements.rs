@@ -1,7 +1,8 @@
 //! Element and clamp matrices of a plan at one Poisson ratio: the one truth that every backend reads.
 
-use crate::body::Body;
+use crate::body::{Body, Cell};
 use crate::element::CellMatrices;
+use crate::held::FreePart;
 use crate::material::{lame, lame_by_nu};
 use crate::plan::{ClampCell, Plan};
 use std::collections::BTreeMap;
@@ -17,27 +18,34 @@ const CLAMP_VOLUME: f64 = 10.0;
 pub struct Classes {
     /// Class of each cell.
     pub of_cell: Vec<u32>,
-    /// Gauss weights and fraction of each class.
-    pub weights: Vec<([f64; 27], f64)>,
+    /// What deforms in the cells of each class.
+    pub classes: Vec<FreePart>,
+    /// Fraction of every cell that deforms; where none does, and the matrix is zero, the fraction inside the body.
+    pub fractions: Vec<f64>,
 }
 
 impl Classes {
-    /// Groups cells with equal weights (all full cells, and cells cut alike).
-    pub fn new(body: &Body) -> Classes {
+    /// Groups cells with equal weights (all full cells, and cells cut alike) that are held alike.
+    pub fn new(plan: &Plan) -> Classes {
         let mut known: BTreeMap<Vec<u64>, u32> = BTreeMap::new();
-        let mut weights = Vec::new();
-        let of_cell = body
-            .cells
-            .iter()
-            .map(|cell| {
-                let key = cell.weights.iter().map(|w| w.to_bits()).collect();
+        let mut classes = Vec::new();
+        let mut free: Vec<FreePart> = plan.body.cells.iter().map(FreePart::of).collect();
+        for c in plan.clamps.iter().flat_map(|site| &site.cells) {
+            free[c.cell as usize].take(&c.held);
+        }
+        let fraction = |(cell, part): (&Cell, &FreePart)| if part.fraction > 0.0 { part.fraction } else { cell.fraction };
+        let fractions = plan.body.cells.iter().zip(&free).map(fraction).collect();
+        let of_cell = free
+            .into_iter()
+            .map(|part| {
+                let key = part.weights.iter().map(|w| w.to_bits()).collect();
                 *known.entry(key).or_insert_with(|| {
-                    weights.push((cell.weights, cell.fraction));
-                    weights.len() as u32 - 1
+                    classes.push(part);
+                    classes.len() as u32 - 1
                 })
             })
             .collect();
-        Classes { of_cell, weights }
+        Classes { of_cell, classes, fractions }
     }
 }
 
@@ -49,6 +57,8 @@ pub struct Elements {
     /// One per class of [`Classes`].
     pub matrices: Vec<CellMatrices>,
     of_cell: Vec<u32>,
+    /// Fraction of every cell that the laws of cells act in ([`Classes::fractions`]).
+    pub fractions: Vec<f64>,
     /// Per clamp and clamp cell: Nitsche's matrix and its derivative by ν.
     pub clamps: Vec<Vec<CellMatrices>>,
     /// Shear modulus μ at E = 1, and its derivative by ν (ghost penalty).
@@ -59,14 +69,10 @@ impl Elements {
     /// Computes the matrices of a plan at a Poisson ratio.
     pub fn new(plan: &Plan, classes: &Classes, nu: f64) -> Elements {
         use rayon::prelude::*;
-        let h = plan.body.grid.h;
-        let matrices = classes
-            .weights
-            .par_iter()
-            .map(|(weights, fraction)| CellMatrices::new(plan.solver.element, h, weights, *fraction, nu))
-            .collect();
+        let matrices = classes.classes.par_iter().map(|part| cell_matrices(plan, part, nu)).collect();
         let clamps = plan.clamps.iter().map(|s| s.cells.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect()).collect();
-        Elements { nu, matrices, of_cell: classes.of_cell.clone(), clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
+        let (of_cell, fractions) = (classes.of_cell.clone(), classes.fractions.clone());
+        Elements { nu, matrices, of_cell, fractions, clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
     }
 
     /// Matrices of cell e.
@@ -75,10 +81,15 @@ impl Elements {
     }
 }
 
+/// Matrices of the part of a cell that deforms, for E = 1 Pa.
+pub fn cell_matrices(plan: &Plan, part: &FreePart, nu: f64) -> CellMatrices {
+    CellMatrices::new(plan.solver.element, plan.body.grid.h, &part.weights, part.fraction, nu)
+}
+
 /// Nitsche's matrix of one clamp cell for E = 1 Pa, and its derivative by ν.
 pub fn clamp_matrices(body: &Body, c: &ClampCell, nu: f64) -> CellMatrices {
-    let (h, fraction) = (body.grid.h, body.cells[c.cell as usize].fraction);
-    let make = |(l, m)| Box::new(clamp_matrix(c, h, fraction, l, m));
+    let (h, free) = (body.grid.h, c.free(body).fraction);
+    let make = |(l, m)| Box::new(clamp_matrix(c, h, free, l, m));
     CellMatrices { k: make(lame(1.0, nu)), k_nu: make(lame_by_nu(1.0, nu)) }
 }
 
@@ -86,8 +97,8 @@ pub fn clamp_matrices(body: &Body, c: &ClampCell, nu: f64) -> CellMatrices {
 ///
 /// The traction is that of the cell's mean strain: bounded by the element's energy whatever modes it condenses, so the
 /// penalty that keeps the matrix positive does not depend on Poisson's ratio.
-fn clamp_matrix(c: &ClampCell, h: f64, fraction: f64, lambda: f64, mu: f64) -> [f64; 576] {
-    let fade = (fraction / 0.1).min(1.0);
+fn clamp_matrix(c: &ClampCell, h: f64, free: f64, lambda: f64, mu: f64) -> [f64; 576] {
+    let fade = (free / 0.1).min(1.0);
     let stiff = lambda + 2.0 * mu;
     let traction = |i: usize, j: usize, row: usize, col: usize| {
         let (n, g) = (c.surface_normal[i], c.mean_gradient[j]);
@@ -97,7 +108,8 @@ fn clamp_matrix(c: &ClampCell, h: f64, fraction: f64, lambda: f64, mu: f64) -> [
     let mut k = [0.0; 576];
     for i in 0..8 {
         for j in 0..8 {
-            let penalty = stiff * (CLAMP_SURFACE / h * c.surface_mass[i][j] + CLAMP_VOLUME / (h * h) * c.volume_mass[i][j]);
+            let pinned = c.pins[i] * c.pins[j] * c.volume_mass[i][j];
+            let penalty = stiff * (CLAMP_SURFACE / h * c.surface_mass[i][j] + CLAMP_VOLUME / (h * h) * pinned);
             for row in 0..3 {
                 for col in 0..3 {
                     let own = if row == col { penalty } else { 0.0 };
@@ -112,8 +124,8 @@ fn clamp_matrix(c: &ClampCell, h: f64, fraction: f64, lambda: f64, mu: f64) -> [
 /// Matrix ∫ t(u)·t(v) / (λ + 2μ) of one clamp cell over its held surface, and its derivative by ν, with t the same traction as in
 /// Nitsche's terms: what a compliant layer behind the surface adds (Juntunen & Stenberg, *Math. Comp.* 78, 2009), per metre of
 /// layer and for 1 Pa. The surface's mean normal stands for the surface, which never overestimates the term.
-pub fn layer_matrix(c: &ClampCell, fraction: f64, nu: f64) -> [Box<[f64; 576]>; 2] {
-    let fade = (fraction / 0.1).min(1.0);
+pub fn layer_matrix(c: &ClampCell, free: f64, nu: f64) -> [Box<[f64; 576]>; 2] {
+    let fade = (free / 0.1).min(1.0);
     let normal: glam::DVec3 = c.surface_normal.iter().sum();
     let area: f64 = c.surface_mass.iter().flatten().sum();
     let ((l, m), (dl, dm)) = (lame(1.0, nu), lame_by_nu(1.0, nu));

@@ -9,7 +9,7 @@ use crate::corotation::M24;
 use crate::effects::field::Spot;
 use crate::effects::{Law, Site};
 use crate::element::CellMatrices;
-use crate::elements::{Elements, clamp_matrices, layer_matrix, layered};
+use crate::elements::{Elements, cell_matrices, clamp_matrices, layer_matrix, layered};
 use crate::plan::{ClampCell, ClampSite, Physics, Plan, clamp_pose};
 use glam::{DMat3, DVec3};
 
@@ -103,7 +103,7 @@ impl<'a> Grips<'a> {
     }
 
     fn layer(&self, c: &ClampCell, nu: f64) -> [Box<M24>; 2] {
-        layer_matrix(c, self.plan.body.cells[c.cell as usize].fraction, nu)
+        layer_matrix(c, c.free(&self.plan.body).fraction, nu)
     }
 }
 
@@ -114,6 +114,8 @@ pub struct Grip {
     pub cells: Vec<ClampCell>,
     /// Matrices of the cells, layer included.
     pub matrices: Vec<CellMatrices>,
+    /// Those without what a shifted edge frees or takes of the cells' own stiffness: never negative.
+    pub convex: Vec<CellMatrices>,
     /// Those without layer.
     stiff: Vec<CellMatrices>,
     /// Derivative of the stiffness by the shift of the edge [1/m]; `None` away from the edge.
@@ -157,14 +159,48 @@ impl Grips<'_> {
             Some(_) => held.iter().map(|h| clamp_matrices(body, &h.now, nu)).collect(),
             None => elements.clamps[index].clone(),
         };
-        let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect();
+        let whole = |c: &ClampCell, stiff: &CellMatrices| {
+            let mut m = self.layered(c, stiff, nu);
+            if shift.is_some() {
+                self.add_freed(clamp, c, elements, &mut m);
+            }
+            m
+        };
+        let matrices: Vec<CellMatrices> = held.iter().zip(&stiff).map(|(h, k)| whole(&h.now, k)).collect();
         let by_edge = |(held, now): (&Held, &CellMatrices)| {
             let (further, step) = held.near.as_ref()?;
-            let [next, second] = [0, 1].map(|i| self.layered(&further[i], &clamp_matrices(body, &further[i], nu), nu).k);
+            let [next, second] = [0, 1].map(|i| whole(&further[i], &clamp_matrices(body, &further[i], nu)).k);
             Some(Box::new(std::array::from_fn(|i| clamp_edge::slope(now.k[i], next[i], second[i], *step))))
         };
         let by_edge = held.iter().zip(&matrices).map(by_edge).collect();
-        Grip { cells: held.into_iter().map(|h| h.now).collect(), matrices, stiff, by_edge }
+        let convex = held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect();
+        Grip { convex, cells: held.into_iter().map(|h| h.now).collect(), matrices, stiff, by_edge }
+    }
+}
+
+impl Grips<'_> {
+    /// Adds what a shifted edge frees of a cell, or takes from it: the matrix of what is free now minus that of what the plan's own edge leaves
+    /// free. Elastic forces turn with the cell, these with the clamp; at an edge both turn alike.
+    fn add_freed(&self, clamp: &ClampSite, c: &ClampCell, elements: &Elements, m: &mut CellMatrices) {
+        let stated = clamp.cells.binary_search_by_key(&c.cell, |c| c.cell).ok().map(|i| &clamp.cells[i]);
+        if stated.is_some_and(|s| s.held == c.held) {
+            return;
+        }
+        let now = cell_matrices(self.plan, &c.free(&self.plan.body), elements.nu);
+        let own = elements.cell(c.cell as usize);
+        // A cell that turns a little against the clamp leaves a remainder of either sign. Pinned nodes are held against it as firmly as the
+        // cell did: the volume of a sliver alone would hold them too softly.
+        let firm: [bool; 8] =
+            std::array::from_fn(|i| (0..3).map(|r| own.k[25 * (3 * i + r)] - now.k[25 * (3 * i + r)]).sum::<f64>() > 0.0);
+        for (sum, [now, own]) in [(&mut m.k, [&now.k, &own.k]), (&mut m.k_nu, [&now.k_nu, &own.k_nu])] {
+            for (s, (now, own)) in sum.iter_mut().zip(now.iter().zip(own.iter())) {
+                *s += now - own;
+            }
+            for (i, pin) in c.pins.iter().enumerate().filter(|(i, _)| firm[*i]) {
+                let taken = (0..3).map(|r| own[25 * (3 * i + r)] - now[25 * (3 * i + r)]).sum::<f64>();
+                (0..3).for_each(|r| sum[25 * (3 * i + r)] += pin * taken / 3.0);
+            }
+        }
     }
 }
 

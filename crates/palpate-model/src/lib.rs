@@ -18,6 +18,7 @@ pub mod extension;
 pub mod front;
 pub mod grid;
 pub mod grips;
+pub mod held;
 pub mod instant;
 pub mod kernel;
 pub mod material;

@@ -2,6 +2,8 @@
 
 use crate::body::Body;
 use crate::clamp_edge::Edge;
+use crate::cut::HeldMoments;
+use crate::held::FreePart;
 use crate::motion::RigidMotion;
 use crate::observation::Observation;
 use crate::params::{Layout, ParamKey};
@@ -70,14 +72,42 @@ impl std::fmt::Debug for ClampSite {
 pub struct ClampCell {
     /// Number of the cell in [`Body::cells`].
     pub cell: u32,
-    /// ∫_Γ N_i n dS over the held surface [m²].
+    /// ∫_Γ N_i n dS over the faces of the region inside the body [m²]; n points into the region.
     pub surface_normal: [DVec3; 8],
-    /// ∫_Γ N_i N_j dS over the held surface [m²].
+    /// ∫_Γ N_i N_j dS over them [m²].
     pub surface_mass: [[f64; 8]; 8],
     /// ∫ N_i N_j dV over the held part of the cell [m³].
     pub volume_mass: [[f64; 8]; 8],
-    /// Mean of ∇N_i over the body in the cell [1/m]; traction is taken from the mean strain.
+    /// How much each node is pinned, 0 to 1 ([`crate::held`]): the volume is held as far as both nodes are.
+    pub pins: [f64; 8],
+    /// Gauss weights of the held part of the cell; they sum to the fraction of the cell that is held.
+    pub held: [f64; 27],
+    /// Mean of ∇N_i over the free part of the body in the cell [1/m]; traction is taken from the mean strain.
     pub mean_gradient: [DVec3; 8],
+}
+
+impl ClampCell {
+    /// A held part of a cell; all of its nodes are pinned.
+    pub(crate) fn new(body: &Body, cell: u32, m: &HeldMoments) -> ClampCell {
+        let mut c = ClampCell {
+            cell,
+            surface_normal: m.surface_normal,
+            surface_mass: m.surface_mass,
+            volume_mass: m.volume_mass,
+            pins: [1.0; 8],
+            held: m.weights(),
+            mean_gradient: [DVec3::ZERO; 8],
+        };
+        c.mean_gradient = c.free(body).mean_gradient(body.grid.h);
+        c
+    }
+
+    /// The part of the body in the cell that is not held.
+    pub fn free(&self, body: &Body) -> FreePart {
+        let mut free = FreePart::of(&body.cells[self.cell as usize]);
+        free.take(&self.held);
+        free
+    }
 }
 
 /// A point mass' place.

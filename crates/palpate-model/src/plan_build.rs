@@ -2,10 +2,11 @@
 
 use crate::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
 use crate::clamp_edge::Edge;
-use crate::cut::{ClipBox, HeldMoments, Lattice, POINTS27, held_moments};
+use crate::cut::{ClipBox, HeldMoments, Lattice, held_moments};
 use crate::effects::check_choices;
 use crate::extension::{NodeLookup, active_cell, affine_weights};
-use crate::grid::{shape_functions, shape_gradients};
+use crate::grid::shape_functions;
+use crate::held::Pins;
 use crate::observation::{MarkerRest, MarkerSite, Observation};
 use crate::params::ParamKey;
 use crate::plan::{ClampCell, ClampSite, Clock, MassSite, Plan, PlaneSite};
@@ -143,19 +144,13 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
         let (cell, basis) = (body::world_cell(grid, from), body::world_cell(grid, body.cells[to as usize].lattice));
         held_moments(&lattice, cell, basis, false, &region, held[to as usize].get_or_insert_default());
     }
-    let cells: Vec<ClampCell> = held
+    let mut cells: Vec<ClampCell> = held
         .into_iter()
         .enumerate()
         .filter_map(|(n, m)| Some((n, m?)))
         // Rounding of a box that only touches a cell's face holds nothing.
         .filter(|(_, m)| m.area() > 1e-9 * h * h || m.volume() > 1e-9 * h.powi(3))
-        .map(|(n, m)| ClampCell {
-            cell: n as u32,
-            surface_normal: m.surface_normal,
-            surface_mass: m.surface_mass,
-            volume_mass: m.volume_mass,
-            mean_gradient: mean_gradient(&body.cells[n], h),
-        })
+        .map(|(n, m)| ClampCell::new(body, n as u32, &m))
         .collect();
     if cells.is_empty() {
         let (lo, hi) = shape.bounds();
@@ -170,20 +165,10 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
             ),
         ));
     }
+    let pins = Pins::new(body, &cells);
+    cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
     Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })
-}
-
-/// Mean of ∇N_i over the body in a cell [1/m]; the cell's weights integrate it exactly.
-pub(crate) fn mean_gradient(cell: &body::Cell, h: f64) -> [DVec3; 8] {
-    let mut mean = [DVec3::ZERO; 8];
-    for q in 0..27 {
-        let g = shape_gradients(POINTS27[q]);
-        for i in 0..8 {
-            mean[i] += g[i] * (cell.weights[q] / (cell.fraction * h));
-        }
-    }
-    mean
 }
 
 fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<MassSite, PlanError> {

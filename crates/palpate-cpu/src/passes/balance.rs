@@ -264,12 +264,12 @@ impl<'a> Balance<'a> {
     pub fn tangent_from(&self, s: States, posed: &[Posed], curvature: Curvature, matrix: &mut Matrix) {
         let (elasticity, materials) = (self.elasticity(), self.materials());
         assembly::cells(&elasticity, materials.as_ref(), self.pattern, self.places, &self.mix, s, posed, curvature, matrix);
-        self.add_sparse(s.u1, matrix);
+        self.add_sparse(s.u1, curvature == Curvature::Convex, matrix);
         self.add_effects_tangent(s, curvature != Curvature::Exact, matrix);
     }
 
     /// Adds everything but the cells to the matrix.
-    fn add_sparse(&self, u: &[DVec3], matrix: &mut Matrix) {
+    fn add_sparse(&self, u: &[DVec3], convex: bool, matrix: &mut Matrix) {
         let (plan, pattern, physics) = (self.plan, self.pattern, self.physics);
         let values = &mut matrix.values;
         let ghost = self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.rate);
@@ -292,7 +292,7 @@ impl<'a> Balance<'a> {
         for c in 0..plan.clamps.len() {
             let (a, _) = held.pose(c, self.time, self.time - physics.start);
             for (m, cell) in held.cells(c).iter().enumerate() {
-                let (k, factor) = held.stiffness(c, m);
+                let (k, factor) = held.stiffness(c, m, convex);
                 let places = &self.places.cells[cell.cell as usize];
                 for b in 0..64 {
                     values[places[b] as usize] +=

@@ -104,9 +104,13 @@ impl<'a> Clamps<'a> {
         self.cells(index).iter().enumerate().map(energy).sum()
     }
 
-    /// Matrix of cell `m` of clamp `index` in the clamp's frame, for E = 1 Pa, and the factor on E.
-    pub fn stiffness(&self, index: usize, m: usize) -> (&M24, f64) {
-        (self.matrix(index, m, Matrices::Stiffness), self.factor(&self.cells(index)[m]))
+    /// Matrix of cell `m` of clamp `index` in the clamp's frame, for E = 1 Pa, and the factor on E; with `convex` one that is never negative.
+    pub fn stiffness(&self, index: usize, m: usize, convex: bool) -> (&M24, f64) {
+        let k = match self.grips {
+            Some(grips) if convex => &grips[index].convex[m].k,
+            _ => self.matrix(index, m, Matrices::Stiffness),
+        };
+        (k, self.factor(&self.cells(index)[m]))
     }
 
     /// Adds the derivative of the force of clamp `index` by the stiffness of its cells, `slope` per cell of the body.

@@ -240,7 +240,7 @@ impl<'a> Materials<'a> {
     fn local_with(&self, n: usize, e: usize, u1: &[DVec3], u0: &[DVec3], young: f64) -> Local<'a> {
         let el = &self.elasticity;
         let (h, k) = (el.body.grid.h, el.stiffness(e));
-        let (volume, gradient) = (el.body.cells[e].fraction * h.powi(3), 0.25 / h);
+        let (volume, gradient) = (el.elements.fractions[e] * h.powi(3), 0.25 / h);
         let (new, old) = el.both(&self.mix, e, u1, u0);
         let new = self.side(k, volume, new, n, gradient);
         let old = old.map(|p| self.side(k, volume, p, n, gradient));

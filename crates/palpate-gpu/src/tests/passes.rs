@@ -150,7 +150,7 @@ struct Exact {
 impl Exact {
     fn new(plan: &Plan) -> Exact {
         let physics = Physics::new(&plan.layout, &plan.theta);
-        let elements = Elements::new(plan, &Classes::new(&plan.body), physics.poisson_ratio);
+        let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
         let pattern = Pattern::new(&plan.body);
         let places = Places::new(plan, &pattern);
         let altered = Altered::new(plan, &physics, &elements);

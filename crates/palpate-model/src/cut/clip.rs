@@ -2,6 +2,7 @@
 
 use super::quadrature::{TETRA, TRIANGLE6};
 use super::walk::{Lattice, Sink, below, kuhn, walk};
+use super::{add_moments, lagrange_weights};
 use crate::grid::shape_functions;
 use glam::{DAffine3, DVec3};
 
@@ -31,14 +32,27 @@ impl ClipBox {
 }
 
 /// Moments of a held region in one cell.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct HeldMoments {
-    /// ∫ N_i n dS over the held surface [m²].
+    /// ∫ N_i n dS over the faces of the region inside the body [m²]; n points out of the free part of the body, into the region.
     pub surface_normal: [DVec3; 8],
-    /// ∫ N_i N_j dS over the held surface [m²].
+    /// ∫ N_i N_j dS over them [m²].
     pub surface_mass: [[f64; 8]; 8],
     /// ∫ N_i N_j dV over the held part of the body [m³].
     pub volume_mass: [[f64; 8]; 8],
+    // Of monomials about the basis cell's centre, over h³.
+    moments: [f64; 27],
+}
+
+impl Default for HeldMoments {
+    fn default() -> HeldMoments {
+        HeldMoments {
+            surface_normal: Default::default(),
+            surface_mass: Default::default(),
+            volume_mass: Default::default(),
+            moments: [0.0; 27],
+        }
+    }
 }
 
 impl HeldMoments {
@@ -50,6 +64,11 @@ impl HeldMoments {
     /// Volume of the held part [m³].
     pub fn volume(&self) -> f64 {
         self.volume_mass.iter().flatten().sum()
+    }
+
+    /// Weights of the basis cell's Gauss points over the held part, as in [`super::CellCut::weights`].
+    pub fn weights(&self) -> [f64; 27] {
+        lagrange_weights(&self.moments)
     }
 }
 
@@ -74,14 +93,14 @@ impl std::ops::AddAssign<&HeldMoments> for HeldMoments {
                 self.volume_mass[i][j] += other.volume_mass[i][j];
             }
         }
+        self.moments.iter_mut().zip(other.moments).for_each(|(m, o)| *m += o);
     }
 }
 
-/// The pieces of a cell inside the body and of the surface in it, kept so that many boxes can be held against them.
+/// The pieces of a cell inside the body, kept so that many boxes can be held against them.
 #[derive(Clone, Debug, Default)]
 pub struct Pieces {
     solids: Vec<[DVec3; 4]>,
-    faces: Vec<[DVec3; 3]>,
 }
 
 impl Pieces {
@@ -101,7 +120,6 @@ impl Pieces {
         let mut held = HeldMoments::default();
         let mut sink = Clipped { region, h, origin: point(cell), shift: point(cell) - point(basis), held: &mut held };
         self.solids.iter().for_each(|t| sink.tetra(*t));
-        self.faces.iter().for_each(|t| sink.triangle(*t, 0));
         held
     }
 }
@@ -115,9 +133,7 @@ impl Sink for Pieces {
         self.solids.push(v);
     }
 
-    fn triangle(&mut self, v: [DVec3; 3], _octant: usize) {
-        self.faces.push(v);
-    }
+    fn triangle(&mut self, _v: [DVec3; 3], _octant: usize) {}
 }
 
 fn point(c: [i64; 3]) -> DVec3 {
@@ -139,10 +155,45 @@ impl Clipped<'_> {
     }
 
     fn add_tetra(&mut self, v: [DVec3; 4]) {
-        let volume = (v[1] - v[0]).cross(v[2] - v[0]).dot(v[3] - v[0]).abs() / 6.0 * self.h.powi(3);
+        let part = (v[1] - v[0]).cross(v[2] - v[0]).dot(v[3] - v[0]).abs() / 6.0;
+        let volume = part * self.h.powi(3);
+        add_moments(&mut self.held.moments, v.map(|p| p + self.shift - 0.5), part);
         for (b, w) in &TETRA {
             let n = shape_functions(v[0] * b[0] + v[1] * b[1] + v[2] * b[2] + v[3] * b[3] + self.shift);
             add_outer(&mut self.held.volume_mass, &n, w * volume);
+        }
+    }
+
+    /// Adds a polygon that a face of the box cuts out of the body, as far as the faces after it leave it.
+    fn add_face(&mut self, face: usize, mut polygon: Vec<DVec3>) {
+        for plane in face + 1..6 {
+            // Sutherland–Hodgman against one half-space.
+            let mut kept = Vec::with_capacity(polygon.len() + 1);
+            for i in 0..polygon.len() {
+                let (p, q) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+                let (a, b) = (self.distances(p)[plane], self.distances(q)[plane]);
+                if a <= 0.0 {
+                    kept.push(p);
+                }
+                if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
+                    kept.push(p + (q - p) * (a / (a - b)));
+                }
+            }
+            polygon = kept;
+        }
+        // Seen from the free part of the body, outwards is into the box.
+        let into = if face < 3 { DVec3::AXES[face] } else { -DVec3::AXES[face - 3] };
+        let normal = self.region.to_frame.inverse().transform_vector3(into);
+        for k in 2..polygon.len() {
+            let t = [polygon[0], polygon[k - 1], polygon[k]];
+            let area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]).length() * (self.h * self.h);
+            for (b, w) in &TRIANGLE6 {
+                let n = shape_functions(t[0] * b[0] + t[1] * b[1] + t[2] * b[2] + self.shift);
+                add_outer(&mut self.held.surface_mass, &n, w * area);
+                for i in 0..8 {
+                    self.held.surface_normal[i] += normal * (w * area * n[i]);
+                }
+            }
         }
     }
 }
@@ -168,7 +219,9 @@ impl Sink for Clipped<'_> {
             let mut kept = Vec::with_capacity(parts.len());
             for t in parts {
                 let d = t.map(|p| self.distances(p)[plane]);
-                below(t, d, &mut |t| kept.push(t), &mut [DVec3::ZERO; 4]);
+                let mut face = [DVec3::ZERO; 4];
+                let corners = below(t, d, &mut |t| kept.push(t), &mut face);
+                self.add_face(plane, face[..corners].to_vec());
             }
             parts = kept;
         }
@@ -177,34 +230,5 @@ impl Sink for Clipped<'_> {
         }
     }
 
-    fn triangle(&mut self, v: [DVec3; 3], _octant: usize) {
-        let mut polygon = v.to_vec();
-        for plane in 0..6 {
-            // Sutherland–Hodgman against one half-space.
-            let mut kept = Vec::with_capacity(polygon.len() + 1);
-            for i in 0..polygon.len() {
-                let (p, q) = (polygon[i], polygon[(i + 1) % polygon.len()]);
-                let (a, b) = (self.distances(p)[plane], self.distances(q)[plane]);
-                if a <= 0.0 {
-                    kept.push(p);
-                }
-                if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
-                    kept.push(p + (q - p) * (a / (a - b)));
-                }
-            }
-            polygon = kept;
-        }
-        for k in 2..polygon.len() {
-            let t = [polygon[0], polygon[k - 1], polygon[k]];
-            let vector = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]) * (self.h * self.h);
-            let area = vector.length();
-            for (b, w) in &TRIANGLE6 {
-                let n = shape_functions(t[0] * b[0] + t[1] * b[1] + t[2] * b[2] + self.shift);
-                add_outer(&mut self.held.surface_mass, &n, w * area);
-                for i in 0..8 {
-                    self.held.surface_normal[i] += vector * (w * n[i]);
-                }
-            }
-        }
-    }
+    fn triangle(&mut self, _v: [DVec3; 3], _octant: usize) {}
 }
