@@ -64,6 +64,7 @@ where
 {
     let mut chart = ChartBuilder::on(area)
         .margin(8)
+        .margin_right(28)
         .x_label_area_size(36)
         .y_label_area_size(64)
         .build_cartesian_2d(x, y)
@@ -89,7 +90,7 @@ where
     if curves.iter().any(|c| !c.label.is_empty()) {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(SeriesLabelPosition::MiddleRight)
             .background_style(WHITE.mix(0.8))
             .draw()
             .map_err(|e| e.to_string())?;
