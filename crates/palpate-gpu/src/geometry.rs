@@ -188,7 +188,7 @@ impl Geometry {
             planes: plan.planes.len() as u32,
             masses: masses.len() as u32,
             parameters: plan.layout.len() as u32,
-            classes: classes.classes.len() as u32,
+            classes: classes.parts.len() as u32,
             lagged: u32::from(plan.solver.rotation == RotationUpdate::Lagged),
             h: body.grid.h as f32,
             dt: plan.clock.step as f32,

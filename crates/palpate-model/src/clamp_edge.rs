@@ -7,7 +7,6 @@ use crate::body::{Body, world_cell};
 use crate::cut::{ClipBox, HeldMoments, Lattice, Pieces};
 use crate::held::Pins;
 use crate::plan::ClampCell;
-
 use crate::shape::Shape;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -60,11 +59,13 @@ pub fn slope(now: f64, next: f64, second: f64, step: f64) -> f64 {
 
 /// Sets the pins of what is held, now and with the edge further out.
 fn pin(body: &Body, held: &mut [Held], step: f64) {
-    let at = |h: &Held, i: usize| match (&h.near, i) {
-        (Some((further, _)), 1..) => further[i - 1].clone(),
-        _ => h.now.clone(),
-    };
-    let pins = [0, 1, 2].map(|i| Pins::new(body, &held.iter().map(|h| at(h, i)).collect::<Vec<_>>()));
+    fn at(h: &Held, i: usize) -> &ClampCell {
+        match (&h.near, i) {
+            (Some((further, _)), 1..) => &further[i - 1],
+            _ => &h.now,
+        }
+    }
+    let pins = [0, 1, 2].map(|i| Pins::new(body, held.iter().map(|h| at(h, i))));
     for h in held.iter_mut() {
         let [now, next, second] = [0, 1, 2].map(|i| pins[i].of(body, h.now.cell));
         h.now.pins = now;
@@ -91,7 +92,7 @@ impl Edge {
         // Half a cell's diagonal, with a little slack for rounding: beyond it a face cannot reach the cell.
         let radius = 0.5 * 3f64.sqrt() * h * 1.01;
         let regions = [shift, shift + step, shift + 2.0 * step].map(|s| self.grown(h, s));
-        let stated = |cell: u32| own.binary_search_by_key(&cell, |c| c.cell).ok().map(|i| &own[i]);
+        let stated = |cell: u32| ClampCell::find(own, cell);
         let one = |source: &Source| {
             if regions[2].misses(source.middle, radius) {
                 return None;

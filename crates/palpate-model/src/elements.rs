@@ -19,7 +19,7 @@ pub struct Classes {
     /// Class of each cell.
     pub of_cell: Vec<u32>,
     /// What deforms in the cells of each class.
-    pub classes: Vec<FreePart>,
+    pub parts: Vec<FreePart>,
     /// Fraction of every cell that deforms; where none does, and the matrix is zero, the fraction inside the body.
     pub fractions: Vec<f64>,
 }
@@ -28,7 +28,7 @@ impl Classes {
     /// Groups cells with equal weights (all full cells, and cells cut alike) that are held alike.
     pub fn new(plan: &Plan) -> Classes {
         let mut known: BTreeMap<Vec<u64>, u32> = BTreeMap::new();
-        let mut classes = Vec::new();
+        let mut parts = Vec::new();
         let mut free: Vec<FreePart> = plan.body.cells.iter().map(FreePart::of).collect();
         for c in plan.clamps.iter().flat_map(|site| &site.cells) {
             free[c.cell as usize].take(&c.held);
@@ -40,12 +40,12 @@ impl Classes {
             .map(|part| {
                 let key = part.weights.iter().map(|w| w.to_bits()).collect();
                 *known.entry(key).or_insert_with(|| {
-                    classes.push(part);
-                    classes.len() as u32 - 1
+                    parts.push(part);
+                    parts.len() as u32 - 1
                 })
             })
             .collect();
-        Classes { of_cell, classes, fractions }
+        Classes { of_cell, parts, fractions }
     }
 }
 
@@ -69,7 +69,7 @@ impl Elements {
     /// Computes the matrices of a plan at a Poisson ratio.
     pub fn new(plan: &Plan, classes: &Classes, nu: f64) -> Elements {
         use rayon::prelude::*;
-        let matrices = classes.classes.par_iter().map(|part| cell_matrices(plan, part, nu)).collect();
+        let matrices = classes.parts.par_iter().map(|part| cell_matrices(plan, part, nu)).collect();
         let clamps = plan.clamps.iter().map(|s| s.cells.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect()).collect();
         let (of_cell, fractions) = (classes.of_cell.clone(), classes.fractions.clone());
         Elements { nu, matrices, of_cell, fractions, clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }

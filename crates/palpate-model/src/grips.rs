@@ -114,8 +114,8 @@ pub struct Grip {
     pub cells: Vec<ClampCell>,
     /// Matrices of the cells, layer included.
     pub matrices: Vec<CellMatrices>,
-    /// Those without what a shifted edge frees or takes of the cells' own stiffness: never negative.
-    pub convex: Vec<CellMatrices>,
+    /// Where the edge is shifted, those without what that frees or takes of the cells' own stiffness: never negative.
+    pub convex: Option<Vec<CellMatrices>>,
     /// Those without layer.
     stiff: Vec<CellMatrices>,
     /// Derivative of the stiffness by the shift of the edge [1/m]; `None` away from the edge.
@@ -173,7 +173,7 @@ impl Grips<'_> {
             Some(Box::new(std::array::from_fn(|i| clamp_edge::slope(now.k[i], next[i], second[i], *step))))
         };
         let by_edge = held.iter().zip(&matrices).map(by_edge).collect();
-        let convex = held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect();
+        let convex = shift.map(|_| held.iter().zip(&stiff).map(|(h, k)| self.layered(&h.now, k, nu)).collect());
         Grip { convex, cells: held.into_iter().map(|h| h.now).collect(), matrices, stiff, by_edge }
     }
 }
@@ -182,23 +182,21 @@ impl Grips<'_> {
     /// Adds what a shifted edge frees of a cell, or takes from it: the matrix of what is free now minus that of what the plan's own edge leaves
     /// free. Elastic forces turn with the cell, these with the clamp; at an edge both turn alike.
     fn add_freed(&self, clamp: &ClampSite, c: &ClampCell, elements: &Elements, m: &mut CellMatrices) {
-        let stated = clamp.cells.binary_search_by_key(&c.cell, |c| c.cell).ok().map(|i| &clamp.cells[i]);
-        if stated.is_some_and(|s| s.held == c.held) {
+        if ClampCell::find(&clamp.cells, c.cell).is_some_and(|s| s.held == c.held) {
             return;
         }
         let now = cell_matrices(self.plan, &c.free(&self.plan.body), elements.nu);
         let own = elements.cell(c.cell as usize);
+        let taken = |own: &M24, now: &M24, i: usize| (0..3).map(|r| own[25 * (3 * i + r)] - now[25 * (3 * i + r)]).sum::<f64>();
         // A cell that turns a little against the clamp leaves a remainder of either sign. Pinned nodes are held against it as firmly as the
         // cell did: the volume of a sliver alone would hold them too softly.
-        let firm: [bool; 8] =
-            std::array::from_fn(|i| (0..3).map(|r| own.k[25 * (3 * i + r)] - now.k[25 * (3 * i + r)]).sum::<f64>() > 0.0);
+        let firm: [bool; 8] = std::array::from_fn(|i| taken(&own.k, &now.k, i) > 0.0);
         for (sum, [now, own]) in [(&mut m.k, [&now.k, &own.k]), (&mut m.k_nu, [&now.k_nu, &own.k_nu])] {
             for (s, (now, own)) in sum.iter_mut().zip(now.iter().zip(own.iter())) {
                 *s += now - own;
             }
             for (i, pin) in c.pins.iter().enumerate().filter(|(i, _)| firm[*i]) {
-                let taken = (0..3).map(|r| own[25 * (3 * i + r)] - now[25 * (3 * i + r)]).sum::<f64>();
-                (0..3).for_each(|r| sum[25 * (3 * i + r)] += pin * taken / 3.0);
+                (0..3).for_each(|r| sum[25 * (3 * i + r)] += pin * taken(own, now, i) / 3.0);
             }
         }
     }

@@ -63,11 +63,10 @@ pub struct Pins(BTreeMap<u32, f64>);
 
 impl Pins {
     /// The pins of a clamp that holds `cells`.
-    pub fn new(body: &Body, cells: &[ClampCell]) -> Pins {
+    pub fn new<'a>(body: &Body, cells: impl Iterator<Item = &'a ClampCell> + Clone) -> Pins {
         let free: BTreeMap<u32, f64> =
-            cells.iter().map(|c| (c.cell, c.free(body).fraction / body.cells[c.cell as usize].fraction)).collect();
-        let mut pins: BTreeMap<u32, f64> =
-            cells.iter().flat_map(|c| body.cells[c.cell as usize].nodes).map(|n| (n, 1.0)).collect();
+            cells.clone().map(|c| (c.cell, c.free(body).fraction / body.cells[c.cell as usize].fraction)).collect();
+        let mut pins: BTreeMap<u32, f64> = cells.flat_map(|c| body.cells[c.cell as usize].nodes).map(|n| (n, 1.0)).collect();
         for (e, cell) in body.cells.iter().enumerate() {
             let free = free.get(&(e as u32)).unwrap_or(&1.0);
             for n in cell.nodes {

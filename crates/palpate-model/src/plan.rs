@@ -87,6 +87,11 @@ pub struct ClampCell {
 }
 
 impl ClampCell {
+    /// The held part of a cell among a clamp's, which stand in increasing order.
+    pub fn find(held: &[ClampCell], cell: u32) -> Option<&ClampCell> {
+        held.binary_search_by_key(&cell, |c| c.cell).ok().map(|i| &held[i])
+    }
+
     /// A held part of a cell; all of its nodes are pinned.
     pub(crate) fn new(body: &Body, cell: u32, m: &HeldMoments) -> ClampCell {
         let mut c = ClampCell {

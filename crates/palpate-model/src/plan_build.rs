@@ -165,7 +165,7 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
             ),
         ));
     }
-    let pins = Pins::new(body, &cells);
+    let pins = Pins::new(body, cells.iter());
     cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
     Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })

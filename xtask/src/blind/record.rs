@@ -40,10 +40,7 @@ impl Maker {
 }
 
 /// The experiment that is recorded.
-///
-/// # Errors
-/// The scene cannot be built.
-pub fn truth(scene: &Scene, maker: &Maker) -> Result<Experiment, Error> {
+fn truth(scene: &Scene, maker: &Maker) -> Result<Experiment, Error> {
     let mut scene = Scene { observation: None, fit: None, ..scene.clone() };
     scene.solver.element = maker.element;
     // A plane that states no stiffness gets one that follows the grid: the ground is the same for every grid.
@@ -69,10 +66,7 @@ pub fn observed(setup: &Setup, hidden: &Scene, maker: &Maker, folder: &Path, oth
 }
 
 /// Records a true experiment as the cameras and markers of its setup see it.
-///
-/// # Errors
-/// It cannot be simulated, or nothing is seen.
-pub fn record(setup: &Setup, e: &Experiment, maker: &Maker) -> Result<Recording, Error> {
+fn record(setup: &Setup, e: &Experiment, maker: &Maker) -> Result<Recording, Error> {
     let (start, end) = (e.scene().time.start, e.end_time());
     let count = ((end - start) / setup.spacing + 1e-9).floor() as usize;
     let observers = Observers {

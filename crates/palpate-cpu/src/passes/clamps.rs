@@ -106,10 +106,8 @@ impl<'a> Clamps<'a> {
 
     /// Matrix of cell `m` of clamp `index` in the clamp's frame, for E = 1 Pa, and the factor on E; with `convex` one that is never negative.
     pub fn stiffness(&self, index: usize, m: usize, convex: bool) -> (&M24, f64) {
-        let k = match self.grips {
-            Some(grips) if convex => &grips[index].convex[m].k,
-            _ => self.matrix(index, m, Matrices::Stiffness),
-        };
+        let fallback = self.grips.filter(|_| convex).and_then(|grips| grips[index].convex.as_ref());
+        let k = fallback.map_or_else(|| self.matrix(index, m, Matrices::Stiffness), |matrices| &matrices[m].k);
         (k, self.factor(&self.cells(index)[m]))
     }
 

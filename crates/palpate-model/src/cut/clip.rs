@@ -132,8 +132,6 @@ impl Sink for Pieces {
     fn tetra(&mut self, v: [DVec3; 4]) {
         self.solids.push(v);
     }
-
-    fn triangle(&mut self, _v: [DVec3; 3], _octant: usize) {}
 }
 
 fn point(c: [i64; 3]) -> DVec3 {
@@ -229,6 +227,4 @@ impl Sink for Clipped<'_> {
             self.add_tetra(t);
         }
     }
-
-    fn triangle(&mut self, _v: [DVec3; 3], _octant: usize) {}
 }

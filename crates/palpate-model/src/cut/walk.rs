@@ -36,7 +36,7 @@ pub trait Sink {
     /// A tetrahedron inside, in any orientation (may be degenerate).
     fn tetra(&mut self, v: [DVec3; 4]);
     /// A piece of surface, counter-clockwise seen from outside, in an octant of the cell.
-    fn triangle(&mut self, v: [DVec3; 3], octant: usize);
+    fn triangle(&mut self, _v: [DVec3; 3], _octant: usize) {}
 }
 
 /// Orders of the axes in which the six Kuhn tetrahedra walk from corner (0,0,0) to (1,1,1) of a cube.
