@@ -188,11 +188,18 @@ pub trait Laboratory {
     }
     /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none.
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError>;
-    /// What finer computations would change in those residuals, `coarse` as [`Laboratory::held_out`] gave them for the same model.
+    /// What finer computations would change in those residuals, `coarse` as [`Laboratory::held_out`] gave them for the same model. `moves` says
+    /// by how much its numbers would move, were they fitted again with what the field of that name in [`Laboratory::finer`] adds: what one
+    /// recording taught them on a coarse grid makes up for errors of the grid in the other as well.
     ///
     /// # Errors
     /// The finer scene cannot be computed.
-    fn held_out_finer(&mut self, _model: &Model, _coarse: &Readings) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(
+        &mut self,
+        _model: &Model,
+        _moves: &[(&'static str, Vec<f64>)],
+        _coarse: &Readings,
+    ) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
     /// How far [m] two models are apart in other measurements: description and root mean square distance.

@@ -254,8 +254,9 @@ impl Session<'_> {
 
     /// What finer computations would change in a state's residuals of data that no fit has seen.
     fn held_out_finer(&mut self, state: &State) -> Vec<Field> {
-        let coarse = state.held_out.as_ref();
-        coarse.and_then(|r| self.lab.held_out_finer(&state.model, r).ok()).unwrap_or_default()
+        let Some(coarse) = &state.held_out else { return Vec::new() };
+        let moves: Vec<_> = state.fields.iter().zip(&state.frame.fields).map(|(f, y)| (f.name, race::moves(state, y))).collect();
+        self.lab.held_out_finer(&state.model, &moves, coarse).unwrap_or_default()
     }
 
     /// Root mean square noise of single residuals [m].

@@ -37,9 +37,13 @@ impl Session<'_> {
         let share = share(predicted(best), &state.predicted[0]);
         // Frames that follow each other are not independent: a clear misfit that the best does not have is no matter of chance.
         let as_close = |i: usize, to: usize| predicted(i).excess() < 2.0 * predicted(to).excess() + 0.5 * predicted(to).floor;
+        // Fewer numbers that follow the readings more closely are no worse, whatever the grid's error does to the prediction of either.
+        let cost = |i: usize| fitted[i].state.readings.cost;
+        let fits_better = |i: usize, to: usize| fitted[i].freedom < fitted[to].freedom && cost(i) <= cost(to);
+        let small = PRICE_OF_MISFIT * state.predicted[0].excess();
         let as_good = |i: usize, to: usize| {
             let (by, z) = worse_by(&self.cells, predicted(to), predicted(i));
-            passes(i) && (by < 2.0 * share || (z < 2.0 && as_close(i, to)))
+            passes(i) && (by < 2.0 * share || (z < 2.0 && as_close(i, to)) || (fits_better(i, to) && by < small))
         };
         // Every number has its price.
         let price = price(met(&state.readings), predicted(best), &state.predicted[0]);

@@ -61,12 +61,12 @@ impl Session<'_> {
         let after = self.level(&state);
         let predicted = (base.predicted[0].rms, state.predicted[0].rms);
         let held_out = self.held_out(&base).zip(self.held_out(&state));
-        let (b, a, noise) = match held_out {
-            Some((b, a)) => (b.rms, a.rms, b.noise),
-            None => (predicted.0, predicted.1, before.noise),
-        };
-        let gap = b * b - noise * noise;
-        let gap_closed = if gap > 0.0 { (1.0 - (a * a - noise * noise).max(0.0) / gap).clamp(0.0, 1.0) } else { 0.0 };
+        // Each with what finer computations would change of it.
+        let (b, a) = held_out.unwrap_or_else(|| {
+            let noise = before.noise;
+            (Level { rms: predicted.0, noise }, Level { rms: predicted.1, noise })
+        });
+        let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
         let adequate = !self.is_missing(adequacy, &state);
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,

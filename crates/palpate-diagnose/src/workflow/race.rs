@@ -3,29 +3,37 @@
 
 use super::{Session, State, Variant, keep_first};
 use crate::change::Change;
-use crate::laboratory::{Fit, LabError, Start};
+use crate::laboratory::{Fit, LabError, Number, Start};
 use crate::linear::least_squares;
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
 /// behind after it and still go on. The last lap brings what is compared to its optimum.
-const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.05), (40, 2e-5, 1.0)];
+const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.02), (25, 2e-5, 1.0)];
 /// A fit may gain as many times again what it gained in a lap.
 const STAMINA: f64 = 2.0;
 /// Shares of the linear estimate that a fit may start from: the first at which the cost is lower than without.
-const STARTS: [f64; 3] = [1.0, 0.3, 0.1];
-/// Largest change of a fitted number at the start, relative to its size.
+pub(super) const STARTS: [f64; 3] = [1.0, 0.3, 0.1];
+/// The same of a fit that starts carefully: far out an effect is no longer linear, and what is found there may be another valley.
+pub(super) const CAREFUL: [f64; 2] = [0.3, 0.1];
+/// A lap that gained less than this share of the cost may have spent itself on finding the length of a step.
+const NO_GAIN: f64 = 0.02;
+/// Laps after which such a fit goes on if it promised nearly as much as the best, by this share.
+const PATIENCE: (usize, f64) = (2, 0.8);
+/// Largest change of a fitted number by a linear answer, relative to its size.
 const MOVES: f64 = 0.3;
 /// Ridge of the fitted numbers' linear answer.
 const RIDGE: f64 = 1e-3;
 
 impl Session<'_> {
-    /// Fits variants side by side, each from the state that it was scored at; those that arrived, the lowest cost first, at most one for each candidate.
+    /// Fits variants side by side, each from the state that it was scored at, along shares of its linear estimate, the first that helps; those that arrived, the lowest cost first, at most one for each candidate.
     pub(super) fn race<'v>(
         &mut self,
         state: &State,
         tries: &[(&State, &'v Variant)],
+        shares: &[f64],
     ) -> Result<Vec<(&'v Variant, Fit)>, LabError> {
-        let mut jobs = self.starts(tries);
+        let mut jobs = self.starts(tries, shares);
+        let most = tries.iter().map(|(_, v)| v.score.share).fold(0.0, f64::max);
         let mut running: Vec<(&Variant, Option<Fit>)> = tries.iter().map(|(_, v)| (*v, None)).collect();
         for (lap, (iterations, tolerance, lag)) in LAPS.into_iter().enumerate() {
             let last = lap + 1 == LAPS.len();
@@ -53,7 +61,11 @@ impl Session<'_> {
             let worst = best + lag * (state.readings.cost - best).max(0.0);
             // Steps have a longest length: who starts far away and still gains with every step is not behind for good.
             let promises = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost - STAMINA * f.gained);
-            let stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst).collect();
+            let searches = |f: &Fit| !f.settled && f.gained < NO_GAIN * f.cost && f.cost < state.readings.cost;
+            let patient = |r: &(&Variant, Option<Fit>)| {
+                lap < PATIENCE.0 && r.0.score.share >= PATIENCE.1 * most && r.1.as_ref().is_some_and(searches)
+            };
+            let stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
             let mut keep = stays.iter();
             jobs.retain(|_| *keep.next().unwrap_or(&false));
             let mut keep = stays.iter();
@@ -66,11 +78,11 @@ impl Session<'_> {
     }
 
     /// Where each fit starts: along the linear estimate, as far as that lowers the cost.
-    fn starts(&mut self, tries: &[(&State, &Variant)]) -> Vec<Start> {
-        let mut jobs: Vec<_> = tries.iter().map(|(from, v)| start(from, v, STARTS[0])).collect();
+    fn starts(&mut self, tries: &[(&State, &Variant)], shares: &[f64]) -> Vec<Start> {
+        let mut jobs: Vec<_> = tries.iter().map(|(from, v)| start(from, v, shares[0])).collect();
         let mut open: Vec<usize> = (0..jobs.len()).collect();
         self.lab.say(&format!("looking for starts of {} candidates", jobs.len()));
-        for share in &STARTS[1..] {
+        for share in &shares[1..] {
             let places: Vec<_> = open.iter().map(|i| (jobs[*i].changes.clone(), jobs[*i].values.clone())).collect();
             let costs = self.lab.costs(&places);
             let kept: Vec<bool> = open.iter().zip(costs).map(|(i, c)| c < tries[*i].0.readings.cost).collect();
@@ -90,6 +102,17 @@ impl Session<'_> {
     }
 }
 
+/// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer, within bounds.
+pub(super) fn moves(state: &State, y: &[f64]) -> Vec<f64> {
+    let columns: Vec<&[f64]> = state.table.columns.iter().map(Vec::as_slice).collect();
+    let moves = least_squares(&columns, y, RIDGE).unwrap_or_else(|| vec![0.0; columns.len()]);
+    let within = |((d, v), n): ((f64, &f64), &Number)| {
+        let most = MOVES * v.abs().max(n.scale);
+        (v + d.clamp(-most, most)).clamp(n.bounds.0, n.bounds.1) - v
+    };
+    moves.into_iter().zip(&state.model.values).zip(&state.model.numbers).map(within).collect()
+}
+
 /// A candidate at a share of its linear estimate, with the fitted numbers where they best go with it.
 fn start(state: &State, v: &Variant, share: f64) -> Start {
     let mut changes = state.model.changes.clone();
@@ -99,12 +122,7 @@ fn start(state: &State, v: &Variant, share: f64) -> Start {
     for (k, c) in v.columns.iter().enumerate() {
         y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
     }
-    let columns: Vec<&[f64]> = state.table.columns.iter().map(Vec::as_slice).collect();
-    let moves = least_squares(&columns, &y, RIDGE).unwrap_or_else(|| vec![0.0; columns.len()]);
-    let own = state.model.values.iter().zip(&moves).zip(&state.model.numbers).map(|((v, d), n)| {
-        let most = MOVES * v.abs().max(n.scale);
-        (v + d.clamp(-most, most)).clamp(n.bounds.0, n.bounds.1)
-    });
+    let own = state.model.values.iter().zip(moves(state, &y)).map(|(v, d)| v + d);
     let values = own.chain((0..v.start.len()).map(|k| v.start[k] + step(k))).collect();
     Start { changes, values, reach: f64::INFINITY }
 }

@@ -1,15 +1,42 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
+use super::race::{CAREFUL, STARTS};
 use super::{Fitted, Session, State, Variant, keep_first};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::linear::dot;
+use crate::null::test;
 use crate::score::f_tail;
 
 /// Change of a fitted number, relative to its size, from which on the value that the baseline's fit started from counts as another place to
 /// start from.
 const FAR: f64 = 0.3;
+
+/// Share of the sum of squares that a wall must take away where it stands first, without any fit, to be fitted.
+const WALL: f64 = 0.3;
+/// So many of them are.
+const WALLS: usize = 3;
+/// Mean square of residuals, in units of their noise, up to which an explanation is not looked for elsewhere.
+const CLOSE: f64 = 2.0;
+/// Further starts of candidates at unknown places: in all, and of each.
+const ELSEWHERE: (usize, usize) = (10, 3);
+
+/// A wall that helps as it stands: what others promise after a fit does not compare.
+fn is_wall(v: &Variant) -> bool {
+    v.change.blunt().is_some() && v.score.share > WALL
+}
+
+/// The most promising further starts of candidates at unknown places, of variants sorted by what they promise.
+fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Variant> {
+    let mut out: Vec<&Variant> = Vec::new();
+    for v in variants.iter().filter(|v| !v.amplitudes.iter().all(|a| *a) && !taken(v)) {
+        if out.len() < ELSEWHERE.0 && out.iter().filter(|o| o.candidate == v.candidate).count() < ELSEWHERE.1 {
+            out.push(v);
+        }
+    }
+    out
+}
 
 impl Session<'_> {
     /// One round: the accepted effect with its state, or the candidates that came closest.
@@ -32,8 +59,12 @@ impl Session<'_> {
                 self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
             }
             // The best start of a candidate, and a second one where it acts at an unknown place.
-            let starts = if v.amplitudes.iter().all(|a| *a) { 1 } else { 2 };
-            if before < starts && tries.len() < fits + fits / 2 {
+            let starts = match v {
+                wall if is_wall(wall) => WALLS,
+                certain if certain.amplitudes.iter().all(|a| *a) => 1,
+                _ => 2,
+            };
+            if before < starts && (tries.len() < fits + fits / 2 || is_wall(v)) {
                 tries.push((state, v));
             }
         }
@@ -41,7 +72,35 @@ impl Session<'_> {
         if let Some((home, variants)) = &home {
             tries.extend(variants.iter().map(|v| (home, v)));
         }
-        let arrived = self.race(state, &tries)?;
+        let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
+        if !self.explained(state, &fitted) && !self.lab.out_of_time() {
+            // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
+            let taken: Vec<*const Variant> = tries.iter().map(|t| std::ptr::from_ref(t.1)).collect();
+            let others = elsewhere(&variants, |v| taken.contains(&std::ptr::from_ref(v)));
+            let tries: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
+            if !tries.is_empty() {
+                fitted.extend(self.fitted(state, &tries, &CAREFUL, count)?);
+            }
+        }
+        fitted.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
+        keep_first(&mut fitted, |f| f.candidate);
+        for f in &fitted {
+            let kind = f.state.model.changes.last().map_or("", Change::kind);
+            let mine = self.tried.iter_mut().find(|t| t.round == round && t.kind == kind && t.held_out_gain.is_none());
+            mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
+        }
+        self.decide(state, fitted)
+    }
+
+    /// Fits variants and judges what arrives.
+    fn fitted(
+        &mut self,
+        state: &State,
+        tries: &[(&State, &Variant)],
+        shares: &[f64],
+        count: f64,
+    ) -> Result<Vec<Fitted>, LabError> {
+        let arrived = self.race(state, tries, shares)?;
         let jobs: Vec<(Vec<Change>, Vec<f64>)> =
             arrived.iter().map(|(_, f)| (f.model.changes.clone(), f.model.values.clone())).collect();
         self.lab.say(&format!("judging {} candidates", jobs.len()));
@@ -53,13 +112,24 @@ impl Session<'_> {
                 Err(why) => self.missed(&v.change, &why),
             }
         }
-        fitted.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
-        for f in &fitted {
-            let kind = f.state.model.changes.last().map_or("", Change::kind);
-            let mine = self.tried.iter_mut().find(|t| t.round == round && t.kind == kind && t.held_out_gain.is_none());
-            mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
-        }
-        self.decide(state, fitted)
+        Ok(fitted)
+    }
+
+    /// True if the best of the candidates leaves little more than noise.
+    fn explained(&self, state: &State, fitted: &[Fitted]) -> bool {
+        let adequate = |f: &Fitted| {
+            let left = test(&self.cells, &f.state.frame, &self.noise, self.options.bins, self.options.seed);
+            self.over_noise(&f.state.readings) <= CLOSE && !self.is_missing(&left, &f.state)
+        };
+        let least = fitted.iter().map(|f| f.state.predicted[0].loss()).fold(state.predicted[0].loss(), f64::min);
+        fitted.iter().filter(|f| f.state.predicted[0].loss() <= least).any(adequate)
+    }
+
+    /// Mean square of residuals in units of their noise.
+    fn over_noise(&self, readings: &Readings) -> f64 {
+        let squares = readings.rows.iter().filter_map(|r| Some(r.row.value?.powi(2) / self.variance(r)));
+        let (sum, n) = squares.fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
+        sum / f64::max(n, 1.0)
     }
 
     /// The scene where the baseline's fit started, with the candidates that promise most there, where that is far away: the numbers that
@@ -78,9 +148,12 @@ impl Session<'_> {
         let home = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
         let mut variants = self.variants(&home)?;
         variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
-        keep_first(&mut variants, |v| v.candidate);
-        variants.truncate(self.options.fits / 2);
-        Ok(Some((home, variants)))
+        let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) = variants.into_iter().partition(is_wall);
+        walls.truncate(WALLS);
+        keep_first(&mut others, |v| v.candidate);
+        others.truncate(self.options.fits * 3 / 4);
+        others.extend(walls);
+        Ok(Some((home, others)))
     }
 
     /// What a fitted candidate is worth.
@@ -148,5 +221,44 @@ impl Session<'_> {
             indistinguishable_from: Vec::new(),
             separated_by: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::effects::{Effect, find};
+
+    fn variant(candidate: usize, kind: &str, amplitudes: &[bool], share: f64) -> Variant {
+        Variant {
+            candidate,
+            change: Change::Effect(Effect::absent(find(kind).unwrap())),
+            columns: Vec::new(),
+            amplitudes: amplitudes.to_vec(),
+            start: Vec::new(),
+            bounds: Vec::new(),
+            score: crate::score::Score { share, ..Default::default() },
+        }
+    }
+
+    #[test]
+    fn further_starts_are_those_of_effects_at_unknown_places() {
+        let place = [true, false, false, false];
+        let mut all = vec![variant(0, "stiffness-gradient", &[true; 3], 0.9)];
+        all.extend((0..6).map(|k| variant(1, "point-mass", &place, 0.8 - 0.01 * f64::from(k))));
+        all.extend((0..20).map(|k| variant(2 + k, "inclusion", &place, 0.5)));
+        let first = std::ptr::from_ref(&all[1]);
+        let chosen = elsewhere(&all, |v| std::ptr::eq(v, first));
+        // The best one was tried already; three of a kind are enough, and ten in all.
+        let shares: Vec<f64> = chosen.iter().filter(|v| v.candidate == 1).map(|v| v.score.share).collect();
+        assert_eq!(shares, [0.79, 0.78, 0.77]);
+        assert!(chosen.len() == ELSEWHERE.0 && chosen.iter().all(|v| v.candidate > 0));
+    }
+
+    #[test]
+    fn a_wall_is_fitted_for_what_it_does_where_it_stands() {
+        assert!(is_wall(&variant(0, "second-plane", &[true, false, false, false], 0.4)));
+        assert!(!is_wall(&variant(0, "second-plane", &[true, false, false, false], 0.2)));
+        assert!(!is_wall(&variant(0, "point-mass", &[true, false, false, false], 0.9)));
     }
 }

@@ -10,7 +10,7 @@ use crate::score::{Score, score};
 /// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
 const FIRST_STARTS: usize = 8;
 /// The share of the best candidate's gain that is within reach.
-const REACH: f64 = 0.6;
+const REACH: f64 = 0.25;
 
 /// A variant of a candidate with its columns where it is absent.
 pub(super) struct Variant {

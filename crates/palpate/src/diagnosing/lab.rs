@@ -390,12 +390,22 @@ impl Laboratory for Lab<'_> {
         self.held_out.map(|e| held_out(e, &self.base, self.backend, model)).transpose()
     }
 
-    fn held_out_finer(&mut self, model: &Model, coarse: &Readings) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(
+        &mut self,
+        model: &Model,
+        moves: &[(&'static str, Vec<f64>)],
+        coarse: &Readings,
+    ) -> Result<Vec<Field>, LabError> {
         let Some(e) = self.held_out else { return Ok(Vec::new()) };
         let (base, backend) = (&self.base, self.backend);
         let mut fields = Vec::new();
         for (name, e, factor) in [("grid", finer(e).map_err(lab_error)?, GRID), ("step", halved(e.clone()), STEP)] {
-            fields.push(difference(name, &held_out(&e, base, backend, model)?, coarse, factor));
+            let mut model = model.clone();
+            // They are those in the limit.
+            for (_, moves) in moves.iter().filter(|m| m.0 == name) {
+                model.values.iter_mut().zip(moves).for_each(|(v, d)| *v += d / factor);
+            }
+            fields.push(difference(name, &held_out(&e, base, backend, &model)?, coarse, factor));
         }
         Ok(fields)
     }
