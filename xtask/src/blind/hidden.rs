@@ -154,6 +154,12 @@ impl Hidden {
         find(self.name).is_some()
     }
 
+    /// True for a body of two parts that are told apart the other way round by this direction.
+    pub fn faces_away(&self, direction: DVec3) -> bool {
+        let own = self.stays.iter().find(|k| self.name == "two-part-stiffness" && k.0 == "direction");
+        own.is_some_and(|k| DVec3::from_slice(k.1).dot(direction) < 0.0)
+    }
+
     /// Puts it into a scene with this amplitude; the hidden numbers.
     ///
     /// # Errors
