@@ -145,7 +145,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let mut adequacy;
     let base = state.clone();
     loop {
-        adequacy = test(&s.cells, &state.frame, &s.noise, options.bins, options.seed);
+        adequacy = s.adequacy(&state);
         if out.places.is_none() {
             out.places = Some(locate(&s.cells, &adequacy, s.lab.setting()));
             (out.p_value, out.structure) = (adequacy.p_value, adequacy.structure);
@@ -270,6 +270,11 @@ impl Session<'_> {
     fn variance(&self, r: &Reading) -> f64 {
         let ratio = if matches!(r.row.source, Source::Point { .. }) { self.noise_ratio } else { 1.0 };
         (ratio * r.row.noise * r.row.along_sight).powi(2)
+    }
+
+    /// Structure of a state's residuals against what noise and discretisation leave.
+    fn adequacy(&self, state: &State) -> Adequacy {
+        test(&self.cells, &state.frame, &self.noise, self.options.bins, self.options.seed)
     }
 
     /// True when residuals have structure that is neither chance nor too small to count.

@@ -196,7 +196,8 @@ impl Grips<'_> {
                 *s += now - own;
             }
             for (i, pin) in c.pins.iter().enumerate().filter(|(i, _)| firm[*i]) {
-                (0..3).for_each(|r| sum[25 * (3 * i + r)] += pin * taken(own, now, i) / 3.0);
+                let each = pin * taken(own, now, i) / 3.0;
+                (0..3).for_each(|r| sum[25 * (3 * i + r)] += each);
             }
         }
     }

@@ -25,7 +25,8 @@ const MOVES: f64 = 0.3;
 const RIDGE: f64 = 1e-3;
 
 impl Session<'_> {
-    /// Fits variants side by side, each from the state that it was scored at, along shares of its linear estimate, the first that helps; those that arrived, the lowest cost first, at most one for each candidate.
+    /// Fits variants side by side, each from the state that it was scored at and along the first of the shares of its linear estimate that
+    /// helps; those that arrived, the lowest cost first, at most one for each candidate.
     pub(super) fn race<'v>(
         &mut self,
         state: &State,

@@ -6,7 +6,6 @@ use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::linear::dot;
-use crate::null::test;
 use crate::score::f_tail;
 
 /// Change of a fitted number, relative to its size, from which on the value that the baseline's fit started from counts as another place to
@@ -58,7 +57,7 @@ impl Session<'_> {
                 let (kind, promised, p_value) = (v.change.kind().to_string(), v.score.share, v.score.p_value);
                 self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
             }
-            // The best start of a candidate, and a second one where it acts at an unknown place.
+            // The best start of a candidate, a second one where it acts at an unknown place, and several of walls.
             let starts = match v {
                 wall if is_wall(wall) => WALLS,
                 certain if certain.amplitudes.iter().all(|a| *a) => 1,
@@ -75,11 +74,10 @@ impl Session<'_> {
         let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
         if !self.explained(state, &fitted) && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
-            let taken: Vec<*const Variant> = tries.iter().map(|t| std::ptr::from_ref(t.1)).collect();
-            let others = elsewhere(&variants, |v| taken.contains(&std::ptr::from_ref(v)));
-            let tries: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
-            if !tries.is_empty() {
-                fitted.extend(self.fitted(state, &tries, &CAREFUL, count)?);
+            let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
+            let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
+            if !further.is_empty() {
+                fitted.extend(self.fitted(state, &further, &CAREFUL, count)?);
             }
         }
         fitted.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
@@ -117,12 +115,11 @@ impl Session<'_> {
 
     /// True if the best of the candidates leaves little more than noise.
     fn explained(&self, state: &State, fitted: &[Fitted]) -> bool {
-        let adequate = |f: &Fitted| {
-            let left = test(&self.cells, &f.state.frame, &self.noise, self.options.bins, self.options.seed);
-            self.over_noise(&f.state.readings) <= CLOSE && !self.is_missing(&left, &f.state)
-        };
-        let least = fitted.iter().map(|f| f.state.predicted[0].loss()).fold(state.predicted[0].loss(), f64::min);
-        fitted.iter().filter(|f| f.state.predicted[0].loss() <= least).any(adequate)
+        let loss = |s: &State| s.predicted[0].loss();
+        let best = fitted.iter().map(|f| &f.state).min_by(|a, b| loss(a).total_cmp(&loss(b)));
+        best.is_some_and(|s| {
+            loss(s) <= loss(state) && self.over_noise(&s.readings) <= CLOSE && !self.is_missing(&self.adequacy(s), s)
+        })
     }
 
     /// Mean square of residuals in units of their noise.
