@@ -32,6 +32,8 @@ pub struct Body {
     pub area: f64,
     /// Centre of mass (uniform density) [m].
     pub center: DVec3,
+    /// Lowest and highest corner of the box around the surface's patches [m]; the centre without any.
+    pub corners: (DVec3, DVec3),
 }
 
 /// A cell that holds some of the body.

@@ -31,8 +31,7 @@ impl Spot {
     /// A spot of a plan's body, at its centre and at the start.
     pub fn of(plan: &Plan) -> Spot {
         let body = &plan.body;
-        let corner = |f: fn(DVec3, DVec3) -> DVec3| body.patches.iter().map(|p| p.point).reduce(f).unwrap_or(body.center);
-        let size = 0.5 * (corner(DVec3::max) - corner(DVec3::min)).max_element().max(body.grid.h);
+        let size = 0.5 * (body.corners.1 - body.corners.0).max_element().max(body.grid.h);
         let anchor = plan.clamps.first().map_or(body.center, |c| {
             let middle = |cell: u32| body.grid.position(body.cells[cell as usize].lattice) + 0.5 * body.grid.h;
             c.cells.iter().map(|c| middle(c.cell)).sum::<DVec3>() / c.cells.len() as f64

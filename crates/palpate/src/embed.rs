@@ -131,6 +131,7 @@ mod tests {
             volume: 0.002,
             area: 0.1,
             center: DVec3::new(0.1, 0.05, 0.05),
+            corners: (DVec3::ZERO, DVec3::ZERO),
         }
     }
 

@@ -7,8 +7,8 @@
 use crate::passes::cells::{Corners, Elasticity, Mix, pick};
 use glam::DVec3;
 use palpate_model::corotation::{CellPose, M24, V24, flatten, multiply};
+use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
-use palpate_model::effects::{EffectParam, Site, Unstated};
 use palpate_model::grid::SIGNS;
 use palpate_model::plan::{Physics, Plan};
 
@@ -33,10 +33,7 @@ impl std::fmt::Debug for CellActing {
 pub fn cell_laws(plan: &Plan, physics: &Physics) -> Vec<CellActing> {
     let all = plan.layout.effects().zip(&physics.effects).enumerate();
     all.filter_map(|(effect, ((law, _), p))| match law.site {
-        Site::Cells(cell) => {
-            let zero = |(spec, v): (&EffectParam, &f64)| !matches!(spec.default, Unstated::Absent(a) if a != *v);
-            Some(CellActing { effect, law: cell, p: p.clone(), absent: law.params.iter().zip(p).all(zero) })
-        }
+        Site::Cells(cell) => Some(CellActing { effect, law: cell, p: p.clone(), absent: law.is_absent(p) }),
         _ => None,
     })
     .collect()

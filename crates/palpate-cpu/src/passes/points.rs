@@ -21,6 +21,8 @@ pub struct Acting {
     values: Vec<f64>,
     /// Shares of the nodes and their derivatives by the parameters, `[N]` and `[K, N]`, for laws that share one load.
     shares: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+    /// It does nothing with these parameters; only derivatives by its amplitudes are not zero.
+    absent: bool,
 }
 
 impl std::fmt::Debug for Acting {
@@ -36,7 +38,7 @@ pub fn acting(plan: &Plan, physics: &Physics) -> Vec<Acting> {
             Site::Nodes(point) => point.shares(&plan.body.nodes, &plan.body.node_volume, values),
             _ => None,
         };
-        Acting { law, values: values.clone(), shares }
+        Acting { law, values: values.clone(), shares, absent: law.is_absent(values) }
     };
     plan.layout.effects().zip(&physics.effects).map(make).collect()
 }
@@ -74,6 +76,11 @@ fn put(z: &mut [f64], at: usize, v: DVec3) {
 }
 
 impl<'a> Balance<'a> {
+    /// The effects that do something.
+    fn present(&self) -> impl Iterator<Item = &'a Acting> {
+        self.effects.iter().filter(|a| !a.absent)
+    }
+
     /// Visits every point of an effect that is not idle.
     fn points(&self, acting: &Acting, s: States, mut visit: impl FnMut(&At)) {
         let (body, k) = (&self.plan.body, acting.values.len());
@@ -134,7 +141,7 @@ impl<'a> Balance<'a> {
 
     /// Adds the effects' part of the residual.
     pub(super) fn add_effects(&self, s: States, out: &mut [DVec3]) {
-        for a in self.effects {
+        for a in self.present() {
             self.points(a, s, |at| at.add(at.point.gradient(&at.place, at.z), out));
         }
     }
@@ -142,7 +149,7 @@ impl<'a> Balance<'a> {
     /// The effects' part of the potential [J].
     pub(super) fn effects_potential(&self, s: States) -> f64 {
         let mut w = 0.0;
-        for a in self.effects {
+        for a in self.present() {
             self.points(a, s, |at| w += at.point.value(&at.place, at.z));
         }
         w
@@ -150,7 +157,7 @@ impl<'a> Balance<'a> {
 
     /// Adds the effects' part of ∂r/∂u₁; with `convex`, points where it is not positive are left out.
     pub(super) fn add_effects_tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
-        for a in self.effects {
+        for a in self.present() {
             self.points(a, s, |at| {
                 let h = at.point.hessian(&at.place, at.z);
                 let h = DMat3::from_cols_array_2d(&h);
@@ -172,7 +179,7 @@ impl<'a> Balance<'a> {
     /// Adds the effects' part of (∂r/∂u₀) du₀ + (∂r/∂v₀) dv₀.
     pub(super) fn add_effects_by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3], out: &mut [DVec3]) {
         let mut d = [0.0; COMMON + MOST];
-        for a in self.effects {
+        for a in self.present() {
             self.points(a, s, |at| {
                 put(&mut d, OLD, at.mean(du0));
                 put(&mut d, VELOCITY, at.mean(dv0));
@@ -183,7 +190,7 @@ impl<'a> Balance<'a> {
 
     /// Adds the effects' part of (∂r/∂u₀)ᵀ z and (∂r/∂v₀)ᵀ z.
     pub(super) fn add_effects_transposed(&self, s: States, z: &[DVec3], to_u: &mut [DVec3], to_v: &mut [DVec3]) {
-        for a in self.effects {
+        for a in self.present() {
             self.points(a, s, |at| {
                 let mut row = [0.0; 6];
                 at.point.transposed(&at.place, at.z, at.mean(z).to_array(), OLD..OLD + 6, &mut row);
@@ -202,6 +209,9 @@ impl<'a> Balance<'a> {
                 ParamKey::PlaneHeight(_) | ParamKey::PlaneTheta(_) | ParamKey::PlanePhi(_) => None,
                 _ => continue,
             };
+            if own.is_none() && a.absent {
+                continue;
+            }
             self.points(a, s, |at| {
                 let mut d = [0.0; COMMON + MOST];
                 if let Some(slot) = own {

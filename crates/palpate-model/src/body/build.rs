@@ -182,10 +182,14 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         active.push(Cell { lattice, nodes: ids, fraction: cut.fraction, weights: cut.weights });
     }
     let ghosts = ghost_lines(&grid, &active);
+    let center = moment / fractions;
+    let corner = |f: fn(DVec3, DVec3) -> DVec3| patches.iter().map(|p: &Patch| p.point).reduce(f).unwrap_or(center);
+    let corners = (corner(DVec3::min), corner(DVec3::max));
     let mut body = Body {
         area: patches.iter().map(|p| p.area).sum(),
         volume: fractions * h.powi(3),
-        center: moment / fractions,
+        center,
+        corners,
         grid,
         nodes,
         node_volume,

@@ -257,6 +257,15 @@ const fn component(key: &'static str, axis: u8, unit: &'static str, typical: f64
     }
 }
 
+impl Law {
+    /// True where every amplitude has the value at which the effect is absent: it does nothing then, whatever its other numbers are.
+    pub fn is_absent(&self, values: &[f64]) -> bool {
+        let at_rest = |(p, v): (&EffectParam, &f64)| if let Unstated::Absent(a) = p.default { Some(*v == a) } else { None };
+        let mut amplitudes = self.params.iter().zip(values).filter_map(at_rest).peekable();
+        amplitudes.peek().is_some() && amplitudes.all(|at_rest| at_rest)
+    }
+}
+
 /// An effect of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
