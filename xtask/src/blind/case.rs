@@ -253,15 +253,15 @@ impl Outcome {
         self.close = d.effects.iter().filter(|e| !e.accepted).map(|e| (e.kind.clone(), e.held_out_gain)).collect();
         // Of everything that belongs to what was named; a number that the answer does not state is as wrong as it can be.
         let mut off = (0.0, 0.0);
-        let stated = |path: &str| {
-            let mut all = accepted.iter().flat_map(|e| &e.parameters);
+        let stated = |kind: &str, path: &str| {
+            let mut all = accepted.iter().filter(|e| e.kind == kind).flat_map(|e| &e.parameters);
             all.find(|p| p.0 == path || p.0.splitn(3, '.').last() == Some(path)).map(|p| p.1)
         };
         for (kind, n) in numbers.iter().filter(|(kind, _)| self.named.contains(kind)) {
-            let direction = DVec3::from(["x", "y", "z"].map(|a| stated(&format!("direction.{a}")).unwrap_or(0.0)));
+            let direction = DVec3::from(["x", "y", "z"].map(|a| stated(kind, &format!("direction.{a}")).unwrap_or(0.0)));
             // A body whose one part is softer is one whose other part is stiffer.
             let mirrored = TABLE.iter().any(|h| h.name == kind && h.scene == self.scene && h.faces_away(direction));
-            let value = stated(&n.path).map(|v| if mirrored { -v } else { v });
+            let value = stated(kind, &n.path).map(|v| if mirrored { -v } else { v });
             off.0 += ((value.unwrap_or(n.absent) - n.truth) / n.scale).powi(2);
             off.1 += ((n.truth - n.absent) / n.scale).powi(2);
         }
