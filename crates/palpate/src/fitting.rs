@@ -213,8 +213,8 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     }
     if rms > 2.0 * noise {
         fitted.warnings.push(format!(
-            "the remaining residual of {:.3} mm is {:.1} times what noise and grid explain ({:.3} mm): something in the model is \
-             missing or wrong",
+            "the remaining residual of {:.3} mm is {:.1} times what noise explains ({:.3} mm): something in the model is \
+             missing or wrong (`palpate diagnose` looks for it), or cells and time step are too coarse (`--grid-check`)",
             rms * 1e3,
             rms / noise,
             noise * 1e3

@@ -17,7 +17,7 @@ pub(super) const LAW: Law = Law {
 };
 
 const MOVED: &str = "stated minus true place of the camera";
-const TURNED: &str = "rotation vector from the true to the stated pose";
+const TURNED: &str = "rotation vector from the true to the stated pose, in the world's axes, about the camera's centre";
 
 const PARAMS: [EffectParam; 7] = [
     number("camera", "1", [0.0, f64::INFINITY, 1.0], Unstated::Choice(Numbered::Camera), "number of the camera, counted from 0"),

@@ -37,8 +37,13 @@ const PARAMS: [EffectParam; 6] = [
 ];
 
 /// Size of the region that shares a load at a place.
-pub(super) const RADIUS: EffectParam =
-    number("radius", "m", [1e-6, 1e6, 0.01], Unstated::Fixed(0.01), "size of the region that carries it");
+pub(super) const RADIUS: EffectParam = number(
+    "radius",
+    "m",
+    [1e-6, 1e6, 0.01],
+    Unstated::Fixed(0.01),
+    "size of the region that carries it; at an edge of the body its middle lies that far inside",
+);
 
 /// Weight (1 + d²/4r²)⁻⁴ of a node at distance d from the place: a bell like exp(−d²/r²), whose tail never underflows, so that a
 /// place far outside still has a derivative.

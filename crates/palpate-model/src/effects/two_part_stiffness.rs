@@ -25,7 +25,7 @@ const PARAMS: [EffectParam; 5] = [
         "m",
         [-1e3, 1e3, 0.02],
         Unstated::Stated(0.0),
-        "distance of the dividing plane from the centre of mass along `direction`",
+        "distance of the dividing plane from the centre of mass along `direction`; the change spreads over a cell",
     ),
     direction("direction", 0, DOC),
     direction("direction", 1, DOC),

@@ -175,7 +175,13 @@ fn scene(e: &Experiment) -> Vec<Line> {
             if steps == 0 {
                 "static".to_string()
             } else {
-                format!("{steps} steps of {} s, from {} s to {:.4} s", time.step, time.start, e.end_time())
+                format!(
+                    "{steps} steps of {} s, from {} s to {:.4} s{}",
+                    time.step,
+                    time.start,
+                    e.end_time(),
+                    numerical_damping(time)
+                )
             },
         ),
         line("memory", "tape", json!(tape), format!("{} for one gradient of one start", megabytes(tape))),
@@ -183,6 +189,15 @@ fn scene(e: &Experiment) -> Vec<Line> {
     lines.extend(device_memory(plan));
     lines.retain(|l| l.key != "title" || !l.text.is_empty());
     lines
+}
+
+/// What the θ-scheme damps by itself: ζ = (θ − ½) ω Δt to first order, which a fit takes for the material's.
+fn numerical_damping(time: &palpate_model::scene::Time) -> String {
+    let of_one_hertz = std::f64::consts::TAU * (time.theta - 0.5) * time.step;
+    if of_one_hertz < 1e-6 {
+        return String::new();
+    }
+    format!("; theta = {} damps 1 Hz by {:.2} % of critical, 10 Hz by ten times as much", time.theta, 100.0 * of_one_hertz)
 }
 
 /// What is compared and what is free.
@@ -194,6 +209,10 @@ fn observed(e: &Experiment) -> Vec<Line> {
         let markers: usize = o.frames.iter().map(|f| f.markers.len()).sum();
         let (low, high) = (points.iter().min().copied().unwrap_or(0), points.iter().max().copied().unwrap_or(0));
         let total: usize = points.iter().sum();
+        let of = |seen: usize, size: f64, what: &str| (seen > 0).then(|| format!("{:.2} mm ({what})", size * 1e3));
+        let noise: Vec<String> =
+            [of(total, o.depth_noise, "depth"), of(markers, o.marker_noise, "markers")].into_iter().flatten().collect();
+        let noise = if noise.is_empty() { "unknown".to_string() } else { noise.join(", ") };
         lines.push(line(
             "observation",
             "observed",
@@ -202,14 +221,12 @@ fn observed(e: &Experiment) -> Vec<Line> {
                     "depth_noise": o.depth_noise, "marker_noise": o.marker_noise, "overlap": true }),
             format!(
                 "{} frames from {:.4} s to {:.4} s, {} cameras, {low} to {high} depth points a frame, {} markers ({markers} readings); \
-                 noise {:.2} mm (depth), {:.2} mm (markers); lies around the object",
+                 noise {noise}; lies around the object",
                 o.frames.len(),
                 first.time,
                 last.time,
                 o.cameras.len(),
                 o.markers.len(),
-                o.depth_noise * 1e3,
-                o.marker_noise * 1e3
             ),
         ));
     }

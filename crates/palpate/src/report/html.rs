@@ -75,7 +75,7 @@ fn write_page(p: &mut String, input: &ReportInput) -> std::fmt::Result {
     writeln!(
         p,
         "<p>Root mean square distance between measurement and model: <b>{before}</b> at the first start, <b>{:.3} mm</b> with the \
-         values found; measurement noise and grid alone would leave {:.3} mm ({points} points).</p>",
+         values found; measurement noise, and the shape's rounding by cells, would leave {:.3} mm ({points} points); what cells and time step change, <code>--grid-check</code> tells.</p>",
         rms * 1e3,
         noise * 1e3
     )?;
@@ -182,7 +182,7 @@ fn scene(p: &mut String, input: &ReportInput, s: usize, e: &Experiment) -> std::
     let ends = after.frames.first().zip(after.frames.last());
     if let Some((a, b)) = ends {
         let mm = after.noise * 1e3;
-        lines.push(Curve { label: "noise and grid".into(), points: vec![(a.time, mm), (b.time, mm)] });
+        lines.push(Curve { label: "noise".into(), points: vec![(a.time, mm), (b.time, mm)] });
     }
     if let Some(svg) = curves(&lines, "time [s]", "rms distance [mm]", false) {
         writeln!(p, "{svg}")?;

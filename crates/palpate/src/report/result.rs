@@ -137,7 +137,11 @@ pub fn summary(fitted: &Fitted) -> String {
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let before = before.map_or(String::new(), |b| format!("{:.3} mm before, ", total(&b, |r| r.rms) * 1e3));
-    text += &format!("  residual: {before}{:.3} mm now ({:.3} mm from noise and grid), {points} points", rms * 1e3, noise * 1e3);
+    text += &format!(
+        "  residual: {before}{:.3} mm now ({:.3} mm from noise and the shape's rounding), {points} points",
+        rms * 1e3,
+        noise * 1e3
+    );
     text
 }
 
