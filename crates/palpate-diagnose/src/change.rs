@@ -30,6 +30,11 @@ impl Change {
         }
     }
 
+    /// Names of several, joined by a plus.
+    pub fn kinds(changes: &[Change]) -> String {
+        changes.iter().map(Change::kind).collect::<Vec<_>>().join(" + ")
+    }
+
     /// What it would mean, for reports.
     pub fn sentence(&self) -> &'static str {
         match self {

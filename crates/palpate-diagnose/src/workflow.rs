@@ -3,12 +3,14 @@
 mod bound;
 mod choose;
 mod conclude;
+mod pairs;
 mod prune;
 mod race;
 mod rounds;
 mod variants;
 
 use crate::cells::{Cells, Table};
+use crate::change::Change;
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
@@ -85,6 +87,21 @@ struct Fitted {
     p_value: f64,
     gain: f64,
     freedom: usize,
+    /// Effects that it adds.
+    effects: usize,
+}
+
+impl Fitted {
+    /// What it adds to the model.
+    fn changes(&self) -> &[Change] {
+        let all = &self.state.model.changes;
+        &all[all.len() - self.effects..]
+    }
+
+    /// Its name, of two joined by a plus.
+    fn kind(&self) -> String {
+        Change::kinds(self.changes())
+    }
 }
 
 /// What stays the same during a diagnosis.
@@ -160,9 +177,9 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             s.not_tried.push("whatever a further round would have tried: no time left".into());
             break;
         }
-        match s.round(&state, out.accepted.len() + 1) {
+        match s.round(&state, out.accepted.len() + 1, options.rounds - out.accepted.len()) {
             Ok((Some((found, next)), _)) => {
-                out.accepted.push(found);
+                out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
                 s.settle(&mut state, met(&base.readings));
             }

@@ -35,6 +35,12 @@ fn two_hidden_effects_are_both_named() {
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     let kinds: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.kind.as_str()).collect();
     assert!(kinds.contains(&"coulomb-friction") && kinds.contains(&"depth-bias"), "{}", d.sentence());
+    // In one round, as a pair: neither alone explains the recording.
+    let pairs = |t: &&crate::diagnosis::Tried| t.kind.contains(" + ") && t.held_out_gain.is_some();
+    let pair = d.tried.iter().find(pairs).unwrap_or_else(|| panic!("{:?}", d.tried));
+    assert!(pair.round == 1 && pair.kind.contains("coulomb-friction") && pair.kind.contains("depth-bias"), "{pair:?}");
+    // What the pair is, with something beside it, is no other explanation.
+    assert!(d.effects.iter().all(|e| e.indistinguishable_from.is_empty()), "{:?}", d.effects);
 }
 
 #[test]
@@ -66,7 +72,11 @@ fn an_answer_says_what_there_was_no_time_for() {
     let baseline = bench.baseline();
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", d.sentence());
-    assert!(d.sentence().ends_with("The search ended before it had tried to the end: depth-bias."), "{}", d.sentence());
+    assert!(
+        d.sentence().ends_with("The search ended before it had tried to the end: uniform-force + depth-bias."),
+        "{}",
+        d.sentence()
+    );
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Which of the fitted candidates is named, and which others are as good.
 
 use super::{Fitted, Session, State, met};
+use crate::change::Change;
 use crate::crossval::{Predicted, worse_by};
 
 /// The share of the gap that one more number must close to be worth it; candidates that differ by less than twice as much count as equal.
@@ -28,10 +29,21 @@ fn share(best: &Predicted, whole: &Predicted) -> f64 {
 }
 
 impl Session<'_> {
+    /// True if each effect of a pair closes as much of the gap that the other one leaves as an effect that is added later must.
+    fn both_help(&self, pair: &Fitted, fitted: &[Fitted]) -> bool {
+        let has = |c: &Change| pair.changes().iter().any(|p| p.kind() == c.kind());
+        let half = |f: &&Fitted| f.effects < pair.effects && f.changes().iter().all(has);
+        fitted.iter().filter(half).all(|f| self.gain(&f.state, &pair.state) >= self.options.least_gain)
+    }
+
     /// The candidate to be named and those that the data cannot tell from the best, itself among them; candidates come best prediction
     /// first. `None` when none passes.
-    pub(super) fn choose(&self, state: &State, fitted: &[Fitted]) -> Option<(usize, Vec<usize>)> {
-        let passes = |i: usize| fitted[i].p_value < self.options.significance && fitted[i].gain >= self.options.least_gain;
+    pub(super) fn choose(&self, state: &State, fitted: &[Fitted], count: f64) -> Option<(usize, Vec<usize>)> {
+        let least = self.options.least_gain;
+        let passes = |i: usize| {
+            let f = &fitted[i];
+            f.p_value < self.options.significance && f.gain >= least && self.both_help(f, fitted)
+        };
         let best = (0..fitted.len()).find(|i| passes(*i))?;
         let predicted = |i: usize| -> &Predicted { &fitted[i].state.predicted[0] };
         let share = share(predicted(best), &state.predicted[0]);
@@ -47,16 +59,25 @@ impl Session<'_> {
         };
         // Every number has its price.
         let price = price(met(&state.readings), predicted(best), &state.predicted[0]);
-        let worth = |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64;
+        // A second effect is chosen from as many as the first (Chen & Chen, Biometrika 95, 2008).
+        let choice = 2.0 * count.max(1.0).ln() * misfit(predicted(best)).max(1.0);
+        let worth =
+            |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64 + choice * (fitted[*i].effects - 1) as f64;
         let able = (0..fitted.len()).filter(|i| passes(*i));
         let leader = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
         // Of what the data cannot tell from that, the plainest (Breiman et al., Classification and Regression Trees, 1984: one standard error).
-        let plainer = |i: &usize| fitted[*i].freedom < fitted[leader].freedom && as_good(*i, leader) && as_good(*i, best);
+        let plainer = |i: &usize| {
+            fitted[*i].effects <= fitted[leader].effects
+                && fitted[*i].freedom < fitted[leader].freedom
+                && as_good(*i, leader)
+                && as_good(*i, best)
+        };
         let by_freedom = |a: &usize, b: &usize| fitted[*a].freedom.cmp(&fitted[*b].freedom).then(worth(a).total_cmp(&worth(b)));
         let first = able.clone().filter(plainer).min_by(by_freedom).unwrap_or(leader);
         // What predicts the same with as many numbers is named in the table's order: the plainer cause first.
         let like_first = |i: &usize| {
-            fitted[*i].freedom == fitted[first].freedom && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
+            (fitted[*i].freedom, fitted[*i].effects) == (fitted[first].freedom, fitted[first].effects)
+                && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
         };
         let winner = able.filter(like_first).min_by_key(|i| fitted[*i].candidate).unwrap_or(first);
         // Of what is as good as the best, or as what is named.

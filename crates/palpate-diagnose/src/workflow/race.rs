@@ -2,7 +2,6 @@
 //! Talwalkar, *AISTATS* 2016).
 
 use super::{Session, State, Variant, keep_first};
-use crate::change::Change;
 use crate::laboratory::{Fit, LabError, Number, Start};
 use crate::linear::least_squares;
 
@@ -54,7 +53,7 @@ impl Session<'_> {
                         }
                     }
                     Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                    Err(why) => self.missed(&running[i].0.change, &why),
+                    Err(why) => self.missed(&running[i].0.kind(), &why),
                 }
             }
             let reached = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost);
@@ -94,9 +93,9 @@ impl Session<'_> {
     }
 
     /// Notes that a hypothesis could not be tried.
-    pub(super) fn missed(&mut self, change: &Change, why: &LabError) {
+    pub(super) fn missed(&mut self, kind: &str, why: &LabError) {
         self.no_time |= *why == LabError::NoTime;
-        let line = format!("{}: {why}", change.kind());
+        let line = format!("{kind}: {why}");
         if !self.not_tried.contains(&line) {
             self.not_tried.push(line);
         }
@@ -117,7 +116,7 @@ pub(super) fn moves(state: &State, y: &[f64]) -> Vec<f64> {
 /// A candidate at a share of its linear estimate, with the fitted numbers where they best go with it.
 fn start(state: &State, v: &Variant, share: f64) -> Start {
     let mut changes = state.model.changes.clone();
-    changes.push(v.change.clone());
+    changes.extend_from_slice(&v.changes);
     let step = |k: usize| share * v.score.step[k].clamp(v.bounds[k].0, v.bounds[k].1);
     let mut y = state.table.y.clone();
     for (k, c) in v.columns.iter().enumerate() {

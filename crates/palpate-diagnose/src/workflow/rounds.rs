@@ -23,13 +23,13 @@ const ELSEWHERE: (usize, usize) = (10, 3);
 
 /// A wall that helps as it stands: what others promise after a fit does not compare.
 fn is_wall(v: &Variant) -> bool {
-    v.change.blunt().is_some() && v.score.share > WALL
+    v.blunt().is_some() && v.score.share > WALL
 }
 
 /// The most promising further starts of candidates at unknown places, of variants sorted by what they promise.
 fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Variant> {
     let mut out: Vec<&Variant> = Vec::new();
-    for v in variants.iter().filter(|v| !v.amplitudes.iter().all(|a| *a) && !taken(v)) {
+    for v in variants.iter().filter(|v| !v.is_certain() && !taken(v)) {
         if out.len() < ELSEWHERE.0 && out.iter().filter(|o| o.candidate == v.candidate).count() < ELSEWHERE.1 {
             out.push(v);
         }
@@ -37,10 +37,22 @@ fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Var
     out
 }
 
+/// The best prediction first, each candidate once.
+fn ranked(mut all: Vec<Fitted>) -> Vec<Fitted> {
+    all.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
+    keep_first(&mut all, |f| f.candidate);
+    all
+}
+
 impl Session<'_> {
-    /// One round: the accepted effect with its state, or the candidates that came closest.
+    /// One round: the accepted effect with its state (two effects where there is room for them), or the candidates that came closest.
     #[expect(clippy::type_complexity, reason = "one caller, which takes it apart at once")]
-    pub(super) fn round(&mut self, state: &State, round: usize) -> Result<(Option<(Found, State)>, Vec<Found>), LabError> {
+    pub(super) fn round(
+        &mut self,
+        state: &State,
+        round: usize,
+        room: usize,
+    ) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
         let mut variants = match self.scored.take() {
             Some(v) => v,
             None => self.variants(state)?,
@@ -54,13 +66,12 @@ impl Session<'_> {
             let before = seen.iter().filter(|c| **c == v.candidate).count();
             seen.push(v.candidate);
             if before == 0 {
-                let (kind, promised, p_value) = (v.change.kind().to_string(), v.score.share, v.score.p_value);
-                self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
+                self.note(round, v);
             }
             // The best start of a candidate, a second one where it acts at an unknown place, and several of walls.
             let starts = match v {
                 wall if is_wall(wall) => WALLS,
-                certain if certain.amplitudes.iter().all(|a| *a) => 1,
+                certain if certain.is_certain() => 1,
                 _ => 2,
             };
             if before < starts && (tries.len() < fits + fits / 2 || is_wall(v)) {
@@ -80,14 +91,30 @@ impl Session<'_> {
                 fitted.extend(self.fitted(state, &further, &CAREFUL, count)?);
             }
         }
-        fitted.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
-        keep_first(&mut fitted, |f| f.candidate);
+        let mut fitted = ranked(fitted);
+        if room > 1 && !self.lab.out_of_time() {
+            let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].freedom);
+            let fewer_than = if self.explained(state, &fitted) { named } else { usize::MAX };
+            let pairs = self.pairs(state, &fitted, &variants, fewer_than)?;
+            pairs.iter().for_each(|(_, p)| self.note(round, p));
+            let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from, v)).collect();
+            if !tries.is_empty() {
+                fitted.extend(self.fitted(state, &tries, &STARTS, count)?);
+                fitted = ranked(fitted);
+            }
+        }
         for f in &fitted {
-            let kind = f.state.model.changes.last().map_or("", Change::kind);
+            let kind = f.kind();
             let mine = self.tried.iter_mut().find(|t| t.round == round && t.kind == kind && t.held_out_gain.is_none());
             mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
         }
-        self.decide(state, fitted)
+        self.decide(state, fitted, count)
+    }
+
+    /// Notes that a candidate is looked at.
+    fn note(&mut self, round: usize, v: &Variant) {
+        let (kind, promised, p_value) = (v.kind(), v.score.share, v.score.p_value);
+        self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
     }
 
     /// Fits variants and judges what arrives.
@@ -107,7 +134,7 @@ impl Session<'_> {
             match readings {
                 Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings, count)?),
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                Err(why) => self.missed(&v.change, &why),
+                Err(why) => self.missed(&v.kind(), &why),
             }
         }
         Ok(fitted)
@@ -164,13 +191,19 @@ impl Session<'_> {
         let freedom = v.columns.len();
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * count).min(1.0);
+        let gain = self.gain(state, &new);
+        Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, effects: v.changes.len() })
+    }
+
+    /// Share of the gap that one model leaves which another closes, on data left out, in whichever way of leaving some out it is least.
+    pub(super) fn gain(&self, state: &State, new: &State) -> f64 {
         let gains = state.predicted.iter().zip(&new.predicted);
         let gains = gains.map(|(b, a)| (b.loss() - a.loss()) / (b.loss() - b.floor).max(0.02 * b.floor));
-        let mut gain = gains.fold(1.0, f64::min);
-        if let (Some(b), Some(a)) = (self.held_out(state), self.held_out(&new)) {
-            gain = gain.min((b.rms * b.rms - a.rms * a.rms) / b.gap().max(0.02 * b.noise * b.noise));
+        let gain = gains.fold(1.0, f64::min);
+        match (self.held_out(state), self.held_out(new)) {
+            (Some(b), Some(a)) => gain.min((b.rms * b.rms - a.rms * a.rms) / b.gap().max(0.02 * b.noise * b.noise)),
+            _ => gain,
         }
-        Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom })
     }
 
     /// Distance of a model from the data that no fit has seen, but for errors of the discretisation.
@@ -180,20 +213,27 @@ impl Session<'_> {
 
     /// Chooses among fitted candidates, best prediction first.
     #[expect(clippy::type_complexity, reason = "as `round`")]
-    fn decide(&mut self, state: &State, fitted: Vec<Fitted>) -> Result<(Option<(Found, State)>, Vec<Found>), LabError> {
-        let Some((winner, equal)) = self.choose(state, &fitted) else {
-            return Ok((None, fitted.iter().take(3).map(|f| self.found(f, false)).collect()));
+    fn decide(
+        &mut self,
+        state: &State,
+        fitted: Vec<Fitted>,
+        count: f64,
+    ) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
+        let Some((winner, equal)) = self.choose(state, &fitted, count) else {
+            return Ok((None, fitted.iter().take(3).flat_map(|f| self.found(f, false)).collect()));
         };
         let mut found = self.found(&fitted[winner], true);
-        for &other in equal.iter().filter(|i| **i != winner) {
-            let change = fitted[other].state.model.changes.last();
-            found.indistinguishable_from.extend(change.map(|c| c.kind().to_string()));
+        let named = |i: usize| fitted[i].changes().iter().map(Change::kind);
+        // The same with something added to it is nothing else.
+        let else_ = |i: &&usize| **i != winner && !named(winner).all(|kind| named(**i).any(|k| k == kind));
+        for &other in equal.iter().filter(else_) {
+            found[0].indistinguishable_from.push(fitted[other].kind());
         }
-        if let Some(&other) = equal.iter().find(|i| **i != winner) {
+        if let Some(&other) = equal.iter().find(else_) {
             self.lab.say("looking for a measurement that separates candidates");
             let mut ways = self.lab.separations(&fitted[winner].state.model, &fitted[other].state.model);
             ways.sort_by(|a, b| b.1.total_cmp(&a.1));
-            found.separated_by = ways.into_iter().next();
+            found[0].separated_by = ways.into_iter().next();
         }
         let mut fitted = fitted;
         let mut next = fitted.swap_remove(winner).state;
@@ -204,20 +244,25 @@ impl Session<'_> {
         Ok((Some((found, next)), Vec::new()))
     }
 
-    fn found(&self, f: &Fitted, accepted: bool) -> Found {
+    /// What a candidate adds, effect by effect.
+    fn found(&self, f: &Fitted, accepted: bool) -> Vec<Found> {
         let model = &f.state.model;
-        let change = model.changes.last();
-        let own = model.values.len() - f.freedom;
-        Found {
-            kind: change.map_or("", Change::kind).into(),
-            sentence: change.map_or("", Change::sentence).into(),
-            parameters: (own..model.values.len()).map(|k| model.found(k)).collect(),
-            p_value: f.p_value,
-            held_out_gain: f.gain.clamp(0.0, 1.0),
-            accepted,
-            indistinguishable_from: Vec::new(),
-            separated_by: None,
-        }
+        let mut next = model.values.len() - f.freedom;
+        let mut found = |change: &Change| {
+            let own = next..next + change.free_slots().len();
+            next = own.end;
+            Found {
+                kind: change.kind().into(),
+                sentence: change.sentence().into(),
+                parameters: own.map(|k| model.found(k)).collect(),
+                p_value: f.p_value,
+                held_out_gain: f.gain.clamp(0.0, 1.0),
+                accepted,
+                indistinguishable_from: Vec::new(),
+                separated_by: None,
+            }
+        };
+        f.changes().iter().map(&mut found).collect()
     }
 }
 
@@ -229,7 +274,7 @@ mod tests {
     fn variant(candidate: usize, kind: &str, amplitudes: &[bool], share: f64) -> Variant {
         Variant {
             candidate,
-            change: Change::Effect(Effect::absent(find(kind).unwrap())),
+            changes: vec![Change::Effect(Effect::absent(find(kind).unwrap()))],
             columns: Vec::new(),
             amplitudes: amplitudes.to_vec(),
             start: Vec::new(),

@@ -15,14 +15,32 @@ const REACH: f64 = 0.25;
 /// A variant of a candidate with its columns where it is absent.
 pub(super) struct Variant {
     pub candidate: usize,
-    pub change: Change,
-    /// Of every free number of the change, `[k][m]`.
+    /// What it adds: one change, or two at once.
+    pub changes: Vec<Change>,
+    /// Of every free number of the changes, `[k][m]`.
     pub columns: Vec<Vec<f64>>,
     /// Which of them count at "absent".
     pub amplitudes: Vec<bool>,
     pub start: Vec<f64>,
     pub bounds: Vec<(f64, f64)>,
     pub score: Score,
+}
+
+impl Variant {
+    /// Its name, of two joined by a plus.
+    pub fn kind(&self) -> String {
+        Change::kinds(&self.changes)
+    }
+
+    /// Sizes of its numbers that show whether it helps, where small ones do not tell ([`Change::blunt`]).
+    pub fn blunt(&self) -> Option<Vec<f64>> {
+        if let [change] = &self.changes[..] { change.blunt() } else { None }
+    }
+
+    /// True where every number has a derivative at "absent": there is one place to start from.
+    pub fn is_certain(&self) -> bool {
+        self.amplitudes.iter().all(|a| *a)
+    }
 }
 
 impl Session<'_> {
@@ -46,7 +64,7 @@ impl Session<'_> {
     }
 
     /// These variants (which pass, number of their candidate, change), scored where they are absent.
-    fn scored(&mut self, state: &State, wanted: Vec<(bool, usize, Change)>) -> Result<Vec<Variant>, LabError> {
+    pub(super) fn scored(&mut self, state: &State, wanted: Vec<(bool, usize, Change)>) -> Result<Vec<Variant>, LabError> {
         let mut tries = Vec::new();
         let mut out: Vec<Variant> = Vec::new();
         let own = state.model.values.len();
@@ -65,7 +83,7 @@ impl Session<'_> {
                 candidate,
                 columns: Vec::new(),
                 amplitudes: change.amplitudes(),
-                change,
+                changes: vec![change],
                 start: values[own..].to_vec(),
                 bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
                 score: Score::default(),
@@ -83,7 +101,7 @@ impl Session<'_> {
                 }
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(LabError::Failed(_)) => {}
-                Err(LabError::NoTime) => self.missed(&v.change, &LabError::NoTime),
+                Err(LabError::NoTime) => self.missed(&v.kind(), &LabError::NoTime),
             }
         }
         self.score_walls(state, &mut kept);
@@ -95,7 +113,7 @@ impl Session<'_> {
     fn score_walls(&mut self, state: &State, variants: &mut [Variant]) {
         let mut walls: Vec<(&mut Variant, Vec<f64>)> = Vec::new();
         for v in variants {
-            if let Some(sizes) = v.change.blunt() {
+            if let Some(sizes) = v.blunt() {
                 walls.push((v, sizes));
             }
         }
@@ -103,7 +121,7 @@ impl Session<'_> {
             .iter()
             .map(|(v, sizes)| {
                 let mut changes = state.model.changes.clone();
-                changes.push(v.change.clone());
+                changes.extend_from_slice(&v.changes);
                 let own = state.model.values.iter().copied();
                 (changes, own.chain(v.start.iter().zip(sizes).map(|(s, size)| s + size)).collect::<Vec<f64>>())
             })
