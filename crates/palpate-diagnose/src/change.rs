@@ -48,6 +48,11 @@ impl Change {
         matches!(self, Change::Effect(e) if e.law().family == Family::Measurement)
     }
 
+    /// True for two effects of one family of laws: a gradient of the stiffness and a body of two parts describe the same.
+    pub fn is_kin(&self, other: &Change) -> bool {
+        matches!((self, other), (Change::Effect(a), Change::Effect(b)) if a.law().family == b.law().family)
+    }
+
     /// Places in the law's parameters of an effect that a fit may move, or 0 to n of freed numbers.
     pub fn free_slots(&self) -> Vec<usize> {
         match self {

@@ -36,8 +36,9 @@ impl Session<'_> {
     fn without(&mut self, state: &State, k: usize) -> Result<Option<State>, LabError> {
         let places = self.places(&state.model.changes)?;
         let freedom = places[k].len();
-        // With enough numbers anything is followed: a freer effect does not take the place of a plainer one.
-        if places.last().is_some_and(|newest| newest.len() > freedom) {
+        // With enough numbers anything is followed: a freer effect does not take the place of a plainer one, unless it says the same more exactly.
+        let kin = state.model.changes.last().is_some_and(|newest| newest.is_kin(&state.model.changes[k]));
+        if places.last().is_some_and(|newest| newest.len() > freedom) && !kin {
             return Ok(None);
         }
         let mut changes = state.model.changes.clone();
@@ -75,10 +76,10 @@ mod tests {
     use palpate_model::effects::{Effect, find};
 
     /// Kinds that are left of two that were accepted, and the stated number of the last.
-    fn left(hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
+    fn left(accepted: [&str; 2], hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
         let mut bench = Bench::new(11, hidden, false);
         let effect = |kind: &str| Change::Effect(Effect::absent(find(kind).unwrap()));
-        let changes = vec![effect("depth-bias"), effect("air-drag")];
+        let changes = accepted.map(effect).to_vec();
         let values = bench.numbers(&changes).unwrap().iter().map(|n| n.start).collect();
         let start = Start { changes, values, reach: f64::INFINITY };
         let model = bench.fit(&[start], 1, 0.0).remove(0).unwrap().model;
@@ -109,7 +110,7 @@ mod tests {
             indistinguishable_from: Vec::new(),
             separated_by: None,
         };
-        let mut accepted = vec![found("depth-bias"), found("air-drag")];
+        let mut accepted = accepted.map(found).to_vec();
         let state = s.prune(state, &mut accepted);
         assert_eq!(state.model.changes.len(), accepted.len());
         (accepted.iter().map(|f| f.kind.clone()).collect(), accepted.last().unwrap().parameters[0].1)
@@ -118,10 +119,20 @@ mod tests {
     #[test]
     fn what_a_later_effect_explains_is_dropped_and_what_is_needed_stays() {
         let (bias, drag) = (Bench::first_pattern("depth-bias"), Bench::first_pattern("air-drag"));
-        let (kinds, number) = left(&[(&drag, -1.5 * NOISE)]);
+        let both = ["depth-bias", "air-drag"];
+        let (kinds, number) = left(both, &[(&drag, -1.5 * NOISE)]);
         assert_eq!(kinds, ["air-drag"]);
         // Noise leaves 1/√5760 of 1 mm on the amplitude.
         assert!((number / (1.5 * NOISE) - 1.0).abs() < 0.05, "{number}");
-        assert_eq!(left(&[(&drag, -1.5 * NOISE), (&bias, 1.5 * NOISE)]).0, ["depth-bias", "air-drag"]);
+        assert_eq!(left(both, &[(&drag, -1.5 * NOISE), (&bias, 1.5 * NOISE)]).0, both);
+    }
+
+    #[test]
+    fn a_freer_effect_takes_the_place_of_a_plainer_one_of_its_kind_only() {
+        let (parts, force) = (Bench::first_pattern("two-part-stiffness"), Bench::first_pattern("uniform-force"));
+        let kin = ["stiffness-gradient", "two-part-stiffness"];
+        assert_eq!(left(kin, &[(&parts, -1.5 * NOISE)]).0, ["two-part-stiffness"]);
+        let strange = ["depth-bias", "uniform-force"];
+        assert_eq!(left(strange, &[(&force, -1.5 * NOISE)]).0, strange);
     }
 }
