@@ -14,12 +14,13 @@ use crate::change::Change;
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
+use crate::linear::dot;
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
 use crate::still::still_ratio;
 use palpate_engine::Source;
-use variants::Variant;
+use variants::{Variant, most_promising};
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +80,14 @@ struct State {
     held_out_finer: Vec<Field>,
 }
 
+impl State {
+    /// Sum of squares that the model leaves, but for what its free numbers and the discretisation explain.
+    fn squares(&self) -> f64 {
+        let left = self.frame.left();
+        dot(&left, &left)
+    }
+}
+
 /// A fitted candidate.
 struct Fitted {
     /// Its number in the table of candidates.
@@ -101,6 +110,11 @@ impl Fitted {
     /// Its name, of two joined by a plus.
     fn kind(&self) -> String {
         Change::kinds(self.changes())
+    }
+
+    /// True if another adds everything that this one does.
+    fn is_within(&self, other: &Fitted) -> bool {
+        self.changes().iter().all(|c| other.changes().iter().any(|o| o.kind() == c.kind()))
     }
 }
 
@@ -177,7 +191,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             s.not_tried.push("whatever a further round would have tried: no time left".into());
             break;
         }
-        match s.round(&state, out.accepted.len() + 1, options.rounds - out.accepted.len()) {
+        match s.round(&state, out.accepted.len() + 1) {
             Ok((Some((found, next)), _)) => {
                 out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
@@ -322,7 +336,7 @@ impl Session<'_> {
         let variants = self.variants(state).unwrap_or_default();
         let mut saturated = state.frame.absorbed.clone();
         let mut best: Vec<&Variant> = variants.iter().collect();
-        best.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        best.sort_by(|a, b| most_promising(a, b));
         for c in best.iter().flat_map(|v| &v.columns) {
             // A third of the cells stays free to show the noise.
             if saturated.rank() * 3 < self.cells.len() {

@@ -30,7 +30,8 @@ const INCIDENCE_FRAMES: usize = 12;
 pub struct ResidualSummary {
     /// Root mean square distance [m] over `points`; NaN without any.
     pub rms: f64,
-    /// What measurement noise would leave, and the shape's rounding by the cells of the grid [m]; not what cells and time step change in the motion.
+    /// What measurement noise would leave, and the shape's rounding by the cells of the grid [m]; not what cells and time step change
+    /// in the motion.
     pub noise: f64,
     /// Matched depth points and markers.
     pub points: usize,

@@ -1,7 +1,6 @@
 //! Which of the fitted candidates is named, and which others are as good.
 
 use super::{Fitted, Session, State, met};
-use crate::change::Change;
 use crate::crossval::{Predicted, worse_by};
 
 /// The share of the gap that one more number must close to be worth it; candidates that differ by less than twice as much count as equal.
@@ -31,19 +30,17 @@ fn share(best: &Predicted, whole: &Predicted) -> f64 {
 impl Session<'_> {
     /// True if each effect of a pair closes as much of the gap that the other one leaves as an effect that is added later must.
     fn both_help(&self, pair: &Fitted, fitted: &[Fitted]) -> bool {
-        let has = |c: &Change| pair.changes().iter().any(|p| p.kind() == c.kind());
-        let half = |f: &&Fitted| f.effects < pair.effects && f.changes().iter().all(has);
+        let half = |f: &&Fitted| f.effects < pair.effects && f.is_within(pair);
         fitted.iter().filter(half).all(|f| self.gain(&f.state, &pair.state) >= self.options.least_gain)
     }
 
     /// The candidate to be named and those that the data cannot tell from the best, itself among them; candidates come best prediction
     /// first. `None` when none passes.
     pub(super) fn choose(&self, state: &State, fitted: &[Fitted], count: f64) -> Option<(usize, Vec<usize>)> {
-        let least = self.options.least_gain;
-        let passes = |i: usize| {
-            let f = &fitted[i];
-            f.p_value < self.options.significance && f.gain >= least && self.both_help(f, fitted)
-        };
+        let (significance, least) = (self.options.significance, self.options.least_gain);
+        let pass = |f: &Fitted| f.p_value < significance && f.gain >= least && self.both_help(f, fitted);
+        let passing: Vec<bool> = fitted.iter().map(pass).collect();
+        let passes = |i: usize| passing[i];
         let best = (0..fitted.len()).find(|i| passes(*i))?;
         let predicted = |i: usize| -> &Predicted { &fitted[i].state.predicted[0] };
         let share = share(predicted(best), &state.predicted[0]);

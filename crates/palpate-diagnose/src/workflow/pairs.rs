@@ -1,10 +1,11 @@
 //! Two plain effects at once as one candidate: what a freer one follows, because with enough numbers anything is followed, may be two plain
 //! ones, neither of which explains much by itself.
 
-use super::variants::Variant;
+use super::variants::{Variant, most_promising};
 use super::{Fitted, Session, State, keep_first};
 use crate::laboratory::{LabError, Model};
-use crate::linear::dot;
+use crate::score::Score;
+use std::rc::Rc;
 
 /// Most numbers of an effect of a pair.
 const PLAIN: usize = 3;
@@ -27,14 +28,15 @@ impl Session<'_> {
         fitted: &[Fitted],
         variants: &[Variant],
         fewer_than: usize,
-    ) -> Result<Vec<(State, Variant)>, LabError> {
+    ) -> Result<Vec<(Rc<State>, Variant)>, LabError> {
         // The smallest pair has two.
         if fewer_than <= 2 {
             return Ok(Vec::new());
         }
         let plain = plain(variants);
         let mut out = self.partners(state, fitted, &plain, fewer_than)?;
-        out.extend(self.promising(state, &plain, fewer_than).into_iter().map(|v| (state.clone(), v)));
+        let baseline = Rc::new(state.clone());
+        out.extend(self.promising(state, &plain, fewer_than).into_iter().map(|v| (baseline.clone(), v)));
         keep_first(&mut out, |(_, v)| v.candidate);
         Ok(out)
     }
@@ -48,13 +50,14 @@ impl Session<'_> {
                 for b in &plain[i + 1..] {
                     let numbers = a.columns.len() + b.columns.len();
                     if class.contains(&numbers) && numbers < fewer_than {
-                        let both = self.both(state, a, b);
+                        let mut both = joined(a, b);
+                        both.score = self.score(state, &both);
                         let share = both.score.share;
                         these.extend((share >= PROMISE.0 && share >= a.score.share + PROMISE.1).then_some(both));
                     }
                 }
             }
-            these.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+            these.sort_by(most_promising);
             these.truncate(EACH);
             out.extend(these);
         }
@@ -69,71 +72,60 @@ impl Session<'_> {
         fitted: &[Fitted],
         plain: &[&Variant],
         fewer_than: usize,
-    ) -> Result<Vec<(State, Variant)>, LabError> {
-        let own = state.model.values.len();
-        let mut out: Vec<(State, Variant)> = Vec::new();
+    ) -> Result<Vec<(Rc<State>, Variant)>, LabError> {
+        let mut out: Vec<(Rc<State>, Variant)> = Vec::new();
         for f in fitted.iter().filter(|f| f.effects == 1 && plain.iter().any(|v| v.candidate == f.candidate)).take(HALVES) {
             let fits = |v: &&&Variant| v.candidate != f.candidate && v.columns.len() + f.freedom < fewer_than;
-            let wanted = plain.iter().filter(fits).map(|v| (true, v.candidate, v.changes[0].clone())).collect();
+            let wanted = plain.iter().filter(fits).map(|v| (v.candidate, v.changes[0].clone())).collect();
             let mut seconds = self.scored(&f.state, wanted)?;
-            seconds.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+            seconds.sort_by(most_promising);
             seconds.truncate(EACH);
-            seconds.retain(|v| squares(&f.state) - v.score.gain <= (1.0 - PROMISE.0) * squares(state));
-            let values = f.state.model.values[..own].to_vec();
-            let mut from = f.state.clone();
-            from.model = Model { values, ..state.model.clone() };
-            let columns = from.table.columns.split_off(own);
-            for b in seconds {
-                let mut step = vec![0.0; columns.len()];
-                step.extend_from_slice(&b.score.step);
-                let bounds = f.state.model.numbers[own..].iter().zip(&f.state.model.values[own..]);
-                let pair = Variant {
-                    candidate: number(f.candidate, b.candidate),
-                    changes: [f.changes(), &b.changes].concat(),
-                    columns: [&columns[..], &b.columns].concat(),
-                    amplitudes: vec![true; step.len()],
-                    start: [&f.state.model.values[own..], &b.start].concat(),
-                    bounds: bounds.map(|(n, v)| (n.bounds.0 - v, n.bounds.1 - v)).chain(b.bounds).collect(),
-                    score: crate::score::Score { step, ..b.score },
-                };
-                out.push((from.clone(), pair));
-            }
+            seconds.retain(|v| f.state.squares() - v.score.gain <= (1.0 - PROMISE.0) * state.squares());
+            let (from, half) = as_fitted(state, f);
+            let from = Rc::new(from);
+            out.extend(seconds.iter().map(|b| (from.clone(), joined(&half, b))));
         }
         Ok(out)
     }
+}
 
-    /// Both at once, where both are absent.
-    fn both(&self, state: &State, a: &Variant, b: &Variant) -> Variant {
-        let mut pair = Variant {
-            candidate: number(a.candidate, b.candidate),
-            changes: [&a.changes[..], &b.changes].concat(),
-            columns: [&a.columns[..], &b.columns].concat(),
-            amplitudes: [&a.amplitudes[..], &b.amplitudes].concat(),
-            start: [&a.start[..], &b.start].concat(),
-            bounds: [&a.bounds[..], &b.bounds].concat(),
-            score: Default::default(),
-        };
-        pair.score = self.score(state, &pair);
-        pair
+/// The baseline with its numbers as they were fitted beside an effect, and that effect as a variant that stands there already.
+fn as_fitted(state: &State, f: &Fitted) -> (State, Variant) {
+    let own = state.model.values.len();
+    let (mut from, fitted) = (f.state.clone(), &f.state.model);
+    from.model = Model { values: fitted.values[..own].to_vec(), ..state.model.clone() };
+    let columns = from.table.columns.split_off(own);
+    let start = fitted.values[own..].to_vec();
+    let half = Variant {
+        candidate: f.candidate,
+        changes: f.changes().to_vec(),
+        amplitudes: vec![true; start.len()],
+        bounds: fitted.numbers[own..].iter().zip(&start).map(|(n, v)| (n.bounds.0 - v, n.bounds.1 - v)).collect(),
+        score: Score { step: vec![0.0; start.len()], ..Score::default() },
+        columns,
+        start,
+    };
+    (from, half)
+}
+
+/// Both at once, each along its own step; the score is otherwise the second one's.
+fn joined(a: &Variant, b: &Variant) -> Variant {
+    Variant {
+        // Whichever of the two came first.
+        candidate: FIRST + 1000 * a.candidate.min(b.candidate) + a.candidate.max(b.candidate),
+        changes: [&a.changes[..], &b.changes].concat(),
+        columns: [&a.columns[..], &b.columns].concat(),
+        amplitudes: [&a.amplitudes[..], &b.amplitudes].concat(),
+        start: [&a.start[..], &b.start].concat(),
+        bounds: [&a.bounds[..], &b.bounds].concat(),
+        score: Score { step: [&a.score.step[..], &b.score.step].concat(), ..b.score.clone() },
     }
 }
 
-/// Sum of squares that a model leaves, but for what its free numbers and the discretisation explain.
-fn squares(state: &State) -> f64 {
-    let left = state.frame.left();
-    dot(&left, &left)
-}
-
-/// The best variants of plain effects, the most promising first.
+/// The best variants of plain effects, of variants sorted by what they promise.
 fn plain(variants: &[Variant]) -> Vec<&Variant> {
     let mut plain: Vec<&Variant> =
         variants.iter().filter(|v| v.is_certain() && v.blunt().is_none() && v.columns.len() <= PLAIN).collect();
-    plain.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
     keep_first(&mut plain, |v| v.candidate);
     plain
-}
-
-/// Number of a pair in the table of candidates, whichever of the two came first.
-fn number(a: usize, b: usize) -> usize {
-    FIRST + 1000 * a.min(b) + a.max(b)
 }

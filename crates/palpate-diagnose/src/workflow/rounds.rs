@@ -1,11 +1,10 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
 use super::race::{CAREFUL, STARTS};
-use super::{Fitted, Session, State, Variant, keep_first};
+use super::{Fitted, Session, State, Variant, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
-use crate::linear::dot;
 use crate::score::f_tail;
 
 /// Change of a fitted number, relative to its size, from which on the value that the baseline's fit started from counts as another place to
@@ -47,18 +46,13 @@ fn ranked(mut all: Vec<Fitted>) -> Vec<Fitted> {
 impl Session<'_> {
     /// One round: the accepted effect with its state (two effects where there is room for them), or the candidates that came closest.
     #[expect(clippy::type_complexity, reason = "one caller, which takes it apart at once")]
-    pub(super) fn round(
-        &mut self,
-        state: &State,
-        round: usize,
-        room: usize,
-    ) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
+    pub(super) fn round(&mut self, state: &State, round: usize) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
         let mut variants = match self.scored.take() {
             Some(v) => v,
             None => self.variants(state)?,
         };
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
-        variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        variants.sort_by(most_promising);
         let mut seen: Vec<usize> = Vec::new();
         let mut tries: Vec<(&State, &Variant)> = Vec::new();
         let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
@@ -83,21 +77,24 @@ impl Session<'_> {
             tries.extend(variants.iter().map(|v| (home, v)));
         }
         let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
-        if !self.explained(state, &fitted) && !self.lab.out_of_time() {
+        let mut explained = self.explained(state, &fitted);
+        if !explained && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
             let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
             let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
             if !further.is_empty() {
                 fitted.extend(self.fitted(state, &further, &CAREFUL, count)?);
+                explained = self.explained(state, &fitted);
             }
         }
         let mut fitted = ranked(fitted);
-        if room > 1 && !self.lab.out_of_time() {
+        // There must be room for both.
+        if round < self.options.rounds && !self.lab.out_of_time() {
             let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].freedom);
-            let fewer_than = if self.explained(state, &fitted) { named } else { usize::MAX };
+            let fewer_than = if explained { named } else { usize::MAX };
             let pairs = self.pairs(state, &fitted, &variants, fewer_than)?;
             pairs.iter().for_each(|(_, p)| self.note(round, p));
-            let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from, v)).collect();
+            let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
             if !tries.is_empty() {
                 fitted.extend(self.fitted(state, &tries, &STARTS, count)?);
                 fitted = ranked(fitted);
@@ -171,7 +168,7 @@ impl Session<'_> {
         let frame = self.frame(&table, &state.fields);
         let home = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
         let mut variants = self.variants(&home)?;
-        variants.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        variants.sort_by(most_promising);
         let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) = variants.into_iter().partition(is_wall);
         walls.truncate(WALLS);
         keep_first(&mut others, |v| v.candidate);
@@ -183,11 +180,7 @@ impl Session<'_> {
     /// What a fitted candidate is worth.
     fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
         let new = self.beside(state, model, readings)?;
-        let squares = |s: &State| {
-            let left = s.frame.left();
-            dot(&left, &left)
-        };
-        let (with, without) = (squares(&new), squares(state));
+        let (with, without) = (new.squares(), state.squares());
         let freedom = v.columns.len();
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * count).min(1.0);
@@ -223,15 +216,12 @@ impl Session<'_> {
             return Ok((None, fitted.iter().take(3).flat_map(|f| self.found(f, false)).collect()));
         };
         let mut found = self.found(&fitted[winner], true);
-        let named = |i: usize| fitted[i].changes().iter().map(Change::kind);
-        // The same with something added to it is nothing else.
-        let else_ = |i: &&usize| **i != winner && !named(winner).all(|kind| named(**i).any(|k| k == kind));
-        for &other in equal.iter().filter(else_) {
-            found[0].indistinguishable_from.push(fitted[other].kind());
-        }
-        if let Some(&other) = equal.iter().find(else_) {
+        // The winner itself, and the same with something added to it, are nothing else.
+        let others: Vec<&Fitted> = equal.iter().map(|i| &fitted[*i]).filter(|f| !fitted[winner].is_within(f)).collect();
+        found[0].indistinguishable_from.extend(others.iter().map(|f| f.kind()));
+        if let Some(other) = others.first() {
             self.lab.say("looking for a measurement that separates candidates");
-            let mut ways = self.lab.separations(&fitted[winner].state.model, &fitted[other].state.model);
+            let mut ways = self.lab.separations(&fitted[winner].state.model, &other.state.model);
             ways.sort_by(|a, b| b.1.total_cmp(&a.1));
             found[0].separated_by = ways.into_iter().next();
         }

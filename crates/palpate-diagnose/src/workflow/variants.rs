@@ -3,7 +3,6 @@
 use super::{Session, State};
 use crate::change::{Candidate, Change, candidates};
 use crate::laboratory::LabError;
-use crate::linear::dot;
 use crate::null::extended;
 use crate::score::{Score, score};
 
@@ -24,6 +23,11 @@ pub(super) struct Variant {
     pub start: Vec<f64>,
     pub bounds: Vec<(f64, f64)>,
     pub score: Score,
+}
+
+/// Order of what variants promise, the most first.
+pub(super) fn most_promising(a: &Variant, b: &Variant) -> std::cmp::Ordering {
+    b.score.gain.total_cmp(&a.score.gain)
 }
 
 impl Variant {
@@ -50,25 +54,27 @@ impl Session<'_> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
         let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(FIRST_STARTS).max(1) };
-        let split = |(n, c): (usize, &Candidate)| -> Vec<(bool, usize, Change)> {
+        let (mut first, mut later) = (Vec::new(), Vec::new());
+        for (n, c) in all.iter().enumerate() {
             let by = stride(c);
-            c.variants.iter().enumerate().map(|(i, v)| (i % by == 0, n, v.clone())).collect()
-        };
-        let (first, later): (Vec<_>, Vec<_>) = all.iter().enumerate().flat_map(split).partition(|(first, ..)| *first);
+            for (i, v) in c.variants.iter().enumerate() {
+                if i % by == 0 { &mut first } else { &mut later }.push((n, v.clone()));
+            }
+        }
         let mut scored = self.scored(state, first)?;
         let best = scored.iter().map(|v| v.score.gain).fold(0.0, f64::max);
         let within = |n: usize| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
-        let more: Vec<_> = later.into_iter().filter(|(_, n, _)| within(*n)).collect();
+        let more: Vec<_> = later.into_iter().filter(|(n, _)| within(*n)).collect();
         scored.extend(self.scored(state, more)?);
         Ok(scored)
     }
 
-    /// These variants (which pass, number of their candidate, change), scored where they are absent.
-    pub(super) fn scored(&mut self, state: &State, wanted: Vec<(bool, usize, Change)>) -> Result<Vec<Variant>, LabError> {
+    /// These variants (number of their candidate, change), scored where they are absent.
+    pub(super) fn scored(&mut self, state: &State, wanted: Vec<(usize, Change)>) -> Result<Vec<Variant>, LabError> {
         let mut tries = Vec::new();
         let mut out: Vec<Variant> = Vec::new();
         let own = state.model.values.len();
-        for (_, candidate, change) in wanted {
+        for (candidate, change) in wanted {
             let same =
                 |x: &Change| matches!((x, &change), (Change::Freed { name: a, .. }, Change::Freed { name: b, .. }) if a == b);
             if state.model.changes.iter().any(same) {
@@ -126,11 +132,11 @@ impl Session<'_> {
                 (changes, own.chain(v.start.iter().zip(sizes).map(|(s, size)| s + size)).collect::<Vec<f64>>())
             })
             .collect();
-        let left = state.frame.left();
+        let whole = state.squares();
         for ((v, sizes), cost) in walls.into_iter().zip(self.lab.costs(&tries)) {
             v.columns.iter_mut().flatten().for_each(|c| *c = 0.0);
             let share = (1.0 - cost / state.readings.cost).max(0.0);
-            v.score = Score { gain: share * dot(&left, &left), share, step: sizes, ..self.score(state, v) };
+            v.score = Score { gain: share * whole, share, step: sizes, ..self.score(state, v) };
         }
     }
 

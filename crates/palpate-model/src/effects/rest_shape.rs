@@ -11,7 +11,8 @@ use super::law::Number;
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, number};
 
 const STRETCH: &str = "the stress-free shape is longer by this part";
-const BEND: &str = "curvature of the stress-free shape: by ½ curvature · distance² from where the body is held (the middle of its first clamp, else its centre of mass)";
+const BEND: &str = "curvature of the stress-free shape: by ½ curvature · distance² from where the body is held (the middle of its first \
+                    clamp, else its centre of mass)";
 
 pub(super) const LAW: Law = Law {
     kind: "rest-shape",

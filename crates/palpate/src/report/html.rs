@@ -75,7 +75,8 @@ fn write_page(p: &mut String, input: &ReportInput) -> std::fmt::Result {
     writeln!(
         p,
         "<p>Root mean square distance between measurement and model: <b>{before}</b> at the first start, <b>{:.3} mm</b> with the \
-         values found; measurement noise, and the shape's rounding by cells, would leave {:.3} mm ({points} points); what cells and time step change, <code>--grid-check</code> tells.</p>",
+         values found; measurement noise, and the shape's rounding by cells, would leave {:.3} mm ({points} points); what cells and \
+         time step change, <code>--grid-check</code> tells.</p>",
         rms * 1e3,
         noise * 1e3
     )?;
