@@ -65,6 +65,16 @@ fn nothing_hidden_is_adequate() {
 }
 
 #[test]
+fn what_is_missing_does_not_hide_behind_the_discretisation() {
+    // It looks like what a finer grid changes, only that it is twenty times as large.
+    let mut bench = Bench::new(7, &[("grid", 4e-3)], false);
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert!(!matches!(d.verdict, Verdict::Adequate), "{}", d.sentence());
+    assert!(d.p_value < 0.01 && d.structure.0 > 1e-3, "{} {:?}", d.p_value, d.structure);
+}
+
+#[test]
 fn an_answer_says_what_there_was_no_time_for() {
     let (a, b) = (Bench::first_pattern("uniform-force"), Bench::first_pattern("depth-bias"));
     let mut bench = Bench::new(9, &[(&a, -2.0 * NOISE), (&b, 0.5 * NOISE)], false);

@@ -5,7 +5,7 @@ use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, Readings};
 use crate::linear::{Basis, least_squares};
-use crate::null::{Adequacy, Block};
+use crate::null::{Adequacy, Block, LARGEST};
 use palpate_engine::Source;
 
 /// Ridge that keeps errors of the discretisation apart that look the same.
@@ -31,7 +31,7 @@ impl Session<'_> {
     }
 
     /// The same with a mean square of discretisation per residual [m²], or with what finer computations would change: as much of each is
-    /// added, up to twice its size, as brings the residuals nearest to zero, and the share of it that is not known stays.
+    /// added, up to [`LARGEST`] times its size, as brings the residuals nearest to zero, and the share of it that is not known stays.
     pub(super) fn level_of(&self, readings: &Readings, grid: f64, finer: &[Field]) -> Level {
         let (mut sum, mut n) = (0.0, 0.0);
         let grid = grid + finer.iter().map(|f| f.rough.powi(2) * f.mean_square()).sum::<f64>();
@@ -44,7 +44,7 @@ impl Session<'_> {
         let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let mut y: Vec<f64> = readings.rows.iter().map(|r| r.row.value.unwrap_or(0.0)).collect();
         for (x, c) in least_squares(&chosen, &y, SMALL).unwrap_or_default().into_iter().zip(&chosen) {
-            y.iter_mut().zip(*c).for_each(|(y, c)| *y += x.clamp(-2.0, 2.0) * c);
+            y.iter_mut().zip(*c).for_each(|(y, c)| *y += x.clamp(-LARGEST, LARGEST) * c);
         }
         let values = readings.rows.iter().zip(y).map(|(r, y)| (r.row.source, r.row.value.map(|_| y)));
         Level { rms: rms(values), noise }

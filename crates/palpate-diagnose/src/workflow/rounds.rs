@@ -219,7 +219,9 @@ impl Session<'_> {
         // The winner itself, and the same with something added to it, are nothing else.
         let others: Vec<&Fitted> = equal.iter().map(|i| &fitted[*i]).filter(|f| !fitted[winner].is_within(f)).collect();
         found[0].indistinguishable_from.extend(others.iter().map(|f| f.kind()));
-        if let Some(other) = others.first() {
+        if !others.is_empty() && self.lab.out_of_time() {
+            self.not_tried.push("a measurement that separates what is indistinguishable: no time left".into());
+        } else if let Some(other) = others.first() {
             self.lab.say("looking for a measurement that separates candidates");
             let mut ways = self.lab.separations(&fitted[winner].state.model, &other.state.model);
             ways.sort_by(|a, b| b.1.total_cmp(&a.1));

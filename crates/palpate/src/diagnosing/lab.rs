@@ -46,6 +46,8 @@ pub(super) struct Lab<'a> {
     interrupt: Interrupt,
     checkpoint: Checkpoint,
     finer: Option<Vec<Experiment>>,
+    /// Refinements whose time is set aside of the search's.
+    set_aside: Vec<&'static str>,
     say: &'a mut (dyn FnMut(&str) + Send),
 }
 
@@ -88,8 +90,18 @@ impl<'a> Lab<'a> {
             interrupt: options.interrupt.clone(),
             checkpoint,
             finer: None,
+            set_aside: Vec::new(),
             say,
         })
+    }
+
+    /// Keeps as much of the search's time for the refinement of the answer as that of the baseline took, up to a quarter of what is left.
+    fn set_aside(&mut self, what: &'static str, began: Instant) {
+        if !self.set_aside.contains(&what) {
+            self.set_aside.push(what);
+            let quarter = |d: Instant| d.saturating_duration_since(Instant::now()) / 4;
+            self.deadline = self.deadline.map(|d| d - began.elapsed().min(quarter(d)));
+        }
     }
 
     fn key(&self, start: &Start, effort: (usize, f64)) -> String {
@@ -365,6 +377,7 @@ impl Laboratory for Lab<'_> {
         if self.interrupt.is_raised() {
             return Err(LabError::Interrupted);
         }
+        let began = Instant::now();
         let ready = prepare(&self.base, changes).map_err(lab_error)?;
         let none = ready.free.len();
         let coarse = linearise(&ready, values, none)?;
@@ -379,6 +392,7 @@ impl Laboratory for Lab<'_> {
         };
         let (grid, step) = rayon::join(|| change("grid", &fine, GRID), || change("step", &short, STEP));
         let is_static = self.base.iter().all(|e| e.plan.clock.steps == 0);
+        self.set_aside("recordings", began);
         Ok(if is_static { vec![grid?] } else { vec![grid?, step?] })
     }
 
@@ -397,7 +411,7 @@ impl Laboratory for Lab<'_> {
         coarse: &Readings,
     ) -> Result<Vec<Field>, LabError> {
         let Some(e) = self.held_out else { return Ok(Vec::new()) };
-        let (base, backend) = (&self.base, self.backend);
+        let (base, backend, began) = (&self.base, self.backend, Instant::now());
         let mut fields = Vec::new();
         for (name, e, factor) in [("grid", finer(e).map_err(lab_error)?, GRID), ("step", halved(e.clone()), STEP)] {
             let mut model = model.clone();
@@ -407,6 +421,7 @@ impl Laboratory for Lab<'_> {
             }
             fields.push(difference(name, &held_out(&e, base, backend, &model)?, coarse, factor));
         }
+        self.set_aside("held out", began);
         Ok(fields)
     }
 
