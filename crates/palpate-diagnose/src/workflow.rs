@@ -6,6 +6,7 @@ mod conclude;
 mod pairs;
 mod prune;
 mod race;
+mod replace;
 mod rounds;
 mod variants;
 
@@ -196,6 +197,11 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
                 out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
                 s.settle(&mut state, met(&base.readings));
+                if let Some(mut other) = s.replace(&state, &mut out.accepted) {
+                    s.refine(&mut other);
+                    state = s.prune(other, &mut out.accepted);
+                    s.settle(&mut state, met(&base.readings));
+                }
             }
             Ok((None, close)) => {
                 out.close = close;
@@ -255,6 +261,13 @@ impl Session<'_> {
         let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
         all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
         all
+    }
+
+    /// Brings errors of the discretisation up to date: with another effect in place they are others.
+    fn refine(&mut self, state: &mut State) {
+        state.fields = self.finer(&state.model);
+        state.held_out_finer = self.held_out_finer(state);
+        self.remeasure(state);
     }
 
     /// Everything known about a model; means of cells that it lost are taken over from another one's.

@@ -41,21 +41,32 @@ impl Session<'_> {
         if places.last().is_some_and(|newest| newest.len() > freedom) && !kin {
             return Ok(None);
         }
-        let mut changes = state.model.changes.clone();
-        changes.remove(k);
-        let kept = (0..state.model.values.len()).filter(|i| !places[k].contains(i));
+        let less = self.refitted_without(state, &[k])?;
+        Ok(self.is_as_good(&less, state, freedom as f64).then_some(less))
+    }
+
+    /// The state without some of its changes, fitted again.
+    pub(super) fn refitted_without(&mut self, state: &State, dropped: &[usize]) -> Result<State, LabError> {
+        let places = self.places(&state.model.changes)?;
+        let left = state.model.changes.iter().enumerate().filter(|(k, _)| !dropped.contains(k));
+        let kept = (0..state.model.values.len()).filter(|i| dropped.iter().all(|k| !places[*k].contains(i)));
+        let changes = left.map(|(_, c)| c.clone()).collect();
         let values = kept.map(|i| state.model.values[i]).collect();
         let start = Start { changes, values, reach: f64::INFINITY };
         let fit = super::one(self.lab.fit(&[start], EFFORT.0, EFFORT.1))?;
         let readings = super::one(self.lab.linearise(&[(fit.model.changes.clone(), fit.model.values.clone())]))?;
-        let less = self.beside(state, fit.model, readings)?;
+        self.beside(state, fit.model, readings)
+    }
+
+    /// True if a model predicts the recording as well as another one with so many more numbers, but for the price of these.
+    pub(super) fn is_as_good(&self, less: &State, state: &State, more: f64) -> bool {
         let (with, without) = (&state.predicted[0], &less.predicted[0]);
         let price = price(super::met(&state.readings), with, without);
-        let worse_elsewhere = self.held_out(&less).zip(self.held_out(state)).is_some_and(|(a, b)| {
+        let worse_elsewhere = self.held_out(less).zip(self.held_out(state)).is_some_and(|(a, b)| {
             // Data that no fit has seen decide where there are any: a tenth of their noise is no loss.
             a.rms * a.rms > b.rms * b.rms + 0.01 * b.noise * b.noise
         });
-        Ok((without.loss() - with.loss() < price * freedom as f64 && !worse_elsewhere).then_some(less))
+        without.loss() - with.loss() < price * more && !worse_elsewhere
     }
 
     /// Where the numbers of every change stand among all.
@@ -67,7 +78,7 @@ impl Session<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::cells::Cells;
     use crate::crossval::foldings;
@@ -75,8 +86,13 @@ mod tests {
     use crate::tests::bench::{Bench, NOISE};
     use palpate_model::effects::{Effect, find};
 
-    /// Kinds that are left of two that were accepted, and the stated number of the last.
-    fn left(accepted: [&str; 2], hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
+    /// A step that may leave out some of what was accepted.
+    pub(in crate::workflow) type Step = fn(&mut Session, State, &mut Vec<Found>) -> State;
+
+    const PRUNE: Step = |s, state, accepted| s.prune(state, accepted);
+
+    /// Kinds that a step leaves of two that were accepted, and the stated number of the last.
+    pub(in crate::workflow) fn left(step: Step, accepted: [&str; 2], hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
         let mut bench = Bench::new(11, hidden, false);
         let effect = |kind: &str| Change::Effect(Effect::absent(find(kind).unwrap()));
         let changes = accepted.map(effect).to_vec();
@@ -111,28 +127,28 @@ mod tests {
             separated_by: None,
         };
         let mut accepted = accepted.map(found).to_vec();
-        let state = s.prune(state, &mut accepted);
+        let state = step(&mut s, state, &mut accepted);
         assert_eq!(state.model.changes.len(), accepted.len());
-        (accepted.iter().map(|f| f.kind.clone()).collect(), accepted.last().unwrap().parameters[0].1)
+        (accepted.iter().map(|f| f.kind.clone()).collect(), accepted.last().unwrap().parameters.first().map_or(f64::NAN, |p| p.1))
     }
 
     #[test]
     fn what_a_later_effect_explains_is_dropped_and_what_is_needed_stays() {
         let (bias, drag) = (Bench::first_pattern("depth-bias"), Bench::first_pattern("air-drag"));
         let both = ["depth-bias", "air-drag"];
-        let (kinds, number) = left(both, &[(&drag, -1.5 * NOISE)]);
+        let (kinds, number) = left(PRUNE, both, &[(&drag, -1.5 * NOISE)]);
         assert_eq!(kinds, ["air-drag"]);
         // Noise leaves 1/√5760 of 1 mm on the amplitude.
         assert!((number / (1.5 * NOISE) - 1.0).abs() < 0.05, "{number}");
-        assert_eq!(left(both, &[(&drag, -1.5 * NOISE), (&bias, 1.5 * NOISE)]).0, both);
+        assert_eq!(left(PRUNE, both, &[(&drag, -1.5 * NOISE), (&bias, 1.5 * NOISE)]).0, both);
     }
 
     #[test]
     fn a_freer_effect_takes_the_place_of_a_plainer_one_of_its_kind_only() {
         let (parts, force) = (Bench::first_pattern("two-part-stiffness"), Bench::first_pattern("uniform-force"));
         let kin = ["stiffness-gradient", "two-part-stiffness"];
-        assert_eq!(left(kin, &[(&parts, -1.5 * NOISE)]).0, ["two-part-stiffness"]);
+        assert_eq!(left(PRUNE, kin, &[(&parts, -1.5 * NOISE)]).0, ["two-part-stiffness"]);
         let strange = ["depth-bias", "uniform-force"];
-        assert_eq!(left(strange, &[(&force, -1.5 * NOISE)]).0, strange);
+        assert_eq!(left(PRUNE, strange, &[(&force, -1.5 * NOISE)]).0, strange);
     }
 }

@@ -37,7 +37,7 @@ fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Var
 }
 
 /// The best prediction first, each candidate once.
-fn ranked(mut all: Vec<Fitted>) -> Vec<Fitted> {
+pub(super) fn ranked(mut all: Vec<Fitted>) -> Vec<Fitted> {
     all.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
     keep_first(&mut all, |f| f.candidate);
     all
@@ -115,7 +115,7 @@ impl Session<'_> {
     }
 
     /// Fits variants and judges what arrives.
-    fn fitted(
+    pub(super) fn fitted(
         &mut self,
         state: &State,
         tries: &[(&State, &Variant)],
@@ -229,15 +229,12 @@ impl Session<'_> {
         }
         let mut fitted = fitted;
         let mut next = fitted.swap_remove(winner).state;
-        // The discretisation errs in its own way with the effect in place.
-        next.fields = self.finer(&next.model);
-        next.held_out_finer = self.held_out_finer(&next);
-        self.remeasure(&mut next);
+        self.refine(&mut next);
         Ok((Some((found, next)), Vec::new()))
     }
 
     /// What a candidate adds, effect by effect.
-    fn found(&self, f: &Fitted, accepted: bool) -> Vec<Found> {
+    pub(super) fn found(&self, f: &Fitted, accepted: bool) -> Vec<Found> {
         let model = &f.state.model;
         let mut next = model.values.len() - f.freedom;
         let mut found = |change: &Change| {

@@ -51,13 +51,18 @@ impl Session<'_> {
     /// Variants of every candidate, scored where it is absent: of effects at an unknown place first a few, the others only of those that
     /// promise much.
     pub(super) fn variants(&mut self, state: &State) -> Result<Vec<Variant>, LabError> {
+        self.variants_of(state, |_| true)
+    }
+
+    /// The same of candidates whose changes are wanted.
+    pub(super) fn variants_of(&mut self, state: &State, wanted: impl Fn(&Change) -> bool) -> Result<Vec<Variant>, LabError> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
         let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(FIRST_STARTS).max(1) };
         let (mut first, mut later) = (Vec::new(), Vec::new());
         for (n, c) in all.iter().enumerate() {
             let by = stride(c);
-            for (i, v) in c.variants.iter().enumerate() {
+            for (i, v) in c.variants.iter().enumerate().filter(|(_, v)| wanted(v)) {
                 if i % by == 0 { &mut first } else { &mut later }.push((n, v.clone()));
             }
         }
