@@ -206,6 +206,10 @@ pub trait Laboratory {
     fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)>;
     /// True when the time that was allowed is over.
     fn out_of_time(&self) -> bool;
+    /// Iterations of fits that there is time for, about; with no limit of the time all that can be counted.
+    fn iterations_left(&self) -> usize {
+        usize::MAX
+    }
     /// True when asked to stop.
     fn interrupted(&self) -> bool;
     /// Hears what is going on.

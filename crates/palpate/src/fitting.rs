@@ -8,7 +8,7 @@ use crate::interrupt::Interrupt;
 use crate::residuals::ResidualSummary;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_fit::{
-    ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot,
+    ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
 };
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -31,6 +31,8 @@ pub struct FitOptions<'a> {
     pub starts: Option<usize>,
     /// Seed of the starts.
     pub seed: Option<u64>,
+    /// Decrease of the cost in an iteration, relative to the cost, at which a fit has arrived.
+    pub tolerance: Option<f64>,
     /// Threads; 0 = one per core.
     pub threads: Option<usize>,
     /// Stops the fit in good order.
@@ -138,6 +140,10 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         seed: options.seed.unwrap_or(spec.seed),
         errors: errors(experiments),
         ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
+    };
+    let settings = match options.tolerance {
+        Some(cost) => Settings { tolerance: Tolerance { cost, ..settings.tolerance }, ..settings },
+        None => settings,
     };
     let backend = options.backend.resolve(first.plan(), settings.starts.min(16)).0;
     let (numbers, free, mut warnings) = free_parameters(experiments)?;

@@ -20,6 +20,10 @@ const CLOSE: f64 = 2.0;
 /// Further starts of candidates at unknown places: in all, and of each.
 const ELSEWHERE: (usize, usize) = (10, 3);
 
+/// Iterations that a candidate of a race takes in the mean, and fewest candidates that race however little time there is.
+const RACE: usize = 9;
+const FEWEST: usize = 3;
+
 /// A wall that helps as it stands: what others promise after a fit does not compare.
 fn is_wall(v: &Variant) -> bool {
     v.blunt().is_some() && v.score.share > WALL
@@ -72,10 +76,11 @@ impl Session<'_> {
                 tries.push((state, v));
             }
         }
-        let home = if round == 1 { self.home(state)? } else { None };
+        let home = if round == 1 && self.affordable() > tries.len() { self.home(state)? } else { None };
         if let Some((home, variants)) = &home {
             tries.extend(variants.iter().map(|v| (home, v)));
         }
+        self.shorten(&mut tries);
         let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
         let mut explained = self.explained(state, &fitted);
         if !explained && !self.lab.out_of_time() {
@@ -106,6 +111,26 @@ impl Session<'_> {
             mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
         }
         self.decide(state, fitted, count)
+    }
+
+    /// Candidates that there is time to fit: a few that arrive say more than many that do not.
+    fn affordable(&self) -> usize {
+        (self.lab.iterations_left() / RACE).max(FEWEST)
+    }
+
+    /// Leaves out what there is no time for: of every candidate the best start comes before a second one of any.
+    fn shorten(&mut self, tries: &mut Vec<(&State, &Variant)>) {
+        let affordable = self.affordable();
+        if affordable < tries.len() {
+            let mut seen = Vec::new();
+            tries.sort_by_cached_key(|(_, v)| {
+                seen.push(v.candidate);
+                seen.iter().filter(|c| **c == v.candidate).count()
+            });
+            for (_, v) in tries.split_off(affordable) {
+                self.missed(&v.kind(), &LabError::NoTime);
+            }
+        }
     }
 
     /// Notes that a candidate is looked at.

@@ -254,6 +254,7 @@ pub fn run_in(
             iterations: a.iterations.map(|n| n as usize),
             starts: a.starts.map(|n| n as usize),
             seed: a.seed,
+            tolerance: None,
             threads: a.threads.map(|n| n as usize),
             interrupt: console.interrupt.clone(),
             journal: Some((journal, resume)),

@@ -31,6 +31,8 @@ const STEP: f64 = 2.0;
 const MEMORY: usize = 1 << 29;
 /// Newton's tolerance over the relative decrease of the cost that a fit is after: forces that are off by 1e-6 move costs by less than 1e-4.
 const NEWTON: f64 = 5e-3;
+/// Simulations with sensitivities that an iteration of a fit costs: that at its end, and costs along the way.
+const ITERATION: f64 = 3.0;
 /// Bytes of one tangent per node: displacement and velocity, before and after a step.
 const TANGENT: usize = 2 * 2 * 24;
 
@@ -48,6 +50,8 @@ pub(super) struct Lab<'a> {
     finer: Option<Vec<Experiment>>,
     /// Refinements whose time is set aside of the search's.
     set_aside: Vec<&'static str>,
+    /// Time that one thread takes for a hypothesis with its sensitivities [s]; 0 before the first one.
+    seconds: f64,
     say: &'a mut (dyn FnMut(&str) + Send),
 }
 
@@ -91,6 +95,7 @@ impl<'a> Lab<'a> {
             checkpoint,
             finer: None,
             set_aside: Vec::new(),
+            seconds: 0.0,
             say,
         })
     }
@@ -360,7 +365,11 @@ impl Laboratory for Lab<'_> {
     fn linearise(&mut self, tries: &[Try]) -> Vec<Result<Readings, LabError>> {
         let base = &self.base;
         let one = |(c, v): &Try| linearise(&prepare(base, c).map_err(lab_error)?, v, 0);
-        tries.par_iter().map(one).collect()
+        let began = Instant::now();
+        let all = tries.par_iter().map(one).collect();
+        let threads = rayon::current_num_threads().min(tries.len()) as f64;
+        self.seconds = threads * began.elapsed().as_secs_f64() / tries.len().max(1) as f64;
+        all
     }
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
@@ -427,6 +436,12 @@ impl Laboratory for Lab<'_> {
 
     fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)> {
         separations(&self.base, self.backend, a, b)
+    }
+
+    fn iterations_left(&self) -> usize {
+        let Some(deadline) = self.deadline else { return usize::MAX };
+        let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64() * rayon::current_num_threads() as f64;
+        (left / (ITERATION * self.seconds).max(1e-6)) as usize
     }
 
     fn out_of_time(&self) -> bool {

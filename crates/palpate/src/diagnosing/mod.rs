@@ -18,6 +18,9 @@ use palpate_model::effects::Effect;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+/// Relative decrease of the cost at which the baseline has arrived: what its numbers move by after that is projected out of everything.
+const BASELINE: f64 = 1e-6;
+
 /// How to run a diagnosis.
 #[derive(Default)]
 pub struct DiagnoseOptions<'a> {
@@ -88,7 +91,13 @@ pub fn diagnose(
         let journal = options.checkpoints.as_ref().map(|(folder, resume)| (folder.join("journal.jsonl"), *resume));
         let f = fit(
             experiments,
-            FitOptions { backend: options.backend, interrupt: options.interrupt.clone(), journal, ..FitOptions::default() },
+            FitOptions {
+                backend: options.backend,
+                tolerance: Some(BASELINE),
+                interrupt: options.interrupt.clone(),
+                journal,
+                ..FitOptions::default()
+            },
         )?;
         for (e, theta) in base.iter_mut().zip(&f.result.theta) {
             e.plan.theta.clone_from(theta);
