@@ -33,6 +33,8 @@ pub struct FreeParameter {
     pub start: (f64, f64),
     /// Places that follow it; at least one.
     pub slots: Vec<Slot>,
+    /// The vector that it is a component of, where only the direction of that counts: its length is no unknown.
+    pub direction: Option<String>,
 }
 
 /// One scene of a joint fit.

@@ -53,6 +53,21 @@ pub struct Uncertainty {
     pub(crate) tau: f64,
 }
 
+/// Unit vectors `[m]` along which vectors of which only the direction counts grow: that changes no residual and is no unknown.
+fn lengths(problem: &Problem, inner: &[usize], z: &[f64]) -> Vec<Vec<f64>> {
+    let values = problem.values(z);
+    let vector = |i: usize| problem.free()[i].direction.as_deref();
+    let names: std::collections::BTreeSet<&str> = inner.iter().filter_map(|i| vector(*i)).collect();
+    let along = |name: &str| -> Vec<f64> {
+        inner.iter().map(|&i| if vector(i) == Some(name) { values[i] / problem.charts()[i].slope(z[i]) } else { 0.0 }).collect()
+    };
+    let unit = |v: Vec<f64>| {
+        let size = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (size > 0.0).then(|| v.iter().map(|x| x / size).collect())
+    };
+    names.into_iter().filter_map(|n| unit(along(n))).collect()
+}
+
 /// Uncertainty at z `[q]`, from a sample by z there; without curvature there are no standard errors.
 pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel) -> Uncertainty {
     let q = z.len();
@@ -98,17 +113,25 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
         u.warnings.push("no standard errors: the cost counts no residuals".into());
         return u;
     }
-    let h: Vec<f64> = inner.iter().flat_map(|&i| inner.iter().map(move |&j| sample.curvature[i * q + j])).collect();
+    let mut h: Vec<f64> = inner.iter().flat_map(|&i| inner.iter().map(move |&j| sample.curvature[i * q + j])).collect();
+    let lengths = lengths(problem, &inner, z);
+    // Lengths become eigenvectors that nothing else mixes with.
+    let trace: f64 = (0..m).map(|a| h[a * m + a]).sum();
+    for e in &lengths {
+        (0..m * m).for_each(|k| h[k] += 2.0 * trace * e[k / m] * e[k % m]);
+    }
     let Some((values_h, vectors)) = eigen(&h, m) else {
         u.warnings.push("no standard errors: the curvature of the cost is not finite".into());
         return u;
     };
-    let largest = values_h.iter().fold(0.0, |a: f64, &b| a.max(b));
+    let is_length = |k: usize| lengths.iter().any(|e| e.iter().zip(&vectors[k]).map(|(e, v)| e * v).sum::<f64>().powi(2) > 0.5);
+    let largest = (0..m).filter(|k| !is_length(*k)).map(|k| values_h[k]).fold(0.0, f64::max);
     if largest <= 0.0 {
         u.warnings.push("no standard errors: no free parameter changes the cost".into());
         return u;
     }
-    let variances: Vec<f64> = values_h.iter().map(|v| u.tau / v.max(RANK * largest)).collect();
+    let variance = |k: usize| if is_length(k) { 0.0 } else { u.tau / values_h[k].max(RANK * largest) };
+    let variances: Vec<f64> = (0..m).map(variance).collect();
     let covariance = |a: usize, b: usize| -> f64 { (0..m).map(|k| variances[k] * vectors[k][a] * vectors[k][b]).sum() };
     let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
     for (a, &i) in inner.iter().enumerate() {
@@ -144,7 +167,10 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
     for a in 0..m {
         for b in a + 1..m {
             let r = u.correlation[inner[a]][inner[b]];
-            if r.abs() <= CORRELATED || told.iter().any(|t| t.contains(&a) && t.contains(&b)) {
+            let vector = |k: usize| &problem.free()[inner[k]].direction;
+            // Components of a direction turn together.
+            let turn = vector(a).is_some() && vector(a) == vector(b);
+            if turn || r.abs() <= CORRELATED || told.iter().any(|t| t.contains(&a) && t.contains(&b)) {
                 continue;
             }
             u.warnings.push(if sd[a].max(sd[b]) > KNOWN {

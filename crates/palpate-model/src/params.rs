@@ -118,6 +118,17 @@ impl ParamKey {
         };
         ParamSpec { key: self, path, unit, transform, lower, upper, typical, doc }
     }
+
+    /// Path of the vector that this is a component of, if only the direction of that counts.
+    pub fn direction(self) -> Option<String> {
+        match self {
+            ParamKey::Effect { effect, law, slot } => {
+                let p = &effects::ALL[usize::from(law)].params[usize::from(slot)];
+                p.is_direction().then(|| format!("effect.{effect}.{}", p.key))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// The parameters of one scene in their fixed order; θ vectors are indexed by it.

@@ -283,7 +283,9 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
             let spec = key.spec();
             let is_mass = p.path == "material.mass";
             let number = FreeNumber { path: p.path.clone(), scene: own.then_some(scene) };
+            let vector = |path| FreeNumber { path, scene: number.scene }.label();
             free.push(FreeParameter {
+                direction: key.direction().map(vector),
                 path: number.label(),
                 unit: if is_mass { "kg".into() } else { spec.unit.into() },
                 transform: spec.transform,

@@ -162,3 +162,20 @@ fn logits_have_errors_in_their_own_unit() {
     assert!((p.value - 0.3).abs() < 1e-6, "{p:?}");
     assert!((p.standard_error.expect("inside") / 0.002 - 1.0).abs() < 1e-4, "{p:?}");
 }
+
+#[test]
+fn a_direction_has_the_error_of_its_angle() {
+    // The angle of a vector in the plane, read 25 times with an error of 0.1 rad each: 0.02 rad.
+    let model = LeastSquares::new(2, |p| Some(vec![(p[1].atan2(p[0]) - 0.6) / 0.1; 25]));
+    let vector = |p| FreeParameter { direction: Some("v".into()), ..parameter(p, Transform::Linear, (-10.0, 10.0), (2.0, 2.0)) };
+    let mut problem = Problem::new(vec![scene(&[2.0, 2.0], model)], vec![vector(0), vector(1)]).expect("the problem is valid");
+    let fit = solve(&mut problem, &settings(Optimizer::GaussNewton));
+    let v = values(&fit);
+    let length = (v[0] * v[0] + v[1] * v[1]).sqrt();
+    for (p, across) in fit.parameters.iter().zip([v[1], v[0]]) {
+        // Central differences of the residuals.
+        let expected = 0.02 * length * (across / length).abs();
+        assert!((p.standard_error.unwrap() / expected - 1.0).abs() < 1e-4, "{p:?} {expected}");
+    }
+    assert!(fit.warnings.iter().all(|w| !w.contains("told apart") && !w.contains("determine")), "{:?}", fit.warnings);
+}

@@ -84,6 +84,7 @@ pub fn parameter(place: usize, transform: Transform, bounds: (f64, f64), start: 
         bounds,
         start,
         slots: vec![Slot { scene: 0, place, factor: 1.0 }],
+        direction: None,
     }
 }
 

@@ -237,6 +237,13 @@ const fn direction(key: &'static str, axis: u8, doc: &'static str) -> EffectPara
     EffectParam { default, lower: -1e3, upper: 1e3, ..p }
 }
 
+impl EffectParam {
+    /// True for a component of a vector of which only the direction counts.
+    pub fn is_direction(&self) -> bool {
+        self.axis.is_some() && self.unit == "1" && matches!(self.default, Unstated::Stated(_))
+    }
+}
+
 /// One coordinate of a place; the body's centre of mass unless stated.
 const fn place(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
     EffectParam { default: Unstated::OnBody, typical: 0.02, ..component(key, axis, "m", 0.02, doc) }
