@@ -66,6 +66,23 @@ impl Change {
         }
     }
 
+    /// What each free number is a component of: those of one vector are of one kind and size.
+    pub fn groups(&self) -> Vec<String> {
+        match self {
+            Change::Effect(e) => {
+                self.free_slots().into_iter().map(|s| format!("{} {}", e.law().kind, e.law().params[s].key)).collect()
+            }
+            Change::Freed { paths, .. } => {
+                // The axis, and a scene's name behind it, do not count.
+                let stem = |p: &String| {
+                    let path = p.split(' ').next().unwrap_or(p);
+                    ["x", "y", "z"].iter().find_map(|a| path.strip_suffix(&format!(".{a}"))).unwrap_or(path).to_string()
+                };
+                paths.iter().map(stem).collect()
+            }
+        }
+    }
+
     /// Sizes of the free numbers that show whether the change helps, where small ones do not tell.
     pub fn blunt(&self) -> Option<Vec<f64>> {
         let Change::Effect(e) = self else { return None };

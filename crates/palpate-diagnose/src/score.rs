@@ -3,7 +3,7 @@
 //! With the fitted numbers and the discretisation projected out of residuals y and of the candidate's columns C, the sum of squares falls by
 //! |P_C y|² when the candidate's amplitudes are set free (Rao, *Proc. Camb. Phil. Soc.* 44, 1948, for small changes).
 
-use crate::linear::{Basis, dot, least_squares};
+use crate::linear::{Basis, dot, least_squares, least_squares_in};
 use crate::null::Frame;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -30,14 +30,17 @@ pub struct Score {
     pub step: Vec<f64>,
 }
 
-/// Scores columns `[k][m + fields]` whose changes must stay within `bounds` (smallest and largest change).
-pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Score {
+/// Scores columns `[k][m + fields]` whose changes must stay within `bounds` (smallest and largest change). Those of one of the `groups` `[k]` are
+/// held back alike: a component that does next to nothing would else be taken far.
+pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)], groups: &[String]) -> Score {
     let y = frame.left();
     let total = dot(&y, &y);
     let bent: Vec<Vec<f64>> = columns.iter().map(|c| frame.absorbed.without(c)).collect();
     // A column that the fitted numbers absorb up to rounding says nothing of its own.
     let own = |k: usize| dot(&bent[k], &bent[k]) > 1e-8 * dot(&columns[k], &columns[k]);
     let mut active: Vec<usize> = (0..columns.len()).filter(|k| own(*k)).collect();
+    let length = |k: usize| dot(&bent[k], &bent[k]).sqrt();
+    let size = |k: usize| (0..columns.len()).filter(|j| groups[*j] == groups[k]).map(length).fold(0.0, f64::max);
     let mut out = Score { step: vec![0.0; columns.len()], p_value: 1.0, ..Score::default() };
     // Residuals with the changes that reached a bound.
     let mut y = y;
@@ -63,7 +66,10 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)]) -> Scor
         };
         out.gain = (total - remains(&x)).max(0.0);
         let near = |s: &Vec<f64>| total - remains(s) >= STEP_GAIN * out.gain;
-        let start = STEP_RIDGES.iter().filter_map(|r| solve(*r)).find(near).unwrap_or(x);
+        let sizes: Vec<f64> = active.iter().map(|k| size(*k)).collect();
+        let short = |ridge: &f64| least_squares_in(&chosen, &y, *ridge, &sizes);
+        let inside = |s: &Vec<f64>| active.iter().zip(s).all(|(k, x)| (bounds[*k].0..=bounds[*k].1).contains(x));
+        let start = STEP_RIDGES.iter().filter_map(short).find(|s| near(s) && inside(s)).unwrap_or(x);
         active.iter().zip(&start).for_each(|(k, x)| out.step[*k] = *x);
         out.freedom = Basis::new(active.iter().chain(&held).map(|k| &bent[*k])).rank();
         break;

@@ -172,10 +172,10 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let mut state = s.state(baseline.clone(), readings, fields, None)?;
     state.held_out_finer = s.held_out_finer(&state);
     s.correlate(&mut state);
-    let first = (state.readings.clone(), s.grid(&state));
+    let mut first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress { unsure, ..Progress::default() };
     let mut adequacy;
-    let base = state.clone();
+    let mut base = state.clone();
     loop {
         adequacy = s.adequacy(&state);
         if out.places.is_none() {
@@ -194,6 +194,14 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         }
         match s.round(&state, out.accepted.len() + 1) {
             Ok((Some((found, next)), _)) => {
+                if let Some(better) = s.better_baseline(&state, &next, found.len()) {
+                    state = better;
+                    if out.accepted.is_empty() {
+                        (base, out.places) = (state.clone(), None);
+                        first = (state.readings.clone(), s.grid(&state));
+                    }
+                    continue;
+                }
                 out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
                 s.settle(&mut state, met(&base.readings));

@@ -9,6 +9,9 @@ use crate::laboratory::{LabError, Start};
 /// Iterations and tolerance of a fit without an effect, which starts from a fit with it.
 const EFFORT: (usize, f64) = (20, 2e-5);
 
+/// Change of a fitted number, relative to its size, from which on it may lie in another valley.
+const FAR: f64 = 0.3;
+
 impl Session<'_> {
     /// Leaves out every effect but the newest in turn, fits the others again, and drops it when the recording is predicted as well without it, but for
     /// the price of its numbers. `accepted` are the effects of the state's changes, in their order.
@@ -30,6 +33,26 @@ impl Session<'_> {
             found.parameters = place.map(|i| state.model.found(i)).collect();
         }
         state
+    }
+
+    /// The model before a round at the numbers that the round's `added` effects led to, refined, if it explains as much there without them: the fit
+    /// had ended in another valley, and what looks like an effect only showed the way out of it.
+    pub(super) fn better_baseline(&mut self, before: &State, next: &State, added: usize) -> Option<State> {
+        let size = |k: usize| before.model.values[k].abs().max(before.model.numbers[k].scale);
+        let far = |k: usize| (next.model.values[k] - before.model.values[k]).abs() > FAR * size(k);
+        if self.lab.interrupted() || !(0..before.model.values.len()).any(far) {
+            return None;
+        }
+        self.lab.say("is the effect needed, or only the numbers that were fitted with it?");
+        let changes = next.model.changes.len();
+        let newest: Vec<usize> = (changes - added..changes).collect();
+        let mut less = self.refitted_without(next, &newest).ok()?;
+        let freedom = next.model.values.len() - before.model.values.len();
+        if !self.is_as_good(&less, next, freedom as f64) {
+            return None;
+        }
+        self.refine(&mut less);
+        Some(less)
     }
 
     /// The state without one of its changes, if that one is not worth its numbers.

@@ -150,7 +150,9 @@ impl Session<'_> {
         let chosen: Vec<usize> = (0..v.columns.len()).filter(|k| v.amplitudes[*k]).collect();
         let columns: Vec<Vec<f64>> = chosen.iter().map(|k| extended(&v.columns[*k], n)).collect();
         let bounds: Vec<(f64, f64)> = chosen.iter().map(|k| v.bounds[*k]).collect();
-        let mut s = score(&state.frame, &columns, &bounds);
+        let groups: Vec<String> = v.changes.iter().flat_map(Change::groups).collect();
+        let groups: Vec<String> = chosen.iter().map(|k| groups[*k].clone()).collect();
+        let mut s = score(&state.frame, &columns, &bounds, &groups);
         let mut step = vec![0.0; v.columns.len()];
         chosen.iter().zip(&s.step).for_each(|(k, x)| step[*k] = *x);
         s.step = step;

@@ -104,7 +104,6 @@ pub fn diagnose(
         }
         fitted = Some(f);
     }
-    let theta_before: Vec<Vec<f64>> = base.iter().map(|e| e.plan().theta.clone()).collect();
     let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
     let (backend, known, free) = (options.backend, &base, &fitted);
     let diagnosis = with_threads(threads, move || {
@@ -119,6 +118,8 @@ pub fn diagnose(
         let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
         palpate_diagnose::diagnose(&mut lab, model, &options.statistics).map_err(failed)
     })??;
+    let plain = hypothesis::prepare(&base, &[])?;
+    let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
     let model = &diagnosis.model;
     let ready = hypothesis::prepare(&base, &model.changes)?;
     let mut corrected = ready.experiments.clone();
