@@ -75,7 +75,7 @@ fn bars_of_uneven_stiffness_hang_as_their_integral_says() {
     let cases: [(Effect, &dyn Fn(f64) -> f64); 4] = [
         (effect("stiffness-gradient", &[("slope", &[12.0, 0.0, 0.0])]), &|x| (12.0 * from_center(x)).exp()),
         (effect("two-part-stiffness", &[("ratio", &[1.2]), ("position", &[0.02]), ("direction", &[-3.0, 0.0, 0.0])]), &|x| {
-            (0.6 * (1.0 + ((-from_center(x) - 0.02) / CELL).tanh())).exp()
+            (0.6 * (1.0 + (2.0 * (-from_center(x) - 0.02) / CELL).tanh())).exp()
         }),
         (effect("inclusion", &[("ratio", &[-1.0]), ("center", &[0.03, 0.005, 0.005]), ("radius", &[0.03])]), &|x| {
             (-(-((x - 0.03) / 0.03).powi(4)).exp()).exp()
