@@ -4,6 +4,7 @@ use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
 use super::others::{contact_times, held_out, separations, still_frames};
+use super::refined::{GRID, STEP, difference, finer, halved};
 use super::systematic::systematic;
 use super::walls::walls;
 use crate::engine::Backend;
@@ -21,12 +22,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Cells of the finer grid per cell along an edge: the cheapest that shows the error well.
-const FINER: f64 = 1.5;
-/// The error of the grid, which falls with the square of the cell, over what the finer grid changes.
-const GRID: f64 = 1.0 / (1.0 - 1.0 / (FINER * FINER));
-/// The error of the step, which falls with it, over what half the step changes.
-const STEP: f64 = 2.0;
 /// Most bytes of tangents of one simulation that computes the sensitivities of several hypotheses.
 const MEMORY: usize = 1 << 29;
 /// Newton's tolerance over the relative decrease of the cost that a fit is after: forces that are off by 1e-6 move costs by less than 1e-4.
@@ -292,29 +287,6 @@ fn many(base: &[Experiment], tries: &[Try], from: usize, limits: Limits) -> Vec<
             [many(base, a, from, limits), many(base, b, from, limits)].concat()
         }
     }
-}
-
-/// An experiment on finer cells, with the same step: that is halved by itself.
-fn finer(e: &Experiment) -> Result<Experiment, Error> {
-    let mut f = e.finer(FINER)?;
-    f.plan.clock = e.plan.clock;
-    f.plan.theta.clone_from(&e.plan.theta);
-    f.scene.fit.clone_from(&e.scene.fit);
-    Ok(f)
-}
-
-/// An experiment with half the step.
-fn halved(mut e: Experiment) -> Experiment {
-    e.plan.clock.step *= 0.5;
-    e.plan.clock.steps *= 2;
-    e
-}
-
-/// What a finer computation changed, carried on to the limit by a factor.
-fn difference(name: &'static str, fine: &Readings, coarse: &Readings, factor: f64) -> Field {
-    let both = fine.rows.iter().zip(coarse.rows.iter());
-    let change = both.map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
-    Field { name, change, rough: Field::REFINED }
 }
 
 impl Laboratory for Lab<'_> {

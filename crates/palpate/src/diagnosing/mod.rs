@@ -4,6 +4,7 @@ mod checkpoint;
 mod hypothesis;
 mod lab;
 mod others;
+mod refined;
 mod systematic;
 mod walls;
 
