@@ -67,9 +67,14 @@ impl Frame {
         self.absorbed.without(&self.y)
     }
 
-    /// The same of cells `[m]`, with no field taken more than a few times.
+    /// What of the fields free numbers do not absorb `[fields][m]`: only that shows in residuals.
+    pub fn visible(&self) -> Vec<Vec<f64>> {
+        self.fields.iter().map(|f| self.free.without(f)).collect()
+    }
+
+    /// Residuals after the refit in cells `[m]`, with no field taken more than a few times.
     pub fn left_within_reason(&self) -> Vec<f64> {
-        let bent: Vec<Vec<f64>> = self.fields.iter().map(|f| self.free.without(f)).collect();
+        let bent = self.visible();
         let mut left = self.free.without(&self.y[..self.y.len() - self.fields.len()]);
         let mut times = vec![0.0; bent.len()];
         for _ in 0..ROUNDS {

@@ -39,8 +39,8 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)], groups:
     // A column that the fitted numbers absorb up to rounding says nothing of its own.
     let own = |k: usize| dot(&bent[k], &bent[k]) > 1e-8 * dot(&columns[k], &columns[k]);
     let mut active: Vec<usize> = (0..columns.len()).filter(|k| own(*k)).collect();
-    let length = |k: usize| dot(&bent[k], &bent[k]).sqrt();
-    let size = |k: usize| (0..columns.len()).filter(|j| groups[*j] == groups[k]).map(length).fold(0.0, f64::max);
+    let lengths: Vec<f64> = bent.iter().map(|b| dot(b, b).sqrt()).collect();
+    let size = |k: usize| lengths.iter().zip(groups).filter(|(_, g)| **g == groups[k]).map(|(l, _)| *l).fold(0.0, f64::max);
     let mut out = Score { step: vec![0.0; columns.len()], p_value: 1.0, ..Score::default() };
     // Residuals with the changes that reached a bound.
     let mut y = y;

@@ -134,16 +134,14 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         }
     }
     let spec = specs(first).expect("every scene was just found to have a [fit]");
+    let usual = Tolerance::default();
     let settings = Settings {
         iterations: options.iterations.unwrap_or(spec.iterations),
         starts: options.starts.unwrap_or(spec.starts),
         seed: options.seed.unwrap_or(spec.seed),
         errors: errors(experiments),
+        tolerance: Tolerance { cost: options.tolerance.unwrap_or(usual.cost), ..usual },
         ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
-    };
-    let settings = match options.tolerance {
-        Some(cost) => Settings { tolerance: Tolerance { cost, ..settings.tolerance }, ..settings },
-        None => settings,
     };
     let backend = options.backend.resolve(first.plan(), settings.starts.min(16)).0;
     let (numbers, free, mut warnings) = free_parameters(experiments)?;

@@ -4,7 +4,7 @@ use super::{Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, Readings};
-use crate::linear::{Basis, least_squares};
+use crate::linear::least_squares;
 use crate::null::{Adequacy, Block, LARGEST};
 use palpate_engine::Source;
 
@@ -19,15 +19,9 @@ impl Session<'_> {
 
     /// Mean square of the discretisation's error that refitting leaves, per residual [m²].
     pub(super) fn grid(&self, state: &State) -> f64 {
-        let free = Basis::new(state.table.columns.iter());
         let m = self.cells.len() as f64;
-        // What free numbers absorb of a discretisation error does not show in residuals.
-        state
-            .frame
-            .fields
-            .iter()
-            .map(|f| free.without(f).iter().zip(&self.cells.sd).map(|(d, s)| (d * s).powi(2)).sum::<f64>() / m)
-            .sum()
+        let mean_square = |f: &Vec<f64>| f.iter().zip(&self.cells.sd).map(|(d, s)| (d * s).powi(2)).sum::<f64>() / m;
+        state.frame.visible().iter().map(mean_square).sum()
     }
 
     /// The same with a mean square of discretisation per residual [m²], or with what finer computations would change: as much of each is

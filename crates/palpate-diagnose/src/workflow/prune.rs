@@ -1,6 +1,7 @@
 //! Backward elimination: what was accepted first may be a stand-in for what was found later.
 
 use super::choose::price;
+use super::rounds::FAR;
 use super::{Session, State};
 use crate::change::Change;
 use crate::diagnosis::Found;
@@ -8,9 +9,6 @@ use crate::laboratory::{LabError, Start};
 
 /// Iterations and tolerance of a fit without an effect, which starts from a fit with it.
 const EFFORT: (usize, f64) = (20, 2e-5);
-
-/// Change of a fitted number, relative to its size, from which on it may lie in another valley.
-const FAR: f64 = 0.3;
 
 impl Session<'_> {
     /// Leaves out every effect but the newest in turn, fits the others again, and drops it when the recording is predicted as well without it, but for

@@ -7,9 +7,9 @@ use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::score::f_tail;
 
-/// Change of a fitted number, relative to its size, from which on the value that the baseline's fit started from counts as another place to
+/// Change of a fitted number, relative to its size, from which on it may lie in another valley, and where it was before is another place to
 /// start from.
-const FAR: f64 = 0.3;
+pub(super) const FAR: f64 = 0.3;
 
 /// Share of the sum of squares that a wall must take away where it stands first, without any fit, to be fitted.
 const WALL: f64 = 0.3;

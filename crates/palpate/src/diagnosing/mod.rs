@@ -107,11 +107,12 @@ pub fn diagnose(
     }
     let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
     let (backend, known, free) = (options.backend, &base, &fitted);
+    let plain = hypothesis::prepare(&base, &[])?;
+    let values = plain.own_values();
     let diagnosis = with_threads(threads, move || {
         let deadline = options.budget.map(|b| clock + b);
         let mut lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
         let numbers = lab.numbers(&[]).map_err(failed)?;
-        let values = hypothesis::prepare(known, &[])?.own_values();
         let errors = numbers.iter().map(|n| {
             let parameters = free.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
             parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
@@ -119,7 +120,6 @@ pub fn diagnose(
         let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
         palpate_diagnose::diagnose(&mut lab, model, &options.statistics).map_err(failed)
     })??;
-    let plain = hypothesis::prepare(&base, &[])?;
     let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
     let model = &diagnosis.model;
     let ready = hypothesis::prepare(&base, &model.changes)?;
