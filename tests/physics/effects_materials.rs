@@ -5,7 +5,7 @@
 use glam::{DQuat, DVec3};
 use palpate_model::effects::{self, Effect};
 use palpate_model::scene::*;
-use support::swing::Swing;
+use studies::real::swing::Swing;
 use support::{run, scenes};
 
 const LENGTH: f64 = 0.1;

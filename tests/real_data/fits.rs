@@ -3,10 +3,11 @@
 
 use palpate::{Experiment, Fitted};
 use std::path::Path;
+use studies::real::found;
+use studies::real::swing::Swing;
+use studies::real::tracks::rms;
 use support::data::data_dir;
-use support::measured::{fit, found, open, swings};
-use support::swing::Swing;
-use support::tracks::{rms, track};
+use support::measured::{fit, open, swings, track};
 
 /// The first three periods instead of all seven.
 const SHORT: [&[(&str, &str)]; 2] = [

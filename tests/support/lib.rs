@@ -1,4 +1,4 @@
-//! What the tests share: small scenes built in code, runs, energies, command lines, measured recordings and their swings.
+//! What the tests share: small scenes built in code, runs, energies, command lines, measured recordings.
 
 pub mod command;
 pub mod data;
@@ -7,5 +7,3 @@ pub mod gpu;
 pub mod measured;
 pub mod run;
 pub mod scenes;
-pub mod swing;
-pub mod tracks;

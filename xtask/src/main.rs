@@ -3,7 +3,11 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, blind, paper, table, test, tidy};
+use studies::{bench, blind, paper, real, table, test, tidy};
+
+/// Counts what the benchmarks allocate.
+#[global_allocator]
+static MEMORY: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;
 
 /// Developer verbs of palpate.
 #[derive(Parser)]
@@ -69,6 +73,8 @@ enum Verb {
         #[arg(long)]
         verbose: bool,
     },
+    /// Fit every measured recording and print what docs/real-data.md says of them
+    Real,
     /// Run all tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
         /// Further arguments for `cargo test`
@@ -112,6 +118,7 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose } => {
             blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose })?;
         }
+        Verb::Real => println!("\nwritten to {}", real::run()?.display()),
         Verb::Test { more } => test::run(&table::root(), &more)?,
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Tidy => {

@@ -14,4 +14,5 @@ mod simulate;
 mod world;
 
 pub use backend::CpuBackend;
+pub use newton::Effort;
 pub use world::{Adjoint, State, Tally, Tangent, World};

@@ -74,6 +74,15 @@ struct TangentStiffness {
     factor: Option<Factor>,
 }
 
+/// Work that solves took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Newton iterations.
+    pub newton: usize,
+    /// Iterations of conjugate gradients for their directions; none where solves are direct.
+    pub linear: usize,
+}
+
 /// What a solve keeps of its cells.
 struct Cells {
     before: Before,
@@ -93,6 +102,7 @@ pub fn solve(
     v0: &[DVec3],
     tolerance: f64,
     most: usize,
+    effort: &mut Effort,
 ) -> Result<(), Reason> {
     let mut cells = Cells { before: balance.before(u0), posed: Vec::new() };
     let mut residual = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
@@ -111,10 +121,12 @@ pub fn solve(
         // Steps with the last tangent converge linearly: they stop at the tolerance, where Newton's pass it by far.
         let again = kept.as_ref().is_some_and(|t| t.factor.is_some());
         let aim = if again { STRICT * tolerance } else { tolerance };
-        let (direction, norm, tangent) =
-            direction(balance, solvers, matrix, purpose, s, &cells, &residual, forcing, aim, &mut scale, &mut level, kept)?;
+        let (direction, norm, tangent) = direction(
+            balance, solvers, matrix, purpose, s, &cells, &residual, forcing, aim, &mut scale, &mut level, effort, kept,
+        )?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
+        effort.newton += 1;
         let after;
         (residual, after) = line_search(balance, &tangent.diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
         if after <= aim * scale.unwrap_or(0.0) {
@@ -167,6 +179,7 @@ fn direction(
     tolerance: f64,
     scale: &mut Option<f64>,
     level: &mut Option<Level>,
+    effort: &mut Effort,
     mut kept: Option<TangentStiffness>,
 ) -> Result<(Option<Nodes>, f64, TangentStiffness), Reason> {
     for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
@@ -199,8 +212,9 @@ fn direction(
                 let absolute = 0.3 * tolerance * reference;
                 let digits = if purpose == Purpose::Static { Digits::All } else { Digits::Few };
                 let prepared = solvers.prepare(task(balance, matrix, diagonal, s.u1, purpose, digits), level);
-                let solved = prepared.and_then(|p| p.solve(&mut d, forcing, absolute).map(|()| p.into_factor()));
-                solved.map(|factor| {
+                let solved = prepared.and_then(|p| p.solve(&mut d, forcing, absolute).map(|n| (n, p.into_factor())));
+                solved.map(|(iterations, factor)| {
+                    effort.linear += iterations;
                     tangent.factor = factor;
                     d
                 })

@@ -2,7 +2,7 @@
 
 use crate::linear::Purpose;
 use crate::linear::vector::{Nodes, dot, is_finite};
-use crate::newton::{self, Reason};
+use crate::newton::{self, Effort, Reason};
 use crate::passes::balance::{Balance, Inertia, States};
 use crate::passes::cells::{Mix, zeros};
 use crate::world::{Member, MemberState, MemberTangent, Shared};
@@ -101,7 +101,19 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
         with_matrix(member, |member, matrix| {
             let b = balance(shared, member, None);
             let iterations = plan.solver.newton_iterations.max(STATIC_ITERATIONS);
-            newton::solve(&b, &shared.solvers, matrix, Purpose::Static, &mut s.u, &zero, &zero, plan.solver.tolerance, iterations)
+            let effort = &mut Effort::default();
+            newton::solve(
+                &b,
+                &shared.solvers,
+                matrix,
+                Purpose::Static,
+                &mut s.u,
+                &zero,
+                &zero,
+                plan.solver.tolerance,
+                iterations,
+                effort,
+            )
         })
         .map_err(|(kind, detail)| match kind {
             FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
@@ -221,6 +233,7 @@ pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, n
         next.u[i] = now.u[i] + clock.step * now.v[i] + fall;
     }
     let solver = shared.plan.solver;
+    let mut effort = member.effort;
     with_matrix(member, |member, matrix| {
         let b = balance(shared, member, Some(k));
         newton::solve(
@@ -233,8 +246,10 @@ pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, n
             &now.v,
             solver.tolerance,
             solver.newton_iterations,
+            &mut effort,
         )
     })?;
+    member.effort = effort;
     let (a, c) = velocity_factors(clock.step, clock.theta);
     for i in 0..now.u.len() {
         next.v[i] = a * (next.u[i] - now.u[i]) - c * now.v[i];

@@ -3,6 +3,7 @@
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
+use crate::newton::Effort;
 use crate::passes::altered::Altered;
 use crate::passes::frames::{Compared, Look};
 use crate::passes::matching::{BandLookup, PointHash};
@@ -47,6 +48,8 @@ pub struct Member {
     pub(crate) altered: Altered,
     pub(crate) elements: Arc<Elements>,
     pub(crate) matrix: Matrix,
+    /// Of the time steps since the parameters were set.
+    pub(crate) effort: Effort,
 }
 
 impl Member {
@@ -62,6 +65,11 @@ impl Member {
 }
 
 impl World {
+    /// What the time steps of a member took since its parameters were set.
+    pub fn effort(&self, member: usize) -> Effort {
+        self.members[member].effort
+    }
+
     pub(crate) fn new(plan: &Plan) -> World {
         let plan = plan.clone();
         let pattern = Pattern::new(&plan.body);
@@ -100,6 +108,7 @@ impl World {
                 altered,
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),
+                effort: Effort::default(),
             });
         }
     }

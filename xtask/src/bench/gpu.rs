@@ -210,7 +210,9 @@ fn on_device(gpu: &Arc<Gpu>, plan: &Plan, batch: usize, cpu: &Line) -> Result<Li
         adjoint,
         tape: 48 * plan.body.nodes.len(),
         matrix: 36 * blocks(&plan.body),
-        resident: (gpu.made() - before) as usize,
+        newton: 0.0,
+        linear: 0.0,
+        peak: (gpu.made() - before) as usize,
         failure: run.failure,
         gpu: Some(Device {
             batch,

@@ -5,7 +5,7 @@ pub mod report;
 
 use crate::table;
 use glam::{DAffine3, DVec3};
-use palpate_cpu::CpuBackend;
+use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch};
 use palpate_model::body::{Body, SUBDIVISIONS};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
@@ -13,6 +13,7 @@ use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
 use palpate_model::scene::{Analytic, InitialShape, RotationUpdate, Solver};
 use palpate_model::shape::{Placed, Shape};
+use peak_alloc::PeakAlloc;
 use report::{Line, Report, Times};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -20,6 +21,8 @@ use std::time::Instant;
 
 /// Steps that are timed; fewer of bodies beyond [`BIG`] nodes.
 const STEPS: [usize; 2] = [10, 4];
+/// Times that they are repeated, likewise: a single run is at the mercy of what else the machine does.
+const RUNS: [usize; 2] = [7, 3];
 /// See [`STEPS`].
 const BIG: usize = 20_000;
 /// Points of a frame, about what a 50 × 50 camera sees of a body.
@@ -79,16 +82,9 @@ pub(super) fn placed(body: Analytic) -> Placed {
 }
 
 /// Folder of the recordings: `PALPATE_DATA`, or `shared/data` beside the workspace.
-pub(super) fn data() -> Option<std::path::PathBuf> {
+pub(crate) fn data() -> Option<std::path::PathBuf> {
     let folder = std::env::var_os("PALPATE_DATA").map_or_else(|| table::root().join("../shared/data"), Into::into);
     folder.is_dir().then_some(folder)
-}
-
-/// Resident memory of this process [bytes], where the system tells.
-fn resident() -> usize {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"));
-    line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<usize>().ok()).unwrap_or(0) * 1024
 }
 
 /// A body that is dropped from just above the ground and watched in every step.
@@ -149,57 +145,87 @@ pub(super) fn blocks(body: &Body) -> usize {
 }
 
 pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
-    let before = resident();
+    reserve();
+    PeakAlloc.reset_peak_usage();
+    let before = PeakAlloc.current_usage();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
     let build = clock.elapsed().as_secs_f64();
     let plan = plan(body, rotation, youngs_modulus);
     let body = &plan.body;
-    let backend = CpuBackend;
-    let mut world = backend.build(&plan, 1).map_err(|e| e.to_string())?;
-    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(&world, &[]);
-    let mut now = backend.new_state(&world);
-    backend.start(&mut world, &mut now, &mut tally);
-    let (mut tape, mut forward, mut cost, mut adjoint) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for k in 0..plan.clock.steps {
-        let mut next = backend.new_state(&world);
-        let clock = Instant::now();
-        backend.step(&mut world, k, &now, &mut next, &mut tally);
-        forward.push(clock.elapsed().as_secs_f64());
-        let clock = Instant::now();
-        backend.observe(&world, k, &now, &next, &mut tally);
-        cost.push(clock.elapsed().as_secs_f64());
-        tape.push(std::mem::replace(&mut now, next));
+    let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
+    let mut taken = Seconds::default();
+    let mut failure = None;
+    for _ in 0..RUNS[usize::from(body.nodes.len() > BIG)] {
+        failure = there_and_back(&plan, &mut world, &mut taken);
     }
-    let (mut adj, mut adj_now) = (backend.new_adjoint(&world), backend.new_adjoint(&world));
-    let mut next = now;
-    for k in (0..plan.clock.steps).rev() {
-        let Some(now) = tape.pop() else { break };
-        let clock = Instant::now();
-        backend.observe_adjoint(&world, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
-        backend.step_adjoint(&mut world, k, &now, &next, &adj, &mut adj_now, &mut tally);
-        adjoint.push(clock.elapsed().as_secs_f64());
-        std::mem::swap(&mut adj, &mut adj_now);
-        backend.clear_adjoint(&mut adj_now);
-        next = now;
-    }
-    let resident = resident().saturating_sub(before);
-    let failure = backend.read(&world, &tally).remove(0).failure.map(|f| f.to_string());
+    let (effort, steps) = (world.effort(0), plan.clock.steps as f64);
     Ok(Line {
         name: name.into(),
         nodes: body.nodes.len(),
         cells: body.cells.len(),
         band_nodes: body.band.nodes.len(),
         build,
-        forward: Times::of(forward),
-        cost: Times::of(cost),
-        adjoint: Times::of(adjoint),
+        forward: Times::of(taken.forward),
+        cost: Times::of(taken.cost),
+        adjoint: Times::of(taken.adjoint),
+        newton: effort.newton as f64 / steps,
+        linear: effort.linear as f64 / steps,
         paper: None,
         tape: 48 * body.nodes.len(),
         matrix: 72 * blocks(body),
-        resident,
+        peak: PeakAlloc.peak_usage().saturating_sub(before),
         failure,
         gpu: None,
     })
+}
+
+/// Products of dense matrices reserve a gigabyte of address space per thread when they are first asked for, of which next to nothing is
+/// ever touched: no body's memory.
+fn reserve() {
+    rayon::broadcast(|_| {
+        let m = faer::Mat::<f64>::identity(64, 64);
+        std::hint::black_box(&m * &m)
+    });
+}
+
+/// What steps took, one by one [s].
+#[derive(Default)]
+struct Seconds {
+    forward: Vec<f64>,
+    cost: Vec<f64>,
+    adjoint: Vec<f64>,
+}
+
+/// One rollout and its adjoint; says why it stopped, if it did.
+fn there_and_back(plan: &Plan, world: &mut World, taken: &mut Seconds) -> Option<String> {
+    let backend = CpuBackend;
+    backend.set_params(world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    let mut tally = backend.new_tally(world, &[]);
+    let mut now = backend.new_state(world);
+    backend.start(world, &mut now, &mut tally);
+    let mut tape = Vec::new();
+    for k in 0..plan.clock.steps {
+        let mut next = backend.new_state(world);
+        let clock = Instant::now();
+        backend.step(world, k, &now, &mut next, &mut tally);
+        taken.forward.push(clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        backend.observe(world, k, &now, &next, &mut tally);
+        taken.cost.push(clock.elapsed().as_secs_f64());
+        tape.push(std::mem::replace(&mut now, next));
+    }
+    let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
+    let mut next = now;
+    for k in (0..plan.clock.steps).rev() {
+        let Some(now) = tape.pop() else { break };
+        let clock = Instant::now();
+        backend.observe_adjoint(world, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(world, k, &now, &next, &adj, &mut adj_now, &mut tally);
+        taken.adjoint.push(clock.elapsed().as_secs_f64());
+        std::mem::swap(&mut adj, &mut adj_now);
+        backend.clear_adjoint(&mut adj_now);
+        next = now;
+    }
+    backend.read(world, &tally).remove(0).failure.map(|f| f.to_string())
 }

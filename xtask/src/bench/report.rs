@@ -43,14 +43,21 @@ pub struct Line {
     pub cost: Times,
     /// Adjoint of comparison and step together.
     pub adjoint: Times,
+    /// Newton iterations of a step, on average; 0 where they were not counted.
+    #[serde(default)]
+    pub newton: f64,
+    /// Iterations of conjugate gradients for all of them together; 0 where the matrix was factorised.
+    #[serde(default)]
+    pub linear: f64,
     /// Seconds of a step in the paper (forward, cost, adjoint), for the same body.
     pub paper: Option<[f64; 3]>,
     /// u and v of one step on the tape [bytes].
     pub tape: usize,
     /// Blocks of the stiffness matrix, all of them (3 × 3 numbers each) [bytes].
     pub matrix: usize,
-    /// Growth of the process' memory while building and running [bytes]; 0 where the system does not tell.
-    pub resident: usize,
+    /// Most memory that was allocated at once, from cutting the body to the adjoint of all steps [bytes].
+    #[serde(default)]
+    pub peak: usize,
     /// Why it stopped, if it did.
     pub failure: Option<String>,
     /// What only a graphics device has; its times are per member of a batch.
@@ -82,8 +89,20 @@ fn milliseconds(t: &Times) -> String {
 impl Report {
     /// Prints the table.
     pub fn print(&self) {
-        let head =
-            ["body", "nodes", "cells", "build s", "forward ms", "cost ms", "adjoint ms", "tape/step", "matrix", "resident"];
+        let head = [
+            "body",
+            "nodes",
+            "cells",
+            "build s",
+            "forward ms",
+            "cost ms",
+            "adjoint ms",
+            "newton",
+            "cg",
+            "tape/step",
+            "matrix",
+            "peak",
+        ];
         let mut rows = vec![head.map(String::from).to_vec()];
         let mb = |b: usize| format!("{:.2} MB", b as f64 / 1e6);
         rows.extend(self.lines.iter().map(|l| {
@@ -95,9 +114,11 @@ impl Report {
                 milliseconds(&l.forward),
                 milliseconds(&l.cost),
                 milliseconds(&l.adjoint),
+                format!("{:.1}", l.newton),
+                format!("{:.0}", l.linear),
                 mb(l.tape),
                 mb(l.matrix),
-                mb(l.resident),
+                mb(l.peak),
             ]
         }));
         table::print(&format!("{}, {} threads: median [shortest, longest] of one step", self.date, self.threads), &rows);
@@ -135,7 +156,7 @@ pub fn compare(before: &Path, after: &Path) -> Result<(), String> {
         serde_json::from_str(&text).map_err(|e| format!("{}: no result of a benchmark: {e}", p.display()))
     };
     let (a, b) = (read(before)?, read(after)?);
-    let mut rows = vec![["body", "forward", "cost", "adjoint", "resident"].map(String::from).to_vec()];
+    let mut rows = vec![["body", "forward", "cost", "adjoint", "memory"].map(String::from).to_vec()];
     for l in &b.lines {
         let Some(old) = a.lines.iter().find(|o| o.name == l.name) else { continue };
         let ratio = |new: f64, old: f64| if old > 0.0 { format!("{:.2}", new / old) } else { "-".into() };
@@ -145,7 +166,7 @@ pub fn compare(before: &Path, after: &Path) -> Result<(), String> {
             time(&l.forward, &old.forward),
             time(&l.cost, &old.cost),
             time(&l.adjoint, &old.adjoint),
-            ratio(l.resident as f64, old.resident as f64),
+            ratio(l.peak as f64, old.peak as f64),
         ]);
     }
     let title = format!("{} ({} threads) over {} ({} threads); below 1 is faster", b.date, b.threads, a.date, a.threads);

@@ -134,21 +134,26 @@ impl Solvers {
 }
 
 impl Prepared<'_> {
-    /// Solves A x = b in place.
-    pub fn solve(&self, b: &mut Vec<DVec3>, relative: f64, absolute: f64) -> Result<(), Trouble> {
+    /// Solves A x = b in place; the number of iterations.
+    pub fn solve(&self, b: &mut Vec<DVec3>, relative: f64, absolute: f64) -> Result<usize, Trouble> {
         match self {
-            Prepared::Direct(factor) => factor.solve(&mut [b]),
+            Prepared::Direct(factor) => {
+                factor.solve(&mut [b]);
+                Ok(0)
+            }
             Prepared::Iterative(matrix, precondition) => {
                 let mut x = vec![DVec3::ZERO; b.len()];
                 let (matrix, precondition) = (matrix.as_ref(), precondition.as_ref());
                 match conjugate_gradient::solve(matrix, precondition, b, &mut x, relative, absolute, MOST_ITERATIONS) {
-                    CgEnd::Converged(_) => *b = x,
-                    CgEnd::Unconverged(left) => return Err(Trouble::Unconverged(left)),
-                    CgEnd::Indefinite => return Err(Trouble::Indefinite("a direction of negative curvature".into())),
+                    CgEnd::Converged(iterations) => {
+                        *b = x;
+                        Ok(iterations)
+                    }
+                    CgEnd::Unconverged(left) => Err(Trouble::Unconverged(left)),
+                    CgEnd::Indefinite => Err(Trouble::Indefinite("a direction of negative curvature".into())),
                 }
             }
         }
-        Ok(())
     }
 
     /// The factor, where there is one.
@@ -166,7 +171,7 @@ impl Prepared<'_> {
                 factor.solve(&mut columns.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
                 Ok(())
             }
-            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| self.solve(b, relative, 0.0)),
+            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| self.solve(b, relative, 0.0).map(|_| ())),
         }
     }
 }

@@ -1,0 +1,259 @@
+//! The tables: each recording's own fit, both beams with one modulus, what one beam says of the other, and how the load of 52 g may hang.
+
+use super::{fit, found, open, scene_path, swings};
+use crate::table;
+use palpate::{Error, Experiment, FitOptions, Fitted};
+use palpate_model::params::ParamKey;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+const MODULUS: &str = "material.youngs_modulus";
+const DAMPING: &str = "material.stiffness_damping";
+
+/// A scene that fits a recording, and the marker whose swing is compared with a guess of its frequency [Hz]; none where nothing swings.
+#[derive(Clone, Copy)]
+struct Recorded {
+    name: &'static str,
+    scene: &'static str,
+    marker: Option<(&'static str, f64)>,
+}
+
+const BEAMS: [Recorded; 2] = [
+    Recorded { name: "Dragon Skin beam, own weight", scene: "beam-gravity", marker: Some(("tip1", 7.5)) },
+    Recorded { name: "the same beam with 52 g", scene: "beam-load52", marker: Some(("tip1", 4.3)) },
+];
+
+const CANTILEVERS: [Recorded; 3] = [
+    Recorded {
+        name: "MoldStar cantilever, swinging",
+        scene: "cantilever-moldstar-oscillating",
+        marker: Some(("head_outer_top", 2.6)),
+    },
+    Recorded { name: "Ecoflex cantilever, hanging", scene: "cantilever-ecoflex-hanging", marker: None },
+    Recorded { name: "two materials as one, hanging", scene: "cantilever-two-materials-hanging", marker: None },
+];
+
+/// Something measured, and the same simulated.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Pair {
+    simulated: f64,
+    measured: f64,
+}
+
+/// One row of a table.
+#[derive(Debug, Serialize)]
+struct Row {
+    name: String,
+    /// E and its standard error [Pa].
+    youngs_modulus: f64,
+    standard_error: Option<f64>,
+    damping_ratio: Option<Pair>,
+    /// \[Hz\]
+    frequency: Option<Pair>,
+    /// How far below its place at rest the marker swings [m].
+    sag: Option<Pair>,
+    /// Residual, and what noise alone would leave, root mean square [m].
+    rms: f64,
+    noise: f64,
+}
+
+/// Every table, as it is printed.
+#[derive(Debug, Serialize)]
+struct Report {
+    date: String,
+    recordings: Vec<Row>,
+    predictions: Vec<Row>,
+    loads: Vec<Row>,
+}
+
+/// How a fit did on one of its scenes.
+fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted, scene: usize) -> Result<Row, Error> {
+    let theta = &fitted.result.theta[scene];
+    let modulus = fitted.result.parameters.iter().find(|p| p.path == MODULUS);
+    let of_plan = || theta[experiment.plan().layout.index(ParamKey::YoungsModulus)];
+    let left = &fitted.after[scene];
+    let mut row = Row {
+        name: name.into(),
+        youngs_modulus: modulus.map_or_else(of_plan, |p| p.value),
+        standard_error: modulus.and_then(|p| p.standard_error),
+        damping_ratio: None,
+        frequency: None,
+        sag: None,
+        rms: left.rms,
+        noise: left.noise,
+    };
+    if let Some((marker, guess)) = recorded.marker {
+        let (seen, simulated) = swings(experiment, theta, marker, guess)?;
+        let plan = experiment.plan();
+        let site = plan.observation.markers.iter().find(|m| m.name == marker).expect("its swing was found");
+        let rest = (site.carry(|node| plan.body.nodes[node]).0 + site.stalk).dot(experiment.up());
+        row.damping_ratio = Some(Pair { simulated: simulated.damping_ratio(), measured: seen.damping_ratio() });
+        row.frequency = Some(Pair { simulated: simulated.frequency, measured: seen.frequency });
+        row.sag = Some(Pair { simulated: rest - simulated.centre, measured: rest - seen.centre });
+    }
+    Ok(row)
+}
+
+/// Each recording by itself, and the beams with one modulus.
+fn recordings(data: &Path) -> Result<Vec<Row>, Error> {
+    let mut rows = Vec::new();
+    let mut own = |r: &Recorded| {
+        let experiment = open(data, r.scene, &[])?;
+        rows.push(told(row(r.name, r, &experiment, &fit(&experiment)?, 0)?));
+        Ok::<_, Error>(experiment)
+    };
+    let beams = [own(&BEAMS[0])?, own(&BEAMS[1])?];
+    for r in &CANTILEVERS {
+        own(r)?;
+    }
+    let joint = palpate::fit(&beams, FitOptions::default())?;
+    for (s, (beam, name)) in beams.iter().zip(["both beams, one E: own weight", "both beams, one E: with 52 g"]).enumerate() {
+        rows.insert(2 + s, told(row(name, &BEAMS[s], beam, &joint, s)?));
+    }
+    Ok(rows)
+}
+
+/// E and damping of one beam, only the start fitted to the other.
+fn predictions(data: &Path) -> Result<Vec<Row>, Error> {
+    let mut rows = Vec::new();
+    for (from, to) in [(0, 1), (1, 0)] {
+        let fitted = fit(&open(data, BEAMS[from].scene, &[])?)?;
+        let scene = BEAMS[to].scene;
+        let text = read(scene)?;
+        let mut changes = vec![];
+        for path in [MODULUS, DAMPING] {
+            let key = path.trim_start_matches("material.");
+            let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default().to_string();
+            changes.push((line, format!("{key} = {}", found(&fitted, path))));
+            changes.push((free(&text, path), String::new()));
+        }
+        let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
+        let other = open(data, scene, &changes)?;
+        let name = format!("{} → {}", BEAMS[from].scene, scene);
+        rows.push(told(row(&name, &BEAMS[to], &other, &fit(&other)?, 0)?));
+    }
+    Ok(rows)
+}
+
+fn read(scene: &str) -> Result<String, Error> {
+    let path = scene_path(scene);
+    std::fs::read_to_string(&path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
+}
+
+/// The table of a scene's text that makes `path` free.
+fn free(text: &str, path: &str) -> String {
+    let named = format!("\"{path}\"");
+    let tables = text.match_indices("[[fit.parameter]]").map(|(at, _)| &text[at..]);
+    let table = tables.map(|t| &t[..t[2..].find("[[").map_or(t.len(), |e| e + 2)]).find(|t| t.contains(&named));
+    table.unwrap_or_default().to_string()
+}
+
+/// How the load of 52 g may act.
+struct Load {
+    name: &'static str,
+    /// Where, in the plane of bending [m].
+    x: f64,
+    z: f64,
+    /// Over the whole width, or in its middle.
+    wide: bool,
+    /// On a string: its inertia across gravity is not felt.
+    hangs: bool,
+    /// Gravity along the motion capture's own vertical.
+    tilted: bool,
+}
+
+const EDGE: Load =
+    Load { name: "the scene: over the width of the upper edge", x: 0.1, z: 0.03, wide: true, hangs: false, tilted: false };
+const LOADS: [Load; 7] = [
+    EDGE,
+    Load { name: "the same, hanging on a string", hangs: true, ..EDGE },
+    Load { name: "the same, with the motion capture's own vertical", tilted: true, ..EDGE },
+    Load { name: "in the middle of the upper edge", wide: false, ..EDGE },
+    Load { name: "over the width at mid height", z: 0.015, ..EDGE },
+    Load { name: "over the width of the lower edge", z: 0.0, ..EDGE },
+    Load { name: "over the width of the upper side, 5 mm behind the edge", x: 0.095, ..EDGE },
+];
+
+/// Size of the region that carries a load on a string [m]: half as wide as its places are apart.
+const HOLD: f64 = 0.004;
+/// Gravity in the scene, and along the vertical that the recording states [m/s²].
+const GRAVITY: [&str; 2] = ["gravity = [0.0, 0.0, -9.807]", "gravity = [1.145, 0.189, -9.738]"];
+
+impl Load {
+    /// The scene's tables for it.
+    fn tables(&self) -> String {
+        const WIDE: [(f64, f64); 5] = [(0.0, 0.125), (0.0075, 0.25), (0.015, 0.25), (0.0225, 0.25), (0.03, 0.125)];
+        let shares = if self.wide { &WIDE[..] } else { &[(0.015, 1.0)] };
+        let one = |(y, share): &(f64, f64)| {
+            let (point, mass) = (format!("[{}, {y}, {}]", self.x, self.z), 0.052 * share);
+            if self.hangs {
+                format!("[[effect]]\nkind = \"point-mass\"\npoint = {point}\nmass = {mass}\nradius = {HOLD}\nhung = 1\n\n")
+            } else {
+                format!("[[mass]]\npoint = {point}\nmass = {mass}\n\n")
+            }
+        };
+        shares.iter().map(one).collect()
+    }
+}
+
+/// The fit of the loaded beam with each of them.
+fn loads(data: &Path) -> Result<Vec<Row>, Error> {
+    let text = read(BEAMS[1].scene)?;
+    let [first, last] = [text.find("[[mass]]"), text.rfind("[[mass]]")].map(Option::unwrap_or_default);
+    let end = text[last..].find("\n\n").map_or(text.len(), |e| last + e + 2);
+    let of = |load: &Load| {
+        let gravity = GRAVITY[usize::from(load.tilted)];
+        let changes = [(&text[first..end], load.tables()), (GRAVITY[0], gravity.into())];
+        let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (*a, b.as_str())).collect();
+        let experiment = open(data, BEAMS[1].scene, &changes)?;
+        Ok(told(row(load.name, &BEAMS[1], &experiment, &fit(&experiment)?, 0)?))
+    };
+    LOADS.iter().map(of).collect()
+}
+
+/// Says that a row is there: the whole takes minutes.
+fn told(row: Row) -> Row {
+    println!("{}: {:.1} kPa, {:.2} mm", row.name, 1e-3 * row.youngs_modulus, 1e3 * row.rms);
+    row
+}
+
+fn print(title: &str, rows: &[Row]) {
+    let percent = |p: Pair| format!("{:+.1} %", 100.0 * (p.simulated / p.measured - 1.0));
+    let both = |p: Option<Pair>, scale: f64, digits: usize, off: bool| {
+        p.map_or("–".into(), |p| {
+            let text = format!("{:.digits$} / {:.digits$}", scale * p.simulated, scale * p.measured);
+            if off { format!("{text} ({})", percent(p)) } else { text }
+        })
+    };
+    let line = |r: &Row| {
+        let error = r.standard_error.map_or("given".into(), |e| format!("± {:.1}", 1e-3 * e));
+        vec![
+            r.name.clone(),
+            format!("{:.1} {error}", 1e-3 * r.youngs_modulus),
+            both(r.damping_ratio, 1.0, 3, false),
+            both(r.frequency, 1.0, 2, true),
+            both(r.sag, 1e3, 2, true),
+            format!("{:.2} ({:.2})", 1e3 * r.rms, 1e3 * r.noise),
+        ]
+    };
+    let head = ["", "E [kPa]", "damping ratio", "frequency [Hz]", "sag [mm]", "rms (noise) [mm]"];
+    let rows: Vec<Vec<String>> = std::iter::once(head.map(String::from).to_vec()).chain(rows.iter().map(line)).collect();
+    table::print(title, &rows);
+}
+
+/// Fits every recording, prints the tables and writes `bench/real.json`.
+///
+/// # Errors
+/// There are no recordings, or a fit fails.
+pub fn run() -> Result<PathBuf, String> {
+    let data = crate::bench::data().ok_or("no recordings: set PALPATE_DATA to their folder")?;
+    let all = || -> Result<Report, Error> {
+        let (recordings, predictions, loads) = (recordings(&data)?, predictions(&data)?, loads(&data)?);
+        Ok(Report { date: table::today(), recordings, predictions, loads })
+    };
+    let report = all().map_err(|e| e.to_string())?;
+    print("Fits of measured recordings (simulated / measured)", &report.recordings);
+    print("What one beam says of the other", &report.predictions);
+    print("How the load of 52 g acts", &report.loads);
+    table::save("real", &report)
+}
