@@ -1,13 +1,13 @@
-//! What users get wrong, and the one line that says so: file, key or line, what is wrong, what is allowed.
+//! What users get wrong, and the one line that says so: file, line, key, what is wrong, what is allowed. Every case is a command
+//! that ends with exit code 2 (1 where a result cannot be written) and nothing but that line.
 
 mod numbers;
+mod output;
 mod recordings;
 mod shapes;
 
-use palpate_io::{InputError, read_scene, scene_error};
-use palpate_model::plan_build::build_plan;
-use palpate_model::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use support::command::{arg, palpate, succeed};
 use tempfile::TempDir;
 
 /// A scene that is fine.
@@ -38,43 +38,52 @@ start = 1e5
 bounds = [1e3, 1e6]
 "#;
 
-/// The scene in a folder of its own, one text replaced by another.
-fn scene_file(from: &str, to: &str) -> (TempDir, PathBuf) {
-    assert!(SCENE.contains(from), "{from}");
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("scene.toml");
-    std::fs::write(&path, SCENE.replace(from, to)).expect("a writable folder");
-    (folder, path)
+/// A text with one part replaced by another.
+fn changed(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1)
 }
 
-/// The error that reading the changed scene gives: one line that begins with the file and its line.
+/// Writes a scene into a folder.
+fn write(folder: &Path, text: &str) -> PathBuf {
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).expect("a writable folder");
+    path
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// Runs a command that must end with `code`: nothing on stdout, and beside warnings one line on stderr, which is returned.
+fn refused(arguments: &[&str], code: i32) -> String {
+    let a = palpate(arguments);
+    assert_eq!((a.code, a.out.as_str()), (code, ""), "{arguments:?}: {}", a.err);
+    let lines: Vec<&str> = a.err.lines().filter(|l| !l.starts_with("warning: ") && !l.starts_with("backend: ")).collect();
+    let [line] = lines[..] else { panic!("{arguments:?}: {}", a.err) };
+    line.strip_prefix("error: ").unwrap_or_else(|| panic!("{line}")).to_string()
+}
+
+/// What the changed scene is refused with when it is simulated, after file and line, which are checked.
 fn scene_fault(from: &str, to: &str, line: usize) -> String {
-    let (_folder, path) = scene_file(from, to);
-    let e = read_scene(&path).expect_err("must be refused");
-    assert_eq!((e.file.as_path(), e.line), (path.as_path(), Some(line)), "{e}");
-    one_line(e)
+    let folder = folder();
+    let path = write(folder.path(), &changed(SCENE, from, to));
+    let out = folder.path().join("out");
+    let e = refused(&["simulate", arg(&path), "--out", arg(&out)], 2);
+    assert!(!out.exists(), "nothing is written when something is wrong");
+    after_place(&e, &path, line)
 }
 
-fn one_line(e: InputError) -> String {
-    let text = e.to_string();
-    assert!(!text.contains('\n') && !text.is_empty());
-    text
-}
-
-/// The error that building the plan of the changed scene gives.
-fn plan_fault(from: &str, to: &str, line: usize) -> String {
-    let (_folder, path) = scene_file(from, to);
-    let scene: Scene = read_scene(&path).expect("the file itself is fine").value;
-    let fault = build_plan(&scene, Default::default(), &[]).expect_err("must be refused");
-    let e = scene_error(&scene, &fault.key, fault.message);
-    assert_eq!(e.line, Some(line), "{e}");
-    one_line(e)
+/// An error's text after its file and line.
+fn after_place(error: &str, file: &Path, line: usize) -> String {
+    let place = format!("{}:{line}: ", file.display());
+    error.strip_prefix(&place).unwrap_or_else(|| panic!("{error} does not begin with {place}")).to_string()
 }
 
 #[test]
-fn the_scene_without_faults_is_accepted() {
-    let (_folder, path) = scene_file("0.45", "0.45");
-    let loaded = read_scene(&path).unwrap();
-    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
-    build_plan(&loaded.value, Default::default(), &[]).unwrap();
+fn the_scene_without_faults_is_simulated() {
+    let folder = folder();
+    let path = write(folder.path(), SCENE);
+    let a = succeed(&["simulate", arg(&path), "--out", arg(&folder.path().join("out")), "--backend", "cpu"]);
+    assert_eq!(a.err, "", "no warning");
 }

@@ -1,6 +1,6 @@
 //! A TOML file with line numbers: typed access to keys whose errors name file, line, key and what is allowed.
 
-use crate::error::InputError;
+use crate::error::{InputError, number};
 use crate::keys::Schema;
 use glam::DVec3;
 use std::ops::Range;
@@ -14,11 +14,18 @@ pub(crate) struct Source {
     document: Document<String>,
 }
 
+/// The text of a file.
+///
+/// # Errors
+/// It is not there, may not be read, or is not UTF-8.
+pub fn read_text(path: impl AsRef<Path>) -> Result<String, InputError> {
+    std::fs::read_to_string(&path).map_err(|e| InputError::io(path, &e))
+}
+
 impl Source {
     /// Reads and parses a file.
     pub fn read(path: &Path) -> Result<Source, InputError> {
-        let text = std::fs::read_to_string(path).map_err(|e| InputError::io(path, &e))?;
-        Source::parse(path, text)
+        Source::parse(path, read_text(path)?)
     }
 
     /// Parses text that was read from `path`.
@@ -221,7 +228,7 @@ impl<'a> Table<'a> {
     /// A finite number within a range that `allowed` puts in words (`"must be > 0"`).
     pub fn f64_where(&self, key: &str, ok: impl Fn(f64) -> bool, allowed: &str) -> Result<Option<f64>, InputError> {
         match self.optional_f64(key)? {
-            Some(x) if !ok(x) => Err(self.error(key, format!("{x} {allowed}"))),
+            Some(x) if !ok(x) => Err(self.error(key, format!("{} {allowed}", number(x)))),
             x => Ok(x),
         }
     }
@@ -265,6 +272,23 @@ impl<'a> Table<'a> {
     pub fn optional_str(&self, key: &str) -> Result<Option<&'a str>, InputError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         item.as_str().map(Some).ok_or_else(|| self.wrong(key, "a string", item))
+    }
+
+    /// A file or folder; relative names start from the folder of this file.
+    pub fn optional_path(&self, key: &str) -> Result<Option<PathBuf>, InputError> {
+        match self.optional_str(key)? {
+            // Joined to the folder it would be the folder itself.
+            Some("") => Err(self.error(key, "is empty; expected a path, relative to the folder of this file")),
+            name => Ok(name.map(|n| self.source.folder().join(n))),
+        }
+    }
+
+    /// A file that is there; relative names start from the folder of this file.
+    pub fn optional_file(&self, key: &str) -> Result<Option<PathBuf>, InputError> {
+        match self.optional_path(key)? {
+            Some(path) if !path.exists() => Err(self.error(key, format!("there is no file {}", path.display()))),
+            path => Ok(path),
+        }
     }
 
     /// One of a list of names.
@@ -326,7 +350,9 @@ impl<'a> Table<'a> {
                 Value::Array(a) if a.len() == 2 => {
                     let pair: Vec<f64> = a.iter().map(|x| self.value_f64(key, x)).collect::<Result<_, _>>()?;
                     if pair[0] > pair[1] {
-                        return Err(self.error(key, format!("[{}, {}]: low must not exceed high", pair[0], pair[1])));
+                        return Err(
+                            self.error(key, format!("[{}, {}]: low must not exceed high", number(pair[0]), number(pair[1])))
+                        );
                     }
                     Ok((pair[0], pair[1]))
                 }

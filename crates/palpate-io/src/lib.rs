@@ -17,6 +17,7 @@ pub mod sdf;
 pub mod surface;
 pub mod vtk;
 
+pub use document::read_text;
 pub use error::{InputError, Loaded, OutputError};
 pub use mesh::read_mesh;
 pub use recording::{Recording, check_overlap, read_recording, write_recording};

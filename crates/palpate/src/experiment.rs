@@ -7,8 +7,8 @@ use crate::fitting::{self, FitOptions, Fitted};
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
 use palpate_engine::Snapshot;
-use palpate_io::recording::Recording;
-use palpate_io::{check_overlap, parse_scene, read_recording, read_scene};
+use palpate_io::recording::{ObservationError, Recording};
+use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_error};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
@@ -53,9 +53,7 @@ impl Experiment {
     /// # Errors
     /// [`Error::Input`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
     pub fn open(path: impl AsRef<Path>) -> Result<Experiment, Error> {
-        let loaded = read_scene(&path)?;
-        let text = read_text(path.as_ref())?;
-        Experiment::new(loaded.value, text, loaded.warnings)
+        Experiment::from_toml(&read_text(&path)?, path)
     }
 
     /// Reads a scene file and leaves its recording alone, which need not exist: enough to simulate.
@@ -63,8 +61,8 @@ impl Experiment {
     /// # Errors
     /// [`Error::Input`] with the first thing that is wrong with a file.
     pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
-        let loaded = read_scene(&path)?;
-        let text = read_text(path.as_ref())?;
+        let text = read_text(&path)?;
+        let loaded = parse_scene(&text, path)?;
         let scene = Scene { observation: None, ..loaded.value };
         Experiment::new(scene, text, loaded.warnings)
     }
@@ -83,31 +81,39 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::open`].
     pub fn new(scene: Scene, text: String, mut warnings: Vec<String>) -> Result<Experiment, Error> {
-        let input = |e: &dyn std::fmt::Display| Error::Input(format!("{}: {e}", scene.path.display()));
+        let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
         let shape = shape_of(&scene.object);
         let mut recording = None;
         let (mut observation, mut rest) = (nothing_observed(), Vec::new());
         if let Some(spec) = &scene.observation {
             let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
+            if !place.exists() {
+                let message = format!("there is no recording at {}", place.display());
+                return Err(fault("observation.recording", message));
+            }
             let read = read_recording(place)?;
             warnings.extend(read.warnings.iter().cloned());
-            (observation, rest) = read.observation(spec, &mut warnings)?;
+            (observation, rest) = read.observation(spec, &mut warnings).map_err(|e| match e {
+                ObservationError::Recording(e) => Error::from(e),
+                ObservationError::Scene { key, message } => fault(&key, message),
+            })?;
             let (min, max) = shape.bounds();
-            check_overlap(&observation, min, max).map_err(|e| input(&e))?;
+            check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(Arc::new(read));
         }
-        let plan = build_plan(&scene, observation, &rest).map_err(|e| input(&e))?;
+        let plan = build_plan(&scene, observation, &rest).map_err(|e| fault(&e.key, e.message))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, warnings };
-        experiment.check_times();
+        experiment.check_times()?;
         Ok(experiment)
     }
 
-    /// Frames outside the simulated time are compared with a state that is held; that deserves a word.
-    fn check_times(&mut self) {
+    /// Frames outside the simulated time are compared with a state that is held: some deserve a word, and when all are, nothing of
+    /// the motion is compared at all.
+    fn check_times(&mut self) -> Result<(), Error> {
         let frames = &self.plan.observation.frames;
-        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return };
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return Ok(()) };
         if self.plan.clock.steps == 0 {
-            return;
+            return Ok(());
         }
         let ahead = Sensors::new(&self.plan.layout, &self.plan.theta).ahead();
         let (from, to) = (self.scene.time.start + ahead, self.end_time() + ahead);
@@ -115,16 +121,30 @@ impl Experiment {
         let slack = 1e-6 * (1.0 + to.abs());
         let outside = frames.iter().filter(|f| f.time < from - slack || f.time > to + slack).count();
         let fits_start = self.scene.fit.iter().flat_map(|f| &f.parameters).any(|p| p.path == "time.start");
-        if outside > 0 && !fits_start {
-            self.warnings.push(format!(
-                "{}: {outside} of {} frames ({:.4} s to {:.4} s) lie outside the simulated time ({from:.4} s to {to:.4} s) and are \
-                 compared with its first or last state; adapt [observation] frames or [time]",
-                self.scene.path.display(),
-                frames.len(),
-                first.time,
-                last.time
-            ));
+        if outside == 0 || fits_start {
+            return Ok(());
         }
+        let count = if outside == frames.len() { "all".to_string() } else { format!("{outside} of") };
+        let text = format!(
+            "{count} {} frames ({:.4} s to {:.4} s) lie outside the simulated time ({from:.4} s to {to:.4} s)",
+            frames.len(),
+            first.time,
+            last.time
+        );
+        if outside == frames.len() {
+            return Err(
+                self.fault("observation.frames", format!("{text}; adapt [time] start and duration, or choose other frames"))
+            );
+        }
+        let name = self.scene.path.display();
+        self.warnings
+            .push(format!("{name}: {text} and are compared with its first or last state; adapt [observation] frames or [time]"));
+        Ok(())
+    }
+
+    /// An error about a key of the scene, with its line.
+    pub(crate) fn fault(&self, key: &str, message: impl Into<String>) -> Error {
+        scene_error(&self.scene.path, &self.text, key, message).into()
     }
 
     /// The scene.
@@ -233,10 +253,6 @@ impl Experiment {
     pub fn up(&self) -> DVec3 {
         (-self.scene.gravity).try_normalize().unwrap_or(DVec3::Z)
     }
-}
-
-fn read_text(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))
 }
 
 /// An observation without frames; the noises are never used and only keep divisions harmless.

@@ -59,7 +59,7 @@ pub fn observe(
         return Err(Error::Input(format!("{t} s is not simulated: the scene runs from {start} s to {end} s")));
     }
     check_choices(&experiment.scene().effects, observers.cameras.len(), observers.markers.len())
-        .map_err(|(key, message)| Error::Input(format!("{}: {key}: {message}", experiment.scene().path.display())))?;
+        .map_err(|(key, message)| experiment.fault(&key, message))?;
     let errors = Errors::new(experiment, observers)?;
     let (surface, triangles) = experiment.surface(0.25 * plan.body.grid.h);
     let tracked = Embedding::new(&plan.body, observers.markers.iter().map(|m| m.1).collect());
@@ -119,7 +119,7 @@ impl Errors<'_> {
         let mut sites = Vec::new();
         if (0..observers.markers.len()).any(|m| sensors.marker_offset(m as u32) != DVec3::ZERO) {
             sites = marker_sites(&marker_rest(observers), &plan.body, experiment.shape())
-                .map_err(|e| Error::Input(format!("{}: {e}", experiment.scene().path.display())))?;
+                .map_err(|e| experiment.fault(&e.key, e.message))?;
         }
         Ok(Errors { plan, sensors, sites })
     }

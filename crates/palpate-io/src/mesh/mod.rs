@@ -4,7 +4,7 @@ mod parse;
 #[cfg(test)]
 mod tests;
 
-use crate::error::{InputError, Loaded};
+use crate::error::{InputError, Loaded, number};
 use glam::DVec3;
 use palpate_model::shape::{MeshReport, TriMesh, diagnose, repair};
 use std::path::Path;
@@ -67,7 +67,10 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
     let (min, max) = bounds(&mesh.vertices);
     let side = (max - min).max_element();
     if side > LARGEST_SIDE {
-        return refuse(format!("its longest side is {side} m; in millimetres? convert the file to metres (scale by 0.001)"));
+        return refuse(format!(
+            "its longest side is {} m; in millimetres? convert the file to metres (scale by 0.001)",
+            number(side)
+        ));
     }
     if side < SMALLEST_SIDE {
         return refuse(format!("its longest side is {side:e} m; lengths are in metres: convert the file"));

@@ -13,6 +13,7 @@ mod write;
 pub use camera::RecordedCamera;
 pub use image::DepthImage;
 pub use markers::{MarkerSample, RecordedMarkers};
+pub use observation::ObservationError;
 pub use overlap::check_overlap;
 pub use write::write_recording;
 
@@ -234,10 +235,10 @@ fn markers(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<
     }))
 }
 
-/// A noise in metres; zero would be an infinite weight.
+/// A noise in metres. Costs divide by its square: zero would be an infinite weight, and less than a nanometre is no measurement.
 fn noise(t: &Table, key: &str) -> Result<Option<f64>, InputError> {
     match key {
-        "noise_sigma" => t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0 (m)"),
-        _ => t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0 (m)"),
+        "noise_sigma" => t.f64_where(key, |x| (1e-9..=10.0).contains(&x), "is not allowed: must lie in [1e-9, 10] (m)"),
+        _ => t.f64_where(key, |x| (0.0..=10.0).contains(&x), "is not allowed: must lie in [0, 10] (m)"),
     }
 }

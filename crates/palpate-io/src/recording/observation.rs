@@ -15,6 +15,26 @@ const MARKER_NOISE: f64 = 0.001;
 /// Times closer than this are one instant [s]; clocks in files have microseconds.
 const SAME_TIME: f64 = 1e-9;
 
+/// Why a scene's `[observation]` and a recording do not go together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ObservationError {
+    /// The recording itself is at fault.
+    #[error("{0}")]
+    Recording(#[from] InputError),
+    /// The scene asks for what the recording does not hold.
+    #[error("{key}: {message}")]
+    Scene {
+        /// Key of the scene (`observation.frames`).
+        key: String,
+        /// What is wrong and what there is.
+        message: String,
+    },
+}
+
+fn asked(key: impl Into<String>, message: String) -> ObservationError {
+    ObservationError::Scene { key: key.into(), message }
+}
+
 impl Recording {
     /// What a scene's `[observation]` uses of this recording, in world coordinates; sites are left to the caller, who
     /// knows the body: `ObservedMarker::site` counts the returned rest places.
@@ -28,7 +48,7 @@ impl Recording {
         &self,
         spec: &ObservationSpec,
         warnings: &mut Vec<String>,
-    ) -> Result<(Observation, Vec<MarkerRest>), InputError> {
+    ) -> Result<(Observation, Vec<MarkerRest>), ObservationError> {
         let mut o = Observation {
             cameras: self.cameras.iter().map(|c| Camera { center: c.position(), axis: c.axis() }).collect(),
             depth_noise: DEPTH_NOISE,
@@ -56,11 +76,23 @@ impl Recording {
         Ok((o, rest))
     }
 
-    fn no_data(&self, spec: &ObservationSpec, what: &str) -> InputError {
-        InputError::file(&self.path, format!("has no {what} between {} s and {} s", spec.from, spec.to))
+    /// Nothing to compare with is left; `times` are those at which the recording has it [s].
+    fn no_data(&self, spec: &ObservationSpec, what: &str, times: impl Iterator<Item = f64>) -> ObservationError {
+        let (first, last) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
+        let path = self.path.display();
+        if first > last {
+            return asked("observation.cost", format!("{path} holds no {what}, which this cost needs"));
+        }
+        let chosen = match (spec.from.is_finite(), spec.to.is_finite()) {
+            (true, true) => format!("between {} s and {} s", spec.from, spec.to),
+            (true, false) => format!("from {} s on", spec.from),
+            (false, true) => format!("up to {} s", spec.to),
+            (false, false) => format!("on every {}-th row and column", spec.pixel_stride),
+        };
+        asked("observation.frames", format!("no {what} is left {chosen}; {path} has them from {first} s to {last} s"))
     }
 
-    fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), InputError> {
+    fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), ObservationError> {
         let mut used = vec![false; self.cameras.len()];
         let images = self.frames.iter().filter(|f| f.depth.is_some() && (spec.from..=spec.to).contains(&f.time));
         let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
@@ -95,7 +127,8 @@ impl Recording {
             }
         }
         if o.frames.iter().all(|f| f.points.is_empty()) {
-            return Err(self.no_data(spec, "depth reading of the object"));
+            let seen = self.frames.iter().filter(|f| f.readings().next().is_some()).map(|f| f.time);
+            return Err(self.no_data(spec, "depth reading of the object", seen));
         }
         // One noise serves all cameras: the root mean square of those in use.
         let cameras = || self.cameras.iter().zip(&used).filter(|(_, u)| **u).map(|(c, _)| c);
@@ -117,11 +150,9 @@ impl Recording {
         spec: &ObservationSpec,
         o: &mut Observation,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<MarkerRest>, InputError> {
-        let m = self
-            .markers
-            .as_ref()
-            .ok_or_else(|| InputError::file(&self.path, "has no [markers], which cost \"markers\" needs"))?;
+    ) -> Result<Vec<MarkerRest>, ObservationError> {
+        let none = || asked("observation.cost", format!("\"markers\" needs [markers], which {} lacks", self.path.display()));
+        let m = self.markers.as_ref().ok_or_else(none)?;
         let rest = self.rest_places(m, spec)?;
         let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
         let before = o.frames.len();
@@ -142,7 +173,7 @@ impl Recording {
             }
         }
         if o.frames.len() == before {
-            return Err(self.no_data(spec, "marker"));
+            return Err(self.no_data(spec, "marker reading", m.samples.iter().map(|s| s.time)));
         }
         if m.noise_sigma.is_none() {
             warnings.push(format!("{}: markers state no noise_sigma; {MARKER_NOISE} m is assumed", self.path.display()));
@@ -154,24 +185,24 @@ impl Recording {
 
     /// The rest place of every marker, the scene's word before the recording's. A first sample would not do: a body is
     /// seldom at rest when recording begins.
-    fn rest_places(&self, m: &RecordedMarkers, spec: &ObservationSpec) -> Result<Vec<MarkerRest>, InputError> {
-        if let Some(r) = spec.markers.iter().find(|r| !m.names.contains(&r.name)) {
+    fn rest_places(&self, m: &RecordedMarkers, spec: &ObservationSpec) -> Result<Vec<MarkerRest>, ObservationError> {
+        if let Some((i, r)) = spec.markers.iter().enumerate().find(|(_, r)| !m.names.contains(&r.name)) {
             let known: Vec<&str> = m.names.iter().map(String::as_str).collect();
-            let text = format!(
-                "the scene's [[observation.marker]] \"{}\" does not occur; {}",
-                r.name,
-                crate::keys::suggest(&r.name, &known)
-            );
-            return Err(InputError::file(&m.file, text));
+            let (file, hint) = (m.file.display(), crate::keys::suggest(&r.name, &known));
+            return Err(asked(
+                format!("observation.marker.{i}.name"),
+                format!("\"{}\" does not occur in {file}; {hint}", r.name),
+            ));
         }
         let place = |name: &String| spec.markers.iter().chain(&m.rest).find(|r| r.name == *name).cloned();
         let missing: Vec<&str> = m.names.iter().filter(|n| place(n).is_none()).map(String::as_str).collect();
         if !missing.is_empty() {
             let text = format!(
-                "no rest position for {}; give [[markers.rest]] in the recording or [[observation.marker]] in the scene (name, position, surface)",
-                missing.join(", ")
+                "no rest position for {}; give [[markers.rest]] in {} or [[observation.marker]] in the scene (name, position, surface)",
+                missing.join(", "),
+                self.path.display()
             );
-            return Err(InputError { key: "markers".into(), ..InputError::file(&self.path, text) });
+            return Err(asked("observation.marker", text));
         }
         Ok(m.names.iter().filter_map(place).collect())
     }

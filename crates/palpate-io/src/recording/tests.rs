@@ -142,7 +142,9 @@ fn frames_group_instants_and_choices_thin_them() {
     let late = ObservationSpec { from: 0.0, to: 0.07, ..spec(&[CostKind::Markers]) };
     assert_eq!(r.observation(&late, &mut warnings).unwrap().0.frames.len(), 1);
     let never = ObservationSpec { from: 5.0, ..both };
-    assert!(r.observation(&never, &mut warnings).unwrap_err().to_string().contains("between 5 s and inf s"));
+    let e = r.observation(&never, &mut warnings).unwrap_err().to_string();
+    assert!(e.starts_with("observation.frames: no depth reading of the object is left from 5 s on; "), "{e}");
+    assert!(e.ends_with("has them from -0.1 s to 0.1 s"), "{e}");
 }
 
 #[test]
@@ -185,7 +187,7 @@ fn faults_of_the_text_are_named() {
         ("recording.toml", "camera = \"left\"", "camera = \"lefd\"", "no [[camera]] is named \"lefd\"; did you mean \"left\"?"),
         ("recording.toml", "camera = \"right one\"", "camera = \"left\"", "has two frames at -0.1"),
         ("recording.toml", "name = \"right one\"", "name = \"left\"", "two cameras are named"),
-        ("recording.toml", "noise_sigma = 0.003", "noise_sigma = -0.003", "must be > 0"),
+        ("recording.toml", "noise_sigma = 0.003", "noise_sigma = -0.003", "must lie in [1e-9, 10] (m)"),
         (
             "recording.toml",
             "depth_scale = 0.001",

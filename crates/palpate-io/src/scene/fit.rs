@@ -1,7 +1,7 @@
 //! `[fit]`: what is to be found out, checked against the scene.
 
 use crate::document::Table;
-use crate::error::InputError;
+use crate::error::{InputError, number};
 use crate::keys::suggest;
 use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::{ParamKey, Transform};
@@ -115,28 +115,30 @@ fn parameter(t: &Table, known: &[Target]) -> Result<Vec<FitParameter>, InputErro
         let start = starts.as_ref().map_or((k.value, k.value), |s| s[i]);
         let bounds = bounds.as_ref().map_or((k.lower, k.upper), |b| b[i]);
         let path = &k.path;
+        let (low, high) = (number(bounds.0), number(bounds.1));
         if start.0.is_nan() {
             return Err(t.error("start", format!("{path}: the scene states no value; give a start, or state it in the effect")));
         }
         if bounds.0 >= bounds.1 {
-            return Err(t.error("bounds", format!("{path}: [{}, {}] leaves no room; low must be below high", bounds.0, bounds.1)));
+            return Err(t.error("bounds", format!("{path}: [{low}, {high}] leaves no room; low must be below high")));
         }
         if k.positive && bounds.0 <= 0.0 {
-            return Err(
-                t.error("bounds", format!("{path}: must be > 0 (it is fitted on a logarithmic scale), found {}", bounds.0))
-            );
+            return Err(t.error("bounds", format!("{path}: must be > 0 (it is fitted on a logarithmic scale), found {low}")));
         }
         if k.positive && start.0 <= 0.0 {
             let way_out = if starts.is_some() { "give a start > 0" } else { "the scene's value is 0: set start to a number > 0" };
-            return Err(t.error("start", format!("{path}: {} cannot be fitted on a logarithmic scale; {way_out}", start.0)));
+            return Err(
+                t.error("start", format!("{path}: {} cannot be fitted on a logarithmic scale; {way_out}", number(start.0)))
+            );
         }
         if path == "material.poisson_ratio" && (bounds.0 <= -1.0 || bounds.1 >= 0.5) {
-            return Err(t.error("bounds", format!("{path}: [{}, {}] must lie in (-1, 0.5)", bounds.0, bounds.1)));
+            return Err(t.error("bounds", format!("{path}: [{low}, {high}] must lie in (-1, 0.5)")));
         }
         if start.0 < bounds.0 || start.1 > bounds.1 {
             let from = if starts.is_some() { "start" } else { "the scene's value" };
-            let start = if start.0 == start.1 { format!("{}", start.0) } else { format!("[{}, {}]", start.0, start.1) };
-            return Err(t.error("bounds", format!("{path}: [{}, {}] excludes {from} {start}", bounds.0, bounds.1)));
+            let (first, last) = (number(start.0), number(start.1));
+            let start = if first == last { first } else { format!("[{first}, {last}]") };
+            return Err(t.error("bounds", format!("{path}: [{low}, {high}] excludes {from} {start}")));
         }
         out.push(FitParameter { path: path.clone(), start, bounds, per_scene });
     }

@@ -11,12 +11,12 @@ mod write;
 pub use write::{append_effects, write_scene};
 
 use crate::document::{Source, Table};
-use crate::error::{InputError, Loaded};
+use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
 use palpate_model::scene::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The scene format this version reads and writes.
 pub const FORMAT: &str = "scene/1";
@@ -46,10 +46,11 @@ pub fn parse_scene(text: &str, path: impl AsRef<Path>) -> Result<Loaded<Scene>, 
     scene(&source)
 }
 
-/// An error about a key of a scene (`clamp.0.box`) that was found after reading, with its line where the file has the key.
-pub fn scene_error(scene: &Scene, key: &str, message: impl Into<String>) -> InputError {
-    let line = Source::read(&scene.path).ok().and_then(|s| s.line_of_key(key));
-    InputError { line, key: key.to_string(), ..InputError::file(&scene.path, message) }
+/// An error about a key of a scene (`clamp.0.box`) that was found after reading, with its line where the file's `text` has the
+/// key; a scene built in code has an empty text and no lines.
+pub fn scene_error(path: &Path, text: &str, key: &str, message: impl Into<String>) -> InputError {
+    let line = Source::parse(path, text.to_string()).ok().and_then(|s| s.line_of_key(key));
+    InputError { line, key: key.to_string(), ..InputError::file(path, message) }
 }
 
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
@@ -58,7 +59,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
     root.check_keys(&SCENE)?;
 
     let mut warnings = Vec::new();
-    let object = object::object(source, &root, &mut warnings)?;
+    let object = object::object(&root, &mut warnings)?;
     let material = material(&root, &mut warnings)?;
     let gravity = match root.optional_table("world")? {
         Some(w) => w.optional_vec3("gravity")?,
@@ -71,21 +72,21 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         object,
         material,
         gravity: gravity.unwrap_or(DVec3::new(0.0, 0.0, -9.81)),
-        clamps: clamps(source, &root)?,
+        clamps: clamps(&root)?,
         planes: planes(&root)?,
         masses: masses(&root)?,
         effects: effects::effects(&root)?,
         time: time(&root, initial.state)?,
         initial,
         solver: solver(&root)?,
-        observation: observation(source, &root)?,
+        observation: observation(&root)?,
         fit: None,
     };
     if scene.gravity.length() > 100.0 {
         warnings.push(format!(
             "{}: world.gravity is {} m/s² long; is it in m/s²?",
             source.path.display(),
-            scene.gravity.length()
+            number(scene.gravity.length())
         ));
     }
     scene.fit = fit::fit(&root, &scene)?;
@@ -117,14 +118,16 @@ fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputE
         .f64_where("poisson_ratio", |x| x > -1.0 && x < 0.5, "is not allowed: must lie in (-1, 0.5)")?
         .ok_or_else(|| t.missing("poisson_ratio", "a number in (-1, 0.5)"))?;
     if !(10.0..=1e12).contains(&youngs_modulus) {
-        let e = t
-            .error("youngs_modulus", format!("{youngs_modulus} Pa is unusual (jelly 1e3, rubber 1e6, steel 2e11); is it in Pa?"));
+        let e = t.error(
+            "youngs_modulus",
+            format!("{} Pa is unusual (jelly 1e3, rubber 1e6, steel 2e11); is it in Pa?", number(youngs_modulus)),
+        );
         warnings.push(e.to_string());
     }
     if let Inertia::Density(d) = inertia
         && !(10.0..=30000.0).contains(&d)
     {
-        let e = t.error("density", format!("{d} kg/m³ is unusual (water 1000); is it in kg/m³? 1 g/cm³ is 1000 kg/m³"));
+        let e = t.error("density", format!("{} kg/m³ is unusual (water 1000); is it in kg/m³? 1 g/cm³ is 1000 kg/m³", number(d)));
         warnings.push(e.to_string());
     }
     Ok(Material {
@@ -141,19 +144,19 @@ fn corners(t: &Table) -> Result<(DVec3, DVec3), InputError> {
     let (min, max) = (t.vec3("min")?, t.vec3("max")?);
     for (a, axis) in ["x", "y", "z"].iter().enumerate() {
         if min[a] >= max[a] {
-            return Err(t.error("max", format!("{axis}: {} must be larger than min = {}", max[a], min[a])));
+            return Err(t.error("max", format!("{axis}: {} must be larger than min = {}", number(max[a]), number(min[a]))));
         }
     }
     Ok((min, max))
 }
 
-fn clamps(source: &Source, root: &Table) -> Result<Vec<Clamp>, InputError> {
+fn clamps(root: &Table) -> Result<Vec<Clamp>, InputError> {
     let mut clamps = Vec::new();
     for t in root.tables("clamp")? {
         let b = t.optional_table("box")?.ok_or_else(|| t.missing("box", "box = { min = [x, y, z], max = [x, y, z] }"))?;
         let (min, max) = corners(&b)?;
         let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?.unwrap_or(false);
-        let motion_path = t.optional_str("motion")?.map(|p| source.folder().join(p));
+        let motion_path = t.optional_file("motion")?;
         let motion = motion_path.as_deref().map(motion::read_motion).transpose()?;
         clamps.push(Clamp { min, max, object_frame, motion, motion_path });
     }
@@ -209,13 +212,15 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
             let step = step.ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
             let n = (d / step).round();
             if n < 1.0 {
-                return Err(t.error("duration", format!("{d} s is shorter than half a step ({step} s)")));
+                return Err(t.error("duration", format!("{} s is shorter than half a step ({} s)", number(d), number(step))));
             }
             ("duration", n)
         }
     };
     if count > MOST_STEPS {
-        return Err(t.error(key, format!("asks for {count:.0} steps, at most {MOST_STEPS:.0} are allowed; is step in seconds?")));
+        return Err(
+            t.error(key, format!("asks for {} steps, at most {MOST_STEPS:.0} are allowed; is step in seconds?", number(count)))
+        );
     }
     if count == 0.0 && state != InitialShape::StaticEquilibrium {
         return Err(t.error(key, "0 needs initial.state = \"static-equilibrium\" (a static problem)"));
@@ -244,12 +249,9 @@ fn solver(root: &Table) -> Result<Solver, InputError> {
     Ok(s)
 }
 
-fn observation(source: &Source, root: &Table) -> Result<Option<ObservationSpec>, InputError> {
+fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     let Some(t) = root.optional_table("observation")? else { return Ok(None) };
-    let recording: PathBuf = match t.optional_str("recording")? {
-        Some(r) => source.folder().join(r),
-        None => return Err(t.missing("recording", "the folder of a recording")),
-    };
+    let recording = t.optional_path("recording")?.ok_or_else(|| t.missing("recording", "the folder of a recording"))?;
     if t.optional_str("cost").is_ok_and(|c| c == Some("silhouette")) {
         return Err(t.error("cost", "\"silhouette\" is not available in this version; allowed: \"sparse-surface\", \"markers\""));
     }
@@ -263,7 +265,7 @@ fn observation(source: &Source, root: &Table) -> Result<Option<ObservationSpec>,
         to = f.optional_f64("to")?.unwrap_or(to);
         every = f.optional_count("every", 1..=u64::MAX)?.unwrap_or(1) as usize;
         if from > to {
-            return Err(f.error("to", format!("{to} lies before from = {from}")));
+            return Err(f.error("to", format!("{} lies before from = {}", number(to), number(from))));
         }
     }
     let mut markers: Vec<MarkerRest> = Vec::new();

@@ -1,20 +1,19 @@
 //! `[object]`: the rest shape.
 
 use super::corners;
-use crate::document::{Source, Table};
-use crate::error::InputError;
+use crate::document::Table;
+use crate::error::{InputError, number};
 use crate::mesh::{LARGEST_SIDE, read_mesh};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 
-pub(super) fn object(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
+pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
-    let (body, extent) = match (t.optional_str("mesh")?, t.optional_table("shape")?) {
+    let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
         (Some(_), Some(_)) => return Err(t.error("shape", "mesh and shape exclude each other; give one")),
         (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
-        (Some(file), None) => {
-            let path = source.folder().join(file);
+        (Some(path), None) => {
             let loaded = read_mesh(&path)?;
             warnings.extend(loaded.warnings);
             let (min, max) = crate::mesh::bounds(&loaded.value.vertices);
@@ -28,7 +27,7 @@ pub(super) fn object(source: &Source, root: &Table, warnings: &mut Vec<String>) 
                     "shape",
                     format!(
                         "its longest side is {} m; in millimetres? lengths are in metres: scale by 0.001",
-                        extent.max_element()
+                        number(extent.max_element())
                     ),
                 ));
             }
@@ -46,14 +45,19 @@ pub(super) fn object(source: &Source, root: &Table, warnings: &mut Vec<String>) 
             (None, None) => return Err(t.missing("cell_size", "cell_size (m) or cells")),
             (None, Some(n)) => Resolution::Cells(n as u32),
             (Some(h), None) if h > longest => {
-                return Err(
-                    t.error("cell_size", format!("{h} m is larger than the object, whose longest side is {longest:.4} m"))
-                );
+                return Err(t.error(
+                    "cell_size",
+                    format!("{} m is larger than the object, whose longest side is {longest:.4} m", number(h)),
+                ));
             }
             (Some(h), None) if longest / h > 4096.0 => {
                 return Err(t.error(
                     "cell_size",
-                    format!("{h} m makes {:.0} cells along the longest side, at most 4096 are allowed", longest / h),
+                    format!(
+                        "{} m makes {} cells along the longest side, at most 4096 are allowed",
+                        number(h),
+                        number((longest / h).round())
+                    ),
                 ));
             }
             (Some(h), None) => Resolution::CellSize(h),
@@ -82,7 +86,10 @@ fn analytic(shape: &Table) -> Result<Analytic, InputError> {
         "torus" => {
             let (major, minor) = (length("major")?, length("minor")?);
             if minor >= major {
-                return Err(t.error("minor", format!("{minor} must be smaller than major = {major}, or the torus has no hole")));
+                return Err(t.error(
+                    "minor",
+                    format!("{} must be smaller than major = {}, or the torus has no hole", number(minor), number(major)),
+                ));
             }
             Analytic::Torus { major, minor, center: center()?, axis: axis()? }
         }

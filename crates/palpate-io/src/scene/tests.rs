@@ -260,12 +260,9 @@ fn relative_paths_hold_from_another_folder() {
 
 #[test]
 fn errors_found_later_still_name_the_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scene.toml");
-    std::fs::write(&path, BASE).unwrap();
-    let scene = read_scene(&path).unwrap().value;
     for (key, line) in [("object.cell_size", Some(4)), ("mass.0.point", Some(13)), ("plane.0", Some(9)), ("clamp.0.box", None)] {
-        let e = scene_error(&scene, key, "no");
+        // The text at hand is what counts; there is no such file.
+        let e = scene_error(Path::new("scene.toml"), BASE, key, "no");
         assert_eq!((e.line, e.key.as_str()), (line, key));
     }
 }
