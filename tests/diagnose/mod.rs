@@ -7,7 +7,7 @@ mod stopping;
 use crate::cli::BLOCK;
 use serde_json::Value;
 use std::fs;
-use support::command::{arg, json, succeed};
+use support::command::{arg, json, palpate, succeed};
 
 const SEEN: &str = r#"
 [observation]
@@ -86,4 +86,36 @@ fn a_sensor_that_reads_too_far_is_not_sold_as_physics() {
     // A tenth of the noise of one reading is what this coarse grid moves the mean surface.
     assert!((bias / 0.004 - 1.0).abs() < 0.1, "{bias}");
     assert!(d["gap_closed"].as_f64().unwrap() > 0.9, "{}", d["gap_closed"]);
+}
+
+#[test]
+fn a_second_recording_that_is_not_met_is_spoken_of_and_another_body_is_refused() {
+    let (folder, _) = diagnosed("");
+    let file = |name: &str| folder.path().join(name);
+    let scene = file("scene.toml");
+    let run = |other: &str| {
+        palpate(&["diagnose", arg(&scene), "--held-out", arg(&file(other)), "--out", arg(&file("why2")), "--backend", "cpu"])
+    };
+    // The same recording under another name is nothing new.
+    fs::copy(&scene, file("same.toml")).unwrap();
+    let same = run("same.toml");
+    assert_eq!(same.code, 2, "{}", same.err);
+    assert!(same.err.contains("same.toml") && same.err.contains("recording that no fit sees"), "{}", same.err);
+    // Another body with another recording.
+    fs::write(file("larger.toml"), format!("{BLOCK}{SEEN}").replace("0.04, 0.08]", "0.04, 0.09]")).unwrap();
+    let larger = run("larger.toml");
+    assert_eq!(larger.code, 2, "{}", larger.err);
+    assert!(larger.err.contains("cm³") && larger.err.contains("another recording of the same body"), "{}", larger.err);
+    // The same body, pushed the other way: one recording explained, the other not.
+    let away = BLOCK.replace("velocity = [0.6, 0.0, 0.0]", "velocity = [-0.6, 0.0, 0.0]");
+    fs::write(file("away.toml"), &away).unwrap();
+    let camera = "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30";
+    let (truth, seen) = (file("away.toml"), file("seen-away"));
+    let observe = ["observe", arg(&truth), "--camera", camera, "--noise", "0.0005", "--depth-scale", "0.0001"];
+    succeed(&[&observe[..], &["--refine", "1.5", "--seed", "6", "--out", arg(&seen)]].concat());
+    fs::write(file("other.toml"), format!("{BLOCK}{SEEN}").replace("\"seen\"", "\"seen-away\"")).unwrap();
+    let other = run("other.toml");
+    assert_eq!(other.code, 0, "{}", other.err);
+    assert!(other.out.contains("The second recording is not explained"), "{}", other.out);
+    assert_eq!(json(file("why2/diagnosis.json"))["caveats"].as_array().map(Vec::len), Some(1));
 }

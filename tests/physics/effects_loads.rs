@@ -2,7 +2,7 @@
 
 use super::effects_contact::{apart, effect, mean};
 use glam::DVec3;
-use palpate_model::effects::Effect;
+use palpate_model::effects::{ALL, Effect, Family};
 use palpate_model::scene::*;
 use support::{run, scenes};
 
@@ -149,4 +149,29 @@ fn slack_windows_add_up_to_a_constant_force() {
         second(0.03, 0.02)
     );
     assert!((spin / (5e3 * lattice * 0.05) - 1.0).abs() < 0.01 && mean(&plan, &end).0.length() < 1e-12);
+}
+
+#[test]
+fn absent_effects_change_no_bit() {
+    // Held at one end, it falls onto a plane: everything that an effect may act on is there.
+    let mut s = block();
+    s.gravity = DVec3::new(0.0, 0.0, -9.81);
+    s.material.stiffness_damping = 0.002;
+    s.planes = vec![scenes::plane(DVec3::new(0.0, 0.0, -0.0102), DVec3::Z)];
+    s.clamps = vec![scenes::clamp(DVec3::new(-0.02, -0.02, -0.02), DVec3::new(-0.0149, 0.02, 0.02))];
+    s.initial.angular_velocity = DVec3::new(0.0, 5.0, 0.0);
+    s.time = Time { step: 0.005, steps: 12, start: 0.0, theta: 0.6 };
+    let plain = run::states(&scenes::plan(&s)).pop().unwrap();
+    assert!(plain.displacement.iter().any(|u| u.length() > 1e-4), "it moves");
+    // Those of the measurement act on what a camera sees, not on the body.
+    for law in (0..ALL.len()).filter(|k| !matches!(ALL[*k].family, Family::Measurement)) {
+        s.effects = vec![Effect::absent(law)];
+        let with = run::states(&scenes::plan(&s)).pop().unwrap();
+        let pairs = plain.displacement.iter().zip(&with.displacement).chain(plain.velocity.iter().zip(&with.velocity));
+        let off = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        // Strain is counted from another shape, whose difference from the given one is zero: rounding alone, amplified by Newton's tolerance.
+        let allowed = if ALL[law].kind == "rest-shape" { 1e-9 } else { 0.0 };
+        println!("{}: {off:e}", ALL[law].kind);
+        assert!(off <= allowed, "{}: {off:e}", ALL[law].kind);
+    }
 }

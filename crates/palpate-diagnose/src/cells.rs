@@ -74,6 +74,16 @@ impl Regions {
     }
 }
 
+/// Number of the sensor that a reading came from: its camera, or 1000 + 3 × marker + axis.
+pub fn sensor(source: Source) -> u32 {
+    match source {
+        Source::Point { camera, .. } => camera,
+        Source::Marker { site, axis } => 1000 + 3 * site + u32::from(axis),
+        // Directly observed nodes: one sensor per region and coordinate.
+        Source::Node { axis, .. } => 999 - u32::from(axis),
+    }
+}
+
 /// Which cell every reading belongs to, and what its noise is. Made once, from the baseline, and kept for every model.
 #[derive(Clone, Debug, Default)]
 pub struct Cells {
@@ -114,14 +124,11 @@ impl Cells {
             (&points, (points.len() as f64 / frames as f64 / PER_REGION).log2().floor().clamp(2.0, finest) as u32)
         };
         let regions = Regions::new(sample, depth);
-        let key = |r: &crate::laboratory::Reading| {
-            let sensor = match r.row.source {
-                Source::Point { camera, .. } => camera,
-                Source::Marker { site, axis } => 1000 + 3 * site + u32::from(axis),
-                // Directly observed nodes: one sensor per region and coordinate.
-                Source::Node { axis, .. } => 999 - u32::from(axis),
-            };
-            CellKey { scene: r.scene, sensor, region: regions.of(r.row.rest), frame: r.row.frame }
+        let key = |r: &crate::laboratory::Reading| CellKey {
+            scene: r.scene,
+            sensor: sensor(r.row.source),
+            region: regions.of(r.row.rest),
+            frame: r.row.frame,
         };
         let mut count: BTreeMap<CellKey, (usize, f64)> = BTreeMap::new();
         for r in rows.iter().filter(|r| r.row.value.is_some() && r.row.weight > 0.0) {

@@ -2,6 +2,7 @@
 
 use crate::laboratory::Model;
 use crate::locate::Place;
+use crate::quantity::stated;
 
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +107,8 @@ pub struct Slack {
 pub struct MapEntry {
     /// Scene.
     pub scene: usize,
+    /// Camera, or 1000 + 3 × marker + axis.
+    pub sensor: u32,
     /// Number of the region.
     pub region: usize,
     /// Its middle on the rest shape [m].
@@ -159,6 +162,8 @@ pub struct Diagnosis {
     pub noise_ratio: f64,
     /// Factor by which correlation between readings raises the variance of means.
     pub design_effect: f64,
+    /// What else whoever reads the answer must know, in sentences.
+    pub caveats: Vec<String>,
     /// True when what is left still has structure that counts.
     pub remains: bool,
     /// True when it was stopped before its end.
@@ -169,8 +174,12 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The answer in one sentence, for a lab book.
+    /// The answer in one sentence, for a lab book, and what else must be known.
     pub fn sentence(&self) -> String {
+        self.caveats.iter().fold(self.answer(), |all, c| format!("{all} {c}"))
+    }
+
+    fn answer(&self) -> String {
         let mm = |x: f64| format!("{:.3} mm", x * 1e3);
         let apart =
             format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
@@ -214,8 +223,7 @@ impl Diagnosis {
                     .map(|e| {
                         let numbers = e.parameters.iter().map(|(path, v, se, unit)| {
                             let name = path.splitn(3, '.').last().unwrap_or(path);
-                            let se = se.map_or(String::new(), |s| format!(" ± {s:.2e}"));
-                            format!("{name} {v:.4}{se}{}", if unit == "1" { String::new() } else { format!(" {unit}") })
+                            format!("{name} {}{}", stated(*v, *se), if unit == "1" { String::new() } else { format!(" {unit}") })
                         });
                         let others = if e.indistinguishable_from.is_empty() {
                             String::new()

@@ -12,16 +12,18 @@ mod linear;
 mod locate;
 mod noise;
 mod null;
+mod quantity;
 mod score;
 mod still;
 mod workflow;
 
-pub use cells::Regions;
+pub use cells::{Regions, sensor};
 pub use change::{Candidate, Change, can_be_freed, candidates};
 pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
 pub use linear::least_squares;
 pub use locate::Place;
+pub use quantity::stated;
 pub use workflow::{Options, diagnose};
 
 #[cfg(test)]

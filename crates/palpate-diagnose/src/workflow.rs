@@ -79,6 +79,8 @@ struct State {
     held_out: Option<Readings>,
     /// What finer computations would change in those residuals.
     held_out_finer: Vec<Field>,
+    /// Why there are none although there is such data.
+    elsewhere: Option<String>,
 }
 
 impl State {
@@ -289,12 +291,13 @@ impl Session<'_> {
         let table = self.cells.table(&readings, fallback);
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
-        let held_out = match self.lab.held_out(&model) {
+        let (held_out, elsewhere) = match self.lab.held_out(&model) {
+            Ok(readings) => (readings, None),
             Err(LabError::Interrupted) => return Err(LabError::Interrupted),
             // A model that cannot follow the other recording is judged by this one.
-            other => other.unwrap_or_default(),
+            Err(e) => (None, Some(e.to_string())),
         };
-        Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new() })
+        Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new(), elsewhere })
     }
 
     /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.

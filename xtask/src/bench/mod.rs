@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch};
 use palpate_model::body::{Body, SUBDIVISIONS};
+use palpate_model::effects::{self, Effect, Family};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
@@ -55,6 +56,10 @@ pub fn all(large: bool, only: &str) -> Result<Report, String> {
                     add(Line { paper: Some(PAPER_DRAGON.map(|ms| 1e-3 * ms)), ..line });
                 }
             }
+            // Beside the first: effects that are absent cost nothing.
+            if wanted("dragon, effects absent") {
+                add(one_with("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, RotationUpdate::Converged, 5e4, &effects())?);
+            }
         }
         None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
     }
@@ -89,7 +94,17 @@ pub(crate) fn data() -> Option<std::path::PathBuf> {
 
 /// A body that is dropped from just above the ground and watched in every step.
 pub(super) fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
-    let layout = Layout::new(1, 0, &[]);
+    plan_with(body, rotation, youngs_modulus, &[])
+}
+
+/// Every effect that needs nothing but a body and a plane.
+fn effects() -> Vec<usize> {
+    (0..effects::ALL.len()).filter(|k| !matches!(effects::ALL[*k].family, Family::Measurement)).collect()
+}
+
+/// The same with effects of these laws, all of them absent.
+fn plan_with(body: Body, rotation: RotationUpdate, youngs_modulus: f64, laws: &[usize]) -> Plan {
+    let layout = Layout::new(1, 0, laws);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let value = |k: &ParamKey| match k {
@@ -101,6 +116,7 @@ pub(super) fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) ->
         ParamKey::Gravity(2) => -9.81,
         ParamKey::PlaneTheta(_) | ParamKey::PlanePhi(_) => std::f64::consts::FRAC_PI_2,
         ParamKey::PlaneHeight(_) => lowest,
+        ParamKey::Effect { law, slot, .. } => Effect::absent(usize::from(*law)).value(usize::from(*slot), body.center),
         _ => 0.0,
     };
     let theta = layout.keys.iter().map(value).collect();
@@ -145,13 +161,24 @@ pub(super) fn blocks(body: &Body) -> usize {
 }
 
 pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
+    one_with(name, shape, h, rotation, youngs_modulus, &[])
+}
+
+fn one_with(
+    name: &str,
+    shape: &dyn Shape,
+    h: f64,
+    rotation: RotationUpdate,
+    youngs_modulus: f64,
+    laws: &[usize],
+) -> Result<Line, String> {
     reserve();
     PeakAlloc.reset_peak_usage();
     let before = PeakAlloc.current_usage();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
     let build = clock.elapsed().as_secs_f64();
-    let plan = plan(body, rotation, youngs_modulus);
+    let plan = plan_with(body, rotation, youngs_modulus, laws);
     let body = &plan.body;
     let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
     let mut taken = Seconds::default();

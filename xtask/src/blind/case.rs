@@ -7,6 +7,7 @@ use super::scenes::{Setup, setup};
 use super::strength::{Moved, Ruler, rms};
 use glam::DVec3;
 use palpate::{Backend, DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
+use palpate_diagnose::MapEntry;
 use palpate_model::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -266,18 +267,18 @@ impl Outcome {
             off.1 += ((n.truth - n.absent) / n.scale).powi(2);
         }
         self.parameter_error = (off.1 > 0.0).then(|| (off.0 / off.1).sqrt());
-        self.localisation = localisation(d.map.iter().map(|m| (m.place, m.time, m.before)), moved);
+        self.localisation = localisation(&d.map, moved);
     }
 }
 
-/// Share of the squared excess of a residual map (place, time, z) in those blocks that hold 90 % of what really moved.
-fn localisation(map: impl Iterator<Item = (DVec3, (f64, f64), f64)>, moved: &[Moved]) -> Option<f64> {
-    let map: Vec<_> = map.collect();
+/// Share of the squared excess of a residual map in those blocks that hold 90 % of what really moved.
+fn localisation(map: &[MapEntry], moved: &[Moved]) -> Option<f64> {
     // What really moved in every block: the square of the sum over its readings, over their number, as the null counts it.
     let mut real = vec![(0.0, 0.0); map.len()];
     for m in moved {
-        let near = |b: &usize| (map[*b].0.distance(m.rest), b.to_owned());
-        let blocks = (0..map.len()).filter(|b| (map[*b].1.0 - 1e-9..=map[*b].1.1 + 1e-9).contains(&m.time));
+        let near = |b: &usize| (map[*b].place.distance(m.rest), b.to_owned());
+        let during = |e: &MapEntry| (e.time.0 - 1e-9..=e.time.1 + 1e-9).contains(&m.time);
+        let blocks = (0..map.len()).filter(|b| map[*b].sensor == m.sensor && during(&map[*b]));
         if let Some((_, b)) = blocks.map(|b| near(&b)).min_by(|a, b| a.0.total_cmp(&b.0)) {
             real[b].0 += m.change;
             real[b].1 += 1.0;
@@ -287,7 +288,7 @@ fn localisation(map: impl Iterator<Item = (DVec3, (f64, f64), f64)>, moved: &[Mo
     let mut order: Vec<usize> = (0..map.len()).collect();
     order.sort_by(|a, b| real[*b].total_cmp(&real[*a]));
     let total: f64 = real.iter().sum();
-    let excess = |b: usize| (map[b].2 * map[b].2 - 1.0).max(0.0);
+    let excess = |b: usize| (map[b].before * map[b].before - 1.0).max(0.0);
     let all: f64 = (0..map.len()).map(excess).sum();
     let (mut held, mut inside) = (0.0, 0.0);
     for b in order {

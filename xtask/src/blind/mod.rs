@@ -55,11 +55,12 @@ const QUICK: [&str; 13] = [
 ];
 
 /// Two things at once: names, scene.
-const PAIRS: [([&str; 2], &str); 4] = [
+const PAIRS: [([&str; 2], &str); 5] = [
     (["coulomb-friction", "air-drag"], "ball"),
     (["coulomb-friction", "initial-spin"], "torus"),
     (["two-part-stiffness", "marker-offset"], "beam"),
     (["two-part-stiffness", "depth-along-ray"], "plate"),
+    (["two-part-stiffness", "camera-pose"], "plate"),
 ];
 
 /// A case of the tests on the small ball: what is hidden (a line of the table in any scene), nothing, or a magnet.

@@ -11,6 +11,7 @@ use super::scenes::Setup;
 use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, fit};
 use palpate_cpu::CpuBackend;
+use palpate_diagnose::sensor;
 use palpate_engine::{Linearised, ResidualRow, Rollout};
 use palpate_model::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,8 @@ pub struct Ruler<'a> {
 /// Change of one reading by an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Moved {
+    /// Sensor as in a residual map.
+    pub sensor: u32,
     /// Place on the rest shape [m].
     pub rest: DVec3,
     /// Time [s].
@@ -92,7 +95,12 @@ impl<'a> Ruler<'a> {
         let theta = fit(std::slice::from_ref(&e), options)?.result.theta.remove(0);
         let rows = linearise(&e, &theta, &[])?.rows.residuals;
         let time = |r: &ResidualRow| e.plan().observation.frames[r.frame].time;
-        let moved = |r: &ResidualRow| Moved { rest: r.rest, time: time(r), change: r.value.map_or(0.0, |v| v / r.noise) };
+        let moved = |r: &ResidualRow| Moved {
+            sensor: sensor(r.source),
+            rest: r.rest,
+            time: time(r),
+            change: r.value.map_or(0.0, |v| v / r.noise),
+        };
         Ok(rows.iter().map(moved).collect())
     }
 
@@ -115,7 +123,12 @@ impl<'a> Ruler<'a> {
         };
         let mut d: Vec<f64> = l.rows.residuals.iter().zip(&self.rows).map(difference).collect();
         project(&self.free, &mut d);
-        let moved = |((change, r), time): ((f64, &ResidualRow), &f64)| Moved { rest: r.rest, time: *time, change };
+        let moved = |((change, r), time): ((f64, &ResidualRow), &f64)| Moved {
+            sensor: sensor(r.source),
+            rest: r.rest,
+            time: *time,
+            change,
+        };
         d.into_iter().zip(&self.rows).zip(&self.times).map(moved).collect()
     }
 

@@ -8,6 +8,9 @@ use crate::linear::least_squares;
 use crate::null::{Adequacy, Block, LARGEST};
 use palpate_engine::Source;
 
+/// Distance over what noise and discretisation explain beyond which a recording that no fit has seen counts as not met: bodies simulated
+/// by another method, with nothing missing, stay below 1.2.
+const MET: f64 = 1.5;
 /// Ridge that keeps errors of the discretisation apart that look the same.
 const SMALL: f64 = 1e-3;
 
@@ -75,6 +78,7 @@ impl Session<'_> {
         // Of all that is missing, not of what a rejected explanation leaves; the noise may have become known better since.
         self.remeasure(&mut base);
         let slack = if verdict == Verdict::Unexplained { self.slack(&base).ok() } else { None };
+        let caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
         let baseline = base.model;
         if verdict == Verdict::Unexplained {
             // Part of an explanation is not one: it is shown, but not believed.
@@ -102,6 +106,7 @@ impl Session<'_> {
             slack,
             noise_ratio: self.noise_ratio,
             design_effect: self.design_effect,
+            caveats,
             remains: !adequate,
             interrupted: out.interrupted,
             unsure: out.unsure,
@@ -112,6 +117,7 @@ impl Session<'_> {
         let times = before.cells.iter().map(|c| self.cells.times[*c]);
         MapEntry {
             scene: before.scene,
+            sensor: before.sensor,
             region: before.region,
             place: self.cells.regions.centers[before.region],
             time: times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t))),
@@ -119,4 +125,15 @@ impl Session<'_> {
             after: after.z,
         }
     }
+}
+
+/// What to know of the second recording: distances before and after, and why it could not be simulated, if so.
+fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&String>) -> Vec<String> {
+    let level = held_out.map(|(before, after)| if verdict == Verdict::MissingEffect { after } else { before });
+    let missed = level.filter(|l| l.rms > MET * l.noise).map(|l| {
+        let mm = |x: f64| format!("{:.3} mm", x * 1e3);
+        format!("The second recording is not explained: it is {} apart, noise and grid explain {}.", mm(l.rms), mm(l.noise))
+    });
+    let failed = failure.map(|e| format!("The second recording took no part: {e}."));
+    missed.into_iter().chain(failed).collect()
 }

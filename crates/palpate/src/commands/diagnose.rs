@@ -6,7 +6,7 @@ use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, out_folder};
-use crate::report::{DiagnosisInput, diagnosis_html, diagnosis_json, pictures};
+use crate::report::{DiagnosisInput, diagnosis_html, diagnosis_json, diagnosis_summary, pictures};
 use clap::Args;
 use palpate_io::output::{make_folder, write_file};
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if console.json() {
         console.print(&result.to_string());
     } else {
-        console.print(&format!("{}\n  report: {}", done.diagnosis.sentence(), folder.join("report.html").display()));
+        console.print(&diagnosis_summary(&done, &folder));
     }
     Ok(if done.diagnosis.interrupted { INTERRUPTED } else { 0 })
 }

@@ -16,6 +16,7 @@ use crate::interrupt::Interrupt;
 use lab::Lab;
 use palpate_diagnose::{Change, Diagnosis, LabError, Laboratory, Model};
 use palpate_model::effects::Effect;
+use palpate_model::scene::ObservationSpec;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -63,7 +64,7 @@ pub struct Diagnosed {
 /// Finds what the model of one or several experiments lacks. `held_out` is a recording of the same body that no fit sees.
 ///
 /// # Errors
-/// [`Error::Input`] when there is nothing to compare with, [`Error::Failed`] when the baseline cannot be computed,
+/// [`Error::Input`] when there is nothing to compare with or `held_out` shows another body or nothing new, [`Error::Failed`] when the baseline cannot be computed,
 /// [`Error::Interrupted`] when it was stopped before the baseline was known.
 pub fn diagnose(
     experiments: &[Experiment],
@@ -77,6 +78,9 @@ pub fn diagnose(
             let name = e.scene().path.display();
             return Err(Error::Input(format!("{name}: observation is missing or has no data to compare with; name a recording")));
         }
+    }
+    if let Some(other) = held_out {
+        same_body(experiments, other)?;
     }
     let mut told = options.on_progress.take();
     let mut say = |what: &str| {
@@ -150,6 +154,33 @@ pub fn diagnose(
         seconds: clock.elapsed().as_secs_f64(),
         diagnosis,
     })
+}
+
+/// Share of its volume by which a second recording's body may differ: grids cut the same body a little differently.
+const SAME: f64 = 0.01;
+
+/// What one body taught says nothing of another.
+fn same_body(experiments: &[Experiment], other: &Experiment) -> Result<(), Error> {
+    let volume = |e: &Experiment| e.plan().body.volume;
+    let path = other.scene().path.display();
+    if experiments.iter().all(|e| (volume(other) / volume(e) - 1.0).abs() > SAME) {
+        let cm3 = |e: &Experiment| 1e6 * volume(e);
+        let (given, own) = (cm3(&experiments[0]), cm3(other));
+        let known = experiments[0].scene().path.display();
+        return Err(Error::Input(format!(
+            "{path}: the body has {own:.3} cm³ and that of {known} {given:.3} cm³; --held-out wants another recording of the same body"
+        )));
+    }
+    let absolute = |p: &std::path::Path| p.canonicalize().unwrap_or_else(|_| p.into());
+    let used = |e: &Experiment| {
+        e.scene().observation.as_ref().map(|o| ObservationSpec { recording: absolute(&o.recording), ..o.clone() })
+    };
+    if experiments.iter().any(|e| used(e) == used(other)) {
+        return Err(Error::Input(format!(
+            "{path}: observation.recording is the one that is fitted; --held-out wants a recording that no fit sees"
+        )));
+    }
+    Ok(())
 }
 
 fn failed(e: LabError) -> Error {

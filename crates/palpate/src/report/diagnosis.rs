@@ -6,7 +6,7 @@ use super::plots::{Curve, curves};
 use super::result::number;
 use crate::diagnosing::Diagnosed;
 use crate::residuals::ResidualSummary;
-use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Verdict};
+use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Model, Verdict, stated};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -83,8 +83,9 @@ pub fn diagnosis_json(done: &Diagnosed) -> Value {
             "windows": s.windows.iter().map(|w| json!({ "time": w.time, "values": w.values })).collect::<Vec<_>>(),
         })),
         "map": d.map.iter().map(|m| json!({
-            "scene": m.scene, "region": m.place.to_array(), "time": [m.time.0, m.time.1], "before": finite(m.before), "after": finite(m.after),
+            "scene": m.scene, "sensor": sensor(done, m.scene, m.sensor), "region": m.place.to_array(), "time": [m.time.0, m.time.1], "before": finite(m.before), "after": finite(m.after),
         })).collect::<Vec<_>>(),
+        "caveats": d.caveats,
         "something_remains": d.remains,
         "interrupted": d.interrupted,
         "seconds": done.seconds,
@@ -130,22 +131,18 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         writeln!(p, "<p class=\"w\">The diagnosis was interrupted; this is what was known until then.</p>")?;
     }
     let mm = |x: f64| format!("{:.3} mm", x * 1e3);
-    let noise = |l: &Level| l.rms / l.noise;
     writeln!(
         p,
-        "<h2>Before and after</h2><table><tr><th>data<th class=\"n\">before<th class=\"n\">after<th class=\"n\">noise and grid\
-         <th class=\"n\">before / noise<th class=\"n\">after / noise</tr>"
+        "<h2>Before and after</h2><p>Distances, root mean square, and what noise and grid explain of them.</p><table><tr><th>data\
+         <th class=\"n\">before<th class=\"n\">explained<th class=\"n\">ratio<th class=\"n\">after<th class=\"n\">explained<th class=\"n\">ratio\
+         </tr>"
     )?;
     let mut row = |name: &str, b: Level, a: Level| {
-        writeln!(
-            p,
-            "<tr><td>{name}<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{:.2}<td class=\"n\">{:.2}</tr>",
-            mm(b.rms),
-            mm(a.rms),
-            mm(a.noise),
-            noise(&b),
-            noise(&a)
-        )
+        write!(p, "<tr><td>{name}")?;
+        for l in [b, a] {
+            write!(p, "<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{:.2}", mm(l.rms), mm(l.noise), l.rms / l.noise)?;
+        }
+        writeln!(p, "</tr>")
     };
     row("fitted", d.before, d.after)?;
     let left_out = |rms: f64| Level { rms, noise: d.before.noise };
@@ -174,7 +171,7 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         }
         writeln!(p, "</table>")?;
     }
-    map(p, &d.map)?;
+    map(p, input.done)?;
     for (s, (before, after)) in input.residuals.iter().enumerate() {
         let curve = |label: &str, r: &ResidualSummary| Curve {
             label: label.into(),
@@ -230,40 +227,78 @@ fn effects(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         }
         writeln!(p, "</p><table>")?;
         for (path, value, error, unit) in &f.parameters {
-            let error = error.map_or("–".into(), number);
-            writeln!(p, "<tr><td><code>{}</code><td class=\"n\">{}<td>± {error}<td>{unit}</tr>", escape(path), number(*value))?;
+            let unit = if unit == "1" { "" } else { unit };
+            writeln!(p, "<tr><td><code>{}</code><td class=\"n\">{}<td>{unit}</tr>", escape(path), stated(*value, *error))?;
         }
         writeln!(p, "</table>")?;
     }
     Ok(())
 }
 
+/// A fitted number with its standard error.
+fn fitted(m: &Model, k: usize) -> String {
+    stated(m.values[k], m.errors[k])
+}
+
 fn values(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
     let d = &input.done.diagnosis;
-    if d.baseline.numbers.is_empty() || d.model == d.baseline {
+    let same = d.model == d.baseline;
+    if d.baseline.numbers.is_empty() {
         return Ok(());
     }
-    writeln!(
-        p,
-        "<h2>Fitted values before and after</h2><p>A missing effect pulls the other values along.</p><table><tr><th>number\
-         <th class=\"n\">before<th class=\"n\">after<th class=\"n\">± standard error<th>unit</tr>"
-    )?;
-    for (k, n) in d.baseline.numbers.iter().enumerate() {
-        let (b, a) = (number(d.baseline.values[k]), number(d.model.values[k]));
-        let error = d.model.errors[k].map_or("–".into(), number);
+    if same {
+        writeln!(p, "<h2>Fitted values</h2><table><tr><th>number<th class=\"n\">value<th>unit</tr>")?;
+    } else {
         writeln!(
             p,
-            "<tr><td><code>{}</code><td class=\"n\">{b}<td class=\"n\">{a}<td class=\"n\">{error}<td>{}</tr>",
-            escape(&n.path),
-            n.unit
+            "<h2>Fitted values before and after</h2><p>A missing effect pulls the other values along.</p><table><tr><th>number\
+             <th class=\"n\">before<th class=\"n\">after<th>unit</tr>"
         )?;
+    }
+    for (k, n) in d.baseline.numbers.iter().enumerate() {
+        let after = if same { String::new() } else { format!("<td class=\"n\">{}", fitted(&d.model, k)) };
+        let unit = if n.unit == "1" { "" } else { &n.unit };
+        writeln!(p, "<tr><td><code>{}</code><td class=\"n\">{}{after}<td>{unit}</tr>", escape(&n.path), fitted(&d.baseline, k))?;
     }
     writeln!(p, "</table>")
 }
 
-/// Regions of the rest surface against time: blue where the measurement lies inside the model, red outside, full colour at six standard
-/// deviations.
-fn map(p: &mut String, entries: &[MapEntry]) -> std::fmt::Result {
+/// A few lines for the terminal: the answer, values before and after, what would decide between equals, and where everything is.
+pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
+    let d = &done.diagnosis;
+    let mut text = format!("{}\n", d.sentence());
+    let width = d.baseline.numbers.iter().map(|n| n.path.chars().count()).max().unwrap_or(0);
+    for (k, n) in d.baseline.numbers.iter().enumerate() {
+        let after = if d.model == d.baseline { String::new() } else { format!("  →  {}", fitted(&d.model, k)) };
+        let unit = if n.unit == "1" { String::new() } else { format!(" {}", n.unit) };
+        text += &format!("  {:width$}  {}{after}{unit}\n", n.path, fitted(&d.baseline, k));
+    }
+    for f in d.effects.iter().filter(|f| f.accepted) {
+        if let Some((what, by)) = &f.separated_by {
+            text += &format!("  to tell {} from the others: {what}; they differ by {:.3} mm there\n", f.kind, by * 1e3);
+        }
+    }
+    let model = if done.experiments.len() == 1 { "model.toml" } else { "model-1.toml …" };
+    text + &format!("  corrected scene: {}\n  report: {}", folder.join(model).display(), folder.join("report.html").display())
+}
+
+/// Name of a sensor: a camera, or a coordinate of a marker.
+fn sensor(done: &Diagnosed, scene: usize, sensor: u32) -> String {
+    let recording = done.experiments[scene].recording();
+    let markers = &done.experiments[scene].plan().observation.markers;
+    match sensor.checked_sub(1000) {
+        None => recording.and_then(|r| r.cameras.get(sensor as usize)).map_or("camera".into(), |c| c.name.clone()),
+        Some(m) => {
+            let name = markers.get(m as usize / 3).map_or("marker", |s| s.name.as_str());
+            format!("{name}.{}", ["x", "y", "z"][m as usize % 3])
+        }
+    }
+}
+
+/// What each sensor saw of each region of the rest surface against time: blue where the measurement lies inside the model, red outside, full
+/// colour at six standard deviations.
+fn map(p: &mut String, done: &Diagnosed) -> std::fmt::Result {
+    let entries = &done.diagnosis.map;
     if entries.is_empty() {
         return Ok(());
     }
@@ -272,24 +307,28 @@ fn map(p: &mut String, entries: &[MapEntry]) -> std::fmt::Result {
         let (r, b) = if z > 0.0 { (178, 43) } else { (33, 172) };
         format!("rgba({r},60,{b},{s:.2})")
     };
-    let mut regions: Vec<(usize, usize)> = entries.iter().map(|e| (e.scene, e.region)).collect();
-    regions.sort_unstable();
-    regions.dedup();
+    let key = |e: &MapEntry| (e.scene, e.sensor, e.region);
+    let mut rows: Vec<_> = entries.iter().map(key).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    let (from, to) = entries.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(e.time.0), b.max(e.time.1)));
     writeln!(
         p,
-        "<h2>Residual map</h2><p>Rows: regions of the rest surface; columns: stretches of time, before | after. Blue: measured inside the \
-         model, red: outside; full colour at six standard deviations of what noise and grid leave.</p><table>"
+        "<h2>Residual map</h2><p>Rows: what a camera saw of a region of the rest surface (its middle in metres), or a coordinate of a marker; columns: \
+         stretches of time from {from:.3} to {to:.3} s, before | after. Blue: a point measured inside the model, or a coordinate larger than \
+         simulated; red: the other way round; full colour at six standard deviations of what noise and grid leave.</p><table>"
     )?;
-    for (scene, region) in regions {
-        let mine: Vec<&MapEntry> = entries.iter().filter(|e| (e.scene, e.region) == (scene, region)).collect();
+    for row in rows {
+        let mine: Vec<&MapEntry> = entries.iter().filter(|e| key(e) == row).collect();
+        let scene = if done.experiments.len() > 1 { format!("scene {}, ", row.0 + 1) } else { String::new() };
         let c = mine[0].place;
-        writeln!(p, "<tr><td>scene {}, ({:.3}, {:.3}, {:.3}) m", scene + 1, c.x, c.y, c.z)?;
-        for e in &mine {
-            writeln!(p, "<td style=\"background:{}\" title=\"{:.3} s: {:.1}\">&nbsp;", colour(e.before), e.time.0, e.before)?;
-        }
-        writeln!(p, "<td>|")?;
-        for e in &mine {
-            writeln!(p, "<td style=\"background:{}\" title=\"{:.3} s: {:.1}\">&nbsp;", colour(e.after), e.time.0, e.after)?;
+        let region = if row.1 < 1000 { format!(" ({:.3}, {:.3}, {:.3})", c.x, c.y, c.z) } else { String::new() };
+        write!(p, "<tr><td>{scene}{}{region}", escape(&sensor(done, row.0, row.1)))?;
+        for (part, z) in [("", (|e| e.before) as fn(&MapEntry) -> f64), ("<td>|", |e| e.after)] {
+            write!(p, "{part}")?;
+            for e in &mine {
+                write!(p, "<td style=\"background:{}\" title=\"{:.3} s: {:.1}\">&nbsp;", colour(z(e)), e.time.0, z(e))?;
+            }
         }
         writeln!(p, "</tr>")?;
     }

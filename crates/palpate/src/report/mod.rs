@@ -6,7 +6,7 @@ mod pictures;
 mod plots;
 mod result;
 
-pub use diagnosis::{DiagnosisInput, diagnosis_html, diagnosis_json};
+pub use diagnosis::{DiagnosisInput, diagnosis_html, diagnosis_json, diagnosis_summary};
 pub use html::{ReportInput, html};
 pub use pictures::{FramePicture, pictures};
 pub use result::{history_csv, number, result_json, summary};
