@@ -2,7 +2,7 @@
 
 use super::effects_materials::effect;
 use faer::{Mat, Side};
-use glam::DVec3;
+use glam::{DAffine3, DMat3, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, ParamBatch};
 use palpate_model::plan::Plan;
@@ -38,12 +38,15 @@ fn spectrum(s: &Scene) -> (Plan, Vec<f64>, Vec<DVec3>) {
 }
 
 /// Condition number of the Jacobi-scaled stiffness, and the sag of the top face over that of a column of its height, for a
-/// block of 2 × 2 cells that ends a fraction `cut` into its third layer.
-fn block(cut: f64, ghost: f64) -> (f64, f64) {
+/// block of 2 × 2 cells that ends a fraction `cut` into its third layer, all of it turned against the lattice by `turn`.
+fn block(cut: f64, turn: DMat3, ghost: f64) -> (f64, f64) {
     let top = (2.0 + cut) * H;
     let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(2.0 * H, 2.0 * H, top) }, H);
-    s.clamps = vec![scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5))];
-    s.gravity = DVec3::new(0.0, 0.0, -1.0);
+    s.object.pose = DAffine3::from_mat3(turn);
+    let base = scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5));
+    s.clamps = vec![Clamp { object_frame: true, ..base }];
+    let up = turn * DVec3::Z;
+    s.gravity = -up;
     s.material.poisson_ratio = 0.3;
     s.initial.state = InitialShape::StaticEquilibrium;
     s.time.steps = 0;
@@ -52,9 +55,9 @@ fn block(cut: f64, ghost: f64) -> (f64, f64) {
     let body = &plan.body;
     // Mean sag over the top face, from the patches that lie in it.
     let (mut sag, mut area) = (0.0, 0.0);
-    for p in body.patches.iter().filter(|p| p.normal.z > 0.9) {
+    for p in body.patches.iter().filter(|p| p.normal.dot(up) > 0.9) {
         let nodes = body.cells[p.cell as usize].nodes;
-        sag -= p.area * (0..8).map(|i| p.weights[i] * u[nodes[i] as usize].z).sum::<f64>();
+        sag -= p.area * (0..8).map(|i| p.weights[i] * u[nodes[i] as usize].dot(up)).sum::<f64>();
         area += p.area;
     }
     (eigen[eigen.len() - 1] / eigen[0], sag / area / (1000.0 * top * top / (2.0 * 5000.0)))
@@ -63,19 +66,43 @@ fn block(cut: f64, ghost: f64) -> (f64, f64) {
 #[test]
 fn condition_and_solution_are_bounded_as_a_face_slides_through_a_cell() {
     let cuts = [1e-7, 1e-5, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0];
-    let table: Vec<(f64, f64)> = cuts.iter().map(|&c| block(c, Solver::default().ghost)).collect();
+    let table: Vec<(f64, f64)> = cuts.iter().map(|&c| block(c, DMat3::IDENTITY, Solver::default().ghost)).collect();
     for (c, (condition, sag)) in cuts.iter().zip(&table) {
         println!("cut at {c:8.1e}: condition {condition:8.1}, sag over a column's {sag:.4}");
     }
-    let full = table[cuts.len() - 1];
+    let (two, three) = (table[0], table[cuts.len() - 1]);
     // A thin layer hangs on by the ghost penalty: scaled by the diagonal it is no worse than a full layer.
-    assert!(table.iter().all(|t| t.0 < 1.5 * full.0), "condition bounded");
-    // The held base makes the block a little stiffer than a free column; how much depends smoothly on its height.
-    for pair in table.windows(2) {
-        assert!((pair[0].1 - pair[1].1).abs() < 0.03, "the solution does not jump: {pair:?}");
+    assert!(table.iter().all(|t| t.0 < 1.5 * three.0), "condition bounded");
+    // The held base makes the block a little stiffer than a free column, less so the higher it is: by 2 % from two layers to three. In
+    // between the sag goes along, but for what the ghost penalty does to a part of a layer: a fifth of that change.
+    for (cut, t) in cuts.iter().zip(&table) {
+        let between = two.1 + cut * (three.1 - two.1);
+        assert!((t.1 - between).abs() < 0.2 * (three.1 - two.1), "cut at {cut}: {} instead of {between}", t.1);
     }
     // The test can fail: without the penalty a thin layer is many orders softer than the rest.
-    assert!(block(1e-3, 0.0).0 > 10.0 * block(1e-3, Solver::default().ghost).0);
+    assert!(block(1e-3, DMat3::IDENTITY, 0.0).0 > 10.0 * table[2].0);
+}
+
+#[test]
+fn condition_and_solution_are_bounded_as_an_oblique_face_slides_through_the_lattice() {
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, -0.5, 0.3).normalize(), 0.7);
+    let at = |cut: f64, ghost: f64| block(cut, turn, ghost);
+    let cuts: Vec<f64> = (0..=10).map(|k| f64::from(k) / 10.0).collect();
+    let table: Vec<(f64, f64)> = cuts.iter().map(|&c| at(c, Solver::default().ghost)).collect();
+    for (c, (condition, sag)) in cuts.iter().zip(&table) {
+        println!("oblique, cut at {c:.1}: condition {condition:8.1}, sag over a column's {sag:.4}");
+    }
+    let (two, three) = (table[0], table[10]);
+    // Slivers of every thickness are cut at once. The condition grows from two layers to three as the height's fourth power does in
+    // bending, (3/2)⁴ = 5, at most, so by less than a fifth from one cut to the next unless a sliver sticks out; bounds as above.
+    let full = block(1.0, DMat3::IDENTITY, Solver::default().ghost).0;
+    assert!(table.iter().all(|t| t.0 < 1.5 * full), "condition bounded");
+    assert!(table.windows(2).all(|w| w[1].0 < 1.2 * w[0].0 && w[1].0 > w[0].0 / 1.2), "condition without peaks");
+    for (cut, t) in cuts.iter().zip(&table) {
+        let between = two.1 + cut * (three.1 - two.1);
+        assert!((t.1 - between).abs() < 0.2 * (three.1 - two.1), "cut at {cut}: {} instead of {between}", t.1);
+    }
+    assert!(at(0.5, 0.0).0 > 10.0 * table[5].0, "the test can fail");
 }
 
 #[test]

@@ -107,7 +107,9 @@ fn turned_scene_gives_the_turned_result() {
         let off = (third * end.displacement[i] - turned_end.displacement[j]).length();
         assert!(off < 1e-4 * end.displacement[i].length().max(0.01), "node {i}: {off:.1e}");
     }
-    // Any other turn cuts the cells differently: the motion of the centre of mass agrees within the discretisation.
+    // Any other turn cuts the cells differently: the motion of the centre of mass agrees within the discretisation. Free flight, most
+    // of that motion, is the same to 1e-10; what the contact adds depends on how cells are cut, to first order in their size. A block of
+    // three cells' thickness shows a tenth of a per cent.
     let skew = DMat3::from_rotation_x(0.5) * DMat3::from_rotation_z(0.3);
     let (other, other_end) = make(skew);
     let center = |plan: &palpate_model::plan::Plan, u: &[DVec3]| -> DVec3 {
@@ -115,5 +117,6 @@ fn turned_scene_gives_the_turned_result() {
     };
     let a = skew * center(&plan, &end.displacement);
     let b = center(&other, &other_end.displacement);
-    assert!((a - b).length() < 0.03 * a.length(), "{a} {b}");
+    println!("turned askew: {:.5} of the motion off", (a - b).length() / a.length());
+    assert!((a - b).length() < 0.003 * a.length(), "{a} {b}");
 }

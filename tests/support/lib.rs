@@ -5,5 +5,6 @@ pub mod data;
 pub mod energy;
 pub mod gpu;
 pub mod measured;
+pub mod modes;
 pub mod run;
 pub mod scenes;
