@@ -16,7 +16,7 @@ mod results;
 #[cfg(test)]
 pub(crate) mod rollout_tests;
 #[cfg(test)]
-mod rows_tests;
+pub(crate) mod rows_tests;
 mod shots;
 mod tables;
 #[cfg(test)]

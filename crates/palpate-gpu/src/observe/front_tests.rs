@@ -1,7 +1,7 @@
 //! Points that belong to the front of a thin plate, against the CPU: the plate has swung less far than the one that was recorded, so that
 //! points of the side which it swung away from lie behind its middle.
 
-use super::rollout_tests::{differences, seen, watched};
+use super::rollout_tests::{assert_agreement, differences, seen_within, watched};
 use super::rows_tests::{apart, effect};
 use crate::GpuBackend;
 use crate::tests::scenes::{device, held};
@@ -28,7 +28,8 @@ fn plate(effects: Vec<Effect>) -> Plan {
     s.time.steps = 3;
     s.observation = watched();
     s.effects = effects;
-    seen(&s)
+    // Readings that scatter: some of them lie behind the middle.
+    seen_within(&s, 0.1)
 }
 
 /// Rows of fronts: no place of the plate lies deeper in it than half its thickness.
@@ -55,8 +56,7 @@ fn check(plan: &Plan, keys: &[usize]) {
     let found = rollout.evaluate(&batch, &request);
     for ((a, b), row) in found.iter().zip(&cpu.evaluate(&batch, &request)).zip(&rows) {
         assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
-        let off = differences(a, b, &directions);
-        assert!(off.is_empty(), "{off:#?}");
+        assert_agreement(a, b, &directions);
         let right = cpu.linearise(row, &directions).unwrap_or_else(|e| panic!("{e}"));
         let lin = rollout.linearise(row, &directions).unwrap_or_else(|e| panic!("{e}"));
         let places = fronts(&right);

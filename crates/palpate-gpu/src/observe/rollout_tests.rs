@@ -23,8 +23,14 @@ pub(crate) fn watched() -> Option<palpate_model::scene::ObservationSpec> {
     scene(Analytic::Ball { radius: 0.05, center: DVec3::ZERO }, 0.03).observation
 }
 
-/// The plan of a scene that was seen from two sides, a little after each of its states.
+/// The plan of a scene that was seen from two sides, a little after each of its states; sharply, so that what a test changes explains
+/// most of a cost, and gradients are not small beside what they could be.
 pub(crate) fn seen(scene: &Scene) -> Plan {
+    seen_within(scene, 0.02)
+}
+
+/// The same with points off by up to so many cells.
+pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     let bare = build_plan(scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"));
     let body = bare.body.clone();
     let (mut frames, mut noise) = (Vec::new(), Noise(11));
@@ -35,7 +41,7 @@ pub(crate) fn seen(scene: &Scene) -> Plan {
             p.point + (0..8).map(|i| p.weights[i] * s.displacement[nodes[i] as usize]).sum::<DVec3>()
         };
         let mut point =
-            |p| ObservedPoint { position: place(p) + 0.1 * body.grid.h * noise.vector(), camera: u32::from(p.normal.x < 0.0) };
+            |p| ObservedPoint { position: place(p) + off * body.grid.h * noise.vector(), camera: u32::from(p.normal.x < 0.0) };
         let points = body.patches.iter().map(&mut point).collect();
         frames.push(Frame { time: scene.time.start + s.time + 0.2 * scene.time.step, points, ..Frame::default() });
         ControlFlow::Continue(())
@@ -50,31 +56,67 @@ pub(crate) fn seen(scene: &Scene) -> Plan {
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// What differs of two evaluations. |dJ/dp| is at most √(2 J H_pp), and H_pq at most √(H_pp H_qq).
-pub(crate) fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
-    let (Some(x), Some(y)) = (&a.curvature, &b.curvature) else { return vec!["no curvature".into()] };
+/// A number of an evaluation that is compared, by name.
+type Number = (String, f64);
+
+/// Everything that is compared.
+fn numbers(e: &Evaluation, directions: &[usize]) -> Vec<Number> {
     let q = directions.len();
-    let mut out = Vec::new();
-    let mut check = |name: String, x: f64, y: f64, size: f64| {
-        let d = (x - y).abs() / size;
-        // Not a number is a difference as well.
-        if d.is_nan() || d > AGREEMENT {
-            out.push(format!("{name}: {x} is not {y} ({d:.1e})"));
-        }
-    };
-    check("cost".into(), a.cost, b.cost, b.cost);
-    check("matched".into(), a.matched as f64, b.matched as f64, b.matched as f64);
-    for i in 0..q {
-        let own = y.matrix[i * q + i];
-        let most = (2.0 * b.cost * own).sqrt();
-        check(format!("gradient {i}"), a.gradient[directions[i]], b.gradient[directions[i]], most);
-        check(format!("Gauss–Newton gradient {i}"), x.gradient[i], y.gradient[i], most);
-        for j in 0..q {
-            let size = (own * y.matrix[j * q + j]).sqrt();
-            check(format!("matrix {i} {j}"), x.matrix[i * q + j], y.matrix[i * q + j], size);
-        }
+    let mut out = vec![("cost".into(), e.cost), ("matched".into(), e.matched as f64)];
+    let Some(c) = &e.curvature else { return out };
+    for (i, place) in directions.iter().enumerate() {
+        out.push((format!("gradient {i}"), e.gradient[*place]));
+        out.push((format!("Gauss–Newton gradient {i}"), c.gradient[i]));
+        out.extend((0..q).map(|j| (format!("matrix {i} {j}"), c.matrix[i * q + j])));
     }
     out
+}
+
+/// What each of them could be at most: |dJ/dp| is at most √(2 J H_pp), and H_pq at most √(H_pp H_qq).
+fn sizes(e: &Evaluation, q: usize) -> Vec<f64> {
+    let mut out = vec![e.cost, e.matched as f64];
+    let own = |i: usize| e.curvature.as_ref().map_or(0.0, |c| c.matrix[i * q + i]);
+    for i in 0..q {
+        let most = (2.0 * e.cost * own(i)).sqrt();
+        out.extend([most, most]);
+        out.extend((0..q).map(|j| (own(i) * own(j)).sqrt()));
+    }
+    out
+}
+
+fn apart(a: &[Number], b: &[Number], sizes: &[f64]) -> Vec<String> {
+    assert_eq!(a.len(), b.len());
+    let all = a.iter().zip(b).zip(sizes).map(|(((name, x), (_, y)), size)| (name, x, y, (x - y).abs() / size));
+    // Not a number is a difference as well.
+    all.filter(|n| n.3.is_nan() || n.3 > AGREEMENT).map(|(name, x, y, d)| format!("{name}: {x} is not {y} ({d:.1e})")).collect()
+}
+
+/// What differs of two evaluations.
+pub(crate) fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
+    apart(&numbers(a, directions), &numbers(b, directions), &sizes(b, directions.len()))
+}
+
+/// Two evaluations agree, and would not if any number of the first, gradients among them, were one percent larger. Only of numbers
+/// above 15 % of what they could be at most is that half as much again as the agreement; what is compared is off by some of it already.
+pub(crate) fn assert_agreement(a: &Evaluation, b: &Evaluation, directions: &[usize]) {
+    let (found, right, sizes) = (numbers(a, directions), numbers(b, directions), sizes(b, directions.len()));
+    let off = apart(&found, &right, &sizes);
+    assert!(off.is_empty(), "{off:#?}");
+    let large = |k: usize| right[k].1.abs() > 0.15 * sizes[k];
+    for k in (0..found.len()).filter(|k| large(*k)) {
+        let mut wrong = found.clone();
+        wrong[k].1 *= 1.01;
+        assert_eq!(apart(&wrong, &right, &sizes).len(), 1, "1 % of {} was not seen", found[k].0);
+    }
+    let shares: Vec<String> = right
+        .iter()
+        .zip(&sizes)
+        .filter(|(n, _)| n.0.starts_with("gradient"))
+        .map(|((_, v), s)| format!("{:.2}", v / s))
+        .collect();
+    println!("gradients over what they could be: {}", shares.join(" "));
+    let gradients = (0..found.len()).filter(|k| right[*k].0.starts_with("gradient") && large(*k)).count();
+    assert!(gradients > 0, "no gradient is large enough to tell 1 %");
 }
 
 fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]]) {
@@ -97,12 +139,7 @@ fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]]) {
     assert!(failed.failure.is_some() && failed.cost.is_infinite(), "{failed:?}");
     for (a, b) in found.iter().zip(&right) {
         assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
-        let off = differences(a, b, &directions);
-        assert!(off.is_empty(), "{off:#?}");
-        let mut wrong = a.clone();
-        wrong.cost *= 1.01;
-        wrong.curvature.iter_mut().for_each(|c| c.matrix[0] *= 1.01);
-        assert_eq!(differences(&wrong, b, &directions).len(), 2, "1 % was not seen");
+        assert_agreement(a, b, &directions);
     }
 }
 

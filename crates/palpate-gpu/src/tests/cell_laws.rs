@@ -1,6 +1,6 @@
 //! Laws of cells: every one against its twin at random deformations, and whole evaluations with all of them against the CPU.
 
-use super::effects::{Noise, compare, with};
+use super::effects::{Noise, compare, compare_within, with};
 use super::scenes::{ball, device, held};
 use crate::device::Gpu;
 use crate::memory::Maker as _;
@@ -123,7 +123,8 @@ fn evaluations_with_laws_of_cells_agree() {
     s.time.steps = 3;
     s.observation = watched();
     lawful(&mut s);
-    compare(&seen(&s), 0.2);
+    // A hit at 2 m/s strains cells more than all else here: rounding makes 5e-4, and one percent of any law 7e-3 or more.
+    compare_within(&seen(&s), 1e-3);
 }
 
 #[test]
@@ -137,5 +138,5 @@ fn evaluations_of_a_held_body_with_laws_of_cells_and_uneven_stiffness_agree() {
     with(&mut s, "rest-shape", &[("stretch", &[0.04, -0.02, 0.03]), ("bend_x_to_z", &[1.5])]);
     with(&mut s, "stiffness-gradient", &[("slope", &[12.0, 2.0, -4.0])]);
     with(&mut s, "creep", &[("fraction", &[0.6]), ("time", &[0.005])]);
-    compare(&seen(&s), 0.2);
+    compare(&seen(&s));
 }

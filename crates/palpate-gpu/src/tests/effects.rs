@@ -4,7 +4,8 @@ use super::scenes::{ball, device, held};
 use crate::GpuBackend;
 use crate::device::Gpu;
 use crate::memory::Maker as _;
-use crate::observe::rollout_tests::{differences, seen, watched};
+use crate::observe::rollout_tests::{assert_agreement, seen, watched};
+use crate::observe::rows_tests::apart as apart_by_row;
 use crate::pipelines::pass;
 use crate::recorder::{Args, Recorder, Size};
 use glam::DVec3;
@@ -183,13 +184,18 @@ pub(super) fn with(scene: &mut Scene, kind: &str, values: &[(&str, &[f64])]) {
     scene.effects.push(effect);
 }
 
-/// Evaluations agree, and every effect's first number, wrong by `fault`, shows.
-pub(super) fn compare(plan: &Plan, fault: f64) {
-    check(plan, Some(fault));
+/// Part of the noise (of a cell, of the largest derivative) by which single residuals may differ: 3e-7 m, which is what Newton's method
+/// in single precision leaves of a few steps (`forward::CLOSE`).
+const CLOSE: f64 = 1e-4;
+
+/// Evaluations of two members with all derivatives by the numbers of effects and by what effects change the derivative of; then every
+/// residual of the second with its derivatives, in which one percent of any effect's first number must show.
+pub(super) fn compare(plan: &Plan) {
+    compare_within(plan, CLOSE);
 }
 
-/// Two members with all derivatives by the numbers of effects and by what effects change the derivative of.
-fn check(plan: &Plan, fault: Option<f64>) {
+/// The same where single residuals may differ by so much.
+pub(super) fn compare_within(plan: &Plan, close: f64) {
     let Some(gpu) = device(None) else { return };
     let own = |k: &ParamKey| match *k {
         ParamKey::Effect { law, slot, .. } => {
@@ -217,30 +223,23 @@ fn check(plan: &Plan, fault: Option<f64>) {
     for (a, b) in found.iter().zip(&right) {
         assert!(a.failure.is_none() && b.failure.is_none(), "{:?} {:?}", a.failure, b.failure);
     }
-    let named = |off: Vec<String>| -> Vec<String> {
-        off.iter()
-            .map(|o| {
-                o.split(' ')
-                    .map(|w| match w.trim_end_matches(':').parse::<usize>() {
-                        Ok(i) if i < directions.len() => format!("{w}={}", plan.layout.keys[directions[i]].spec().path),
-                        _ => w.to_string(),
-                    })
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            })
-            .collect()
-    };
-    let off = named(differences(&found[1], &right[1], &directions));
-    assert!(off.is_empty(), "{off:#?}");
-    let request = Request { gradient: true, sensitivities: directions[..1].to_vec() };
-    for (key, place) in plan.layout.keys.iter().zip(0..) {
-        if let (ParamKey::Effect { law, slot: 0, .. }, Some(fault)) = (*key, fault) {
+    for (i, place) in directions.iter().enumerate() {
+        println!("direction {i}: {}", plan.layout.keys[*place].spec().path);
+    }
+    assert_agreement(&found[1], &right[1], &directions);
+    let mut linearise = |row: &[f64], along: &[usize]| rollout.linearise(row, along).unwrap_or_else(|e| panic!("{e}"));
+    let right = cpu.linearise(&row, &directions).unwrap_or_else(|e| panic!("{e}"));
+    let off = apart_by_row(&linearise(&row, &directions), &right, plan);
+    println!("single residuals: {off:?}");
+    assert!(off.iter().all(|d| *d < close), "{off:?}");
+    let right = cpu.linearise(&row, &[]).unwrap_or_else(|e| panic!("{e}"));
+    for (place, key) in plan.layout.keys.iter().enumerate() {
+        if matches!(*key, ParamKey::Effect { slot: 0, .. }) {
             let mut wrong = row.clone();
-            wrong[place] *= 1.0 + fault;
-            let wrong = rollout.evaluate(&ParamBatch::from_rows(&[wrong]), &request).remove(0);
-            let seen = differences(&wrong, &right[1], &directions[..1]).len();
-            println!("{}: {fault} is seen in {seen} numbers", ALL[usize::from(law)].kind);
-            assert!(seen > 0, "{fault} of {} is not seen", ALL[usize::from(law)].kind);
+            wrong[place] *= 1.01;
+            let off = apart_by_row(&linearise(&wrong, &[]), &right, plan);
+            println!("{}: 1 % makes {off:?}", key.spec().path);
+            assert!(off.iter().any(|d| *d > close), "1 % of {} is not seen: {off:?}", key.spec().path);
         }
     }
 }
@@ -262,7 +261,7 @@ fn evaluations_with_loads_agree() {
     let place: &[(&str, &[f64])] = &[("stiffness", &[0.5]), ("distance", &[0.045]), ("azimuth", &[3.0]), ("elevation", &[0.3])];
     with(&mut s, "second-plane", place);
     with(&mut s, "time-offset", &[("offset", &[-4e-3])]);
-    compare(&seen(&s), 0.1);
+    compare(&seen(&s));
 }
 
 #[test]
@@ -278,7 +277,23 @@ fn evaluations_with_contact_and_varying_stiffness_agree() {
     with(&mut s, "contact-stiffness", &[("change", &[0.4])]);
     with(&mut s, "contact-dissipation", &[("dissipation", &[2.0])]);
     with(&mut s, "stiffness-gradient", &[("slope", &[9.0, 2.0, -4.0])]);
-    compare(&seen(&s), 0.2);
+    compare(&seen(&s));
+}
+
+#[test]
+fn evaluations_of_bodies_of_uneven_material_agree() {
+    let parts: &[(&str, &[f64])] = &[("ratio", &[0.9]), ("direction", &[0.6, -0.3, 1.0])];
+    let modes: &[(&str, &[f64])] = &[("square", &[1.2, -0.4, 0.8]), ("mixed", &[0.5, -0.7, 0.3])];
+    for (kind, values) in [("two-part-stiffness", parts), ("stiffness-modes", modes)] {
+        let mut s = ball(0.03);
+        s.object.pose.translation.z = -0.006;
+        s.initial.velocity.z = -0.6;
+        s.time.steps = 3;
+        s.observation = watched();
+        with(&mut s, kind, values);
+        with(&mut s, "density-gradient", &[("slope", &[9.0, 3.0, -6.0])]);
+        compare(&seen(&s));
+    }
 }
 
 #[test]
@@ -297,7 +312,7 @@ fn evaluations_of_a_held_body_that_creeps_agree() {
     s.effects[2].values[0] = Some(0.8);
     with(&mut s, "density-inclusion", &[]);
     s.effects[3].values[0] = Some(0.7);
-    compare(&seen(&s), 0.1);
+    compare(&seen(&s));
 }
 
 /// A stress-free shape that differs in every mode, of a body that rests against its ghost penalty.
@@ -313,7 +328,7 @@ fn evaluations_of_a_body_of_another_shape_agree() {
     s.time.steps = 3;
     s.observation = watched();
     bent(&mut s);
-    compare(&seen(&s), 0.1);
+    compare(&seen(&s));
 }
 
 #[test]
@@ -330,9 +345,9 @@ fn evaluations_of_a_body_of_another_shape_in_soft_slipping_clamps_agree() {
         &[("offset", &[0.002, -0.001, 0.003]), ("turn", &[0.05, 0.1, -0.08]), ("drift", &[0.1, 0.0, -0.2]), ("turning", turning)],
     );
     with(&mut s, "stiffness-gradient", &[("slope", &[6.0, 2.0, -4.0])]);
-    compare(&seen(&s), 0.1);
+    compare(&seen(&s));
     s.solver.rotation = RotationUpdate::Lagged;
-    check(&seen(&s), None);
+    compare(&seen(&s));
 }
 
 #[test]
@@ -345,10 +360,10 @@ fn evaluations_of_a_body_in_clamps_with_moved_edges_agree() {
     s.observation = watched();
     with(&mut s, "clamp-edge", &[("shift", &[0.008])]);
     with(&mut s, "compliant-clamp", &[("layer", &[0.004])]);
-    compare(&seen(&s), 0.1);
+    compare(&seen(&s));
     // It holds less than stated.
     s.effects[0].values[0] = Some(-0.005);
-    check(&seen(&s), None);
+    compare(&seen(&s));
 }
 
 #[test]
