@@ -42,6 +42,9 @@ enum Verb {
         /// With --gpu: the small bodies alone, for software adapters
         #[arg(long, requires = "gpu")]
         quick: bool,
+        /// With --gpu: instead of steps, a whole fit of the size of the paper's teddy; with --quick a tiny one
+        #[arg(long, requires = "gpu")]
+        fit: bool,
         /// Only compare two results of earlier runs
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
@@ -101,6 +104,12 @@ fn run(verb: Verb) -> Result<(), String> {
             println!("\nwritten to {}", table::save(&name, &report)?.display());
         }
         Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
+        Verb::Bench { gpu: true, fit: true, quick, .. } => {
+            let report = bench::fit::run(quick)?;
+            report.print();
+            let name = format!("bench-gpu-fit{}-{}", if quick { "-quick" } else { "" }, report.date);
+            println!("\nwritten to {}", table::save(&name, &report)?.display());
+        }
         Verb::Bench { large, gpu: true, quick, only, .. } => {
             let report = bench::gpu::all(large, quick, only.as_deref().unwrap_or(""))?;
             report.print();

@@ -67,6 +67,10 @@ const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 const WELCOME: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
 /// Storage buffers that the widest kernel binds.
 pub(crate) const STORAGE_BUFFERS: u32 = 20;
+/// Invocations of the widest workgroup.
+pub(crate) const WIDTH: u32 = 256;
+/// Workgroup memory of the hungriest kernel [B], and some to spare.
+pub(crate) const WORKGROUP_BYTES: u32 = 16_384;
 
 fn instance() -> wgpu::Instance {
     // Indirect arguments come from our own kernels, so the validating dispatch before each of them is left out.
@@ -89,23 +93,22 @@ fn rank(kind: wgpu::DeviceType) -> u8 {
 }
 
 /// Why an adapter cannot run the kernels.
-fn refusal(adapter: &wgpu::Adapter) -> Option<GpuError> {
-    let name = adapter.get_info().name;
-    if !adapter.features().contains(NEEDED) {
-        return Some(GpuError::Unsupported { adapter: name, feature: "immediates (push constants)".into() });
+fn refused(adapter: &wgpu::Adapter) -> Option<GpuError> {
+    refusal(&adapter.get_info().name, adapter.features(), &adapter.limits())
+}
+
+/// The same of what an adapter says of itself.
+pub(crate) fn refusal(name: &str, features: wgpu::Features, limits: &wgpu::Limits) -> Option<GpuError> {
+    if !features.contains(NEEDED) {
+        return Some(GpuError::Unsupported { adapter: name.into(), feature: "immediates (push constants)".into() });
     }
-    let limits = adapter.limits();
     let need = |limit, available: u32, needed: u32| {
-        (available < needed).then(|| GpuError::Limit {
-            limit,
-            available: available.into(),
-            needed: needed.into(),
-            what: name.clone(),
-        })
+        let (adapter, available, needed) = (name.to_string(), u64::from(available), u64::from(needed));
+        (available < needed).then_some(GpuError::TooSmall { adapter, limit, available, needed })
     };
     need("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS)
-        .or_else(|| need("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256))
-        .or_else(|| need("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16384))
+        .or_else(|| need("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, WIDTH))
+        .or_else(|| need("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, WORKGROUP_BYTES))
 }
 
 /// Every adapter of this machine, the one that [`Choice::Auto`] takes first.
@@ -121,7 +124,7 @@ pub fn adapters() -> Vec<AdapterReport> {
                 limits: a.limits(),
                 subgroups: a.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
                 timestamps: a.features().contains(wgpu::Features::TIMESTAMP_QUERY),
-                refusal: refusal(a),
+                refusal: refused(a),
             }
         })
         .collect();
@@ -129,11 +132,26 @@ pub fn adapters() -> Vec<AdapterReport> {
     found
 }
 
+/// How lanes talk after what the probe of subgroups said. A driver that lists subgroups and cannot compile or run a kernel with them
+/// still has workgroup memory.
+///
+/// # Errors
+/// The device is gone or full, whatever the kernel.
+pub(crate) fn lanes_for(probe: Result<bool, GpuError>) -> Result<Lanes, GpuError> {
+    match probe {
+        Ok(true) => Ok(Lanes::Subgroup),
+        Err(e @ (GpuError::Lost { .. } | GpuError::OutOfMemory { .. })) => Err(e),
+        Ok(false) | Err(_) => Ok(Lanes::Memory),
+    }
+}
+
 /// An open device with its kernels.
 #[derive(Debug)]
 pub struct Gpu {
     /// Name of the adapter.
     pub name: String,
+    /// Its driver, with the version.
+    pub driver: String,
     /// Kind of the adapter.
     pub kind: wgpu::DeviceType,
     pub(crate) device: wgpu::Device,
@@ -143,6 +161,8 @@ pub struct Gpu {
     pub(crate) largest: u64,
     /// Bytes of all buffers made so far.
     made: AtomicU64,
+    /// Times that the host has waited for results.
+    pub(crate) waits: AtomicU64,
     trouble: Arc<Mutex<Option<GpuError>>>,
 }
 
@@ -170,10 +190,10 @@ impl Gpu {
         let fits =
             |a: &wgpu::Adapter| wanted.as_ref().is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase()));
         found.retain(fits);
-        let usable = found.iter().position(|a| refusal(a).is_none());
+        let usable = found.iter().position(|a| refused(a).is_none());
         let Some(first) = found.first() else { return Err(GpuError::NoAdapter { wanted, found: names }) };
         let Some(place) = usable else {
-            return Err(refusal(first).unwrap_or(GpuError::NoAdapter { wanted, found: names }));
+            return Err(refused(first).unwrap_or(GpuError::NoAdapter { wanted, found: names }));
         };
         let adapter = &found[place];
         let info = adapter.get_info();
@@ -199,12 +219,14 @@ impl Gpu {
         let subgroups = features.contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8;
         let open = |lanes| Gpu {
             name: info.name.clone(),
+            driver: format!("{} {}", info.driver, info.driver_info),
             kind: info.device_type,
             device: device.clone(),
             queue: queue.clone(),
             pipelines: Pipelines::new(lanes),
             largest: device.limits().max_storage_buffer_binding_size,
             made: AtomicU64::new(0),
+            waits: AtomicU64::new(0),
             trouble: trouble.clone(),
         };
         let gpu = match lanes {
@@ -215,7 +237,10 @@ impl Gpu {
             // Whether lanes lie in subgroups in their order is up to the driver: ask a kernel.
             None if subgroups => {
                 let gpu = open(Lanes::Subgroup);
-                if crate::probe::lanes_work(&gpu)? { gpu } else { open(Lanes::Memory) }
+                match lanes_for(crate::probe::lanes_work(&gpu))? {
+                    Lanes::Subgroup => gpu,
+                    Lanes::Memory => open(Lanes::Memory),
+                }
             }
             None => open(Lanes::Memory),
         };
@@ -252,20 +277,21 @@ impl Gpu {
     /// # Errors
     /// It is larger than a limit of the device.
     fn make(&self, label: &str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
-        let most = self.device.limits().max_buffer_size;
-        for (limit, available) in [("max_storage_buffer_binding_size", self.largest), ("max_buffer_size", most)] {
-            if bytes > available {
-                return Err(GpuError::Limit { limit, available, needed: bytes, what: format!("the buffer `{label}`") });
-            }
-        }
+        fits(label, bytes, self.largest, self.device.limits().max_buffer_size)?;
         let usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST
             | if ["arguments", "gate"].contains(&label) { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
             | if label == "shape" { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::empty() };
         let size = whole(bytes);
+        let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let buffer =
+            self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        if let Some(e) = pollster::block_on(guard.pop()) {
+            return Err(no_room(label, size, e));
+        }
         self.made.fetch_add(size, Ordering::Relaxed);
-        Ok(self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }))
+        Ok(buffer)
     }
 
     /// Bytes of all buffers made so far, those included that are gone since.
@@ -284,20 +310,40 @@ impl Gpu {
     /// # Errors
     /// Anything that went wrong since the last read.
     pub(crate) fn download<T: bytemuck::Pod>(&self, source: &wgpu::Buffer, items: usize) -> Result<Vec<T>, GpuError> {
+        let mut all = self.download_all(&[(source, items * size_of::<T>())])?;
+        Ok(bytemuck::pod_collect_to_vec(&all.remove(0)))
+    }
+
+    /// Waits once for everything submitted, and returns the first bytes of each buffer.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub(crate) fn download_all(&self, parts: &[(&wgpu::Buffer, usize)]) -> Result<Vec<Vec<u8>>, GpuError> {
         if let Some(e) = self.take_trouble() {
             return Err(e);
         }
-        let bytes = (items * size_of::<T>()) as u64;
-        let size = bytes.max(4).next_multiple_of(4);
+        let places: Vec<usize> =
+            parts.iter().scan(0, |end, part| Some(std::mem::replace(end, *end + part.1.next_multiple_of(4)))).collect();
+        let size = places.last().zip(parts.last()).map_or(4, |(at, part)| (at + part.1).next_multiple_of(4).max(4)) as u64;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let staging =
             self.device.create_buffer(&wgpu::BufferDescriptor { label: Some("read"), size, usage, mapped_at_creation: false });
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read") });
-        encoder.copy_buffer_to_buffer(source, 0, &staging, 0, size.min(source.size()));
+        for ((source, bytes), at) in parts.iter().zip(&places) {
+            let bytes = (bytes.next_multiple_of(4) as u64).min(source.size());
+            encoder.copy_buffer_to_buffer(source, 0, &staging, *at as u64, bytes);
+        }
         self.queue.submit([encoder.finish()]);
+        let view = self.map(&staging)?;
+        Ok(parts.iter().zip(&places).map(|(part, at)| view[*at..at + part.1].to_vec()).collect())
+    }
+
+    /// Waits for everything submitted, and then for the buffer.
+    fn map(&self, staging: &wgpu::Buffer) -> Result<wgpu::BufferView, GpuError> {
         let done = Arc::new(Mutex::new(None));
         let slot = done.clone();
         staging.map_async(wgpu::MapMode::Read, .., move |r| *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(r));
+        self.waits.fetch_add(1, Ordering::Relaxed);
         let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
         if let Some(e) = self.take_trouble() {
             return Err(e);
@@ -308,8 +354,7 @@ impl Gpu {
             Some(Err(e)) => return Err(GpuError::Lost { reason: e.to_string() }),
             None => return Err(GpuError::Lost { reason: "the device did not answer".into() }),
         }
-        let view = staging.get_mapped_range(..).map_err(|e| GpuError::Lost { reason: e.to_string() })?;
-        Ok(bytemuck::pod_collect_to_vec(&view[..bytes as usize]))
+        staging.get_mapped_range(..).map_err(|e| GpuError::Lost { reason: e.to_string() })
     }
 }
 
@@ -338,6 +383,26 @@ pub(crate) fn whole(bytes: u64) -> u64 {
 
 fn keep(slot: &Mutex<Option<GpuError>>, error: GpuError) {
     slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+}
+
+/// Refuses a buffer beyond what a kernel can bind, or beyond the largest there is [B].
+pub(crate) fn fits(label: &str, bytes: u64, binding: u64, buffer: u64) -> Result<(), GpuError> {
+    for (limit, available) in [("max_storage_buffer_binding_size", binding), ("max_buffer_size", buffer)] {
+        if bytes > available {
+            return Err(GpuError::Limit { limit, available, needed: bytes, what: format!("the buffer `{label}`") });
+        }
+    }
+    Ok(())
+}
+
+/// What a device says that has no room for a buffer.
+pub(crate) fn no_room(label: &str, bytes: u64, e: wgpu::Error) -> GpuError {
+    match translate(e) {
+        GpuError::OutOfMemory { what } => {
+            GpuError::OutOfMemory { what: format!("the buffer `{label}` of {bytes} bytes: {what}") }
+        }
+        e => e,
+    }
 }
 
 /// wgpu's error as ours.

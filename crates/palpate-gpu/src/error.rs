@@ -21,6 +21,18 @@ pub enum GpuError {
         /// What is missing.
         feature: String,
     },
+    /// The adapter is too small for some kernel, whatever the body.
+    #[error("{adapter} is too small: a kernel needs {needed}, and its limit {limit} is {available}")]
+    TooSmall {
+        /// Its name.
+        adapter: String,
+        /// Name of the limit.
+        limit: &'static str,
+        /// Its value.
+        available: u64,
+        /// What is needed.
+        needed: u64,
+    },
     /// A limit of the device is too small.
     #[error("{what} needs {needed}, and the limit {limit} of this device is {available}")]
     Limit {
@@ -86,9 +98,11 @@ impl GpuError {
     pub fn hint(&self) -> &'static str {
         match self {
             GpuError::NoAdapter { .. } => "install a Vulkan driver (Debian: mesa-vulkan-drivers), or use --backend cpu",
-            GpuError::Unsupported { .. } | GpuError::Shader { .. } | GpuError::Refused { .. } | GpuError::Plan { .. } => {
-                "use --backend cpu, or another adapter"
-            }
+            GpuError::Unsupported { .. }
+            | GpuError::TooSmall { .. }
+            | GpuError::Shader { .. }
+            | GpuError::Refused { .. }
+            | GpuError::Plan { .. } => "use --backend cpu, or another adapter",
             GpuError::Setting { .. } => "unset the variable, and what is faster is chosen",
             GpuError::Limit { .. } | GpuError::OutOfMemory { .. } => "use coarser cells, a smaller batch, or --backend cpu",
             GpuError::Lost { .. } => "run again; results so far are kept; or use --backend cpu",

@@ -8,6 +8,7 @@
 
 mod backend;
 mod backward;
+mod choices;
 mod columns;
 pub mod device;
 mod effects;
@@ -32,7 +33,7 @@ mod world;
 pub use backend::GpuBackend;
 pub use device::{AdapterReport, Choice, Gpu, Lanes, adapters};
 pub use error::GpuError;
-pub use measure::ProductSpeed;
+pub use measure::{CgSpeed, Traffic};
 pub use memory::{Memory, memory};
 pub use tuning::{Product, Tuning};
 pub use world::{Adjoint, State, Tally, Tangent, World};

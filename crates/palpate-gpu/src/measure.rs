@@ -1,24 +1,48 @@
-//! What benchmarks ask a device: how long passes take, how fast it copies, what a product of conjugate gradients moves.
+//! What benchmarks ask a device: how long passes take, how fast it copies, what an iteration of conjugate gradients takes and moves.
 
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::layout::Newton;
 use crate::memory::Maker as _;
+use crate::pipelines::pass;
 use crate::recorder::PassTime;
+use crate::solve::{ALL, Per, Solve};
 use crate::tuning::{self, Product};
-use crate::world::World;
+use crate::world::{State, Tally, VECTOR, World};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// One product A p of all members: what conjugate gradients spend their time on.
+/// Time of some work of all members, and what it has to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProductSpeed {
-    /// With or without a matrix.
-    pub product: Product,
-    /// True when many workgroups share the solve of a member.
-    pub many: bool,
+pub struct Traffic {
     /// Time [s].
     pub seconds: f64,
     /// Numbers read and written, each once [B].
     pub bytes: f64,
+}
+
+/// How fast conjugate gradients are: what steps spend their time on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CgSpeed {
+    /// True when many workgroups share the solve of a member.
+    pub many: bool,
+    /// How A p is computed.
+    pub product: Product,
+    /// A whole iteration, as solves run it.
+    pub iteration: Traffic,
+    /// Iterations that were timed.
+    pub iterations: usize,
+    /// Each product A p by itself; empty where one workgroup does a whole iteration, as no such product runs there.
+    pub products: Vec<(Product, Traffic)>,
+}
+
+/// Iterations that are timed, where the host counts them; an even number, and fewer than the smallest body needs to converge.
+const ITERATIONS: u32 = 16;
+
+/// A body at rest, and where its solves report to.
+struct Rest {
+    tally: Tally,
+    blank: State,
 }
 
 impl Gpu {
@@ -27,6 +51,7 @@ impl Gpu {
     /// # Errors
     /// The device is gone.
     pub fn wait(&self) -> Result<(), GpuError> {
+        self.waits.fetch_add(1, Ordering::Relaxed);
         self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ()).map_err(|e| GpuError::Lost { reason: e.to_string() })
     }
 
@@ -66,21 +91,96 @@ impl World {
         all
     }
 
-    /// Time and traffic of a product with the current batch.
+    /// Time and traffic of conjugate gradients with the current batch: the body at rest, under a load in all directions.
     ///
     /// # Errors
     /// The device is gone.
-    pub fn product_speed(&self) -> Result<ProductSpeed, GpuError> {
-        let s = &self.geometry.shape;
-        let [nodes, cells, blocks] = [s.nodes, s.cells, s.blocks].map(f64::from);
-        // Values, columns and vectors; or tangents, corner forces (written and read) and lists.
-        let one = match self.product {
-            Product::Matrix => 36.0 * blocks + 4.0 * blocks + 2.0 * 16.0 * nodes,
-            Product::Free => {
-                (480.0 + 64.0 + 2.0 * 128.0 + 4.0 * 8.0) * cells + 2304.0 * f64::from(s.classes) + 8.0 * blocks + 48.0 * nodes
-            }
+    pub fn cg_speed(&mut self) -> Result<CgSpeed, GpuError> {
+        // The shape goes to the device with this.
+        self.set_iterations(self.plan.solver.newton_iterations);
+        self.time_cg()
+    }
+
+    fn time_cg(&self) -> Result<CgSpeed, GpuError> {
+        let products = if self.many { vec![Product::Matrix, Product::Free] } else { Vec::new() };
+        let alone = |p: Product| Ok((p, Traffic { seconds: tuning::time(self, p)?, bytes: self.bytes_of(p) }));
+        let products = products.into_iter().map(alone).collect::<Result<Vec<_>, GpuError>>()?;
+        let rest = Rest { tally: Tally::new(self, &[]), blank: State(self.lend(3)) };
+        self.record(|r| r.clear(&rest.blank.0.buffer));
+        self.work(&rest, |s| s.linearise());
+        let run = |repeats: u32| {
+            self.begin(&rest)?;
+            let clock = Instant::now();
+            self.work(&rest, |s| {
+                s.list();
+                (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(1) });
+            });
+            self.gpu.download::<f32>(&self.buffers["cg_parts"], 1).map(|_| clock.elapsed().as_secs_f64())
         };
-        let seconds = tuning::time(self, self.product)? / tuning::REPEATS as f64;
-        Ok(ProductSpeed { product: self.product, many: self.many, seconds, bytes: one * self.members() as f64 })
+        let repeats = if self.many { ITERATIONS } else { 1 };
+        // The first run compiles the kernels.
+        run(repeats)?;
+        let seconds = (tuning::shortest(|| run(repeats))? - tuning::shortest(|| run(0))?).max(1e-6);
+        run(repeats)?;
+        let iterations = self.iterations_done()?;
+        // Directions and rests are turned and advanced: 13 vectors a node.
+        let bytes =
+            self.bytes_of(self.product) + 13.0 * VECTOR as f64 * self.members() as f64 * f64::from(self.geometry.shape.nodes);
+        let iteration = Traffic { seconds: seconds / iterations.max(1) as f64, bytes };
+        Ok(CgSpeed { many: self.many, product: self.product, iteration, iterations, products })
+    }
+
+    fn work(&self, rest: &Rest, record: impl FnOnce(&mut Solve)) {
+        self.record(|r| record(&mut Solve::new(self, r, Some(0), &rest.blank, &rest.blank, &rest.tally)));
+    }
+
+    /// Makes a solve ready that does not end by itself.
+    fn begin(&self, rest: &Rest) -> Result<(), GpuError> {
+        let count = self.plan.body.nodes.len() * self.members();
+        let wave = |i: usize| [(i as f32).sin(), (2.0 * i as f32).cos(), (3.0 * i as f32).sin(), 0.0f32];
+        let load: Vec<[f32; 4]> = (0..count).map(wave).collect();
+        self.gpu.queue.write_buffer(&self.buffers["rhs"], 0, bytemuck::cast_slice(&load));
+        self.work(rest, |s| {
+            // A solve that ran to the end of single precision is an error otherwise.
+            s.recorder.clear(rest.tally.get("health"));
+            s.list();
+            s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        });
+        let newton = &self.buffers["newton"];
+        let mut state: Vec<Newton> = self.gpu.download(newton, self.members())?;
+        // A norm that nothing is below.
+        state.iter_mut().for_each(|n| n.goal = -1.0);
+        self.gpu.queue.write_buffer(newton, 0, bytemuck::cast_slice(&state));
+        self.gpu.wait()
+    }
+
+    /// Iterations that the first member's solve has made.
+    fn iterations_done(&self) -> Result<usize, GpuError> {
+        if self.many {
+            let scalars: Vec<[f32; 4]> = self.gpu.download(&self.buffers["cg_scalars"], 2)?;
+            return Ok(scalars[0][1].max(scalars[1][1]) as usize);
+        }
+        Ok(self.gpu.download::<Newton>(&self.buffers["newton"], 1)?[0].cg as usize)
+    }
+
+    /// What a product has to move for all members: what each has of its own, and what they share [B].
+    fn bytes_of(&self, product: Product) -> f64 {
+        let s = &self.geometry.shape;
+        let [nodes, cells, blocks, patches] = [s.nodes, s.cells, s.blocks, s.patches].map(f64::from);
+        let (own, shared) = match product {
+            // Values and two vectors; columns, rows and masses.
+            Product::Matrix => (36.0 * blocks + 32.0 * nodes, 4.0 * blocks + 20.0 * nodes),
+            // Tangents, corner forces (written and read), contact and two vectors; cells, corners, patches, element matrices, masses,
+            // ghosts.
+            Product::Free => (
+                (480.0 + 2.0 * 128.0) * cells + 48.0 * patches + 32.0 * nodes,
+                (64.0 + 32.0) * cells
+                    + 64.0 * patches
+                    + 2304.0 * f64::from(s.classes)
+                    + 24.0 * nodes
+                    + 8.0 * f64::from(s.ghosts) * blocks,
+            ),
+        };
+        own * self.members() as f64 + shared
     }
 }

@@ -68,7 +68,7 @@ impl Pipelines {
     }
 }
 
-fn compile(gpu: &Gpu, source: &PassSource, lanes: Lanes) -> Result<Kernel, GpuError> {
+pub(crate) fn compile(gpu: &Gpu, source: &PassSource, lanes: Lanes) -> Result<Kernel, GpuError> {
     let device = &gpu.device;
     let entries: Vec<wgpu::BindGroupLayoutEntry> = source
         .bindings

@@ -69,8 +69,12 @@ pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
 
 fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> {
     let (b, p, q) = (world.members(), world.plan.layout.len(), tally.directions.len());
-    let health: Vec<Health> = world.gpu.download(tally.get("health"), b)?;
-    let gradient: Vec<f32> = world.gpu.download(tally.get("gradient"), b * p)?;
+    let own = [(tally.get("health"), b * size_of::<Health>()), (tally.get("gradient"), 4 * b * p)];
+    let observed = world.observer.results(&tally.buffers, b, q);
+    let found = world.gpu.download_all(&[&own[..], &observed].concat())?;
+    let (own, observed) = found.split_at(own.len());
+    let health: Vec<Health> = bytemuck::pod_collect_to_vec(&own[0]);
+    let gradient: Vec<f32> = bytemuck::pod_collect_to_vec(&own[1]);
     let mut all: Vec<Evaluation> = (0..b)
         .map(|m| {
             let failure = failure(world, m, &health[m]);
@@ -84,6 +88,6 @@ fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> 
             }
         })
         .collect();
-    world.observer.add_to(&world.gpu, &tally.buffers, q, &mut all)?;
+    world.observer.add_to(observed, q, &mut all);
     Ok(all)
 }

@@ -28,8 +28,8 @@ pub enum Size {
     Gate,
 }
 
-/// Timed passes need this many queries at most per submission.
-const QUERIES: u32 = 2048;
+/// Queries of one set, two a dispatch; a submission has as many sets as it needs. (WebGPU allows 4096.)
+pub(crate) const QUERIES: u32 = 2048;
 
 /// Time spent in one pass.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,8 +55,26 @@ pub struct Recorder<'a> {
 pub type Groups = HashMap<(usize, Vec<wgpu::Buffer>), wgpu::BindGroup>;
 
 struct Timer {
-    set: wgpu::QuerySet,
+    /// Each full but the last.
+    sets: Vec<wgpu::QuerySet>,
     passes: Vec<usize>,
+}
+
+impl Timer {
+    /// Where the times of one more dispatch go.
+    fn place(&mut self, device: &wgpu::Device, pass: usize) -> wgpu::ComputePassTimestampWrites<'_> {
+        let first = 2 * self.passes.len() as u32 % QUERIES;
+        if first == 0 {
+            let (label, ty) = (Some("pass times"), wgpu::QueryType::Timestamp);
+            self.sets.push(device.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count: QUERIES }));
+        }
+        self.passes.push(pass);
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.sets[self.sets.len() - 1],
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        }
+    }
 }
 
 /// Arguments of a pass beside its buffers.
@@ -81,14 +99,7 @@ impl<'a> Recorder<'a> {
         timed: bool,
     ) -> Recorder<'a> {
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("palpate") });
-        let timer = (timed && gpu.tick().is_some()).then(|| Timer {
-            set: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("pass times"),
-                ty: wgpu::QueryType::Timestamp,
-                count: QUERIES,
-            }),
-            passes: Vec::new(),
-        });
+        let timer = (timed && gpu.tick().is_some()).then(|| Timer { sets: Vec::new(), passes: Vec::new() });
         Recorder { gpu, world, encoder, groups, timer, open: None }
     }
 
@@ -120,15 +131,7 @@ impl<'a> Recorder<'a> {
             let label = Some(source.name);
             device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &kernel.layout, entries: &entries })
         });
-        let timestamp_writes = self.timer.as_mut().filter(|t| 2 * t.passes.len() as u32 + 2 <= QUERIES).map(|t| {
-            let first = 2 * t.passes.len() as u32;
-            t.passes.push(pass);
-            wgpu::ComputePassTimestampWrites {
-                query_set: &t.set,
-                beginning_of_pass_write_index: Some(first),
-                end_of_pass_write_index: Some(first + 1),
-            }
-        });
+        let timestamp_writes = self.timer.as_mut().map(|t| t.place(device, pass));
         if timestamp_writes.is_some() {
             self.open = None;
         }
@@ -187,7 +190,9 @@ impl<'a> Recorder<'a> {
             usage,
             mapped_at_creation: false,
         });
-        self.encoder.resolve_query_set(&timer.set, 0..count, &resolved, 0);
+        for (set, first) in timer.sets.iter().zip((0..count).step_by(QUERIES as usize)) {
+            self.encoder.resolve_query_set(set, 0..(count - first).min(QUERIES), &resolved, 8 * u64::from(first));
+        }
         self.gpu.queue.submit([self.encoder.finish()]);
         match self.gpu.download::<u64>(&resolved, count as usize) {
             Ok(ticks) => {

@@ -179,20 +179,30 @@ impl<'a, 'r> Solve<'a, 'r> {
     fn conjugate_gradients(&mut self, exact: u32, budget: u32) {
         if !self.world.many {
             for _ in 0..self.world.geometry.chunks() {
-                self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
+                self.iterate_chunk(exact);
                 self.relist();
             }
             return;
         }
         for block in 1..=budget.div_ceil(BLOCK) {
             for i in 0..BLOCK {
-                self.run(pass::TURN_CG, SOLVE, Per::Wide, i % 2);
-                let width = self.multiply(self.world.product, i % 2);
-                self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, i % 2 + width);
+                self.iterate(i % 2);
             }
             self.run(pass::CLOSE_CG, SOLVE, Per::Member, 4 * exact);
             if block % GATED == 0 { self.list() } else { self.relist() }
         }
+    }
+
+    /// One iteration by many workgroups a member, of this parity.
+    pub(crate) fn iterate(&mut self, parity: u32) {
+        self.run(pass::TURN_CG, SOLVE, Per::Wide, parity);
+        let width = self.multiply(self.world.product, parity);
+        self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, parity + width);
+    }
+
+    /// A chunk of iterations by one workgroup a member; `exact` as `iterate_cg` has it.
+    pub(crate) fn iterate_chunk(&mut self, exact: u32) {
+        self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
     }
 
     /// A times `cg_along` → `cg_image`; returns how the parts of pᵀ A p lie, for `advance_cg`.

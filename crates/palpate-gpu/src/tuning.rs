@@ -1,8 +1,9 @@
 //! Ways to solve of which one is faster: one or many workgroups a member, with an assembled matrix or without.
 
+use crate::choices::Choices;
 use crate::error::GpuError;
 use crate::layout::Newton;
-use crate::solve::Solve;
+use crate::solve::{SOLVE, Solve};
 use crate::world::{State, Tally, World};
 use palpate_engine::ParamBatch;
 use std::collections::HashMap;
@@ -16,7 +17,7 @@ pub const MANY: usize = 4096;
 /// the last bits of a result.
 const CLEARLY: f64 = 0.8;
 /// Products that are timed.
-pub(crate) const REPEATS: usize = 8;
+const REPEATS: usize = 8;
 
 /// How A p is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +26,21 @@ pub enum Product {
     Matrix,
     /// From the element matrices, cell by cell.
     Free,
+}
+
+impl Product {
+    /// As `PALPATE_GPU_PRODUCT` has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Product::Matrix => "csr",
+            Product::Free => "free",
+        }
+    }
+
+    /// The one of a name.
+    pub(crate) fn named(name: &str) -> Option<Product> {
+        [Product::Matrix, Product::Free].into_iter().find(|p| p.name() == name)
+    }
 }
 
 /// What is given instead of chosen.
@@ -63,45 +79,52 @@ impl Tuning {
             },
             product: match product {
                 "" => None,
-                "csr" => Some(Product::Matrix),
-                "free" => Some(Product::Free),
-                _ => return Err(wrong("PALPATE_GPU_PRODUCT", product, "csr, free")),
+                name => Some(Product::named(name).ok_or_else(|| wrong("PALPATE_GPU_PRODUCT", name, "csr, free"))?),
             },
         })
     }
 }
 
-/// Adapter, nodes, cells, kinds of cells.
-type Key = (String, u32, u32, u32);
-
-/// The faster product for a body on its device: measured once per process, so that a process gives the same bits twice.
-pub(crate) fn faster(world: &mut World) -> Result<Product, GpuError> {
-    static KNOWN: Mutex<Option<HashMap<Key, Product>>> = Mutex::new(None);
+/// What a choice holds for: adapter and driver, nodes, cells, kinds of cells.
+fn key(world: &World) -> String {
     let s = &world.geometry.shape;
-    let key = (world.gpu.name.clone(), s.nodes, s.cells, s.classes);
+    let device = format!("{} {}", world.gpu.name, world.gpu.driver).replace(char::is_control, " ");
+    format!("{device}: {} nodes, {} cells of {} kinds", s.nodes, s.cells, s.classes)
+}
+
+/// The faster product for a body on its device: measured once, so that a user gets the same bits twice.
+pub(crate) fn faster(world: &mut World, choices: &Choices) -> Result<Product, GpuError> {
+    // For where nothing can be kept: a process gives the same bits twice in any case.
+    static KNOWN: Mutex<Option<HashMap<String, Product>>> = Mutex::new(None);
+    let key = key(world);
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(p) = known.as_ref().and_then(|k| k.get(&key)) {
-        return Ok(*p);
+    if let Some(p) = choices.get(&key).or_else(|| known.as_ref()?.get(&key).copied()) {
+        return Ok(p);
     }
     world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&world.plan.theta.clone())));
     world.set_iterations(1);
-    let seconds = [Product::Matrix, Product::Free].map(|p| time(world, p));
-    let [matrix, free] = seconds;
-    let product = if free? < CLEARLY * matrix? { Product::Free } else { Product::Matrix };
+    let [matrix, free] = [Product::Matrix, Product::Free].map(|p| time(world, p));
+    let product = choices.keep(&key, choose(matrix?, free?));
     known.get_or_insert_default().insert(key, product);
     Ok(product)
 }
 
-/// Seconds of [`REPEATS`] products of the first member with a matrix of zeros, which takes as long as any.
+/// The product to take when these take so long [s].
+fn choose(matrix: f64, free: f64) -> Product {
+    if free < CLEARLY * matrix { Product::Free } else { Product::Matrix }
+}
+
+/// Seconds of a product of every member with a matrix of zeros, which takes as long as any.
 pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
     let tally = Tally::new(world, &[]);
     let blank = State(world.lend(3));
-    let newton = &world.buffers["newton"];
-    let wanting = |stage: u32| vec![Newton { stage, ..Newton::default() }; world.members()];
-    world.gpu.queue.write_buffer(newton, 0, bytemuck::cast_slice(&wanting(2)));
+    let wanting = vec![Newton { stage: SOLVE, ..Newton::default() }; world.members()];
+    world.gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::cast_slice(&wanting));
     let run = |repeats: usize| {
         let clock = Instant::now();
         world.record(|r| {
+            // Solves that have ended, as an earlier one may have, multiply nothing.
+            r.clear(&world.buffers["cg_scalars"]);
             let mut s = Solve::new(world, r, Some(0), &blank, &blank, &tally);
             s.list();
             for _ in 0..repeats {
@@ -110,20 +133,35 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
         });
         world.gpu.download::<f32>(&world.buffers["cg_parts"], 1).map(|_| clock.elapsed().as_secs_f64())
     };
-    // The first run compiles the kernels. The shortest of three is the least disturbed; what submitting and waiting take by
-    // themselves is left out.
+    // The first run compiles the kernels.
     run(1)?;
-    let shortest = |repeats| -> Result<f64, GpuError> { Ok(run(repeats)?.min(run(repeats)?).min(run(repeats)?)) };
-    let idle = shortest(0)?;
-    let seconds = shortest(REPEATS)? - idle;
-    world.gpu.queue.write_buffer(newton, 0, bytemuck::cast_slice(&wanting(0)));
     // No clock tells less than a microsecond of such work.
-    Ok(seconds.max(1e-6))
+    let seconds = (shortest(|| run(REPEATS))? - shortest(|| run(0))?).max(1e-6);
+    world.gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::cast_slice(&vec![Newton::default(); world.members()]));
+    Ok(seconds / REPEATS as f64)
+}
+
+/// The shortest of three, which is the least disturbed.
+pub(crate) fn shortest(mut run: impl FnMut() -> Result<f64, GpuError>) -> Result<f64, GpuError> {
+    Ok(run()?.min(run()?).min(run()?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_matrix_is_left_only_for_what_is_clearly_faster() {
+        assert_eq!(choose(1e-3, 0.5e-3), Product::Free);
+        // Equals, measured twice with a tenth of noise either way: the same answer.
+        for (matrix, free) in [(1.0, 1.0), (1.1, 0.9), (0.9, 1.1), (1e-6, 1e-6)] {
+            assert_eq!(choose(matrix, free), Product::Matrix);
+        }
+        assert_eq!(
+            [Product::Matrix, Product::Free].map(|p| Product::named(p.name())),
+            [Some(Product::Matrix), Some(Product::Free)]
+        );
+    }
 
     #[test]
     fn settings_are_read_and_others_refused() {

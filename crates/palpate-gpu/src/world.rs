@@ -1,5 +1,6 @@
 //! What the backend holds: buffers of a plan and a batch, states on loan from a pool, adjoints, tangents, tallies.
 
+use crate::choices::Choices;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::geometry::Geometry;
@@ -128,7 +129,7 @@ impl World {
             // What effects add to blocks is in the matrix alone.
             world.product = Product::Matrix;
         } else if many && tuning.product.is_none() {
-            world.product = tuning::faster(&mut world)?;
+            world.product = tuning::faster(&mut world, &Choices::of_user())?;
         }
         Ok(world)
     }

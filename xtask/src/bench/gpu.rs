@@ -1,7 +1,7 @@
 //! Time of a step of the GPU backend beside the CPU's: batches, passes by the device's own clock, traffic of conjugate gradients.
 
 use super::report::{Line, Report, Times};
-use super::{BAND, PAPER_DRAGON, blocks, data, one, placed, plan};
+use super::{BAND, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
 use crate::table;
 use glam::DVec3;
 use palpate_engine::{Backend, ParamBatch};
@@ -24,8 +24,30 @@ const PATIENCE: f64 = 600.0;
 /// Passes that are printed.
 const SHOWN: usize = 8;
 
+/// Time and traffic of some work of a whole batch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Traffic {
+    /// Time [s].
+    pub seconds: f64,
+    /// Numbers read and written, each once [bytes].
+    pub bytes: f64,
+    /// Bandwidth over that of a copy.
+    pub share: f64,
+}
+
+impl Traffic {
+    fn new(t: palpate_gpu::Traffic, copy: f64) -> Traffic {
+        Traffic { seconds: t.seconds, bytes: t.bytes, share: t.bytes / t.seconds / copy }
+    }
+
+    fn text(&self) -> String {
+        let (megabytes, gigabytes) = (self.bytes / 1e6, self.bytes / self.seconds / 1e9);
+        format!("{megabytes:.2} MB in {:.3} ms, {gigabytes:.1} GB/s = {:.0} % of a copy", 1e3 * self.seconds, 100.0 * self.share)
+    }
+}
+
 /// What only a graphics device has.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
     /// Simulations that ran together.
     pub batch: usize,
@@ -33,27 +55,25 @@ pub struct Device {
     pub over_cpu: [f64; 3],
     /// How conjugate gradients multiply, and with how many workgroups a member.
     pub product: String,
-    /// Time of one such product of the whole batch [s].
-    pub product_seconds: f64,
-    /// What it moves [bytes].
-    pub product_bytes: f64,
+    /// A whole iteration of conjugate gradients, as steps run it. (Files of earlier versions lack it.)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iteration: Option<Traffic>,
+    /// Both products by themselves, where many workgroups share a solve.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub products: Vec<(String, Traffic)>,
     /// Passes of one step forward and back: name, dispatches, milliseconds on the device; the longest first.
     pub passes: Vec<(String, u64, f64)>,
 }
 
 impl Device {
     /// Prints what the table has no room for.
-    pub fn print(&self, name: &str, copy: Option<f64>) {
-        let gigabytes = self.product_bytes / self.product_seconds.max(1e-12) / 1e9;
-        let part = copy.map_or_else(String::new, |c| format!(" = {:.0} % of a copy", 1e11 * gigabytes / c));
+    pub fn print(&self, name: &str) {
         let [f, c, a] = self.over_cpu.map(|x| format!("{x:.2}"));
         println!("  {name}: times faster than the CPU: forward {f}, cost {c}, adjoint {a}");
-        println!(
-            "    CG ({}): {:.2} MB an iteration in {:.3} ms, {gigabytes:.1} GB/s{part}",
-            self.product,
-            self.product_bytes / 1e6,
-            1e3 * self.product_seconds
-        );
+        if let Some(t) = &self.iteration {
+            println!("    iteration of CG ({}): {}", self.product, t.text());
+        }
+        self.products.iter().for_each(|(name, t)| println!("    product {name}: {}", t.text()));
         let shown: Vec<String> = self.passes.iter().take(SHOWN).map(|(p, n, ms)| format!("{p} {ms:.2} ({n}×)")).collect();
         if !shown.is_empty() {
             println!("    passes of a step and its adjoint [ms]: {}", shown.join(", "));
@@ -66,19 +86,25 @@ struct Subject {
     name: &'static str,
     shape: Box<dyn Shape>,
     h: f64,
-    dragon: bool,
+    /// The paper's seconds for such a body.
+    paper: Option<[f64; 3]>,
 }
 
 fn subjects(large: bool, quick: bool) -> Result<Vec<Subject>, String> {
     let center = DVec3::new(0.001, 0.002, 0.103);
     let torus = Analytic::Torus { major: 0.08, minor: 0.03, center, axis: DVec3::Z };
     let ball = Analytic::Ball { radius: 0.1, center };
-    let of = |name, body, across: f64| Subject { name, shape: Box::new(placed(body)), h: 0.2 / across, dragon: false };
-    let mut all = vec![of("torus", torus, if quick { 9.0 } else { 14.0 }), of("ball", ball.clone(), 6.0)];
-    if !quick {
+    let of = |name, body, across: f64| Subject { name, shape: Box::new(placed(body)), h: 0.2 / across, paper: None };
+    let like = |paper, subject| Subject { paper: Some(paper), ..subject };
+    if quick {
+        return Ok(vec![of("torus", torus, 9.0), of("ball", ball, 6.0)]);
+    }
+    // Cells across that give about as many nodes as the paper's bodies have: 1138 and 770.
+    let mut all = vec![like(PAPER_TORUS, of("torus", torus, 13.0)), like(PAPER_BALL, of("ball", ball.clone(), 8.6))];
+    {
         if let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
             let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
-            all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, dragon: true });
+            all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, paper: Some(PAPER_DRAGON) });
         } else {
             println!("no dragon: set PALPATE_DATA to the folder of recordings");
         }
@@ -103,11 +129,12 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
         threads: rayon::current_num_threads(),
         adapter: Some(gpu.name.clone()),
         copy: Some(copy),
+        fit: None,
         lines: Vec::new(),
     };
     for s in subjects(large, quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
         let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, 5e4)?;
-        cpu.paper = s.dragon.then(|| PAPER_DRAGON.map(|ms| 1e-3 * ms));
+        cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
         let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
         let mut plan = plan(body, RotationUpdate::Converged, 5e4);
@@ -121,7 +148,7 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
                 break;
             }
             let clock = Instant::now();
-            let answer = on_device(&gpu, &plan, batch, &cpu);
+            let answer = on_device(&gpu, copy, &plan, batch, &cpu);
             took = clock.elapsed().as_secs_f64();
             match answer {
                 Ok(line) => {
@@ -176,7 +203,7 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, Str
     Ok(Run { seconds, failure })
 }
 
-fn on_device(gpu: &Arc<Gpu>, plan: &Plan, batch: usize, cpu: &Line) -> Result<Line, String> {
+fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -> Result<Line, String> {
     let backend = GpuBackend::on(gpu.clone());
     let before = gpu.made();
     let clock = Instant::now();
@@ -199,7 +226,7 @@ fn on_device(gpu: &Arc<Gpu>, plan: &Plan, batch: usize, cpu: &Line) -> Result<Li
     let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
     world.time_passes(false);
     let run = run(&backend, &mut world, steps)?;
-    let speed = world.product_speed().map_err(|e| e.to_string())?;
+    let speed = world.cg_speed().map_err(|e| e.to_string())?;
     let [forward, cost, adjoint] = run.seconds.map(|s| Times::of(s.into_iter().map(|x| x / batch as f64).collect()));
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
     Ok(Line {
@@ -217,10 +244,9 @@ fn on_device(gpu: &Arc<Gpu>, plan: &Plan, batch: usize, cpu: &Line) -> Result<Li
         gpu: Some(Device {
             batch,
             over_cpu: [ratio(&cpu.forward, &forward), ratio(&cpu.cost, &cost), ratio(&cpu.adjoint, &adjoint)],
-            product: format!("{:?}, {}", speed.product, if speed.many { "many workgroups" } else { "one workgroup" })
-                .to_lowercase(),
-            product_seconds: speed.seconds,
-            product_bytes: speed.bytes,
+            product: format!("{}, {}", speed.product.name(), if speed.many { "many workgroups" } else { "one workgroup" }),
+            iteration: Some(Traffic::new(speed.iteration, copy)),
+            products: speed.products.iter().map(|(p, t)| (p.name().to_string(), Traffic::new(*t, copy))).collect(),
             passes,
         }),
         ..cpu.clone()

@@ -1,5 +1,6 @@
 //! Time and memory of one step, forward and back, of the CPU backend: the paper's dragon, and balls and blocks of growing size.
 
+pub mod fit;
 pub mod gpu;
 pub mod report;
 
@@ -30,16 +31,29 @@ const BIG: usize = 20_000;
 const POINTS: usize = 1000;
 /// Width of the band in cells, as for the paper's dragon.
 pub(super) const BAND: f64 = 4.0;
-/// The paper's table 2 for the dragon: forward, cost, adjoint of one step [ms].
-pub(super) const PAPER_DRAGON: [f64; 3] = [318.0, 172.0, 462.0];
+/// The paper's table 2 (RTX 2070): forward, cost, adjoint of one step [s]; of 2489, 1138, 770 and 2440 nodes.
+pub(super) const PAPER_DRAGON: [f64; 3] = seconds([318.0, 172.0, 462.0]);
+pub(super) const PAPER_TORUS: [f64; 3] = seconds([95.0, 92.0, 225.0]);
+pub(super) const PAPER_BALL: [f64; 3] = seconds([77.0, 199.0, 58.0]);
+pub(super) const PAPER_TEDDY: [f64; 3] = seconds([803.0, 165.0, 764.0]);
+
+const fn seconds([a, b, c]: [f64; 3]) -> [f64; 3] {
+    [1e-3 * a, 1e-3 * b, 1e-3 * c]
+}
 
 /// Runs everything whose name begins with `only`; `large` adds a body of 100 000 nodes.
 ///
 /// # Errors
 /// A body cannot be built.
 pub fn all(large: bool, only: &str) -> Result<Report, String> {
-    let mut report =
-        Report { date: table::today(), threads: rayon::current_num_threads(), adapter: None, copy: None, lines: Vec::new() };
+    let mut report = Report {
+        date: table::today(),
+        threads: rayon::current_num_threads(),
+        adapter: None,
+        copy: None,
+        fit: None,
+        lines: Vec::new(),
+    };
     let mut add = |line: Line| {
         println!("{}: {} nodes, forward {:.1} ms", line.name, line.nodes, 1e3 * line.forward.median);
         report.lines.push(line);
@@ -53,7 +67,7 @@ pub fn all(large: bool, only: &str) -> Result<Report, String> {
                 let name = format!("dragon, {rotation:?}").to_lowercase();
                 if wanted(&name) {
                     let line = one(&name, &sdf, 0.3 / 5.0 / 6.0, rotation, 5e4)?;
-                    add(Line { paper: Some(PAPER_DRAGON.map(|ms| 1e-3 * ms)), ..line });
+                    add(Line { paper: Some(PAPER_DRAGON), ..line });
                 }
             }
             // Beside the first: effects that are absent cost nothing.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Median and extremes of repeated timings [s].
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Times {
     /// Median.
     pub median: f64,
@@ -25,7 +25,7 @@ impl Times {
 }
 
 /// One body.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// Body and kind of rotation.
     pub name: String,
@@ -66,7 +66,7 @@ pub struct Line {
 }
 
 /// A run.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Day.
     pub date: String,
@@ -78,6 +78,9 @@ pub struct Report {
     /// Its measured bandwidth of copies [bytes/s].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copy: Option<f64>,
+    /// A whole fit, if one was timed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<super::fit::Fit>,
     /// Bodies.
     pub lines: Vec<Line>,
 }
@@ -89,6 +92,15 @@ fn milliseconds(t: &Times) -> String {
 impl Report {
     /// Prints the table.
     pub fn print(&self) {
+        if let Some(f) = &self.fit {
+            f.print();
+        }
+        if !self.lines.is_empty() {
+            self.print_lines();
+        }
+    }
+
+    fn print_lines(&self) {
         let head = [
             "body",
             "nodes",
@@ -137,7 +149,7 @@ impl Report {
                 );
             }
             if let Some(g) = &l.gpu {
-                g.print(&l.name, self.copy);
+                g.print(&l.name);
             }
             if let Some(f) = &l.failure {
                 println!("  {}: {f}", l.name);
@@ -151,25 +163,130 @@ impl Report {
 /// # Errors
 /// A file that cannot be read or is no result of a benchmark.
 pub fn compare(before: &Path, after: &Path) -> Result<(), String> {
-    let read = |p: &Path| -> Result<Report, String> {
-        let text = std::fs::read_to_string(p).map_err(|e| format!("{}: {e}", p.display()))?;
-        serde_json::from_str(&text).map_err(|e| format!("{}: no result of a benchmark: {e}", p.display()))
-    };
     let (a, b) = (read(before)?, read(after)?);
-    let mut rows = vec![["body", "forward", "cost", "adjoint", "memory"].map(String::from).to_vec()];
+    let of = |r: &Report| format!("{} ({} threads, {})", r.date, r.threads, r.adapter.as_deref().unwrap_or("no adapter"));
+    println!("before: {}\nafter: {}", of(&a), of(&b));
+    table::print("after over before; below 1 is faster; shares of a copy's bandwidth before → after", &rows(&a, &b));
+    for (report, other, which) in [(&a, &b, "before"), (&b, &a, "after")] {
+        let alone: Vec<&str> = report.lines.iter().map(|l| l.name.as_str()).filter(|n| find(other, n).is_none()).collect();
+        if !alone.is_empty() {
+            println!("  only in {which}: {}", alone.join(", "));
+        }
+    }
+    if let (Some(x), Some(y)) = (&a.fit, &b.fit) {
+        println!("  fit: {:.1} s → {:.1} s ({} → {} nodes)", x.seconds, y.seconds, x.nodes, y.nodes);
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Report, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    serde_json::from_str(&text).map_err(|e| format!("{}: no result of a benchmark: {e}", path.display()))
+}
+
+fn find<'a>(report: &'a Report, name: &str) -> Option<&'a Line> {
+    report.lines.iter().find(|l| l.name == name)
+}
+
+/// The table of [`compare`].
+fn rows(a: &Report, b: &Report) -> Vec<Vec<String>> {
+    let head = ["body", "nodes", "forward", "cost", "adjoint", "memory", "product", "share of CG"];
+    let mut rows = vec![head.map(String::from).to_vec()];
     for l in &b.lines {
-        let Some(old) = a.lines.iter().find(|o| o.name == l.name) else { continue };
+        let Some(old) = find(a, &l.name) else { continue };
         let ratio = |new: f64, old: f64| if old > 0.0 { format!("{:.2}", new / old) } else { "-".into() };
         let time = |new: &Times, old: &Times| ratio(new.median, old.median);
+        // What is the same in both is said once.
+        let both = |of: fn(&Line) -> String| {
+            let (old, new) = (of(old), of(l));
+            if old == new { new } else { format!("{old} → {new}") }
+        };
         rows.push(vec![
             l.name.clone(),
+            both(|l| l.nodes.to_string()),
             time(&l.forward, &old.forward),
             time(&l.cost, &old.cost),
             time(&l.adjoint, &old.adjoint),
             ratio(l.peak as f64, old.peak as f64),
+            both(|l| l.gpu.as_ref().map_or("-".into(), |g| g.product.clone())),
+            both(|l| l.gpu.as_ref().and_then(|g| g.iteration).map_or("-".into(), |t| format!("{:.0} %", 100.0 * t.share))),
         ]);
     }
-    let title = format!("{} ({} threads) over {} ({} threads); below 1 is faster", b.date, b.threads, a.date, a.threads);
-    table::print(&title, &rows);
-    Ok(())
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gpu::{Device, Traffic};
+    use super::*;
+
+    fn line(name: &str, seconds: f64, share: f64) -> Line {
+        let traffic = Traffic { seconds: 1e-4, bytes: 1e6, share };
+        let times = Times { median: seconds, min: seconds, max: seconds };
+        let device = Device {
+            batch: 8,
+            over_cpu: [1.0; 3],
+            product: "csr, many workgroups".into(),
+            iteration: Some(traffic),
+            products: vec![("csr".into(), traffic), ("free".into(), traffic)],
+            passes: vec![("press_cells".into(), 3, 0.5)],
+        };
+        Line {
+            name: name.into(),
+            nodes: 770,
+            cells: 516,
+            band_nodes: 2605,
+            build: 0.1,
+            forward: times,
+            cost: times,
+            adjoint: times,
+            paper: Some([0.077, 0.199, 0.058]),
+            tape: 1,
+            matrix: 1,
+            newton: 3.0,
+            linear: 0.0,
+            peak: 4,
+            failure: None,
+            gpu: Some(device),
+        }
+    }
+
+    fn report(lines: Vec<Line>) -> Report {
+        Report { date: "2026-01-01".into(), threads: 2, adapter: Some("a device".into()), copy: Some(1e10), fit: None, lines }
+    }
+
+    #[test]
+    fn a_report_comes_back_from_its_file_and_is_compared() {
+        let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+        let (before, after) =
+            (report(vec![line("ball", 2e-3, 0.3), line("torus", 1.0, 0.1)]), report(vec![line("ball", 1e-3, 0.6)]));
+        let file = |name: &str, r: &Report| {
+            let path = folder.path().join(name);
+            let text = serde_json::to_string(r).unwrap_or_else(|e| panic!("{e}"));
+            std::fs::write(&path, text).unwrap_or_else(|e| panic!("{e}"));
+            path
+        };
+        let paths = [file("before", &before), file("after", &after)];
+        for (path, report) in paths.iter().zip([&before, &after]) {
+            assert_eq!(read(path).as_ref(), Ok(report));
+        }
+        assert_eq!(compare(&paths[0], &paths[1]), Ok(()));
+        let rows = rows(&before, &after);
+        assert_eq!(rows.len(), 2, "the torus is in one file alone");
+        let expected = ["ball", "770", "0.50", "0.50", "0.50", "1.00", "csr, many workgroups", "30 % → 60 %"];
+        assert_eq!(rows[1], expected);
+        assert!(find(&after, "torus").is_none());
+        let none = file("none", &before);
+        std::fs::write(&none, "{}").unwrap_or_else(|e| panic!("{e}"));
+        assert!(compare(&none, &paths[1]).is_err_and(|e| e.contains("no result of a benchmark")));
+    }
+
+    #[test]
+    fn results_of_earlier_versions_are_read() {
+        let files = std::fs::read_dir(table::root().join("bench")).unwrap_or_else(|e| panic!("{e}"));
+        let named = |p: &Path| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("bench-"));
+        let all: Vec<_> = files.filter_map(|f| Some(f.ok()?.path())).filter(|p| named(p)).collect();
+        assert!(!all.is_empty());
+        all.iter().for_each(|p| assert!(read(p).is_ok_and(|r| r.fit.is_some() || !r.lines.is_empty()), "{}", p.display()));
+    }
 }

@@ -1,8 +1,7 @@
 //! What observations found, back on the host: sums over frames in double precision, and residuals for reports.
 
 use super::readings::shifts;
-use super::{FOUND, Observer, look};
-use crate::device::Gpu;
+use super::{FOUND, Observer, VECTOR, look};
 use crate::error::GpuError;
 use crate::layout::Health;
 use crate::memory::Maker as _;
@@ -12,19 +11,26 @@ use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, S
 use palpate_model::kernel;
 
 impl Observer {
-    /// Adds to evaluations (one a member) what a tally holds of observations.
-    ///
-    /// # Errors
-    /// Whatever went wrong on the device.
-    pub(crate) fn add_to(&self, gpu: &Gpu, tally: &Buffers, directions: usize, all: &mut [Evaluation]) -> Result<(), GpuError> {
-        let (frames, q) = (self.sight.frames as usize, directions);
-        if frames == 0 {
-            return Ok(());
+    /// What a tally of `members` holds of observations along `directions` directions: buffers, and their bytes.
+    pub(crate) fn results<'a>(&self, tally: &'a Buffers, members: usize, directions: usize) -> Vec<(&'a wgpu::Buffer, usize)> {
+        let (looks, q) = (members * self.sight.frames as usize, directions);
+        if looks == 0 {
+            return Vec::new();
         }
-        let sums: Vec<[f32; 4]> = gpu.download(&tally["frame_sums"], all.len() * frames)?;
-        let later: Vec<[f32; 4]> = gpu.download(&tally["start_sums"], all.len() * frames)?;
+        let mut all = vec![(&tally["frame_sums"], VECTOR as usize * looks), (&tally["start_sums"], VECTOR as usize * looks)];
+        if q > 0 {
+            all.push((&tally["curvature"], 4 * members * (q + q * q)));
+        }
+        all
+    }
+
+    /// Adds to evaluations (one a member) what [`Observer::results`] held.
+    pub(crate) fn add_to(&self, results: &[Vec<u8>], directions: usize, all: &mut [Evaluation]) {
+        let (frames, q) = (self.sight.frames as usize, directions);
+        let [sums, later, curvature @ ..] = results else { return };
+        let [sums, later] = [sums, later].map(|bytes| -> Vec<[f32; 4]> { bytemuck::pod_collect_to_vec(bytes) });
         let each = q + q * q;
-        let curvature: Vec<f32> = if q > 0 { gpu.download(&tally["curvature"], all.len() * each)? } else { Vec::new() };
+        let curvature: Vec<f32> = curvature.iter().flat_map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
         for (m, e) in all.iter_mut().enumerate() {
             for [cost, matched, squares, signed] in &sums[m * frames..(m + 1) * frames] {
                 e.cost += f64::from(*cost);
@@ -40,7 +46,6 @@ impl Observer {
                 e.curvature = Some(Curvature { gradient: own.by_ref().take(q).collect(), matrix: own.collect() });
             }
         }
-        Ok(())
     }
 }
 
@@ -69,8 +74,10 @@ pub(crate) fn residuals(
         let frame = at.frame as usize;
         let shot = &o.shots.shots[at.shot as usize];
         let (points, markers) = (shot.point_count as usize, shot.marker_count as usize);
-        let found: Vec<[f32; FOUND as usize / 4]> = gpu.download(&o.buffers["found"], points)?;
-        let rows: Vec<[f32; 2]> = gpu.download(&o.buffers["rows"], points + 3 * markers)?;
+        let sizes = [("found", FOUND as usize * points), ("rows", 8 * (points + 3 * markers))];
+        let all_found = gpu.download_all(&sizes.map(|(name, bytes)| (&o.buffers[name], bytes)))?;
+        let found: Vec<[f32; FOUND as usize / 4]> = bytemuck::pod_collect_to_vec(&all_found[0]);
+        let rows: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&all_found[1]);
         let mut out = FrameResiduals { frame, points: vec![None; points], markers: vec![DVec3::ZERO; markers] };
         let order = &o.shots.point_order[shot.point_start as usize..][..points];
         for (f, &p) in found.iter().zip(order) {
@@ -110,9 +117,14 @@ pub(crate) fn rows(
         let frame = at.frame as usize;
         let (f, shot) = (&obs.frames[frame], &o.shots.shots[at.shot as usize]);
         let (points, most) = (f.points.len(), o.sight.rows as usize);
-        let found: Vec<[f32; FOUND as usize / 4]> = gpu.download(&o.buffers["found"], points)?;
-        let values: Vec<[f32; 2]> = gpu.download(&o.buffers["rows"], f.residuals())?;
-        let slopes: Vec<f32> = if q > 0 { gpu.download(&tally["slopes"], q * most)? } else { Vec::new() };
+        let all_found = gpu.download_all(&[
+            (&o.buffers["found"], FOUND as usize * points),
+            (&o.buffers["rows"], 8 * f.residuals()),
+            (&tally["slopes"], 4 * q * most),
+        ])?;
+        let found: Vec<[f32; FOUND as usize / 4]> = bytemuck::pod_collect_to_vec(&all_found[0]);
+        let values: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&all_found[1]);
+        let slopes: Vec<f32> = bytemuck::pod_collect_to_vec(&all_found[2]);
         let mut add = |row: ResidualRow, place: usize| {
             out.residuals.push(row);
             out.sensitivity.extend((0..q).map(|q| f64::from(slopes[q * most + place])));

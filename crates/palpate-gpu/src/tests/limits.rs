@@ -1,12 +1,12 @@
 //! What is too large, lost or out of memory is an error with a name, a size and a way out.
 
 use super::scenes::{ball, device, held, own_device, plan, spread};
-use crate::device::STORAGE_BUFFERS;
+use crate::device::{Lanes, STORAGE_BUFFERS, WIDTH, WORKGROUP_BYTES, fits, no_room, refusal};
 use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
-use crate::pipelines::{PASSES, pass};
+use crate::pipelines::{PASSES, PassSource, compile, pass};
 use crate::recorder::{Args, Recorder, Size};
 use crate::solve::{ALL, Per, SOLVE, Solve};
 use crate::tuning::Tuning;
@@ -124,6 +124,75 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
 fn no_kernel_binds_more_buffers_than_adapters_are_asked_for() {
     let widest = PASSES.iter().map(|p| p.bindings.iter().filter(|b| !b.3).count()).max();
     assert!(widest.is_some_and(|w| w <= STORAGE_BUFFERS as usize && w > 10), "{widest:?}");
+    assert_eq!(PASSES.iter().map(|p| p.width).max(), Some(WIDTH));
+    assert!(PASSES.iter().all(|p| p.memory <= WORKGROUP_BYTES));
+}
+
+#[test]
+fn an_adapter_that_is_too_small_is_refused_by_the_limit_that_is() {
+    let enough = wgpu::Limits {
+        max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+        max_compute_invocations_per_workgroup: WIDTH,
+        max_compute_workgroup_storage_size: WORKGROUP_BYTES,
+        ..wgpu::Limits::default()
+    };
+    let features = wgpu::Features::IMMEDIATES;
+    assert_eq!(refusal("a", features, &enough), None);
+    type Fault = (&'static str, u32, fn(&mut wgpu::Limits));
+    let faults: [Fault; 3] = [
+        ("max_storage_buffers_per_shader_stage", STORAGE_BUFFERS, |l| l.max_storage_buffers_per_shader_stage -= 1),
+        ("max_compute_invocations_per_workgroup", WIDTH, |l| l.max_compute_invocations_per_workgroup -= 1),
+        ("max_compute_workgroup_storage_size", WORKGROUP_BYTES, |l| l.max_compute_workgroup_storage_size -= 1),
+    ];
+    for (limit, needed, fault) in faults {
+        let mut limits = enough.clone();
+        fault(&mut limits);
+        let e = refusal("Small 3000", features, &limits).unwrap_or_else(|| panic!("{limit} is not missed"));
+        let text = e.to_string();
+        for word in ["Small 3000", limit, &needed.to_string(), &(needed - 1).to_string()] {
+            assert!(text.contains(word), "{text}");
+        }
+        assert!(e.hint().contains("--backend cpu") && e.hint().contains("another adapter"), "{}", e.hint());
+    }
+    let e = refusal("Small 3000", wgpu::Features::empty(), &enough).unwrap_or_else(|| panic!("no feature is missed"));
+    assert!(e.to_string().contains("immediates"), "{e}");
+}
+
+#[test]
+fn a_buffer_beyond_a_limit_names_it_and_memory_that_runs_out_the_buffer() {
+    assert_eq!(fits("values", 1000, 1000, 2000), Ok(()));
+    for (binding, buffer, limit) in [
+        (999, 2000, "max_storage_buffer_binding_size"),
+        (2000, 999, "max_buffer_size"),
+        (999, 999, "max_storage_buffer_binding_size"),
+    ] {
+        let e = fits("values", 1000, binding, buffer).err().unwrap_or_else(|| panic!("{limit} is not missed"));
+        let text = e.to_string();
+        assert!(["`values`", "1000", limit, "999"].iter().all(|w| text.contains(w)), "{text}");
+        assert!(["coarser cells", "smaller batch", "--backend cpu"].iter().all(|w| e.hint().contains(w)), "{}", e.hint());
+    }
+    let source: Box<dyn std::error::Error + Send + Sync> = "not enough memory left".into();
+    let e = no_room("tangents", 123_456, wgpu::Error::OutOfMemory { source });
+    let text = e.to_string();
+    assert!(["out of memory", "`tangents`", "123456 bytes", "not enough memory left"].iter().all(|w| text.contains(w)), "{text}");
+    assert!(e.hint().contains("smaller batch"), "{}", e.hint());
+}
+
+#[test]
+fn a_kernel_that_does_not_compile_is_named() {
+    let Some(gpu) = own_device() else { return };
+    // What no build lets pass: bad text, and bad types.
+    for text in
+        ["@compute @workgroup_size(1) fn broken() { let x = ; }", "@compute @workgroup_size(1) fn broken() { let x: u32 = 1.5; }"]
+    {
+        let source =
+            PassSource { name: "broken", sources: [text; 2], lanes: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
+        let e = compile(&gpu, &source, Lanes::Memory).err().unwrap_or_else(|| panic!("{text} compiles"));
+        assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
+        assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");
+        // The device is none the worse.
+        assert_eq!(gpu.take_trouble(), None);
+    }
 }
 
 #[test]

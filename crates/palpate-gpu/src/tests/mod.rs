@@ -1,11 +1,13 @@
 //! Kernels against the CPU backend on small bodies.
 
 mod cell_laws;
+mod clocks;
 mod derivatives;
 mod effects;
 mod extremes;
 mod faults;
 mod forward;
+mod lanes;
 mod limits;
 mod loops;
 mod memory;

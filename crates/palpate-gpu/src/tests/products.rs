@@ -2,9 +2,11 @@
 
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, spread};
+use crate::choices::Choices;
 use crate::observe::rollout_tests::{differences, seen, watched};
 use crate::pipelines::pass;
 use crate::solve::{ALL, Per, Solve};
+use crate::tuning;
 use crate::world::World;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_cpu::CpuBackend;
@@ -133,13 +135,20 @@ fn gradients_by_many_workgroups_agree_with_the_cpu() {
 }
 
 #[test]
-fn a_measurement_chooses_the_same_product_twice() {
+fn a_measurement_chooses_a_product_for_large_bodies_and_keeps_it() {
     let Some(gpu) = device(None) else { return };
     let plan = plan(&ball(0.03));
-    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: None });
-    let [a, b] = [0, 1].map(|_| backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}")).product);
-    assert_eq!(a, b);
-    let world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
-    let small = GpuBackend::on(world.gpu.clone()).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+    let choices = Choices::at(folder.path().join("products.txt"));
+    let mut world = World::new(gpu.clone(), &plan, 1, many(Product::Matrix)).unwrap_or_else(|e| panic!("{e}"));
+    let chosen = tuning::faster(&mut world, &choices).unwrap_or_else(|e| panic!("{e}"));
+    // Another process finds what was measured, and does not measure: it would not come to the opposite.
+    let line = std::fs::read_to_string(folder.path().join("products.txt")).unwrap_or_else(|e| panic!("{e}"));
+    assert!(line.starts_with(chosen.name()) && line.contains(&gpu.name) && line.contains(&gpu.driver), "{line}");
+    let other = BOTH[usize::from(chosen == Product::Matrix)];
+    let swapped = line.replacen(chosen.name(), other.name(), 1);
+    std::fs::write(folder.path().join("products.txt"), swapped).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(tuning::faster(&mut world, &choices), Ok(other));
+    let small = GpuBackend::on(gpu).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     assert!(world.many && !small.many);
 }

@@ -1,0 +1,89 @@
+//! What benchmarks are told: every dispatch is counted, the kernels that are timed are those that run; an evaluation waits once.
+
+use super::products::crowded;
+use super::scenes::{ball, device, own_device, plan, spread};
+use crate::memory::Maker as _;
+use crate::observe::rollout_tests::{seen, watched};
+use crate::pipelines::{PASSES, pass};
+use crate::recorder::{Args, QUERIES, Recorder, Size};
+use crate::{GpuBackend, Product, Tuning};
+use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use std::collections::HashMap;
+use std::sync::atomic::Ordering;
+
+#[test]
+fn every_dispatch_of_a_long_submission_is_timed() {
+    let Some(gpu) = device(None) else { return };
+    if gpu.tick().is_none() {
+        return;
+    }
+    let sums = gpu.buffer("sums", (16 * PASSES[pass::PROBE_LANES].width).into()).unwrap_or_else(|e| panic!("{e}"));
+    // Ends of a set of queries, and more than two of them.
+    for count in [1, QUERIES / 2, QUERIES / 2 + 1, QUERIES + 3] {
+        let (world, mut groups, mut times) = (HashMap::new(), HashMap::new(), HashMap::new());
+        let mut r = Recorder::new(&gpu, &world, &mut groups, true);
+        for _ in 0..count {
+            r.run(pass::PROBE_LANES, &[("sums", &sums)], Size::All { members: 1, groups: 1 }, Args::default());
+        }
+        r.submit(&mut times);
+        let time = times.get("probe_lanes").cloned().unwrap_or_default();
+        println!("{count} dispatches: {time:?}");
+        assert_eq!(time.count, u64::from(count));
+        // A dispatch cannot take longer than a second, nor a thousand of them no time.
+        assert!(time.nanoseconds < 1e9 * f64::from(count) && (count < 1000 || time.nanoseconds > 0.0), "{time:?}");
+    }
+}
+
+#[test]
+fn conjugate_gradients_are_timed_by_whole_iterations_of_the_kernels_that_run() {
+    let Some(gpu) = device(None) else { return };
+    let plan = plan(&crowded());
+    let theta = ParamBatch::from_rows(&spread(&plan, 2));
+    let one = Tuning { many_from: usize::MAX, product: None };
+    let many = [Product::Matrix, Product::Free].map(|p| Tuning { many_from: 0, product: Some(p) });
+    for tuning in [one, many[0], many[1]] {
+        let backend = GpuBackend::on(gpu.clone()).tuned(tuning);
+        let mut world = backend.build(&plan, 2).unwrap_or_else(|e| panic!("{e}"));
+        backend.set_params(&mut world, &theta);
+        world.time_passes(true);
+        let speed = world.cg_speed().unwrap_or_else(|e| panic!("{e}"));
+        let ran: HashMap<&str, u64> = world.pass_times().into_iter().map(|(name, t)| (name, t.count)).collect();
+        println!("{speed:?}");
+        assert_eq!(speed.many, tuning.many_from == 0);
+        let chunk = world.geometry.shape.chunk as usize;
+        // One workgroup may come to the end of single precision before that of its chunk.
+        let count = if speed.many { 16..=16 } else { 40..=chunk };
+        assert!(count.contains(&speed.iterations), "{} of {chunk} iterations ran", speed.iterations);
+        assert_eq!(speed.products.len(), if speed.many { 2 } else { 0 });
+        if gpu.tick().is_some() {
+            assert_eq!([ran.contains_key("iterate_cg"), ran.contains_key("turn_cg")], [!speed.many, speed.many], "{ran:?}");
+        }
+        // The values of the blocks are read, and at most ten times as much moves in all.
+        let values = 2.0 * 36.0 * f64::from(world.geometry.shape.blocks);
+        assert!(speed.iteration.bytes > 0.1 * values && speed.iteration.bytes < 10.0 * values, "{speed:?}");
+        for (product, traffic) in &speed.products {
+            assert!(traffic.seconds > 0.0 && traffic.bytes > 0.0);
+            assert!(*product != speed.product || traffic.bytes < speed.iteration.bytes);
+        }
+        // The world is as good as before.
+        let mut tally = backend.new_tally(&world, &[]);
+        let mut state = backend.new_state(&world);
+        backend.start(&mut world, &mut state, &mut tally);
+        assert!(backend.read(&world, &tally).iter().all(|e| e.failure.is_none()));
+    }
+}
+
+#[test]
+fn an_evaluation_waits_once() {
+    let Some(gpu) = own_device() else { return };
+    let mut scene = ball(0.03);
+    scene.time.steps = 2;
+    scene.observation = watched();
+    let plan = seen(&scene);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let request = Request { gradient: true, sensitivities: vec![0, 1] };
+    let before = gpu.waits.load(Ordering::Relaxed);
+    let all = rollout.evaluate(&ParamBatch::from_rows(&spread(&plan, 2)), &request);
+    assert!(all.iter().all(|e| e.failure.is_none() && e.matched > 100 && e.curvature.is_some()));
+    assert_eq!(gpu.waits.load(Ordering::Relaxed) - before, 1);
+}
