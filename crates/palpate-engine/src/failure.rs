@@ -9,7 +9,7 @@ pub struct Failure {
     pub kind: FailureKind,
     /// Simulation time [s] since the initial state at which it happened.
     pub time: f64,
-    /// Details with numbers.
+    /// Details with numbers; those of a device with the way out.
     pub detail: String,
 }
 
@@ -64,6 +64,10 @@ impl fmt::Display for Failure {
             FailureKind::Unsupported => "the backend cannot do this",
             FailureKind::Device => "the device failed",
         };
+        if self.kind == FailureKind::Device {
+            // It has no place in the simulation, and brings its own way out.
+            return write!(f, "{what}: {}", self.detail);
+        }
         write!(f, "{what} at t = {:.6} s: {} (hint: {})", self.time, self.detail, self.kind.hint())
     }
 }

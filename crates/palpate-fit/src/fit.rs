@@ -16,6 +16,9 @@ pub enum FitError {
     /// No start could be evaluated.
     #[error("the model could not be evaluated at any start: {0}")]
     NoStart(String),
+    /// What computes broke before anything was evaluated.
+    #[error("nothing was computed: {0}")]
+    Broken(String),
     /// Interrupted before anything was evaluated.
     #[error("interrupted before the first evaluation")]
     Interrupted,
@@ -114,6 +117,8 @@ pub struct FitResult {
     pub theta: Vec<Vec<f64>>,
     /// Plain sentences on what the data do not determine and what went wrong.
     pub warnings: Vec<String>,
+    /// Why the fit broke off before its end, where what computes failed; the rest is the best until then.
+    pub broken: Option<String>,
     /// Every start, in order.
     pub runs: Vec<Run>,
     /// Evaluations of all starts.
@@ -122,7 +127,19 @@ pub struct FitResult {
     pub seconds: f64,
 }
 
+/// Why a start could not be evaluated, or broke off.
+fn reason(status: &Status) -> &str {
+    match status {
+        Status::Failed(why) | Status::Broken(why) => why,
+        other => other.name(),
+    }
+}
+
 /// Fits the free parameters of a problem.
+///
+/// # Errors
+/// Nothing could be evaluated, or the journal cannot be used. A device that fails later ends the search, and its best so far is the
+/// result, with the reason in [`FitResult::broken`].
 pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Result<FitResult, FitError> {
     let clock = Instant::now();
     let journal = hooks.journal.as_ref().map(|place| Journal::open(place, problem, settings)).transpose()?;
@@ -142,18 +159,26 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         .collect();
     // The first of equally good starts, so that the choice does not depend on anything else.
     let best = (0..runs.len()).filter(|&s| runs[s].cost.is_finite()).min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost));
+    let mut broken = runs.iter().find(|r| matches!(r.status, Status::Broken(_))).map(|r| reason(&r.status).to_string());
     let Some(best) = best else {
+        if let Some(why) = broken {
+            return Err(FitError::Broken(why));
+        }
         let why = runs.iter().find_map(|r| if let Status::Failed(why) = &r.status { Some(why.clone()) } else { None });
         return Err(why.map_or(FitError::Interrupted, FitError::NoStart));
     };
     let values = runs[best].end.clone();
     let z = starts[best].outcome.z.clone();
-    let (u, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, &hooks);
+    let cut = match &broken {
+        Some(_) => Some("the fit broke off"),
+        None => hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)).then_some("the fit was interrupted"),
+    };
+    let (u, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, cut, &mut broken);
     let mut warnings = u.warnings.clone();
     warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
     let failed: Vec<usize> = (0..runs.len()).filter(|&s| runs[s].cost.is_infinite()).collect();
     if let Some(&first) = failed.first() {
-        let why = if let Status::Failed(why) = &runs[first].status { why } else { runs[first].status.name() };
+        let why = reason(&runs[first].status);
         warnings.push(format!("{} of {} starts could not be evaluated (start {first}: {why})", failed.len(), runs.len()));
     }
     if settings.starts > runs.len() {
@@ -185,18 +210,21 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         cost: runs[best].cost,
         evaluations: runs.iter().map(|r| r.evaluations).sum::<usize>() + extra,
         warnings,
+        broken,
         runs,
         seconds: clock.elapsed().as_secs_f64(),
     })
 }
 
-/// Uncertainty at the best point, and how many evaluations that took.
+/// Uncertainty at the best point, and how many evaluations that took. Nothing is computed for a fit that was `cut` short; a device
+/// that fails here says so in `broken`.
 fn curvature(
     problem: &mut Problem,
     z: &[f64],
     known: Option<&Sample>,
     settings: &Settings,
-    hooks: &Hooks,
+    cut: Option<&str>,
+    broken: &mut Option<String>,
 ) -> (Uncertainty, usize) {
     // A sample without curvature still tells of bounds.
     let without = |problem: &Problem, why: &str| {
@@ -204,21 +232,21 @@ fn curvature(
         u.warnings.push(format!("no standard errors: {why}"));
         u
     };
-    let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
     // Gauss–Newton has seen its best point's curvature.
     if let Some(sample) = known.filter(|s| s.curvature.len() == z.len() * z.len()) {
         let mut u = uncertainty::assess(problem, z, sample, &settings.errors);
-        if interrupted {
-            u.warnings.push("the fit was interrupted: standard errors are those of the place that it had reached".into());
-        }
+        u.warnings.extend(cut.map(|why| format!("{why}: standard errors are those of the place that it had reached")));
         return (u, 0);
     }
-    if interrupted {
-        return (without(problem, "the fit was interrupted"), 0);
+    if let Some(why) = cut {
+        return (without(problem, why), 0);
     }
     let sample = problem.evaluate(&[z.to_vec()], Want::Curvature).swap_remove(0);
     match &sample.failure {
-        Some(why) => (without(problem, why), 1),
+        Some(why) => {
+            *broken = sample.broken.then(|| why.clone());
+            (without(problem, why), 1)
+        }
         None => (uncertainty::assess(problem, z, &sample, &settings.errors), 1),
     }
 }

@@ -119,7 +119,8 @@ impl Journal {
         Ok(Some(sample))
     }
 
-    /// Appends a round of evaluations (start, number, z, result) as one line.
+    /// Appends a round of evaluations (start, number, z, result) as one line. None of them may be [broken](Sample::broken): a resumed
+    /// fit would take the failure for the point's.
     pub fn add(&mut self, round: &[(usize, usize, &[f64], &Sample)]) -> Result<(), JournalError> {
         let entries: Vec<Entry> = round
             .iter()
@@ -207,7 +208,9 @@ fn read(path: &Path, text: &str, head: &Value, q: usize) -> Result<Entries, Jour
                 let sizes =
                     z.len() == q && cost.len() == 1 && [0, q].contains(&gradient.len()) && [0, q * q].contains(&curvature.len());
                 let residuals = e.residuals;
-                sizes.then(|| (z, Sample { cost: cost[0], gradient, curvature, residuals, failure: e.failure.clone() }))
+                sizes.then(|| {
+                    (z, Sample { cost: cost[0], gradient, curvature, residuals, failure: e.failure.clone(), broken: false })
+                })
             })();
             let Some((z, sample)) = sample else {
                 return Err(wrong(line, format!("evaluation {} of start {} is damaged", e.evaluation, e.start)));

@@ -16,7 +16,7 @@ mod uncertainty;
 pub use chart::{AtBound, Chart};
 pub use fit::{FitError, FitResult, FittedParameter, Hooks, Progress, Run, fit};
 pub use journal::{JournalError, JournalFile};
-pub use optimise::{Outcome, Sample, Search, Status, Stop};
+pub use optimise::{Outcome, Sample, Search, Status, Stop, want};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};
 pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance};
 

@@ -166,6 +166,7 @@ fn broker(
     let mut asked: Vec<Option<Vec<f64>>> = vec![None; starts];
     let mut served = vec![0; starts];
     let mut residuals = 0;
+    let mut broken = None;
     loop {
         let mut heard: Vec<(usize, usize, f64, Vec<f64>)> = Vec::new();
         while (0..starts).any(|s| done[s].is_none() && asked[s].is_none()) {
@@ -189,7 +190,7 @@ fn broker(
         if live.is_empty() {
             return Ok(done.into_iter().flatten().collect());
         }
-        // What an earlier run has computed is served even when the fit is being interrupted: it costs nothing.
+        // What an earlier run has computed is served even when the fit is about to end: it costs nothing.
         let mut answered = Vec::new();
         if let Some(journal) = &mut journal {
             for &s in &live {
@@ -200,15 +201,18 @@ fn broker(
         }
         let fresh: Vec<usize> = live.iter().copied().filter(|s| answered.iter().all(|(a, _)| a != s)).collect();
         let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
-        if interrupted {
+        let stop = broken.clone().map(Stop::Broken).or(interrupted.then_some(Stop::Interrupted));
+        if let Some(stop) = stop {
             for &s in &fresh {
                 asked[s] = None;
-                let _ = answers[s].send(Err(Stop::Interrupted));
+                let _ = answers[s].send(Err(stop.clone()));
             }
         } else if !fresh.is_empty() {
             let z: Vec<Vec<f64>> = fresh.iter().filter_map(|&s| asked[s].clone()).collect();
             let samples = problem.evaluate(&z, want(settings.optimizer));
-            if let Some(journal) = &mut journal {
+            broken = samples.iter().find(|s| s.broken).and_then(|s| s.failure.clone());
+            // A round that broke is computed again by a resumed fit, as a whole.
+            if let (Some(journal), None) = (&mut journal, &broken) {
                 let round: Vec<_> =
                     fresh.iter().zip(&z).zip(&samples).map(|((&s, z), sample)| (s, served[s], z.as_slice(), sample)).collect();
                 journal.add(&round)?;
@@ -224,8 +228,12 @@ fn broker(
             }
             asked[s] = None;
             served[s] += 1;
+            let answer = match sample {
+                Sample { broken: true, failure, .. } => Err(Stop::Broken(failure.unwrap_or_default())),
+                sample => Ok(sample),
+            };
             // A start that no longer listens has ended and said so.
-            let _ = answers[s].send(Ok(sample));
+            let _ = answers[s].send(answer);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::chart::Chart;
 use crate::optimise::Sample;
-use palpate_engine::{Evaluate, ParamBatch, Request};
+use palpate_engine::{Evaluate, FailureKind, ParamBatch, Request};
 use palpate_model::params::Transform;
 
 /// Where a free parameter acts: `theta[scene][place] = value · factor`.
@@ -182,7 +182,8 @@ impl<'a> Problem<'a> {
                 let sum = &mut sums[b];
                 if e.failure.is_some() || !e.cost.is_finite() {
                     let why = e.failure.as_ref().map_or("the cost is not finite".into(), |f| f.to_string());
-                    *sum = Sample::failed(format!("{}: {why}", self.scenes[s].name));
+                    let broken = e.failure.as_ref().is_some_and(|f| f.kind == FailureKind::Device);
+                    *sum = Sample { broken, ..Sample::failed(format!("{}: {why}", self.scenes[s].name)) };
                     continue;
                 }
                 // Physics that counts no residuals (an analytic cost) weighs as one.

@@ -138,7 +138,11 @@ pub fn search_on(backend: Backend, plan: &Plan, unknowns: &[Unknown], how: &Sear
     };
     let mut problem = Problem::new(vec![scene], free).map_err(Error::Input)?;
     let settings = Settings { iterations: how.iterations, starts: how.starts, seed: how.seed, ..Settings::new(how.optimizer) };
-    fit(&mut problem, &settings, Hooks::default()).map_err(|e| Error::Failed(e.to_string()))
+    let result = fit(&mut problem, &settings, Hooks::default()).map_err(|e| Error::Failed(e.to_string()))?;
+    match result.broken {
+        Some(why) => Err(Error::Failed(why)),
+        None => Ok(result),
+    }
 }
 
 /// Relative errors of one unknown over the starts of a fit.

@@ -25,6 +25,8 @@ pub struct Sample {
     pub residuals: usize,
     /// Why there is no cost.
     pub failure: Option<String>,
+    /// True where there is none because what computes broke: the point is not to blame.
+    pub broken: bool,
 }
 
 impl Sample {
@@ -64,10 +66,12 @@ impl Sample {
 }
 
 /// Why no sample came back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The fit is to end now.
     Interrupted,
+    /// What computes broke, in its words.
+    Broken(String),
 }
 
 /// How a run ended.
@@ -83,6 +87,17 @@ pub enum Status {
     Failed(String),
     /// The fit was interrupted.
     Interrupted,
+    /// What computes broke, in its words.
+    Broken(String),
+}
+
+impl From<Stop> for Status {
+    fn from(stop: Stop) -> Status {
+        match stop {
+            Stop::Interrupted => Status::Interrupted,
+            Stop::Broken(why) => Status::Broken(why),
+        }
+    }
 }
 
 impl Status {
@@ -94,6 +109,7 @@ impl Status {
             Status::Stalled => "stalled",
             Status::Failed(_) => "failed",
             Status::Interrupted => "interrupted",
+            Status::Broken(_) => "broken-off",
         }
     }
 }
@@ -173,7 +189,7 @@ impl<'a> Search<'a> {
     pub fn run(mut self, optimizer: Optimizer, z: &[f64]) -> Outcome {
         let start = self.project(z);
         let status = match self.evaluate(&start) {
-            Err(Stop::Interrupted) => Status::Interrupted,
+            Err(stop) => stop.into(),
             Ok(Sample { failure: Some(why), .. }) => Status::Failed(why),
             Ok(first) => {
                 self.start_cost = first.cost;
@@ -185,7 +201,7 @@ impl<'a> Search<'a> {
                     Optimizer::Lbfgs => lbfgs::minimise(&mut self, start.clone(), first),
                     Optimizer::NelderMead => simplex::minimise(&mut self, start.clone(), first),
                 };
-                walk.unwrap_or(Status::Interrupted)
+                walk.unwrap_or_else(Status::from)
             }
         };
         let Search { start_cost, iterations, evaluations, reach, best, .. } = self;

@@ -15,7 +15,7 @@ const EDGE: f64 = 0.5;
 const SECOND_EDGE: f64 = 0.05;
 
 struct Shared<'s, 'a> {
-    search: RefCell<(&'s mut Search<'a>, bool)>,
+    search: RefCell<(&'s mut Search<'a>, Option<Stop>)>,
     /// The last points tried: argmin does not show its simplex, but tries points no farther apart than its corners.
     tried: RefCell<VecDeque<Vec<f64>>>,
 }
@@ -27,7 +27,7 @@ impl CostFunction for &Shared<'_, '_> {
     fn cost(&self, z: &Vec<f64>) -> Result<f64, argmin::core::Error> {
         let mut shared = self.search.borrow_mut();
         let (search, stopped) = &mut *shared;
-        if *stopped {
+        if stopped.is_some() {
             return Ok(f64::INFINITY);
         }
         let z = search.project(z);
@@ -38,8 +38,8 @@ impl CostFunction for &Shared<'_, '_> {
         }
         match search.evaluate(&z) {
             Ok(sample) => Ok(sample.cost),
-            Err(Stop::Interrupted) => {
-                *stopped = true;
+            Err(stop) => {
+                *stopped = Some(stop);
                 Ok(f64::INFINITY)
             }
         }
@@ -67,7 +67,7 @@ fn descend(search: &mut Search, z: Vec<f64>, cost: f64, edge: f64) -> Result<Sta
     }
     type Simplex = NelderMead<Vec<f64>, f64>;
     type At = IterState<Vec<f64>, (), (), (), (), f64>;
-    let shared = Shared { search: RefCell::new((search, false)), tried: RefCell::default() };
+    let shared = Shared { search: RefCell::new((search, None)), tried: RefCell::default() };
     let mut problem = Problem::new(&shared);
     let broken = |e: argmin::core::Error| Status::Failed(format!("Nelder-Mead: {e}"));
     let mut solver = Simplex::new(corners);
@@ -86,8 +86,8 @@ fn descend(search: &mut Search, z: Vec<f64>, cost: f64, edge: f64) -> Result<Sta
         };
         {
             let mut borrowed = shared.search.borrow_mut();
-            if borrowed.1 {
-                return Err(Stop::Interrupted);
+            if let Some(stop) = borrowed.1.take() {
+                return Err(stop);
             }
             if <Simplex as Solver<&Shared, At>>::terminate(&mut solver, &state).terminated() {
                 return Ok(Status::Converged);

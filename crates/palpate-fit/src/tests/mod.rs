@@ -1,5 +1,6 @@
 //! Tests on cheap physics.
 
+mod broken;
 mod errors;
 mod fits;
 mod models;

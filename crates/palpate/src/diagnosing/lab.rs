@@ -192,6 +192,9 @@ fn fit(
     };
     let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| LabError::Failed(e.to_string()))?;
+    if let Some(why) = result.broken {
+        return Err(LabError::Failed(why));
+    }
     if limits.interrupt.is_raised() {
         return Err(LabError::Interrupted);
     }

@@ -121,6 +121,9 @@ pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, mo
         let mut problem = Problem::new(vec![scene], free.collect()).map_err(LabError::Failed)?;
         let settings = Settings { iterations: 12, ..Settings::new(Optimizer::GaussNewton) };
         let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(|e| LabError::Failed(e.to_string()))?;
+        if let Some(why) = found.broken {
+            return Err(LabError::Failed(why));
+        }
         open.iter().zip(&found.parameters).for_each(|(k, p)| values[*k] = p.value);
     }
     let none = ready.free.len();
