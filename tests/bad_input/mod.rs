@@ -4,6 +4,7 @@
 mod numbers;
 mod output;
 mod recordings;
+mod scale;
 mod shapes;
 
 use std::path::{Path, PathBuf};

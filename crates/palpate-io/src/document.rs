@@ -52,6 +52,11 @@ impl Source {
         }
     }
 
+    /// An error about a dotted path (`clamp.0.box`), with its line.
+    pub fn fault(&self, key: &str, message: impl Into<String>) -> InputError {
+        InputError { line: self.line_of_key(key), key: key.to_string(), ..InputError::file(&self.path, message) }
+    }
+
     /// Line of a dotted path (`clamp.0.box`), or of the deepest part of it that is in the file.
     pub fn line_of_key(&self, key: &str) -> Option<usize> {
         let parts: Vec<&str> = key.split('.').collect();

@@ -1,22 +1,47 @@
 //! Is the recording where the body is?
 
+use crate::mesh::bounds;
+use crate::scene::scale::{FAR_SMALLER, LARGE};
 use glam::DVec3;
-use palpate_model::observation::Observation;
+use palpate_model::observation::{Frame, Observation};
+
+fn positions(frame: &Frame) -> impl Iterator<Item = DVec3> {
+    frame.points.iter().map(|p| p.position).chain(frame.markers.iter().map(|m| m.position))
+}
+
+fn millimetres(observation: &Observation, min: DVec3, max: DVec3) -> Result<(), String> {
+    let (extent, all) = (max - min, observation.frames.iter().flat_map(positions).collect::<Vec<_>>());
+    let (low, high) = bounds(&all);
+    let spread = (high - low).length();
+    let about_origin = all.iter().all(|p| p.length() < FAR_SMALLER * extent.max_element());
+    if all.is_empty() || extent.max_element() < LARGE || spread > FAR_SMALLER * extent.min_element() || !about_origin {
+        return Ok(());
+    }
+    Err(format!(
+        "all {} points of the recording lie within {spread:.4} m, the object's longest side is {:.4} m; is the object in millimetres? \
+         convert it to metres (scale by 0.001)",
+        all.len(),
+        extent.max_element()
+    ))
+}
 
 /// Checks that what was measured lies near the body's bounding box at rest, `min` to `max` [m].
 ///
 /// In at least one frame, at least one in a hundred points or markers must come closer to the box than half its diagonal: bodies
 /// move and images show more than the body, but nothing near the body at any time is a wrong pose or unit.
 ///
+/// An object of some metres around a recording that lies about the world's origin and spans less than a hundredth of the object's
+/// shortest side was written in millimetres.
+///
 /// # Errors
 /// One line with the numbers and what to look at.
 pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Result<(), String> {
     let size = (max - min).length();
+    millimetres(observation, min, max)?;
     let distance = |p: DVec3| (p - p.clamp(min, max)).length();
     let mut all = Vec::new();
     for f in &observation.frames {
-        let positions = f.points.iter().map(|p| p.position).chain(f.markers.iter().map(|m| m.position));
-        let d: Vec<f64> = positions.map(distance).collect();
+        let d: Vec<f64> = positions(f).map(distance).collect();
         let near = d.iter().filter(|d| **d < 0.5 * size).count();
         if near > 0 && near * 100 >= d.len() {
             return Ok(());

@@ -4,6 +4,7 @@ mod effects;
 mod fit;
 mod motion;
 mod object;
+pub(crate) mod scale;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -49,8 +50,10 @@ pub fn parse_scene(text: &str, path: impl AsRef<Path>) -> Result<Loaded<Scene>, 
 /// An error about a key of a scene (`clamp.0.box`) that was found after reading, with its line where the file's `text` has the
 /// key; a scene built in code has an empty text and no lines.
 pub fn scene_error(path: &Path, text: &str, key: &str, message: impl Into<String>) -> InputError {
-    let line = Source::parse(path, text.to_string()).ok().and_then(|s| s.line_of_key(key));
-    InputError { line, key: key.to_string(), ..InputError::file(path, message) }
+    match Source::parse(path, text.to_string()) {
+        Ok(source) => source.fault(key, message),
+        Err(_) => InputError { key: key.to_string(), ..InputError::file(path, message) },
+    }
 }
 
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
@@ -89,6 +92,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
             number(scene.gravity.length())
         ));
     }
+    scale::check(source, &scene, &mut warnings)?;
     scene.fit = fit::fit(&root, &scene)?;
     Ok(Loaded { value: scene, warnings })
 }

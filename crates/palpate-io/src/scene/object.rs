@@ -10,10 +10,12 @@ use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
+    if t.has("mesh") && t.has("shape") {
+        return Err(t.error("shape", "mesh and shape exclude each other; give one"));
+    }
     let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
-        (Some(_), Some(_)) => return Err(t.error("shape", "mesh and shape exclude each other; give one")),
         (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
-        (Some(path), None) => {
+        (Some(path), _) => {
             let loaded = read_mesh(&path)?;
             warnings.extend(loaded.warnings);
             let (min, max) = crate::mesh::bounds(&loaded.value.vertices);
@@ -105,7 +107,7 @@ fn analytic(shape: &Table) -> Result<Analytic, InputError> {
 }
 
 /// Sides of a box that holds the shape whatever its axis [m]; the shape's own longest side is the largest of them.
-fn extent(shape: &Analytic) -> DVec3 {
+pub(super) fn extent(shape: &Analytic) -> DVec3 {
     match *shape {
         Analytic::Ball { radius, .. } => DVec3::splat(2.0 * radius),
         Analytic::Torus { major, minor, .. } => DVec3::splat(2.0 * (major + minor)),
