@@ -1,6 +1,7 @@
 //! What users get wrong, and the one line that says so: file, line, key, what is wrong, what is allowed. Every case is a command
 //! that ends with exit code 2 (1 where a result cannot be written) and nothing but that line.
 
+mod failures;
 mod numbers;
 mod output;
 mod recordings;

@@ -7,7 +7,7 @@ use crate::passes::balance::{Balance, Inertia, States};
 use crate::passes::cells::{Mix, zeros};
 use crate::world::{Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
-use palpate_engine::FailureKind;
+use palpate_engine::{FailureKind, number};
 use palpate_model::changes;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::InitialShape;
@@ -69,7 +69,10 @@ fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
     let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
     let far = s.u.iter().map(|u| u.length()).fold(0.0, f64::max);
     if far > WORLD_SIZE * size {
-        return Err((FailureKind::FellOut, format!("a node moved {far:.3} m, {:.0} times the body's size", far / size)));
+        return Err((
+            FailureKind::FellOut,
+            format!("a node moved {} m, {} times the body's size", number(far), number((far / size).round())),
+        ));
     }
     Ok(())
 }
@@ -80,10 +83,13 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
     let p = &member.physics;
     let positive = [(p.youngs_modulus, "material.youngs_modulus"), (p.density, "material.density")];
     if let Some((value, path)) = positive.iter().find(|(v, _)| v.is_nan() || *v <= 0.0) {
-        return Err((FailureKind::BadParameter, format!("{path} = {value} must be positive")));
+        return Err((FailureKind::BadParameter, format!("{path} = {} must be positive", number(*value))));
     }
     if !(p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5) {
-        return Err((FailureKind::BadParameter, format!("material.poisson_ratio = {} must lie in (-1, 0.5)", p.poisson_ratio)));
+        return Err((
+            FailureKind::BadParameter,
+            format!("material.poisson_ratio = {} must lie in (-1, 0.5)", number(p.poisson_ratio)),
+        ));
     }
     s.u.fill(DVec3::ZERO);
     if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.altered.changes.rest) {

@@ -167,19 +167,7 @@ impl MemberTally {
     }
 
     /// Marks the member as failed; the values of its parameters go into the message.
-    pub(crate) fn fail(&mut self, mut failure: Failure, plan: &Plan, theta: &[f64]) {
-        let values: Vec<String> = plan
-            .layout
-            .keys
-            .iter()
-            .zip(theta)
-            .filter(|(_, v)| **v != 0.0)
-            .map(|(k, v)| {
-                let spec = k.spec();
-                format!("{} = {v:.6} {}", spec.path, spec.unit)
-            })
-            .collect();
-        failure.detail = format!("{}, with {}", failure.detail, values.join(", "));
-        self.evaluation.failure = Some(failure);
+    pub(crate) fn fail(&mut self, failure: Failure, plan: &Plan, theta: &[f64]) {
+        self.evaluation.failure = Some(failure.with_values(&plan.layout, theta));
     }
 }

@@ -1,5 +1,6 @@
 //! Why a member of a batch stopped.
 
+use palpate_model::params::Layout;
 use std::fmt;
 
 /// A member that stopped: what happened, when, and what may help.
@@ -32,6 +33,39 @@ pub enum FailureKind {
     Unsupported,
     /// The device that the backend runs on broke.
     Device,
+}
+
+impl Failure {
+    /// Adds the values θ `[P]` of the parameters that are not zero to the details.
+    pub fn with_values(mut self, layout: &Layout, theta: &[f64]) -> Failure {
+        let stated = layout.keys.iter().zip(theta).filter(|(_, v)| **v != 0.0).map(|(k, v)| {
+            let spec = k.spec();
+            let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
+            format!("{} = {}{unit}", spec.path, number(*v))
+        });
+        self.detail = format!("{}, with {}", self.detail, stated.collect::<Vec<_>>().join(", "));
+        self
+    }
+}
+
+/// A number for messages: six digits, with an exponent where it is very large or small.
+pub fn number(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    // Rounded first, so that 999999.9 counts as a million.
+    let (digits, exponent) = match format!("{x:.5e}").split_once('e') {
+        Some((d, e)) => (d.to_string(), e.parse::<i32>().unwrap_or(0)),
+        None => return x.to_string(),
+    };
+    let trimmed =
+        |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_string() } else { s.to_string() };
+    if (-4..9).contains(&exponent) {
+        let decimals = usize::try_from(5 - exponent).unwrap_or(0);
+        trimmed(&format!("{x:.decimals$}"))
+    } else {
+        format!("{}e{exponent}", trimmed(&digits))
+    }
 }
 
 impl FailureKind {
@@ -68,8 +102,43 @@ impl fmt::Display for Failure {
             // It has no place in the simulation, and brings its own way out.
             return write!(f, "{what}: {}", self.detail);
         }
-        write!(f, "{what} at t = {:.6} s: {} (hint: {})", self.time, self.detail, self.kind.hint())
+        write!(f, "{what} at t = {} s: {} (hint: {})", number(self.time), self.detail, self.kind.hint())
     }
 }
 
 impl std::error::Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_at_any_size() {
+        for (x, text) in [
+            (0.0, "0"),
+            (0.4, "0.4"),
+            (-9.81, "-9.81"),
+            (2e5, "200000"),
+            (123456.789, "123457"),
+            (1e-3, "0.001"),
+            (1.0 / 3.0, "0.333333"),
+            (999_999_999.9, "1e9"),
+            (1e200, "1e200"),
+            (-2.5e-9, "-2.5e-9"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(x), text);
+        }
+    }
+
+    #[test]
+    fn details_name_values_with_units_that_are_units() {
+        let layout = Layout::new(0, 0, &[]);
+        let theta: Vec<f64> = layout.keys.iter().map(|k| if k.spec().path.contains("velocity") { 0.0 } else { 0.4 }).collect();
+        let f = Failure { kind: FailureKind::NotFinite, time: 0.1 + 0.2, detail: "a node".into() }.with_values(&layout, &theta);
+        let text = f.to_string();
+        assert!(text.starts_with("a number became infinite or undefined at t = 0.3 s: a node, with "), "{text}");
+        assert!(text.contains("material.youngs_modulus = 0.4 Pa, material.poisson_ratio = 0.4, "), "{text}");
+        assert!(!text.contains("velocity") && text.ends_with("for the parameters named)"), "{text}");
+    }
+}

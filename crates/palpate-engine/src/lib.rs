@@ -12,6 +12,6 @@ mod rows;
 
 pub use backend::{Backend, BuildError, FrameResiduals};
 pub use evaluate::{Curvature, Evaluate, Evaluation, ParamBatch, Request};
-pub use failure::{Failure, FailureKind};
+pub use failure::{Failure, FailureKind, number};
 pub use rollout::{Rollout, Snapshot};
 pub use rows::{Linearised, ResidualRow, Rows, Source};

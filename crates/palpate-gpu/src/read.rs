@@ -4,7 +4,7 @@ use crate::error::GpuError;
 use crate::layout::Health;
 use crate::world::{State, Tally, World};
 use glam::DVec3;
-use palpate_engine::{Curvature, Evaluation, Failure, FailureKind};
+use palpate_engine::{Curvature, Evaluation, Failure, FailureKind, number};
 
 /// u [m] and v [m/s] of one member, `[N]` each.
 pub(crate) fn state(world: &World, state: &State, member: usize) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
@@ -26,12 +26,14 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
         2 => (FailureKind::NewtonStalled, format!("{b} iterations left a scaled residual of {a:.1e} of the forces")),
         3 => (FailureKind::LinearSolve, format!("{b} conjugate gradient iterations left a relative residual of {a:.1e}")),
         4 => (FailureKind::LinearSolve, "the matrix is not positive definite".to_string()),
-        5 => (FailureKind::FellOut, format!("a node moved {a:.3} m")),
+        5 => (FailureKind::FellOut, format!("a node moved {} m", number(a.into()))),
         6 => (
             FailureKind::BadParameter,
             format!(
                 "material.youngs_modulus = {}, material.poisson_ratio = {}, material.density = {}",
-                p.youngs_modulus, p.poisson_ratio, p.density
+                number(p.youngs_modulus),
+                number(p.poisson_ratio),
+                number(p.density)
             ),
         ),
         _ => (FailureKind::NoEquilibrium, "no clamp holds the body".to_string()),
@@ -41,18 +43,8 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
         FailureKind::NewtonStalled | FailureKind::LinearSolve if h.step == 0 => FailureKind::NoEquilibrium,
         kind => kind,
     };
-    let layout = &world.plan.layout.keys;
-    let values: Vec<String> = layout
-        .iter()
-        .zip(&world.batch.theta[member])
-        .filter(|(_, v)| **v != 0.0)
-        .map(|(k, v)| {
-            let spec = k.spec();
-            format!("{} = {v:.6} {}", spec.path, spec.unit)
-        })
-        .collect();
     let time = f64::from(h.step) * world.plan.clock.step;
-    Some(Failure { kind, time, detail: format!("{what}, with {}", values.join(", ")) })
+    Some(Failure { kind, time, detail: what }.with_values(&world.plan.layout, &world.batch.theta[member]))
 }
 
 /// Costs, gradients and health of every member.
