@@ -2,6 +2,7 @@
 //! that ends with exit code 2 (1 where a result cannot be written) and nothing but that line.
 
 mod failures;
+mod motion;
 mod numbers;
 mod output;
 mod recordings;
