@@ -199,3 +199,23 @@ fn frames_outside_the_simulated_time() {
         "{told}"
     );
 }
+
+#[test]
+fn a_marker_beside_the_body() {
+    let folder = folder();
+    let seen = folder.path().join("seen");
+    std::fs::create_dir(&seen).unwrap();
+    std::fs::write(seen.join("markers.csv"), "time,name,x,y,z\n0,tip,0.1,0.015,0.03\n0.05,tip,0.1,0.015,0.02\n").unwrap();
+    let rest = "name = \"tip\"\nposition = [0.1, 0.015, 0.03]\nsurface = [0.4, 0, 0]\n";
+    let toml = "format = \"recording/1\"\n\n[markers]\nfile = \"markers.csv\"\nnoise_sigma = 0.001\n\n";
+    std::fs::write(seen.join("recording.toml"), format!("{toml}[[markers.rest]]\n{rest}")).unwrap();
+    let observation = OBSERVATION.replace("sparse-surface", "markers");
+    let scene = write(folder.path(), &changed(SCENE, "[time]", &observation));
+    let e = after_place(&refused(&["inspect", arg(&scene)], 2), &seen.join("recording.toml"), 10);
+    assert!(e.starts_with("markers.rest.0.surface: [0.4, 0, 0] m lies 0.3000 m from the body's surface; allowed are"), "{e}");
+    // The scene's word comes before the recording's.
+    let own = observation.replace("[time]", &format!("[[observation.marker]]\n{rest}\n[time]"));
+    let scene = write(folder.path(), &changed(SCENE, "[time]", &own));
+    let e = after_place(&refused(&["inspect", arg(&scene)], 2), &scene, 22);
+    assert!(e.starts_with("observation.marker.0.surface: [0.4, 0, 0] m lies 0.3000 m from the body's surface"), "{e}");
+}

@@ -91,6 +91,59 @@ fn a_journal_of_another_problem_is_refused() {
 }
 
 #[test]
+fn to_resume_without_a_journal_is_to_begin_and_said_so() {
+    let folder = observed(BLOCK);
+    let (scene, out) = (folder.path().join("fit.toml"), folder.path().join("found"));
+    let a = succeed(&["fit", arg(&scene), "--starts", "1", "--out", arg(&out), "--resume", "--quiet"]);
+    assert!(a.err.contains("warning: ") && a.err.contains("journal.jsonl: there is no journal to go on with"), "{}", a.err);
+    assert_eq!(json(out.join("result.json"))["status"], "complete");
+}
+
+#[test]
+fn a_bound_that_keeps_the_best_value_out_leaves_no_standard_error() {
+    let folder = observed(BLOCK);
+    let (scene, out) = (folder.path().join("low.toml"), folder.path().join("found"));
+    let text = fs::read_to_string(folder.path().join("fit.toml")).unwrap();
+    fs::write(&scene, text.replace("[8.0e3, 6.0e4]", "1.0e4").replace("[1.0e2, 1.0e7]", "[1.0e2, 1.2e4]")).unwrap();
+    let a = succeed(&["fit", arg(&scene), "--starts", "1", "--out", arg(&out)]);
+    assert!(a.out.contains("12000 Pa (no standard error)"), "{}", a.out);
+    assert_eq!(json(out.join("result.json"))["parameters"][0]["at_bound"], "upper");
+}
+
+#[test]
+fn a_fit_to_points_that_mostly_meet_nothing_says_so() {
+    let folder = observed(BLOCK);
+    let file = |name: &str| folder.path().join(name);
+    // Held ten centimetres above the recorded block: its top alone is in the images, if anything.
+    let text = fs::read_to_string(file("fit.toml")).unwrap();
+    let pose = "[object]\npose = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.07], [0, 0, 0, 1]]";
+    let text = text.replace("[object]", pose).replace("min = [-0.01, -0.01, -0.01]", "min = [-0.01, -0.01, 0.06]");
+    let text = text.replace("max = [0.05, 0.05, 0.001]", "max = [0.05, 0.05, 0.071]").replace("cost =", "band = 0.5\ncost =");
+    fs::write(file("high.toml"), text).unwrap();
+    let (scene, out) = (file("high.toml"), file("found"));
+    let a = succeed(&["fit", arg(&scene), "--starts", "1", "--out", arg(&out)]);
+    assert!(
+        a.out.contains("not to be trusted: ") && a.out.contains("observed points meet no part of the simulated body"),
+        "{}",
+        a.out
+    );
+    let r = json(out.join("result.json"));
+    assert!(r["warnings"][0].as_str().unwrap().starts_with("not to be trusted: "), "{}", r["warnings"]);
+    assert!(r["residual"]["unmatched"].as_u64() > r["residual"]["points"].as_u64(), "{}", r["residual"]);
+}
+
+#[test]
+fn a_scene_given_twice_is_fitted_with_a_warning() {
+    let folder = observed(BLOCK);
+    let (scene, out) = (folder.path().join("fit.toml"), folder.path().join("found"));
+    let twin = folder.path().join("seen").join("..").join("fit.toml");
+    let a = succeed(&["fit", arg(&scene), arg(&twin), "--starts", "1", "--out", arg(&out)]);
+    assert_eq!(a.err.matches("is given twice; its data count twice").count(), 1, "{}", a.err);
+    let r = json(out.join("result.json"));
+    assert!(r["warnings"].to_string().contains("is given twice"), "{}", r["warnings"]);
+}
+
+#[test]
 fn two_scenes_share_what_both_name_and_keep_what_is_their_own() {
     let folder = observed(BALL);
     let file = |name: &str| folder.path().join(name);

@@ -21,7 +21,9 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
     fs::write(file("block.toml"), BLOCK).unwrap();
     fs::write(file("typo.toml"), BLOCK.replace("youngs_modulus", "young_modulus")).unwrap();
     fs::write(file("markers.csv"), "name,x,y,z\ntip,0,0,0.08\nfar,1,1,1\n").unwrap();
+    fs::write(file("tip.csv"), "name,x,y,z\ntip,0,0,0.08\n").unwrap();
     let (scene, typo, out, markers) = (file("block.toml"), file("typo.toml"), file("out"), file("markers.csv"));
+    let tip = file("tip.csv");
     let (s, o) = (arg(&scene), arg(&out));
     let cases: &[(&[&str], &[&str])] = &[
         (&["simulate"], &["SCENE"]),
@@ -36,7 +38,13 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         (&["observe", s, "--out", o], &["--camera", "--markers"]),
         (&["observe", s, "--out", o, "--camera", "eye=1,0,0"], &["eye=1,0,0", "target"]),
         (&["observe", s, "--out", o, "--camera", "eye=1,0,0 target=2,0,0"], &["never sees"]),
-        (&["observe", s, "--out", o, "--camera", CAMERA, "--noise", "-1"], &["noise"]),
+        (&["observe", s, "--out", o, "--camera", CAMERA, "--noise", "-1"], &["--noise -1", "[0, 1] (m)"]),
+        (&["observe", s, "--out", o, "--camera", CAMERA, "--depth-scale", "1e-9"], &["--depth-scale 1e-9", "no pixel", "65535"]),
+        (
+            &["observe", s, "--out", arg(&typo), "--camera", CAMERA, "--depth-scale", "7"],
+            &["--depth-scale 7", "at most 1 (m per"],
+        ),
+        (&["observe", s, "--out", o, "--markers", arg(&tip), "--dropout", "0.999999"], &["--dropout 0.999999", "no marker"]),
         (&["observe", s, "--out", o, "--camera", CAMERA, "--dropout", "1.5"], &["--dropout 1.5", "[0, 1)"]),
         (&["observe", s, "--out", o, "--camera", CAMERA, "--times", "0.1,9"], &["9 s", "not simulated"]),
         (&["observe", s, "--out", o, "--markers", arg(&markers)], &["markers.csv:3", "far", "surface"]),
@@ -55,6 +63,23 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         }
     }
     assert!(!out.join("recording.toml").exists(), "nothing is written when something is wrong");
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_known_before_the_simulation() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    // Nothing holds this block, so that its simulation cannot even begin.
+    let (head, rest) = BLOCK.split_once("[[clamp]]").unwrap();
+    let free = head.to_string() + rest.split_once("}\n").unwrap().1;
+    fs::write(file("free.toml"), free.replace("[initial]", "[initial]\nstate = \"static-equilibrium\"")).unwrap();
+    fs::write(file("taken"), "a file").unwrap();
+    let (scene, out) = (file("free.toml"), file("taken").join("seen"));
+    for verb in [&["simulate", arg(&scene)][..], &["observe", arg(&scene), "--camera", CAMERA]] {
+        let a = palpate(&[verb, &["--out", arg(&out)]].concat());
+        assert_eq!(a.code, 1, "{}", a.err);
+        assert!(a.err.contains("taken/seen: cannot be written: ") && !a.err.contains("hint"), "{}", a.err);
+    }
 }
 
 #[test]

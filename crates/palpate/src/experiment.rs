@@ -12,7 +12,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_er
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan_build::{PlanError, build_plan};
 use palpate_model::scene::{ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
@@ -101,7 +101,7 @@ impl Experiment {
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(Arc::new(read));
         }
-        let plan = build_plan(&scene, observation, &rest).map_err(|e| fault(&e.key, e.message))?;
+        let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, warnings };
         experiment.check_times()?;
         Ok(experiment)
@@ -170,6 +170,11 @@ impl Experiment {
     /// What a backend gets.
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// Adds something that deserves attention.
+    pub(crate) fn warn(&mut self, text: String) {
+        self.warnings.push(text);
     }
 
     /// What looked suspicious without being wrong, one line each.
@@ -253,6 +258,22 @@ impl Experiment {
     pub fn up(&self) -> DVec3 {
         (-self.scene.gravity).try_normalize().unwrap_or(DVec3::Z)
     }
+}
+
+/// A fault found while the plan is built, where its key stands: in the scene, or in the recording for the rest place of a marker that
+/// the scene does not give.
+fn plan_fault(scene: &Scene, text: &str, recording: Option<&Recording>, e: PlanError) -> Error {
+    let marker = e.key.strip_prefix("markers.rest \"").and_then(|k| k.rsplit_once("\"."));
+    let (Some((name, part)), Some(spec), Some(recording)) = (marker, &scene.observation, recording) else {
+        return scene_error(&scene.path, text, &e.key, e.message).into();
+    };
+    if let Some(i) = spec.markers.iter().position(|m| m.name == name) {
+        return scene_error(&scene.path, text, &format!("observation.marker.{i}.{part}"), e.message).into();
+    }
+    let place = recording.markers.iter().flat_map(|m| &m.rest).position(|m| m.name == name).unwrap_or(0);
+    // It was read a moment ago; without it the line is missing and nothing else.
+    let text = read_text(&recording.path).unwrap_or_default();
+    scene_error(&recording.path, &text, &format!("markers.rest.{place}.{part}"), e.message).into()
 }
 
 /// An observation without frames; the noises are never used and only keep divisions harmless.

@@ -191,8 +191,18 @@ fn write_all(
     Ok(result)
 }
 
+/// A scene that is given twice counts twice: its noise is taken for less than it is.
+fn warn_of_twins(paths: &[PathBuf], experiments: &mut [Experiment]) {
+    let files: Vec<Option<PathBuf>> = paths.iter().map(|p| p.canonicalize().ok()).collect();
+    for (i, e) in experiments.iter_mut().enumerate().filter(|(i, _)| files[..*i].contains(&files[*i])) {
+        let path = paths[i].display();
+        e.warn(format!("{path}: is given twice; its data count twice, and the standard errors are too small"));
+    }
+}
+
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
+    let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
+    warn_of_twins(&a.scenes, &mut experiments);
     let (backend, note) = choose(&a.choices, &experiments[0])?;
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
@@ -236,7 +246,8 @@ pub fn run_in(
     make_folder(folder)?;
     let journal = folder.join(JOURNAL);
     if resume && !journal.exists() {
-        console.note(&format!("{}: there is no journal to go on with; the fit begins anew", journal.display()));
+        // Not what was asked for: --quiet does not silence it.
+        console.warn(&[format!("{}: there is no journal to go on with; the fit begins anew", journal.display())]);
     }
     if let Some(aside) = keep_previous(folder, experiments.len(), resume)? {
         console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));

@@ -9,6 +9,7 @@ use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
 use palpate_io::InputError;
+use palpate_io::output::make_folder;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -73,14 +74,14 @@ fn check(a: &Arguments) -> Result<(), Error> {
     if a.camera.is_empty() && a.markers.is_none() {
         return Err(Error::Input("nothing observes: give --camera \"eye=x,y,z target=x,y,z\" or --markers FILE".into()));
     }
-    if !(a.noise >= 0.0 && a.noise.is_finite()) {
-        return wrong("noise", a.noise, "≥ 0 (m)");
+    if !(0.0..=1.0).contains(&a.noise) {
+        return wrong("noise", a.noise, "in [0, 1] (m)");
     }
     if !(0.0..1.0).contains(&a.dropout) {
         return wrong("dropout", a.dropout, "in [0, 1)");
     }
-    if !(a.depth_scale > 0.0 && a.depth_scale.is_finite()) {
-        return wrong("depth-scale", a.depth_scale, "> 0 (m per count)");
+    if !(a.depth_scale > 0.0 && a.depth_scale <= 1.0) {
+        return wrong("depth-scale", a.depth_scale, "> 0 and at most 1 (m per count)");
     }
     if !(a.refine > 0.0 && a.refine <= 16.0) {
         return wrong("refine", a.refine, "> 0 and at most 16");
@@ -179,6 +180,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         sensor: Sensor { noise: a.noise, dropout: a.dropout, depth_scale: a.depth_scale, seed: a.seed },
     };
     let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
+    // Whether the folder can be made is known before the simulation, not after it.
+    make_folder(&a.out)?;
     let mut track = console.progress(1000, "observing");
     let interrupt = console.interrupt.clone();
     let recording = observe(&experiment, backend, &observers, |share| {
@@ -186,10 +189,20 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     track.finish();
-    palpate_io::write_recording(&a.out, &recording)?;
-
     let readings: usize = recording.frames.iter().map(|f| f.readings().count()).sum();
     let samples = recording.markers.as_ref().map_or(0, |m| m.samples.len());
+    if !recording.cameras.is_empty() && readings == 0 {
+        let (scale, far) = (a.depth_scale, 65535.0 * a.depth_scale);
+        return Err(Error::Input(format!(
+            "--depth-scale {scale:?}: no pixel has a reading; 1 to 65535 counts reach from {scale:?} m to {far:?} m (--dropout {} loses more)",
+            a.dropout
+        )));
+    }
+    if recording.markers.is_some() && samples == 0 {
+        return Err(Error::Input(format!("--dropout {}: no marker is ever seen; make it smaller", a.dropout)));
+    }
+    palpate_io::write_recording(&a.out, &recording)?;
+
     if console.json() {
         let json = serde_json::json!({
             "format": "observation/1",

@@ -15,6 +15,23 @@ fn residual(r: &ResidualSummary) -> Value {
     json!({ "rms": finite(r.rms), "noise": finite(r.noise), "points": r.points, "unmatched": r.unmatched })
 }
 
+/// A plain word where the result rests on the smaller part of what was observed; `None` where it does not.
+fn mostly_unmatched(fitted: &Fitted) -> Option<String> {
+    let points = fitted.residual().2;
+    let unmatched = unmatched(fitted);
+    (unmatched > points).then(|| {
+        format!(
+            "not to be trusted: {unmatched} of {} observed points meet no part of the simulated body even at the best fit; the values \
+             rest on the other {points}",
+            points + unmatched
+        )
+    })
+}
+
+fn unmatched(fitted: &Fitted) -> usize {
+    fitted.after.iter().map(|r| r.unmatched).sum()
+}
+
 /// `result.json`. Beyond the format's keys it holds `status`, `warnings`, per-scene residuals, `residual_before` and the
 /// reduced χ²; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
 pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
@@ -64,6 +81,7 @@ pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
         .collect();
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
+    let warnings: Vec<String> = mostly_unmatched(fitted).into_iter().chain(fitted.warnings.iter().cloned()).collect();
     let scenes: Vec<String> = experiments.iter().map(|e| e.scene().path.display().to_string()).collect();
     json!({
         "format": "fit/1",
@@ -76,12 +94,12 @@ pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
         "correlation": r.correlation,
         "cost": { "initial": finite(r.initial_cost), "final": finite(r.cost) },
         "reduced_chi_square": finite(r.reduced_chi_square),
-        "residual": { "rms": finite(rms), "noise": finite(noise), "points": points,
+        "residual": { "rms": finite(rms), "noise": finite(noise), "points": points, "unmatched": unmatched(fitted),
                       "scenes": fitted.after.iter().map(residual).collect::<Vec<_>>() },
         "residual_before": before.map_or(Value::Null, |b| json!({ "rms": finite(total(&b, |r| r.rms)) })),
         "best": r.best,
         "runs": runs,
-        "warnings": fitted.warnings,
+        "warnings": warnings,
         "evaluations": r.evaluations,
         "seconds": r.seconds,
     })
@@ -123,12 +141,16 @@ pub fn summary(fitted: &Fitted) -> String {
         .zip(&fitted.result.parameters)
         .enumerate()
         .map(|(i, (n, p))| {
-            let error = p.standard_error.map_or("no standard error".to_string(), |e| format!("± {}", number(e)));
+            let unit = unit(&p.unit);
+            let error = match p.standard_error {
+                Some(e) => format!("± {}{unit}", number(e)),
+                None => format!("{unit} (no standard error)").trim_start().to_string(),
+            };
             let shift = fitted
                 .grid_shift
                 .as_ref()
                 .map_or(String::new(), |s| format!("; cells and step half as large: {:+.1} %", 100.0 * s[i] / p.value.abs()));
-            [n.label(), number(p.value), format!("{error}{}{shift}", unit(&p.unit))]
+            [n.label(), number(p.value), format!("{error}{shift}")]
         })
         .collect();
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
@@ -142,6 +164,7 @@ pub fn summary(fitted: &Fitted) -> String {
         rms * 1e3,
         noise * 1e3
     );
+    text += &mostly_unmatched(fitted).map_or(String::new(), |w| format!("\n  {w}"));
     text
 }
 
