@@ -1,7 +1,7 @@
 //! Which place of the deformed body an observed point is: sparse surface inversion on a spatial hash of each frame's points.
 //!
-//! The points of a frame never move, so they are hashed once; each deformed cell asks for the points in its bounding box. The
-//! cost per point does not depend on the number of cells.
+//! The points of a frame never move, so they are hashed once; each deformed cell asks for the points in its bounding box. A frame
+//! costs points + band cells, not points × cells: a point meets the few cells whose boxes hold it, however many there are.
 
 use crate::passes::cells::Corners;
 use glam::DVec3;
