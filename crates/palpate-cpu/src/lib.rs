@@ -8,11 +8,13 @@ mod collapse_tests;
 pub mod linear;
 #[cfg(test)]
 mod local_tests;
+mod memory;
 mod newton;
 pub mod passes;
 mod simulate;
 mod world;
 
 pub use backend::CpuBackend;
+pub use memory::{Memory, memory};
 pub use newton::Effort;
 pub use world::{Adjoint, State, Tally, Tangent, World};

@@ -3,7 +3,7 @@
 use crate::error::GpuError;
 use crate::memory::Maker;
 use crate::pipelines::Pipelines;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Which adapter to use.
@@ -55,6 +55,19 @@ pub struct AdapterReport {
 }
 
 impl AdapterReport {
+    /// The largest buffer that a kernel can bind [B].
+    pub fn largest_buffer(&self) -> u64 {
+        self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
+    }
+
+    /// True when this is an adapter that the choice means.
+    pub fn is_meant(&self, choice: &Choice) -> bool {
+        match choice {
+            Choice::Auto => true,
+            Choice::Named(name) => self.name.to_lowercase().contains(&name.to_lowercase()),
+        }
+    }
+
     /// True for adapters that compute on the CPU.
     pub fn is_software(&self) -> bool {
         self.kind == wgpu::DeviceType::Cpu
@@ -164,6 +177,7 @@ pub struct Gpu {
     /// Times that the host has waited for results.
     pub(crate) waits: AtomicU64,
     trouble: Arc<Mutex<Option<GpuError>>>,
+    lost: Arc<AtomicBool>,
 }
 
 impl Gpu {
@@ -207,10 +221,16 @@ impl Gpu {
         let (device, queue) =
             pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| GpuError::Refused { message: e.to_string() })?;
         let trouble = Arc::new(Mutex::new(None));
-        let slot = trouble.clone();
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| keep(&slot, translate(e))));
-        let slot = trouble.clone();
+        let lost = Arc::new(AtomicBool::new(false));
+        let (slot, gone) = (trouble.clone(), lost.clone());
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            let e = translate(e);
+            gone.fetch_or(matches!(e, GpuError::Lost { .. }), Ordering::SeqCst);
+            keep(&slot, e);
+        }));
+        let (slot, gone) = (trouble.clone(), lost.clone());
         device.set_device_lost_callback(move |reason, text| {
+            gone.store(true, Ordering::SeqCst);
             // Dropping the device ends it as well; that is no error.
             if reason != wgpu::DeviceLostReason::Destroyed {
                 keep(&slot, GpuError::Lost { reason: text });
@@ -228,6 +248,7 @@ impl Gpu {
             made: AtomicU64::new(0),
             waits: AtomicU64::new(0),
             trouble: trouble.clone(),
+            lost: lost.clone(),
         };
         let gpu = match lanes {
             Some(Lanes::Subgroup) if !subgroups => {
@@ -254,12 +275,30 @@ impl Gpu {
 
     /// The first error since the last call.
     pub(crate) fn take_trouble(&self) -> Option<GpuError> {
-        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take()
+        let e = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+        if !matches!(e, GpuError::Refused { .. }) {
+            return Some(e);
+        }
+        // On a lost device operations fail for all kinds of reasons, none of which is the cause; that it is lost may be known only
+        // when nothing is in flight any more.
+        let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+        Some(if self.is_lost() { GpuError::Lost { reason: e.to_string() } } else { e })
     }
 
     /// True when an error waits to be read.
     pub(crate) fn troubled(&self) -> bool {
         self.trouble.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
+
+    /// True when the device is gone for good: another must be opened. [`GpuBackend`](crate::GpuBackend)s on it fail from now on.
+    pub fn is_lost(&self) -> bool {
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        self.lost.load(Ordering::SeqCst)
+    }
+
+    /// Ends the device as a driver's reset would; whoever still computes on it gets an error.
+    pub fn destroy(&self) {
+        self.device.destroy();
     }
 
     /// True for software adapters, which cap the loop iterations of an invocation.
@@ -292,6 +331,18 @@ impl Gpu {
         }
         self.made.fetch_add(size, Ordering::Relaxed);
         Ok(buffer)
+    }
+
+    /// The largest buffer that a kernel can bind [B].
+    pub fn largest_buffer(&self) -> u64 {
+        self.largest.min(self.device.limits().max_buffer_size)
+    }
+
+    /// Bytes that the device's memory holds now, as its allocator counts them; `None` where the driver's interface does not tell.
+    pub fn allocated(&self) -> Option<u64> {
+        // What is no longer needed is given back when the device is looked at.
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        self.device.generate_allocator_report().map(|r| r.total_allocated_bytes)
     }
 
     /// Bytes of all buffers made so far, those included that are gone since.
@@ -407,14 +458,16 @@ pub(crate) fn no_room(label: &str, bytes: u64, e: wgpu::Error) -> GpuError {
 
 /// wgpu's error as ours.
 pub(crate) fn translate(e: wgpu::Error) -> GpuError {
+    // Its words are spread over indented lines.
+    let flat = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
     match e {
-        wgpu::Error::OutOfMemory { source } => GpuError::OutOfMemory { what: source.to_string() },
+        wgpu::Error::OutOfMemory { source } => GpuError::OutOfMemory { what: flat(source.to_string()) },
         // Whatever is asked of a device that is gone is refused so.
         wgpu::Error::Validation { description, .. } if description.contains("device is lost") => {
-            GpuError::Lost { reason: description }
+            GpuError::Lost { reason: flat(description) }
         }
         wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
-            GpuError::Refused { message: description }
+            GpuError::Refused { message: flat(description) }
         }
     }
 }

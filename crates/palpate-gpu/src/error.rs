@@ -104,8 +104,11 @@ impl GpuError {
             | GpuError::Refused { .. }
             | GpuError::Plan { .. } => "use --backend cpu, or another adapter",
             GpuError::Setting { .. } => "unset the variable, and what is faster is chosen",
-            GpuError::Limit { .. } | GpuError::OutOfMemory { .. } => "use coarser cells, a smaller batch, or --backend cpu",
-            GpuError::Lost { .. } => "run again; results so far are kept; or use --backend cpu",
+            GpuError::Limit { .. } | GpuError::OutOfMemory { .. } => {
+                "use coarser cells, a smaller batch (--batch N), or --backend cpu"
+            }
+            // Drivers also drop a device whose memory is full.
+            GpuError::Lost { .. } => "run again, with a smaller batch (--batch N) or --backend cpu; results so far are kept",
         }
     }
 }

@@ -34,6 +34,6 @@ pub use backend::GpuBackend;
 pub use device::{AdapterReport, Choice, Gpu, Lanes, adapters};
 pub use error::GpuError;
 pub use measure::{CgSpeed, Traffic};
-pub use memory::{Memory, memory};
+pub use memory::{Load, Memory, memory};
 pub use tuning::{Product, Tuning};
 pub use world::{Adjoint, State, Tally, Tangent, World};

@@ -32,8 +32,8 @@ pub(crate) trait Maker {
     fn largest(&self) -> u64;
 }
 
-/// Counts bytes, on a device without limits.
-struct Counter;
+/// Counts bytes, on a device with such a largest buffer [B].
+struct Counter(u64);
 
 impl Maker for Counter {
     type Buffer = u64;
@@ -47,8 +47,21 @@ impl Maker for Counter {
     }
 
     fn largest(&self) -> u64 {
-        u64::MAX
+        self.0
     }
+}
+
+/// A batch whose memory is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Load<'a> {
+    /// Simulations at once.
+    pub members: usize,
+    /// Different Poisson's ratios among them: each has element matrices of its own.
+    pub ratios: usize,
+    /// What is asked of every evaluation.
+    pub request: &'a Request,
+    /// Largest buffer of the device [B] ([`crate::AdapterReport::largest_buffer`]); `u64::MAX` where that is not known.
+    pub room: u64,
 }
 
 /// Device memory of an evaluation [B].
@@ -62,6 +75,8 @@ pub struct Memory {
     pub states: u64,
     /// Derivatives of two states along every direction.
     pub tangents: u64,
+    /// The largest single buffer, which must not exceed the device's.
+    pub largest: u64,
 }
 
 impl Memory {
@@ -71,40 +86,45 @@ impl Memory {
     }
 }
 
-/// Device memory that one evaluation of `members` simulations takes, each with a Poisson's ratio (and so element matrices) of its
-/// own.
+/// Device memory that one evaluation of a batch takes.
 ///
 /// # Errors
 /// The body or the batch is beyond what the kernels can do.
-pub fn memory(plan: &Plan, members: usize, request: &Request) -> Result<Memory, GpuError> {
-    let members = members.max(1);
+pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
+    let (members, request, counter) = (load.members.max(1), load.request, Counter(load.room));
     let (b, q) = (members as u64, request.sensitivities.len());
     let mut buffers = HashMap::new();
-    let geometry = Geometry::new(&Counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
+    let geometry = Geometry::new(&counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
     let shape = &geometry.shape;
-    let matrices = |count: u32| whole(b * 2 * u64::from(count) * 576 * 4);
-    let batch = whole(b * size_of::<Member>() as u64)
-        + whole(b * u64::from(shape.planes) * size_of::<Plane>() as u64)
-        + whole(b * u64::from(shape.steps + 1) * u64::from(shape.clamps) * size_of::<ClampPose>() as u64)
-        + whole(b * u64::from(shape.masses) * 4)
-        + matrices(shape.classes)
-        + matrices(shape.holds)
-        + whole(b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64)
-        + geometry
-            .effects
-            .sizes(members, shape.nodes as usize, shape.cells as usize, shape.clamps as usize)
-            .iter()
-            .map(|s| whole(4 * s.1 as u64))
-            .sum::<u64>();
-    let tally: u64 = tally_sizes(b, plan.layout.len() as u64).iter().map(|t| whole(t.1)).sum();
-    let observed = observe::memory(&Counter, plan, members, q)?;
+    let ratios = load.ratios.clamp(1, members) as u64;
+    let matrices = |sets: u64, count: u32| sets * 2 * u64::from(count) * 576 * 4;
+    let mut constants: Vec<u64> = buffers.into_values().collect();
+    constants.extend([
+        b * size_of::<Member>() as u64,
+        b * u64::from(shape.planes) * size_of::<Plane>() as u64,
+        b * u64::from(shape.steps + 1) * u64::from(shape.clamps) * size_of::<ClampPose>() as u64,
+        b * u64::from(shape.masses) * 4,
+        matrices(ratios, shape.classes),
+        // Effects on clamps make other matrices for each member.
+        matrices(if geometry.effects.on_clamps() { b } else { ratios }, shape.holds),
+        b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64,
+    ]);
+    let effects = geometry.effects.sizes(members, shape.nodes as usize, shape.cells as usize, shape.clamps as usize);
+    constants.extend(effects.iter().map(|s| 4 * s.1 as u64));
+    constants.extend(observe::memory(&counter, plan, members, q)?);
+    let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();
+    space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;
     // A static start keeps a state at rest beside the first one.
     let kept = if request.gradient { u64::from(shape.steps) + 1 } else { 2 };
+    let all = |sizes: &[u64]| sizes.iter().map(|s| whole(*s)).sum();
+    // Each state is a buffer of three vectors.
+    let largest = constants.iter().chain(&space).fold(vectors(3), |most, s| most.max(*s));
     Ok(Memory {
-        constants: buffers.values().sum::<u64>() + batch + observed,
-        work: work(shape, members).iter().map(|w| whole(w.1)).sum::<u64>() + tally,
+        constants: all(&constants),
+        work: all(&space),
         states: vectors(3 * kept.max(2)) + if request.gradient { vectors(4) } else { 0 },
         tangents: vectors(4 * q as u64),
+        largest,
     })
 }

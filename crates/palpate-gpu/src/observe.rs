@@ -22,7 +22,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use crate::device::{Gpu, whole};
+use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::{Look, Sight};
 use crate::memory::Maker;
@@ -264,14 +264,19 @@ fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 7] {
     ]
 }
 
-/// Device memory that comparing a plan's frames takes, by buffer [B].
-pub(crate) fn memory<M: Maker<Buffer = u64>>(maker: &M, plan: &Plan, members: usize, directions: usize) -> Result<u64, GpuError> {
+/// Sizes of the buffers that comparing a plan's frames takes [B].
+pub(crate) fn memory<M: Maker<Buffer = u64>>(
+    maker: &M,
+    plan: &Plan,
+    members: usize,
+    directions: usize,
+) -> Result<Vec<u64>, GpuError> {
     let room = Room { points: POINTS_OF_STRIPE, scratch: SCRATCH };
     let (_, mut sight, buffers) = tables(maker, plan, members, room)?;
     sight.members = members as u32;
     let together = tangent_slots(&sight, room, maker.largest(), directions) as u64;
     let tally = tally_sizes(&sight, directions as u64, together);
-    Ok(buffers.values().sum::<u64>() + tally.iter().map(|t| whole(t.1)).sum::<u64>())
+    Ok(buffers.into_values().chain(tally.iter().map(|t| t.1)).collect())
 }
 
 /// What [`tables`] makes.

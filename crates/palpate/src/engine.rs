@@ -1,6 +1,7 @@
 //! Choice of a backend, and rollouts without its type.
 
 use crate::error::Error;
+use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBatch, Request, Rollout, Snapshot};
@@ -52,11 +53,11 @@ pub enum Backend {
 /// Steps that `auto` times on both backends.
 const TRIAL_STEPS: usize = 2;
 
-/// The device of this process: kernels are compiled once.
+/// The device of this process: kernels are compiled once. A device that was lost is opened anew, for whoever comes next.
 fn gpu() -> Result<GpuBackend, GpuError> {
     static OPEN: Mutex<Option<Arc<Gpu>>> = Mutex::new(None);
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
-    if open.is_none() {
+    if open.as_ref().is_none_or(|gpu| gpu.is_lost()) {
         *open = Some(Gpu::open(&Choice::from_env())?);
     }
     Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
@@ -91,13 +92,13 @@ fn refused(e: &GpuError) -> Error {
     Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
 }
 
-/// Seconds of a forward step of `members` simulations; the first round warms up.
-fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, members: usize) -> Option<f64> {
+/// Seconds of a forward step of `members` simulations, so many at once; the first round warms up.
+fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, members: usize, at_once: usize) -> Option<f64> {
     let mut plan =
         Plan { observation: Arc::new(Observation { frames: Vec::new(), ..(*plan.observation).clone() }), ..plan.clone() };
     plan.clock.steps = plan.clock.steps.min(TRIAL_STEPS);
     let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
-    let mut rollout = Rollout::new(backend, &plan, members).ok()?;
+    let mut rollout = Rollout::new(backend, &plan, at_once).ok()?;
     rollout.evaluate(&rows, &Request::default());
     let clock = Instant::now();
     let done = rollout.evaluate(&rows, &Request::default());
@@ -131,16 +132,31 @@ impl Backend {
             Err(e) => return (Backend::Cpu, e.to_string()),
         };
         let name = device.name();
-        let cpu = time_step(CpuBackend, plan, members);
+        let cpu = time_step(CpuBackend, plan, members, members);
+        let at_once = Demand::forward(members).on_device(plan, device.gpu().largest_buffer()).map_or(1, |d| d.0);
         let gpu = {
             let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-            time_step(device, plan, members)
+            time_step(device, plan, members, at_once)
         };
         let ms = |s: f64| format!("{:.2} ms", s * 1e3);
         match (cpu, gpu) {
             (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("a step takes {} on {name}, {} on the CPU", ms(g), ms(c))),
             (Some(c), Some(g)) => (Backend::Cpu, format!("a step takes {}, {} on {name}", ms(c), ms(g))),
             _ => (Backend::Cpu, format!("{name} cannot compute this body")),
+        }
+    }
+
+    /// How many simulations of a fit run at once, with so many threads (0 = one per core).
+    ///
+    /// # Errors
+    /// There is no usable adapter, or the body is beyond what it can do.
+    pub(crate) fn members(self, plan: &Plan, demand: &Demand, threads: usize) -> Result<usize, Error> {
+        match self {
+            Backend::Gpu => {
+                let room = gpu().map_err(|e| refused(&e))?.gpu().largest_buffer();
+                Ok(demand.on_device(plan, room).map_err(|e| refused(&e))?.0)
+            }
+            _ => Ok(demand.on_cpu(plan, threads).0),
         }
     }
 
@@ -231,3 +247,7 @@ mod tests {
         assert_eq!(between(&a, &b, 9.0), b.displacement);
     }
 }
+
+#[cfg(test)]
+#[path = "engine_tests.rs"]
+mod device_tests;

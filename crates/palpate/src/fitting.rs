@@ -5,18 +5,15 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::interrupt::Interrupt;
+use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_fit::{
     ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
 };
 use palpate_model::params::ParamKey;
-use palpate_model::plan::Plan;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
-
-/// Memory that the tapes or tangents of one batch may take together [bytes].
-const BATCH_MEMORY: f64 = 2e9;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -29,6 +26,8 @@ pub struct FitOptions<'a> {
     pub iterations: Option<usize>,
     /// Number of starts.
     pub starts: Option<usize>,
+    /// Most simulations at once; else as many starts as fit into memory.
+    pub batch: Option<usize>,
     /// Seed of the starts.
     pub seed: Option<u64>,
     /// Decrease of the cost in an iteration, relative to the cost, at which a fit has arrived.
@@ -74,7 +73,7 @@ pub struct Fitted {
     pub history: Vec<Progress>,
     /// Residuals at the first start, scene by scene; `None` where it cannot be computed.
     pub before: Vec<Option<ResidualSummary>>,
-    /// Residuals at the best point, scene by scene.
+    /// Residuals at the best point, scene by scene; the CPU's where the device fails.
     pub after: Vec<ResidualSummary>,
     /// True when the fit was stopped before its end.
     pub interrupted: bool,
@@ -102,6 +101,15 @@ impl Fitted {
         all.filter(|(n, _)| own(n) && named(n)).map(|(n, p)| (n.path.clone(), p.value)).collect()
     }
 
+    /// How the fit ended: `complete`, `interrupted`, or `broken-off` by a device that failed.
+    pub fn status(&self) -> &'static str {
+        match (&self.result.broken, self.interrupted) {
+            (Some(_), _) => "broken-off",
+            (None, true) => "interrupted",
+            (None, false) => "complete",
+        }
+    }
+
     /// Root mean square distance [m] and what noise alone would leave [m], over all scenes; and the number of points.
     pub fn residual(&self) -> (f64, f64, usize) {
         let points = self.after.iter().map(|r| r.points).sum();
@@ -118,7 +126,8 @@ fn specs(experiment: &Experiment) -> Option<&FitSpec> {
 ///
 /// # Errors
 /// [`Error::Input`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
-/// [`Error::Failed`] when no start can be computed.
+/// [`Error::Failed`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
+/// [`FitResult::broken`].
 pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     for e in experiments {
@@ -145,10 +154,11 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     };
     let backend = options.backend.resolve(first.plan(), settings.starts.min(16)).0;
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
+    let threads = options.threads.unwrap_or(spec.threads);
     let mut scenes = Vec::new();
-    for e in experiments {
-        let members = batch(e.plan(), settings.starts, free.len());
-        let inner = backend.evaluator(e.plan(), members)?;
+    for (s, e) in experiments.iter().enumerate() {
+        let demand = Demand { asked: options.batch, ..demand(&free, s, settings.optimizer, settings.starts) };
+        let inner = backend.evaluator(e.plan(), backend.members(e.plan(), &demand, threads)?)?;
         scenes.push(FitScene {
             name: e.scene().path.display().to_string(),
             fingerprint: fingerprint(e.plan()),
@@ -157,13 +167,12 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         });
     }
     let mut problem = Problem::new(scenes, free).map_err(|e| Error::Input(format!("{}: {e}", first.scene().path.display())))?;
-    let threads = options.threads.unwrap_or(spec.threads);
     let interrupt = options.interrupt.clone();
     let mut history = Vec::new();
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
     let mut told = options.on_iteration.take();
     let settings = &settings;
-    type Done = (FitResult, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>);
+    type Done = (FitResult, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>, Vec<String>);
     let done: Result<Done, Error> = with_threads(threads, || {
         let mut hear = |p: &Progress| {
             history.push(p.clone());
@@ -174,14 +183,18 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         let hooks = Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal };
         let result = palpate_fit::fit(&mut problem, settings, hooks).map_err(failed)?;
         let theta_before: Vec<Vec<f64>> = (0..experiments.len()).map(|s| problem.theta(s, &result.runs[0].start)).collect();
+        // What the fit held on a device is free for what follows.
+        drop(problem);
         let before = experiments.iter().zip(&theta_before).map(|(e, t)| e.residuals(backend, t).ok()).collect();
-        let after = experiments.iter().zip(&result.theta).map(|(e, t)| e.residuals(backend, t)).collect::<Result<_, _>>()?;
-        Ok((result, before, after))
+        let mut notes = Vec::new();
+        let mut at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &mut notes);
+        let after = experiments.iter().zip(&result.theta).map(&mut at).collect::<Result<_, _>>()?;
+        Ok((result, before, after, notes))
     })?;
-    let (result, before, after) = done?;
+    let (result, before, after, notes) = done?;
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
-    warnings.extend(result.warnings.iter().cloned());
+    warnings.extend(result.warnings.iter().cloned().chain(notes));
     let interrupted = result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
@@ -196,6 +209,22 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         warnings,
     };
     Ok(with_residual_warnings(fitted))
+}
+
+/// Residuals at θ; the CPU's where the device fails, so that a result is not lost with it.
+pub(crate) fn residuals_at(
+    e: &Experiment,
+    backend: Backend,
+    theta: &[f64],
+    notes: &mut Vec<String>,
+) -> Result<ResidualSummary, Error> {
+    match e.residuals(backend, theta) {
+        Err(why) if backend == Backend::Gpu => {
+            notes.push(format!("the residuals of the result were computed on the CPU: {why}"));
+            e.residuals(Backend::Cpu, theta)
+        }
+        done => done,
+    }
 }
 
 fn failed(e: FitError) -> Error {
@@ -330,15 +359,13 @@ pub(crate) fn errors(experiments: &[Experiment]) -> ErrorModel {
     ErrorModel { groups: model.groups.max(1), ..model }
 }
 
-/// Simulations at once: as many as starts, as long as their tapes or tangents fit into memory.
-fn batch(plan: &Plan, starts: usize, free: usize) -> usize {
-    let nodes = plan.body.nodes.len() as f64;
-    // A tape holds every state; tangents hold two states per free parameter. The optimiser may ask for either.
-    let states = 48.0 * nodes * (plan.clock.steps + 1).max(2 * free + 2) as f64;
-    // A sparse Cholesky factor of a 3D grid under nested dissection grows like N^(4/3) (George 1973); some 150 numbers each.
-    let factor = 8.0 * 150.0 * nodes.powf(4.0 / 3.0);
-    let member = states + factor;
-    ((BATCH_MEMORY / member) as usize).clamp(1, starts.max(1))
+/// What a fit asks of a scene's backend. Starts that are fixed are all the same, and one is run.
+pub(crate) fn demand(free: &[FreeParameter], scene: usize, optimizer: Optimizer, starts: usize) -> Demand {
+    let slots = free.iter().flat_map(|f| &f.slots).filter(|s| s.scene == scene);
+    let mut places: Vec<usize> = slots.map(|s| s.place).collect();
+    places.sort_unstable();
+    let fixed = free.iter().all(|f| f.start.0 == f.start.1);
+    Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places }
 }
 
 /// Counts evaluations against an interrupt's budget.

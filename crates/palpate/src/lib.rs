@@ -44,6 +44,7 @@ mod fingerprint;
 mod fitting;
 mod grid;
 mod interrupt;
+mod memory;
 mod options;
 mod progress;
 pub mod render;

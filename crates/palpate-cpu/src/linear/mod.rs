@@ -25,7 +25,7 @@ const MOST_ITERATIONS: usize = 4000;
 const DIRECT_STATIC: usize = 9000;
 /// Largest body (nodes) whose factor is cheaper than the iterations of one solve of a time step, and with several right-hand
 /// sides: clamps and ν near ½ cost block-Jacobi hundreds of iterations, a factor of 1000 nodes about 20 ms.
-const DIRECT_STEP: [usize; 2] = [900, 1800];
+pub(crate) const DIRECT_STEP: [usize; 2] = [900, 1800];
 /// Smallest body (nodes) for which the second level of the preconditioner pays.
 const COARSE_FROM: usize = 600;
 /// Edge of a group of nodes on the second level.

@@ -25,7 +25,9 @@ Examples:
 What is free, and where starts are drawn from, is said by [[fit.parameter]] in the scene. The folder gets result.json
 (format fit/1), model.toml (the scene with the values found), history.csv, report.html and journal.jsonl. Results that are
 already there are moved to previous-1, previous-2, … in the same folder. Ctrl-C stops after the current evaluation, writes the
-best so far (\"status\": \"interrupted\") and exits with 130.";
+best so far (\"status\": \"interrupted\") and exits with 130. A graphics device that fails (out of memory, lost) ends the fit as well:
+the best so far is written (\"status\": \"broken-off\"), the exit code is 1, and --resume goes on where it failed, also with another
+--batch: how many simulations run at once changes no number. `palpate inspect` says how much memory they will take.";
 
 /// Find the parameters that explain a recording
 #[derive(Clone, Debug, Args)]
@@ -53,6 +55,9 @@ pub struct Choices {
     /// Number of starts [default: the scene's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     starts: Option<u64>,
+    /// Most simulations at once, where memory is short (or plenty) [default: all starts, as far as 2 GB and the device's buffers go]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    batch: Option<u64>,
     /// Most iterations per start [default: the scene's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1_000_000))]
     iterations: Option<u64>,
@@ -179,8 +184,8 @@ fn write_all(
     }
     let (rms, noise, _) = fitted.residual();
     let scale = if rms.is_finite() { 2.0 * rms.max(noise) } else { noise.max(1e-3) };
-    // Whoever interrupts does not want to wait for pictures.
-    let count = if fitted.interrupted { 0 } else { a.pictures };
+    // Whoever interrupts does not want to wait for pictures, and a device that failed would make none.
+    let count = if fitted.status() == "complete" { a.pictures } else { 0 };
     let pictures = experiments.iter().enumerate().map(|(s, e)| match count {
         0 => Ok((Vec::new(), Vec::new())),
         n => scene_pictures(e, fitted, s, backend, n, scale),
@@ -215,6 +220,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     } else {
         console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
     }
+    if let Some(why) = &fitted.result.broken {
+        return Err(Error::Failed(format!("{why}; the best so far is in {}, --resume goes on from there", folder.display())));
+    }
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
 }
 
@@ -223,6 +231,13 @@ pub fn choose(a: &Choices, experiment: &Experiment) -> Result<(Backend, Option<S
     let starts = a.starts.unwrap_or(experiment.scene().fit.as_ref().map_or(1, |f| f.starts as u64));
     // More members than this change nothing in what is faster.
     a.backend.choose(experiment.plan(), starts.min(16) as usize)
+}
+
+impl Choices {
+    /// What decides the result: a scene may be gone on with in smaller batches.
+    pub fn lasting(&self) -> Choices {
+        Choices { batch: None, ..self.clone() }
+    }
 }
 
 /// Iterations that a fit may take in all.
@@ -264,6 +279,7 @@ pub fn run_in(
             optimizer: a.optimizer.map(Optimizer::from),
             iterations: a.iterations.map(|n| n as usize),
             starts: a.starts.map(|n| n as usize),
+            batch: a.batch.map(|n| n as usize),
             seed: a.seed,
             tolerance: None,
             threads: a.threads.map(|n| n as usize),
@@ -272,7 +288,7 @@ pub fn run_in(
             on_iteration: Some(&mut hear),
         },
     )?;
-    if a.grid_check && !fitted.interrupted {
+    if a.grid_check && fitted.status() == "complete" {
         match grid_shift(experiments, &fitted, 2.0, backend) {
             Ok(shift) => fitted.grid_shift = Some(shift),
             // The fit stands without it.

@@ -5,11 +5,12 @@ use crate::cli::Console;
 use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::fitting::{self, free_parameters};
+use crate::memory::{Demand, room};
 use clap::Args;
-use palpate_engine::Request;
 use palpate_io::recording::{Recording, read_recording};
-use palpate_model::plan::{Physics, Plan};
-use palpate_model::scene::{BodySource, Scene};
+use palpate_model::plan::Physics;
+use palpate_model::scene::{BodySource, Optimizer, Scene};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -83,7 +84,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     }
     let width = lines.iter().map(|l| l.label.len()).max().unwrap_or(0);
     let mut text = format!("{kind} {}", path.display());
-    for l in lines {
+    // Lines without a label are for programs.
+    for l in lines.iter().filter(|l| !l.label.is_empty()) {
         text += &format!("\n  {:width$}  {}", l.label, l.text);
     }
     for w in &warnings {
@@ -106,19 +108,49 @@ fn megabytes(bytes: f64) -> String {
     if bytes < 1e6 { format!("{:.0} kB", bytes / 1e3) } else { format!("{:.1} MB", bytes / 1e6) }
 }
 
-/// What one gradient of one start takes on a graphics device; nothing where the GPU backend cannot run the scene.
-fn device_memory(plan: &Plan) -> Option<Line> {
-    let request = Request { gradient: true, sensitivities: Vec::new() };
-    let m = palpate_gpu::memory(plan, 1, &request).ok()?;
-    let total = m.total() as f64;
-    let parts = format!(
-        "{} with --backend gpu: body and frames {}, work space {}, states {}",
-        megabytes(total),
-        megabytes(m.constants as f64),
-        megabytes(m.work as f64),
-        megabytes(m.states as f64)
-    );
-    Some(line("device_memory", "device", json!(total), parts))
+/// What the fit of a scene asks of its backend; one simulation where there is nothing to fit.
+fn demand(e: &Experiment) -> (Demand, String) {
+    let one = || (Demand::forward(1), "one simulation".to_string());
+    let Some(fit) = e.scene().fit.as_ref().filter(|f| !f.parameters.is_empty()) else { return one() };
+    let Ok((_, free, _)) = free_parameters(std::slice::from_ref(e)) else { return one() };
+    let demand = fitting::demand(&free, 0, fit.optimizer, fit.starts);
+    let numbers = demand.places.len();
+    let name = match fit.optimizer {
+        Optimizer::Rprop => "rprop",
+        Optimizer::GradientDescent => "gradient-descent",
+        Optimizer::Lbfgs => "lbfgs",
+        Optimizer::GaussNewton => "gauss-newton",
+        Optimizer::NelderMead => "nelder-mead",
+    };
+    (demand, format!("{name}, {numbers} free number{}", if numbers == 1 { "" } else { "s" }))
+}
+
+/// Memory of a fit on either backend: in all, by its parts, and for how many starts at once. Nothing for the device where it
+/// cannot run the scene.
+fn memory(e: &Experiment) -> Vec<Line> {
+    let (demand, what) = demand(e);
+    let text = |backend: &str, total: u64, members: usize, parts: &[(&str, u64)]| {
+        let parts: Vec<String> = parts.iter().map(|(name, bytes)| format!("{name} {}", megabytes(*bytes as f64))).collect();
+        let starts = if demand.starts == 1 { String::new() } else { format!(", {members} of {} starts at once", demand.starts) };
+        format!("{} with --backend {backend} ({what}{starts}): {}", megabytes(total as f64), parts.join(", "))
+    };
+    let threads = e.scene().fit.as_ref().map_or(0, |f| f.threads);
+    let (members, m) = demand.on_cpu(e.plan(), threads);
+    let parts = [
+        ("body, frames and cell matrices", m.shared),
+        ("matrices", m.matrices),
+        ("solves", m.solves),
+        ("states", m.states),
+        ("derivatives", m.tangents),
+    ];
+    let cpu = text("cpu", m.total(), members, &parts);
+    let mut lines = vec![line("memory", "memory", json!(m.total()), cpu), line("batch", "", json!(members), "")];
+    if let Ok((members, m)) = demand.on_device(e.plan(), room()) {
+        let parts = [("body and frames", m.constants), ("work space", m.work), ("states", m.states), ("derivatives", m.tangents)];
+        lines.push(line("device_memory", "device", json!(m.total()), text("gpu", m.total(), members, &parts)));
+        lines.push(line("device_batch", "", json!(members), ""));
+    }
+    lines
 }
 
 fn scene(e: &Experiment) -> Vec<Line> {
@@ -132,9 +164,6 @@ fn scene(e: &Experiment) -> Vec<Line> {
     let nodes = body.nodes.len();
     let mass = physics.density * body.volume;
     let (steps, time) = (plan.clock.steps, &scene.time);
-    // A state is displacement and velocity in double precision; a gradient keeps one per step.
-    let state = 48.0 * nodes as f64;
-    let tape = state * (steps + 1) as f64;
     let mut lines = vec![
         line("title", "title", json!(scene.title), scene.title.clone()),
         line("size", "size", json!(size.to_array()), format!("{:.4} × {:.4} × {:.4} m", size.x, size.y, size.z)),
@@ -184,9 +213,8 @@ fn scene(e: &Experiment) -> Vec<Line> {
                 )
             },
         ),
-        line("memory", "tape", json!(tape), format!("{} for one gradient of one start", megabytes(tape))),
     ]);
-    lines.extend(device_memory(plan));
+    lines.extend(memory(e));
     lines.retain(|l| l.key != "title" || !l.text.is_empty());
     lines
 }

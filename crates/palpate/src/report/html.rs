@@ -69,6 +69,9 @@ fn write_page(p: &mut String, input: &ReportInput) -> std::fmt::Result {
     if fitted.interrupted {
         writeln!(p, "<p class=\"w\">The fit was interrupted; these are the best values found until then.</p>")?;
     }
+    if let Some(why) = &fitted.result.broken {
+        writeln!(p, "<p class=\"w\">The fit broke off; these are the best values found until then. {}</p>", escape(why))?;
+    }
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let before = before.map_or("not computable".to_string(), |b| format!("{:.3} mm", total(&b, |r| r.rms) * 1e3));

@@ -32,7 +32,7 @@ fn unmatched(fitted: &Fitted) -> usize {
     fitted.after.iter().map(|r| r.unmatched).sum()
 }
 
-/// `result.json`. Beyond the format's keys it holds `status`, `warnings`, per-scene residuals, `residual_before` and the
+/// `result.json`. Beyond the format's keys it holds `status`, `error` (why the fit broke off), `warnings`, per-scene residuals, `residual_before` and the
 /// reduced χ²; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
 pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
     let r = &fitted.result;
@@ -89,7 +89,8 @@ pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
         "backend": fitted.backend,
         "scene": scenes.first(),
         "scenes": scenes,
-        "status": if fitted.interrupted { "interrupted" } else { "complete" },
+        "status": fitted.status(),
+        "error": r.broken,
         "parameters": parameters,
         "correlation": r.correlation,
         "cost": { "initial": finite(r.initial_cost), "final": finite(r.cost) },

@@ -1,0 +1,82 @@
+//! How much memory simulations take, from the sizes of what they keep; found before anything is computed.
+
+use crate::linear::DIRECT_STEP;
+use crate::passes::posed::Posed;
+use glam::{DMat3, DVec3};
+use palpate_engine::Request;
+use palpate_model::body::{BandCell, Cell};
+use palpate_model::corotation::V24;
+use palpate_model::elements::Classes;
+use palpate_model::observation::ObservedPoint;
+use palpate_model::pattern::Pattern;
+use palpate_model::plan::Plan;
+use palpate_model::scene::LinearSolver;
+
+/// Vectors over all nodes that a solve keeps at a time: forces, directions, conjugate gradients.
+const VECTORS: usize = 16;
+/// Bytes of a cell's matrix and its derivative by Poisson's ratio.
+const MATRICES: usize = 2 * 576 * size_of::<f64>();
+/// Numbers per node^(4/3) in a sparse Cholesky factor of a 3D grid: under nested dissection it grows so (George 1973).
+const FILL: f64 = 150.0;
+
+/// Memory of a batch of simulations [B].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// The body, its band, the matrices of its cells, what was measured: once for all members.
+    pub shared: u64,
+    /// The matrix of every member.
+    pub matrices: u64,
+    /// What the members solved side by side keep meanwhile: poses of cells, a copy or factor of the matrix, vectors.
+    pub solves: u64,
+    /// States of every member: all steps where a gradient is asked for, two otherwise.
+    pub states: u64,
+    /// Derivatives of two states of every member along every direction.
+    pub tangents: u64,
+}
+
+impl Memory {
+    /// All of it.
+    pub fn total(&self) -> u64 {
+        self.shared + self.matrices + self.solves + self.states + self.tangents
+    }
+}
+
+/// Memory that one evaluation of `members` simulations takes on so many threads, an estimate. Matrices of cells are kept for each of the
+/// `ratios` different Poisson's ratios in the batch.
+pub fn memory(plan: &Plan, members: usize, ratios: usize, threads: usize, request: &Request) -> Memory {
+    let body = &plan.body;
+    let (nodes, cells) = (body.nodes.len(), body.cells.len());
+    let pattern = Pattern::new(body);
+    let blocks = pattern.blocks.columns.len();
+    let classes = Classes::new(plan);
+    let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
+    let points: usize = plan.observation.frames.iter().map(|f| f.points.len()).sum();
+    let band = &body.band;
+    let tables = cells * size_of::<Cell>()
+        + band.cells.len() * size_of::<BandCell>()
+        + band.nodes.len() * size_of::<DVec3>()
+        + band.columns.len() * (size_of::<u32>() + size_of::<f64>())
+        + 4 * body.grid.len()
+        + 8 * pattern.cell_list.len()
+        + 4 * blocks
+        + points * (size_of::<ObservedPoint>() + 8);
+    let vector = nodes * size_of::<DVec3>();
+    let direct = match plan.solver.linear {
+        LinearSolver::Cholesky => true,
+        LinearSolver::ConjugateGradient => false,
+        LinearSolver::Auto => nodes <= DIRECT_STEP[1],
+    };
+    let factor = (8.0 * FILL * (nodes as f64).powf(4.0 / 3.0)) as usize;
+    // A copy is padded to vector registers.
+    let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
+    let solve = copy + cells * (size_of::<Posed>() + size_of::<V24>()) + VECTORS * vector;
+    let kept = if request.gradient { plan.clock.steps + 3 } else { 2 };
+    let bytes = |n: usize| n as u64;
+    Memory {
+        shared: bytes(tables + ratios * (classes.parts.len() + held) * MATRICES),
+        matrices: bytes(members * blocks * size_of::<DMat3>()),
+        solves: bytes(members.min(threads.max(1)) * solve),
+        states: bytes(members * 2 * kept * vector),
+        tangents: bytes(members * 4 * request.sensitivities.len() * vector),
+    }
+}

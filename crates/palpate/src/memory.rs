@@ -1,0 +1,160 @@
+//! How many simulations of a fit run at once, and how much memory they take.
+
+use palpate_engine::Request;
+use palpate_fit::{Want, want};
+use palpate_gpu::{Choice, GpuError, Load};
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::scene::Optimizer;
+
+/// Memory that the simulations of one batch may take together [B], unless the user says how many run at once. What a graphics
+/// device has cannot be asked; any that computes faster than a CPU has more.
+const BATCH_MEMORY: u64 = 2_000_000_000;
+
+/// What a fit asks of its backend.
+#[derive(Clone, Debug)]
+pub(crate) struct Demand {
+    /// Simulations that could run at once: the starts of the fit.
+    pub starts: usize,
+    /// How many the user allows.
+    pub asked: Option<usize>,
+    /// Optimiser.
+    pub optimizer: Optimizer,
+    /// Places in θ of the free parameters.
+    pub places: Vec<usize>,
+}
+
+impl Demand {
+    /// So many simulations without derivatives.
+    pub fn forward(members: usize) -> Demand {
+        Demand { starts: members, asked: None, optimizer: Optimizer::NelderMead, places: Vec::new() }
+    }
+
+    /// What is asked of every evaluation.
+    fn request(&self) -> Request {
+        match want(self.optimizer) {
+            Want::Cost => Request::default(),
+            Want::Gradient => Request { gradient: true, sensitivities: Vec::new() },
+            Want::Curvature => Request { gradient: false, sensitivities: self.places.clone() },
+        }
+    }
+
+    /// What is asked once, at the best point, for standard errors.
+    fn last(&self) -> Request {
+        Request { gradient: false, sensitivities: self.places.clone() }
+    }
+
+    fn ratios(&self, plan: &Plan, members: usize) -> usize {
+        if self.places.contains(&plan.layout.index(ParamKey::PoissonRatio)) { members } else { 1 }
+    }
+
+    fn most(&self) -> usize {
+        self.asked.unwrap_or(usize::MAX).min(self.starts).max(1)
+    }
+
+    /// Simulations at once on so many threads of the CPU (0 = one per core), and their memory: as many as there are starts, as long
+    /// as they fit.
+    pub fn on_cpu(&self, plan: &Plan, threads: usize) -> (usize, palpate_cpu::Memory) {
+        let threads = if threads == 0 { rayon::current_num_threads() } else { threads };
+        let of = |members| {
+            let during = palpate_cpu::memory(plan, members, self.ratios(plan, members), threads, &self.request());
+            let last = palpate_cpu::memory(plan, 1, 1, threads, &self.last());
+            if last.total() > during.total() { last } else { during }
+        };
+        let fits = |members| self.asked.is_some() || of(members).total() <= BATCH_MEMORY;
+        let members = largest(self.most(), fits);
+        (members, of(members))
+    }
+
+    /// The same on a device whose largest buffer is `room` [B]. Where not even one simulation fits, one is the answer: to make it
+    /// says what is too large.
+    ///
+    /// # Errors
+    /// The body is beyond what the kernels can do.
+    pub fn on_device(&self, plan: &Plan, room: u64) -> Result<(usize, palpate_gpu::Memory), GpuError> {
+        let of = |members| {
+            let load = |request| Load { members, ratios: self.ratios(plan, members), request, room };
+            palpate_gpu::memory(plan, &load(&self.request()))
+        };
+        let fits = |members| of(members).is_ok_and(|m| m.largest <= room && (self.asked.is_some() || m.total() <= BATCH_MEMORY));
+        let members = largest(self.most(), fits);
+        let during = of(members)?;
+        // Memory of states is kept for the next batch of the same size. The last evaluation is one member.
+        let gradient = members == 1 && self.request().gradient;
+        let request = Request { gradient, ..self.last() };
+        let last = palpate_gpu::memory(plan, &Load { members: 1, ratios: 1, request: &request, room })?;
+        let then = palpate_gpu::Memory { states: last.states, tangents: last.tangents, ..during };
+        Ok((members, if then.total() > during.total() { then } else { during }))
+    }
+}
+
+/// The largest number up to `most` that fits, at least 1; whatever is larger than one that does not fit does not fit either.
+fn largest(most: usize, fits: impl Fn(usize) -> bool) -> usize {
+    if fits(most) {
+        return most;
+    }
+    let (mut low, mut high) = (1, most);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// The largest buffer of the device that would be used [B]; without any no limit is known.
+pub(crate) fn room() -> u64 {
+    let choice = Choice::from_env();
+    let usable = palpate_gpu::adapters().into_iter().find(|a| a.refusal.is_none() && a.is_meant(&choice));
+    usable.map_or(u64::MAX, |a| a.largest_buffer())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Experiment;
+
+    #[test]
+    fn the_largest_that_fits_is_found() {
+        for most in 1..20 {
+            for limit in 0..25 {
+                assert_eq!(largest(most, |n| n <= limit), limit.clamp(1, most), "{most} {limit}");
+            }
+        }
+    }
+
+    #[test]
+    fn as_many_run_at_once_as_a_buffer_of_the_device_holds() {
+        let scene = r#"
+            format = "scene/1"
+            [object]
+            shape = { ball = { radius = 0.05, center = [0, 0, 0.3] } }
+            cell_size = 0.01
+            [material]
+            density = 1000.0
+            youngs_modulus = 2.0e4
+            poisson_ratio = 0.4
+            [time]
+            step = 0.01
+            steps = 20
+        "#;
+        let experiment = Experiment::from_toml(scene, "ball.toml").unwrap_or_else(|e| panic!("{e}"));
+        let plan = experiment.plan();
+        for optimizer in [Optimizer::GaussNewton, Optimizer::Rprop, Optimizer::NelderMead] {
+            let demand = |starts, asked| Demand { starts, asked, optimizer, places: vec![0, 1] };
+            let on = |starts, asked, room| demand(starts, asked).on_device(plan, room).unwrap_or_else(|e| panic!("{e}"));
+            let (all, memory) = on(20, None, u64::MAX);
+            assert_eq!(all, 20);
+            // A device with buffers of half that size takes half as many; one more would not fit.
+            let (half, part) = on(20, None, memory.largest / 2);
+            assert_eq!((half, part.largest <= memory.largest / 2), (10, true), "{optimizer:?}");
+            assert!(part.total() < memory.total());
+            assert_eq!(on(20, None, memory.largest / 2 - 1).0, 9);
+            assert_eq!(on(20, Some(3), u64::MAX).0, 3, "who asks for fewer gets fewer");
+            assert_eq!(on(20, Some(99), memory.largest / 2).0, 10, "and no more than fit");
+            assert_eq!(on(20, None, 1000).0, 1);
+            let cpu = |asked| demand(20, asked).on_cpu(plan, 2);
+            assert_eq!((cpu(None).0, cpu(Some(4)).0), (20, 4));
+            assert!(cpu(Some(4)).1.total() < cpu(None).1.total());
+        }
+    }
+}
