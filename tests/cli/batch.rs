@@ -46,18 +46,43 @@ fn one_bad_scene_harms_no_other_and_finished_ones_are_taken_over() {
     }
 
     // The missing recording turns up: only that scene is computed.
-    let before = fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap();
+    let written = |name: &str| {
+        let files = ["result.json", "journal.jsonl", "report.html", "fit.log"].map(|f| out.join(name).join(f));
+        files.map(|f| fs::metadata(f).unwrap().modified().unwrap())
+    };
+    let before = ["a", "c"].map(written);
     fs::write(scenes.join("b.toml"), fs::read_to_string(scenes.join("a.toml")).unwrap()).unwrap();
     let second = run(&["--resume"]);
     assert_eq!(second.code, 0, "{}", second.err);
     assert_eq!(statuses(&out), ["complete"; 3]);
-    assert_eq!(fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap(), before);
+    assert_eq!(["a", "c"].map(written), before);
+    assert!(second.err.contains("1/3 a: taken over\n") && second.err.contains("3/3 c: taken over\n"), "{}", second.err);
+    let rows = json(out.join("summary.json"));
+    assert_eq!([0, 1, 2].map(|k| rows["scenes"][k]["message"] == "taken over"), [true, false, true]);
+    let aside = ["a", "b", "c"].map(|name| out.join(name).join("previous-1").exists());
+    assert_eq!(aside, [false; 3], "nothing was computed twice");
 
     // A scene that changed is fitted again.
     let a = fs::read_to_string(scenes.join("a.toml")).unwrap();
     fs::write(scenes.join("a.toml"), a.replace("seed = 4", "seed = 5")).unwrap();
     assert_eq!(run(&["--resume"]).code, 0);
-    assert_ne!(fs::metadata(out.join("a/result.json")).unwrap().modified().unwrap(), before);
+    assert_ne!(written("a"), before[0]);
+    assert_eq!(written("c"), before[1]);
+}
+
+#[test]
+fn a_resumed_run_that_stops_early_forgets_no_scene_ahead() {
+    let folder = folder();
+    let (scenes, out) = (folder.path().join("scenes"), folder.path().join("out"));
+    let arguments = ["batch", arg(&scenes), "--out", arg(&out)];
+    assert_eq!(palpate(&arguments).code, 1);
+    // The first scene changed, and the run stops in its fit.
+    let a = fs::read_to_string(scenes.join("a.toml")).unwrap();
+    fs::write(scenes.join("a.toml"), a.replace("seed = 4", "seed = 5")).unwrap();
+    let cut = stopped(&[&arguments[..], &["--resume"]].concat(), Interrupt::after(1));
+    assert_eq!((cut.code, statuses(&out)), (INTERRUPTED, ["interrupted", "bad-input", "complete"].map(String::from).to_vec()));
+    let last = palpate(&[&arguments[..], &["--resume"]].concat());
+    assert!(last.err.contains("3/3 c: taken over"), "{}", last.err);
 }
 
 #[test]

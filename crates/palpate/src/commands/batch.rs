@@ -45,6 +45,9 @@ pub struct Arguments {
 /// File in a scene's folder that says what its journal belongs to.
 const MARK: &str = "fit.fingerprint";
 
+/// What is said of a scene that an earlier run finished.
+const TAKEN_OVER: &str = "taken over";
+
 /// What became of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
@@ -123,10 +126,16 @@ fn names(scenes: &[PathBuf]) -> Vec<String> {
     scenes.iter().map(free).collect()
 }
 
+/// Rows of an earlier run's summary, of which this run is a continuation; none where there is no such summary.
+fn earlier(out: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(out.join("summary.json")).unwrap_or_default();
+    let summary: Value = serde_json::from_str(&text).unwrap_or(Value::Null);
+    summary["scenes"].as_array().cloned().unwrap_or_default()
+}
+
 /// A finished scene of an earlier run with the same fingerprint.
-fn finished(out: &Path, name: &str, fingerprint: &str) -> Option<Value> {
-    let summary: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).ok()?).ok()?;
-    let row = summary["scenes"].as_array()?.iter().find(|r| r["name"] == name && r["fingerprint"] == fingerprint)?;
+fn finished(earlier: &[Value], out: &Path, name: &str, fingerprint: &str) -> Option<Value> {
+    let row = earlier.iter().find(|r| r["name"] == name && r["fingerprint"] == fingerprint)?;
     if row["status"] != Status::Complete.name() {
         return None;
     }
@@ -134,7 +143,7 @@ fn finished(out: &Path, name: &str, fingerprint: &str) -> Option<Value> {
 }
 
 /// Fits one scene; whatever goes wrong ends up in the row.
-fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Console) -> Row {
+fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, console: &mut Console) -> Row {
     let clock = Instant::now();
     let mut row = Row {
         scene: scene.to_path_buf(),
@@ -150,12 +159,10 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
     // A panic is a bug, but not a reason to lose the other scenes.
     let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<Value>, Error> {
         let experiment = Experiment::open(scene)?;
-        let asked = format!("{:?} {:?}", a.choices, experiment.scene().fit);
+        let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
             format!("{} {:016x}", fingerprint(experiment.plan()), fnv1a(FNV_START, (asked + experiment.text()).as_bytes()));
-        if a.resume
-            && let Some(result) = finished(&a.out, name, &row.fingerprint)
-        {
+        if let Some(result) = finished(earlier, &a.out, name, &row.fingerprint) {
             return Ok(Some(result));
         }
         let (backend, note) = choose(&a.choices, &experiment)?;
@@ -174,8 +181,12 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         track.finish();
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);
-        row.message = fitted.warnings.first().cloned().unwrap_or_default();
-        row.status = if fitted.interrupted { Status::Interrupted } else { Status::Complete };
+        row.message = fitted.result.broken.as_ref().or(fitted.warnings.first()).cloned().unwrap_or_default();
+        row.status = match (&fitted.result.broken, fitted.interrupted) {
+            (Some(_), _) => Status::Failed,
+            (None, true) => Status::Interrupted,
+            (None, false) => Status::Complete,
+        };
         row.result = result;
         Ok(None)
     }));
@@ -183,7 +194,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         Ok(Ok(None)) => {}
         Ok(Ok(Some(result))) => {
             row.seconds = result["seconds"].as_f64().unwrap_or(0.0);
-            (row.status, row.message, row.result) = (Status::Complete, "taken over".into(), result);
+            (row.status, row.message, row.result) = (Status::Complete, TAKEN_OVER.into(), result);
             return row;
         }
         Ok(Err(e)) => {
@@ -213,19 +224,21 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
     row
 }
 
-/// `summary.json`.
-fn summary(rows: &[Row]) -> Value {
-    let scenes: Vec<Value> = rows
-        .iter()
-        .map(|r| {
-            json!({
-                "name": r.name, "scene": r.scene.display().to_string(), "status": r.status.name(), "message": r.message,
-                "seconds": r.seconds, "backend": r.result["backend"], "fingerprint": r.fingerprint, "parameters": r.result["parameters"],
-                "cost": r.result["cost"]["final"], "residual": r.result["residual"],
-            })
-        })
-        .collect();
-    let count = |s: Status| rows.iter().filter(|r| r.status == s).count();
+/// A row of `summary.json`.
+fn entry(r: &Row) -> Value {
+    json!({
+        "name": r.name, "scene": r.scene.display().to_string(), "status": r.status.name(), "message": r.message,
+        "seconds": r.seconds, "backend": r.result["backend"], "fingerprint": r.fingerprint, "parameters": r.result["parameters"],
+        "cost": r.result["cost"]["final"], "residual": r.result["residual"],
+    })
+}
+
+/// `summary.json`: the rows of this run, and those of the earlier one for scenes that this one has not reached yet, so that a run
+/// that ends here can be gone on with.
+fn summary(rows: &[Row], earlier: &[Value], ahead: &[String]) -> Value {
+    let kept = ahead.iter().filter_map(|name| earlier.iter().find(|r| r["name"] == name.as_str()));
+    let scenes: Vec<Value> = rows.iter().map(entry).chain(kept.cloned()).collect();
+    let count = |s: Status| scenes.iter().filter(|r| r["status"] == s.name()).count();
     json!({
         "format": "batch/1", "scenes": scenes, "complete": count(Status::Complete),
         "bad_input": count(Status::BadInput), "failed": count(Status::Failed), "interrupted": count(Status::Interrupted),
@@ -267,6 +280,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let scenes = scenes(&a.paths)?;
     make_folder(&a.out)?;
     let names = names(&scenes);
+    let earlier = if a.resume { earlier(&a.out) } else { Vec::new() };
     let mut rows: Vec<Row> = Vec::new();
     let mut all = Value::Null;
     for (i, (scene, name)) in scenes.iter().zip(&names).enumerate() {
@@ -274,11 +288,14 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             break;
         }
         let label = format!("{}/{} {name}", i + 1, scenes.len());
-        let row = one(a, scene, name, &label, console);
-        let told = if row.status == Status::Complete { String::new() } else { format!(": {}", row.message) };
-        console.note(&format!("{label}: {} in {:.1} s{told}", row.status.name(), row.seconds));
+        let row = one(a, &earlier, scene, name, &label, console);
+        console.note(&match row.status {
+            Status::Complete if row.message == TAKEN_OVER => format!("{label}: {TAKEN_OVER}"),
+            Status::Complete => format!("{label}: complete in {:.1} s", row.seconds),
+            other => format!("{label}: {} in {:.1} s: {}", other.name(), row.seconds, row.message),
+        });
         rows.push(row);
-        all = summary(&rows);
+        all = summary(&rows, &earlier, &names[i + 1..]);
         let text = serde_json::to_string_pretty(&all).map_err(|e| Error::write(&a.out, e))? + "\n";
         write_file(a.out.join("summary.json"), |w| w.write_all(text.as_bytes()))?;
         write_file(a.out.join("summary.csv"), |w| w.write_all(table(&all).as_bytes()))?;
