@@ -1,0 +1,208 @@
+//! The program as a process of its own: what depends on its environment, its memory, and the job for a runner.
+
+use palpate_gpu::AdapterReport;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+/// A soft block on a clamp, pushed sideways.
+const BLOCK: &str = r#"
+format = "scene/1"
+[object]
+shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
+cell_size = 0.02
+[material]
+density = 1000.0
+youngs_modulus = 2.0e4
+poisson_ratio = 0.4
+[[clamp]]
+box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
+[initial]
+velocity = [0.6, 0.0, 0.0]
+[time]
+step = 0.01
+steps = 6
+"#;
+
+/// The program in an environment that is the same everywhere. Where no session gives it a folder, Mesa's Wayland layer complains
+/// on stderr, which is not the program's line.
+fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+    command.env_remove("PALPATE_ADAPTER").env("XDG_RUNTIME_DIR", std::env::temp_dir());
+    command
+}
+
+fn run(command: &mut Command) -> (i32, String, String) {
+    let Output { status, stdout, stderr } = command.output().expect("the program starts");
+    let text = |b: Vec<u8>| String::from_utf8(b).expect("the command line speaks UTF-8");
+    (status.code().expect("no signal"), text(stdout), text(stderr))
+}
+
+/// The first adapter that can run the kernels and has this in its name; `None` where there is none and none is required.
+fn adapter(name: &str) -> Option<AdapterReport> {
+    let usable: Vec<AdapterReport> = palpate_gpu::adapters().into_iter().filter(|a| a.refusal.is_none()).collect();
+    let required = std::env::var("PALPATE_GPU").is_ok_and(|v| v == "require");
+    assert!(!usable.is_empty() || !required, "PALPATE_GPU=require, but there is no usable graphics adapter");
+    let found = usable.into_iter().find(|a| a.name.contains(name));
+    if found.is_none() {
+        eprintln!("skipped: no graphics adapter {name}");
+    }
+    found
+}
+
+fn scene() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("block.toml");
+    fs::write(&path, BLOCK).expect("writable");
+    (folder, path)
+}
+
+#[test]
+fn an_adapter_that_does_not_exist_is_one_line_with_a_way_out() {
+    let (folder, scene) = scene();
+    for verb in ["simulate", "observe"] {
+        let mut command = program();
+        command.arg(verb).arg(&scene).args(["--backend", "gpu", "--out"]).arg(folder.path().join("out"));
+        if verb == "observe" {
+            command.args(["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=8x6"]);
+        }
+        let (code, out, err) = run(command.env("PALPATE_ADAPTER", "no such card"));
+        assert_eq!((code, out.as_str()), (1, ""), "{verb}: {err}");
+        assert_eq!(err.lines().count(), 1, "{verb}: {err}");
+        for word in ["error: --backend gpu: ", "\"no such card\"", "found: ", "hint: ", "--backend cpu"] {
+            assert!(err.contains(word), "{verb}: \"{word}\" is not in: {err}");
+        }
+    }
+}
+
+#[test]
+fn auto_takes_what_it_measured_to_be_faster_and_says_so() {
+    let Some(adapter) = adapter("") else { return };
+    let name = adapter.name.split(" (").next().unwrap_or_default().to_string();
+    let (folder, scene) = scene();
+    let mut command = program();
+    command.arg("simulate").arg(&scene).args(["--backend", "auto", "--format", "obj", "--every", "6", "--out"]);
+    let (code, _, err) = run(command.arg(folder.path().join("out")).env("PALPATE_ADAPTER", &name));
+    assert_eq!(code, 0, "{err}");
+    let told = err.lines().find(|l| l.starts_with("backend: ")).unwrap_or_else(|| panic!("no choice is told: {err}"));
+    let (picked, reason) = told.split_once(" (auto: a step takes ").unwrap_or_else(|| panic!("{told}"));
+    let times: Vec<f64> = reason.split(" ms").filter_map(|w| w.rsplit(' ').next()?.parse().ok()).collect();
+    assert!(reason.contains(&name) && times.len() == 2 && times[0] <= times[1], "{told}");
+    // The time of what was picked comes first.
+    let device_first = reason.find(&name) < reason.find(" ms, ");
+    assert_eq!(picked, if device_first { "backend: gpu" } else { "backend: cpu" }, "{told}");
+}
+
+#[test]
+fn devices_are_listed_with_limits_and_what_they_can_run() {
+    let Some(first) = adapter("") else { return };
+    let (code, text, _) = run(program().args(["inspect", "--devices"]));
+    assert_eq!(code, 0);
+    let binding = "max_storage_buffer_binding_size";
+    for word in [first.name.as_str(), "runs every kernel", binding, "max_buffer_size", "lanes of a cell talk by"] {
+        assert!(text.contains(word), "\"{word}\" is not in:\n{text}");
+    }
+    let (_, json, _) = run(program().args(["inspect", "--devices", "--json"]));
+    let list: Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(list["format"], "devices/1");
+    let device = list["devices"].as_array().and_then(|l| l.iter().find(|d| d["name"] == first.name.as_str()));
+    let device = device.unwrap_or_else(|| panic!("{list}"));
+    assert_eq!((&device["usable"], &device["verdict"]), (&true.into(), &"runs every kernel".into()));
+    assert_eq!(device["limits"][binding], first.limits.max_storage_buffer_binding_size);
+    assert_eq!(device["subgroups"], first.subgroups);
+}
+
+/// Largest resident memory of a command while it runs [B].
+#[cfg(target_os = "linux")]
+fn peak(command: &mut Command) -> f64 {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts");
+    let status = format!("/proc/{}/status", child.id());
+    let mut kilobytes = 0.0;
+    // The kernel keeps the largest value itself: only what is allocated within the last look is missed.
+    while child.try_wait().expect("it can be waited for").is_none() {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        kilobytes = line.and_then(|l| l.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(kilobytes);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(child.wait().expect("it has ended").success());
+    1024.0 * kilobytes
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn inspect_foresees_the_memory_of_a_fit_on_the_cpu() {
+    let (folder, scene) = scene();
+    let path = |name: &str| folder.path().join(name);
+    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
+    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"lbfgs\"\nstarts = 4\niterations = 0\n\
+               threads = 2\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
+    // What the program takes by itself is the same for both: the difference is the body's.
+    let taken = ["0.02", "0.004"].map(|h| {
+        let file = path("fit.toml");
+        let scene = BLOCK.replace("cell_size = 0.02", &format!("cell_size = {h}")).replace("steps = 6", "steps = 3");
+        fs::write(&file, scene + fit).expect("writable");
+        let (code, json, err) = run(program().args(["inspect", "--json"]).arg(&file));
+        assert_eq!(code, 0, "{err}");
+        let said: Value = serde_json::from_str(&json).expect("it is JSON");
+        assert_eq!(said["batch"], 4, "{said}");
+        let mut fit = program();
+        fit.arg("fit").arg(&file).args(["--backend", "cpu", "--pictures", "0", "--out"]).arg(path(h));
+        (said["memory"].as_f64().expect("a number of bytes"), peak(&mut fit))
+    });
+    let (said, real) = (taken[1].0 - taken[0].0, taken[1].1 - taken[0].1);
+    println!("{:.1} MB foreseen, {:.1} MB taken; {taken:?}", said / 1e6, real / 1e6);
+    // Not counted is what cutting the body out of its grid takes in passing, some 20 % here.
+    assert!((said / real - 1.0).abs() < 0.3, "{said} is not {real}");
+}
+
+/// `.ci/batch-lavapipe` with the program that was just built.
+fn job(scenes: &Path, out: &Path) -> (i32, String, String) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.ci/batch-lavapipe");
+    run(Command::new(script).args([scenes, out]).env("PALPATE", env!("CARGO_BIN_EXE_palpate")))
+}
+
+#[test]
+fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
+    if adapter("llvmpipe").is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scenes, out) = (folder.path().join("scenes"), folder.path().join("out"));
+    fs::create_dir(&scenes).expect("a new folder");
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().expect("assets are there");
+    let copy = |name: &str, broken: bool| {
+        let text = fs::read_to_string(assets.join("batch").join(name)).expect("the scene is there");
+        let recordings = if broken { "../nowhere".to_string() } else { assets.join("recordings").display().to_string() };
+        // Two iterations instead of eight: what is tested here is the job.
+        let text = text.replace("../recordings", &recordings).replace("iterations = 8", "iterations = 2");
+        fs::write(scenes.join(name), text).expect("writable");
+    };
+    copy("firm.toml", true);
+    copy("soft.toml", false);
+    let summary = || -> Value {
+        assert_eq!(fs::read_to_string(out.join("summary.csv")).expect("a table").lines().count(), 3);
+        serde_json::from_str(&fs::read_to_string(out.join("summary.json")).expect("a summary")).expect("it is JSON")
+    };
+    let (code, told, err) = job(&scenes, &out);
+    assert_eq!(code, 1, "{err}");
+    assert!(told.contains("1 of 2 scenes complete") && err.contains("1/2 firm: bad-input"), "{told}{err}");
+    let rows = summary();
+    let row = |k: usize, key: &str| rows["scenes"][k][key].clone();
+    let told = [row(0, "status"), row(1, "status"), row(1, "backend")];
+    assert_eq!(told, ["bad-input", "complete", "gpu"].map(Value::from));
+    assert!(row(0, "message").as_str().is_some_and(|m| m.contains("nowhere")), "{rows}");
+    let written = || fs::metadata(out.join("soft/result.json")).and_then(|m| m.modified()).expect("a result");
+    let before = written();
+    let (code, _, err) = job(&scenes, &out);
+    assert_eq!(code, 1, "{err}");
+    assert!(err.contains("2/2 soft: taken over\n"), "{err}");
+    assert_eq!((summary()["scenes"][1]["message"].as_str(), written()), (Some("taken over"), before));
+    // What was broken is mended: everything succeeds, and only that is computed.
+    copy("firm.toml", false);
+    let (code, _, err) = job(&scenes, &out);
+    assert_eq!((code, written()), (0, before), "{err}");
+}
