@@ -85,6 +85,12 @@ fn a_sensor_that_reads_too_far_is_not_sold_as_physics() {
     let bias = d["effects"][0]["parameters"]["bias"].as_f64().unwrap();
     // A tenth of the noise of one reading is what this coarse grid moves the mean surface.
     assert!((bias / 0.004 - 1.0).abs() < 0.1, "{bias}");
+    // A bias and a stretched scale part where the camera stands elsewhere: half as far again, half the bias.
+    let next = &d["effects"][0]["separated_by"];
+    assert!(names.contains(&"depth-scale".to_string()), "{names:?}");
+    assert!(next["measurement"].as_str().unwrap().contains("distance"), "{next}");
+    assert!(next["from"].as_array().unwrap().contains(&"depth-scale".into()), "{next}");
+    assert!(next["difference"].as_f64().unwrap() > next["noise"].as_f64().unwrap(), "{next}");
     assert!(d["gap_closed"].as_f64().unwrap() > 0.9, "{}", d["gap_closed"]);
 }
 

@@ -1,8 +1,10 @@
 //! The answer of a diagnosis.
 
 use crate::laboratory::Model;
-use crate::locate::Place;
+use crate::locate::{Place, direction};
 use crate::quantity::stated;
+use crate::separation::Separated;
+use glam::DVec3;
 
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,8 +67,8 @@ pub struct Found {
     pub accepted: bool,
     /// Other candidates that predict data left out as well.
     pub indistinguishable_from: Vec<String>,
-    /// Measurement that would tell them apart best, and by how much [m].
-    pub separated_by: Option<(String, f64)>,
+    /// Measurement that would tell it best from them; `None` when there was none to be told from, or no time to look for one.
+    pub separated_by: Option<Separated>,
 }
 
 /// A candidate's score where it is absent.
@@ -102,6 +104,28 @@ pub struct Slack {
     pub windows: Vec<SlackWindow>,
 }
 
+impl SlackWindow {
+    /// Force per volume at the body's centre [N/m³].
+    pub fn force(&self) -> DVec3 {
+        self.values.get(..3).map_or(DVec3::ZERO, DVec3::from_slice)
+    }
+}
+
+/// Mean force over the mean of its size from which on a load is said to pull one way.
+const STEADY: f64 = 0.5;
+
+impl Slack {
+    /// What the force at the body's centre does, in words.
+    pub fn words(&self) -> String {
+        let sum: DVec3 = self.windows.iter().map(SlackWindow::force).sum();
+        let sizes: f64 = self.windows.iter().map(|w| w.force().length()).sum();
+        match sum.length() >= STEADY * sizes {
+            true => format!("pulls towards {}", direction(sum)),
+            false => "changes its direction with time".into(),
+        }
+    }
+}
+
 /// One block of the residual map: a region of the rest surface during a stretch of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapEntry {
@@ -112,7 +136,7 @@ pub struct MapEntry {
     /// Number of the region.
     pub region: usize,
     /// Its middle on the rest shape [m].
-    pub place: glam::DVec3,
+    pub place: DVec3,
     /// First and last frame's time [s].
     pub time: (f64, f64),
     /// Residual of the baseline in standard deviations of the null.
@@ -214,7 +238,10 @@ impl Diagnosis {
                     (true, true) => ", and the search was interrupted before every known effect was tried",
                     (true, false) => ", and the time was over before every known effect was tried",
                 };
-                format!("Something is missing ({}){why}: {apart}{place}; {close}.", p(self.p_value))
+                let slack = self.slack.as_ref().map_or(String::new(), |s| {
+                    format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
+                });
+                format!("Something is missing ({}){why}: {apart}{place}; {close}{slack}.", p(self.p_value))
             }
             Verdict::MissingEffect => {
                 let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();
@@ -269,5 +296,21 @@ impl Diagnosis {
             n if n <= 4 => format!(" The search {why} before it had tried to the end: {}.", open.join(", ")),
             n => format!(" The search {why} before it had tried to the end: {} and {} more.", open[..3].join(", "), n - 3),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slack(forces: &[[f64; 3]]) -> Slack {
+        let window = |f: &[f64; 3]| SlackWindow { time: 0.0, values: f.iter().copied().chain([0.0; 14]).collect() };
+        Slack { share: 0.8, windows: forces.iter().map(window).collect() }
+    }
+
+    #[test]
+    fn a_load_that_nobody_has_named_pulls_somewhere_or_changes() {
+        assert_eq!(slack(&[[900.0, 40.0, -500.0], [300.0, -20.0, -200.0]]).words(), "pulls towards +x, -z");
+        assert_eq!(slack(&[[900.0, 0.0, 0.0], [-800.0, 0.0, 0.0]]).words(), "changes its direction with time");
     }
 }

@@ -1,6 +1,7 @@
 //! The laboratory: what a diagnosis asks of whoever simulates and fits.
 
 use crate::change::Change;
+use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::ResidualRow;
 use std::sync::Arc;
@@ -202,8 +203,9 @@ pub trait Laboratory {
     ) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
-    /// How far [m] two models are apart in other measurements: description and root mean square distance.
-    fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)>;
+    /// What other measurements would read of each of several rivals, compared with what they would read of the model that is named; those
+    /// that there is time to simulate.
+    fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation>;
     /// True when the time that was allowed is over.
     fn out_of_time(&self) -> bool;
     /// Iterations of fits that there is time for, about; with no limit of the time all that can be counted.

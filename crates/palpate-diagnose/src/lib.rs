@@ -14,6 +14,7 @@ mod noise;
 mod null;
 mod quantity;
 mod score;
+mod separation;
 mod still;
 mod workflow;
 
@@ -22,8 +23,9 @@ pub use change::{Candidate, Change, can_be_freed, candidates};
 pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
 pub use linear::least_squares;
-pub use locate::Place;
+pub use locate::{Place, direction};
 pub use quantity::stated;
+pub use separation::{Separated, Separation};
 pub use workflow::{Options, diagnose};
 
 #[cfg(test)]

@@ -85,6 +85,17 @@ pub fn locate(cells: &Cells, adequacy: &Adequacy, setting: &Setting) -> Vec<Plac
     out
 }
 
+/// The axes that a vector points along, "+x, -z": components of at least a third of the largest, the largest first; "nowhere" for zero.
+pub fn direction(v: DVec3) -> String {
+    let mut axes: Vec<(f64, &str)> = v.to_array().into_iter().zip(["x", "y", "z"]).collect();
+    axes.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    let least = axes[0].0.abs() / 3.0;
+    let sign = |c: f64| if c > 0.0 { "+" } else { "-" };
+    let named: Vec<String> =
+        axes.iter().filter(|(c, _)| c.abs() >= least && *c != 0.0).map(|(c, a)| format!("{}{a}", sign(*c))).collect();
+    if named.is_empty() { "nowhere".into() } else { named.join(", ") }
+}
+
 /// "lower side, x < 0.02 m, while touching the ground, from 0.31 s".
 fn words(places: &[DVec3], of: usize, time: (f64, f64), scene: usize, setting: &Setting) -> String {
     let mut parts = Vec::new();
@@ -133,4 +144,42 @@ fn words(places: &[DVec3], of: usize, time: (f64, f64), scene: usize, setting: &
     }
     parts.push(format!("from {:.3} s", time.0));
     parts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laboratory::Laboratory;
+    use crate::tests::bench::Bench;
+
+    /// Words for places [cm] on a ball of 5 cm about the origin that touches the ground from 0.5 s to 0.8 s, out of 20 regions.
+    fn said(places: &[[f64; 3]], time: (f64, f64)) -> String {
+        let setting = Bench::new(1, &[], false).setting().clone();
+        let places: Vec<DVec3> = places.iter().map(|p| 0.01 * DVec3::from_array(*p)).collect();
+        words(&places, 20, time, 0, &setting)
+    }
+
+    #[test]
+    fn places_are_put_into_words() {
+        let low = [[3.0, 0.0, -4.0], [-3.0, 0.0, -4.0], [0.0, 4.0, -3.0], [0.0, -4.0, -3.0]];
+        assert_eq!(said(&low, (0.55, 0.78)), "lower side, while touching the ground, from 0.550 s");
+        let high = low.map(|p| p.map(|x| -x));
+        assert_eq!(said(&high, (0.1, 0.4)), "upper side, before the ground is touched, from 0.100 s");
+        // Regions have a size: 0.15 of the radius beside their middles.
+        let right = [[4.5, 0.0, 2.0], [4.0, 2.0, -2.0], [4.0, -2.0, 0.0]];
+        assert_eq!(said(&right, (0.6, 1.0)), "x > 0.033 m, after the first contact, from 0.600 s");
+        let left = [[0.0, -4.5, 2.0], [2.0, -4.0, -2.0], [-2.0, -4.0, 0.0]];
+        assert_eq!(said(&left, (0.6, 1.0)), "y < -0.033 m, after the first contact, from 0.600 s");
+        let around = [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0], [0.0, 5.0, 3.0], [0.0, -5.0, -3.0]];
+        // Neither before nor after the contact, and not during most of it.
+        assert_eq!(said(&around, (0.2, 0.9)), "4 of 20 regions of the surface, from 0.200 s");
+        assert_eq!(said(&[[5.0, 0.0, 0.0]; 18], (0.0, 1.0)), "whole surface, from 0.000 s");
+    }
+
+    #[test]
+    fn directions_name_the_axes_that_count() {
+        assert_eq!(direction(DVec3::new(2.0, 0.1, -1.0)), "+x, -z");
+        assert_eq!(direction(DVec3::new(0.0, -1.0, 0.2)), "-y");
+        assert_eq!(direction(DVec3::ZERO), "nowhere");
+    }
 }

@@ -29,6 +29,11 @@ impl Observation {
     pub fn residuals(&self) -> usize {
         self.frames.iter().map(Frame::residuals).sum()
     }
+
+    /// Cameras, markers and noises alone: enough to simulate what sensors would read.
+    pub fn without_frames(&self) -> Observation {
+        Observation { cameras: self.cameras.clone(), frames: Vec::new(), markers: self.markers.clone(), ..*self }
+    }
 }
 
 /// A camera's place and direction.

@@ -6,7 +6,6 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBatch, Request, Rollout, Snapshot};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
-use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -94,8 +93,7 @@ fn refused(e: &GpuError) -> Error {
 
 /// Seconds of a forward step of `members` simulations, so many at once; the first round warms up.
 fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, members: usize, at_once: usize) -> Option<f64> {
-    let mut plan =
-        Plan { observation: Arc::new(Observation { frames: Vec::new(), ..(*plan.observation).clone() }), ..plan.clone() };
+    let mut plan = Plan { observation: Arc::new(plan.observation.without_frames()), ..plan.clone() };
     plan.clock.steps = plan.clock.steps.min(TRIAL_STEPS);
     let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
     let mut rollout = Rollout::new(backend, &plan, at_once).ok()?;

@@ -4,7 +4,7 @@ use crate::embed::Embedding;
 use crate::engine::{Backend, between};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::render::{Pinhole, Sensor, rasterise};
+use crate::render::{self, Pinhole, Sensor, rasterise};
 use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::recording::{DepthImage, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
@@ -143,17 +143,9 @@ fn images(
 ) -> Vec<RecordedFrame> {
     let one = |camera: usize| {
         let pinhole = &observers.cameras[camera];
-        let mut exact = rasterise(pinhole, vertices, triangles);
+        let exact = read_depths(sensors, camera as u32, pinhole, vertices, triangles);
         if exact.covered() == 0 {
             return None;
-        }
-        if !sensors.exact_points() {
-            let pose = pinhole.world_from_camera;
-            let truly = Camera { center: pose.translation, axis: pose.matrix3.z_axis };
-            let width = exact.width;
-            for (i, z) in exact.depth.iter_mut().enumerate().filter(|(_, z)| z.is_finite()) {
-                *z = sensors.read(&truly, camera as u32, pinhole.unproject((i % width) as f64, (i / width) as f64, *z));
-            }
         }
         // Every image has its own random numbers; frames × cameras never meet.
         let image_number = (number * observers.cameras.len() + camera) as u64;
@@ -162,6 +154,26 @@ fn images(
         Some(RecordedFrame { camera, time, depth: Some(depth), mask: Some(r.mask) })
     };
     (0..observers.cameras.len()).into_par_iter().filter_map(one).collect()
+}
+
+/// Depths that a camera with these errors, truly standing where `pinhole` says, reads of a surface (world points [m]), without noise.
+pub(crate) fn read_depths(
+    sensors: &Sensors,
+    number: u32,
+    pinhole: &Pinhole,
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+) -> render::DepthImage {
+    let mut exact = rasterise(pinhole, vertices, triangles);
+    if !sensors.exact_points() {
+        let pose = pinhole.world_from_camera;
+        let truly = Camera { center: pose.translation, axis: pose.matrix3.z_axis };
+        let width = exact.width;
+        for (i, z) in exact.depth.iter_mut().enumerate().filter(|(_, z)| z.is_finite()) {
+            *z = sensors.read(&truly, number, pinhole.unproject((i % width) as f64, (i / width) as f64, *z));
+        }
+    }
+    exact
 }
 
 fn marker_samples(observers: &Observers, number: usize, time: f64, positions: &[DVec3]) -> Vec<MarkerSample> {

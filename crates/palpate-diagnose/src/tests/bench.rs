@@ -3,6 +3,7 @@
 use crate::change::Change;
 use crate::laboratory::*;
 use crate::linear::least_squares;
+use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
 use palpate_model::effects::{Effect, find};
@@ -25,6 +26,8 @@ pub struct Bench {
     held: Vec<String>,
     /// Kinds that there is no time to fit.
     pub slow: Vec<&'static str>,
+    /// True when the time is over as slack is asked for.
+    pub no_slack: bool,
     /// True once somebody has asked to stop.
     pub stopped: bool,
 }
@@ -110,6 +113,7 @@ impl Bench {
             hidden: hidden.iter().map(|h| (h.0.to_string(), h.1)).collect(),
             held,
             slow: Vec::new(),
+            no_slack: false,
             stopped: false,
         }
     }
@@ -219,7 +223,12 @@ impl Laboratory for Bench {
     }
 
     fn linearise_new(&mut self, tries: &[(Vec<Change>, Vec<f64>)], from: usize) -> Vec<Result<Readings, LabError>> {
-        tries.iter().map(|(c, v)| Ok(self.readings(c, v, from))).collect()
+        let is_slack = |c: &[Change]| c.last().is_some_and(|c| c.kind() == "slack");
+        let one = |(c, v): &(Vec<Change>, Vec<f64>)| match self.no_slack && is_slack(c) {
+            true => Err(LabError::NoTime),
+            false => Ok(self.readings(c, v, from)),
+        };
+        tries.iter().map(one).collect()
     }
 
     fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
@@ -232,8 +241,8 @@ impl Laboratory for Bench {
         Ok(None)
     }
 
-    fn separations(&mut self, _: &Model, _: &Model) -> Vec<(String, f64)> {
-        vec![("from twice the height".into(), 0.002)]
+    fn separations(&mut self, _: &Model, rivals: &[&Model]) -> Vec<Separation> {
+        vec![Separation { measurement: "from twice the height".into(), differences: vec![(2.0 * NOISE, NOISE); rivals.len()] }]
     }
 
     fn out_of_time(&self) -> bool {

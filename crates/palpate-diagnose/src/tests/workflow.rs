@@ -51,6 +51,13 @@ fn what_no_effect_explains_is_called_unexplained() {
     assert_eq!(d.verdict, Verdict::Unexplained, "{}", d.sentence());
     assert!(d.effects.iter().all(|e| !e.accepted) && d.slack.is_some());
     assert_eq!(d.model, d.baseline);
+    assert!(d.sentence().contains("; a free load would explain "), "{}", d.sentence());
+    // Without time for the slack the answer says that it is missing.
+    bench.no_slack = true;
+    let baseline = bench.baseline();
+    let hurried = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!((hurried.verdict, &hurried.slack), (Verdict::Unexplained, &None));
+    assert!(hurried.not_tried.iter().any(|n| n == "slack, what any load could explain: no time left"), "{:?}", hurried.not_tried);
 }
 
 #[test]

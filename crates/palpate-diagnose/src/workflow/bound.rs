@@ -16,7 +16,7 @@ const ENOUGH: f64 = 0.95;
 
 impl Session<'_> {
     /// What any smooth load could explain of what is left.
-    pub(super) fn slack(&mut self, state: &State) -> Result<Slack, LabError> {
+    fn slack(&mut self, state: &State) -> Result<Slack, LabError> {
         self.lab.say("slack: what any load could explain");
         let (from, to) = self.cells.times.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
         let changes = slack(self.lab.setting(), from, to, self.options.windows);
@@ -81,5 +81,14 @@ impl Session<'_> {
             windows[*w].values[*slot] = *x;
         }
         Ok(Slack { share: (gain / excess).clamp(0.0, 1.0), windows })
+    }
+
+    /// The same, or a line in `not_tried` that says why there is none.
+    pub(super) fn slack_or_why(&mut self, state: &State) -> Option<Slack> {
+        let slack = self.slack(state);
+        if let Err(why) = &slack {
+            self.not_tried.push(format!("slack, what any load could explain: {why}"));
+        }
+        slack.ok()
     }
 }

@@ -77,7 +77,7 @@ impl Session<'_> {
         };
         // Of all that is missing, not of what a rejected explanation leaves; the noise may have become known better since.
         self.remeasure(&mut base);
-        let slack = if verdict == Verdict::Unexplained { self.slack(&base).ok() } else { None };
+        let slack = if verdict == Verdict::Unexplained { self.slack_or_why(&base) } else { None };
         let caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
         let baseline = base.model;
         if verdict == Verdict::Unexplained {

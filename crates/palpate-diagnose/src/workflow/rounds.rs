@@ -6,6 +6,7 @@ use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number, Readings};
 use crate::score::f_tail;
+use crate::separation::Separated;
 
 /// Change of a fitted number, relative to its size, from which on it may lie in another valley, and where it was before is another place to
 /// start from.
@@ -244,13 +245,14 @@ impl Session<'_> {
         // The winner itself, and the same with something added to it, are nothing else.
         let others: Vec<&Fitted> = equal.iter().map(|i| &fitted[*i]).filter(|f| !fitted[winner].is_within(f)).collect();
         found[0].indistinguishable_from.extend(others.iter().map(|f| f.kind()));
-        if !others.is_empty() && self.lab.out_of_time() {
-            self.not_tried.push("a measurement that separates what is indistinguishable: no time left".into());
-        } else if let Some(other) = others.first() {
+        if !others.is_empty() {
             self.lab.say("looking for a measurement that separates candidates");
-            let mut ways = self.lab.separations(&fitted[winner].state.model, &other.state.model);
-            ways.sort_by(|a, b| b.1.total_cmp(&a.1));
-            found[0].separated_by = ways.into_iter().next();
+            let rivals: Vec<&Model> = others.iter().map(|f| &f.state.model).collect();
+            let ways = self.lab.separations(&fitted[winner].state.model, &rivals);
+            found[0].separated_by = Separated::best(&ways, &found[0].indistinguishable_from);
+            if found[0].separated_by.is_none() && self.lab.out_of_time() {
+                self.not_tried.push("a measurement that separates what is indistinguishable: no time left".into());
+            }
         }
         let mut fitted = fitted;
         let mut next = fitted.swap_remove(winner).state;

@@ -68,6 +68,7 @@ fn what_is_applied_is_undone() {
             assert!((DVec3::from_array(seen.center) - truly.center).length() < 1e-13);
             assert!((DVec3::from_array(seen.axis) - truly.axis).length() < 1e-13);
             assert!((sensors.cameras(&[camera])[0].center - truly.center).length() < 1e-13);
+            assert!(sensors.true_pose(0, stated).abs_diff_eq(pose, 1e-13));
         }
     }
 }

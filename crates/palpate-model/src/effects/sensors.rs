@@ -164,15 +164,12 @@ impl Sensors {
 
     /// Pose (camera to world) that a recording states for a camera that truly is at `pose`.
     pub fn stated_pose(&self, number: u32, pose: DAffine3) -> DAffine3 {
-        // A law that moves the camera turns every direction fixed to it as it turns the axis.
-        let along = |axis: DVec3| {
-            let seen = Camera { center: pose.translation, axis }.sees(pose.translation + axis);
-            self.links_of(number).fold(seen, |s, l| l.reading.apply(s, &l.values))
-        };
-        let m = pose.matrix3;
-        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(|a| DVec3::from_array(along(a).axis));
-        let center = DVec3::from_array(along(m.z_axis).center);
-        DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), center)
+        moved(pose, |seen| self.links_of(number).fold(seen, |s, l| l.reading.apply(s, &l.values)))
+    }
+
+    /// Where a camera truly is that a recording states at `pose`; the inverse of [`Sensors::stated_pose`].
+    pub fn true_pose(&self, number: u32, pose: DAffine3) -> DAffine3 {
+        moved(pose, |seen| self.undo(seen, number))
     }
 
     /// Offset of a marker [m].
@@ -194,6 +191,16 @@ impl Sensors {
         }
         std::borrow::Cow::Owned(MarkerSite { stalk: site.stalk + offset, ..site.clone() })
     }
+}
+
+/// A camera's pose after what moves its readings.
+fn moved(pose: DAffine3, by: impl Fn(Seen<f64>) -> Seen<f64>) -> DAffine3 {
+    // A law that moves the camera turns every direction fixed to it as it turns the axis.
+    let along = |axis: DVec3| by(Camera { center: pose.translation, axis }.sees(pose.translation + axis));
+    let m = pose.matrix3;
+    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(|a| DVec3::from_array(along(a).axis));
+    let center = DVec3::from_array(along(m.z_axis).center);
+    DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), center)
 }
 
 /// The number that an effect chooses, `None` when it has no such choice.

@@ -3,8 +3,9 @@
 use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
-use super::others::{contact_times, held_out, separations, still_frames};
+use super::others::{contact_times, held_out, still_frames};
 use super::refined::{GRID, STEP, difference, finer, halved};
+use super::separate::separations;
 use super::systematic::systematic;
 use super::walls::walls;
 use crate::engine::Backend;
@@ -13,7 +14,9 @@ use crate::experiment::Experiment;
 use crate::fitting::{errors, fingerprint};
 use crate::interrupt::Interrupt;
 use palpate_cpu::CpuBackend;
-use palpate_diagnose::{Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Setting, Start};
+use palpate_diagnose::{
+    Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start,
+};
 use palpate_engine::Rollout;
 use palpate_fit::{FitScene, Hooks, Problem, Progress, Settings, Status, Tolerance, Want};
 use palpate_model::scene::Optimizer;
@@ -409,8 +412,12 @@ impl Laboratory for Lab<'_> {
         Ok(fields)
     }
 
-    fn separations(&mut self, a: &Model, b: &Model) -> Vec<(String, f64)> {
-        separations(&self.base, self.backend, a, b)
+    fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation> {
+        // What else may be missing comes first.
+        let quarter = |d: Instant| Instant::now() + d.saturating_duration_since(Instant::now()) / 4;
+        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline.map(quarter) };
+        let models: Vec<&Model> = std::iter::once(&named).chain(rivals).copied().collect();
+        separations(&self.base, self.backend, &models, &|| limits.check().is_ok())
     }
 
     fn iterations_left(&self) -> usize {

@@ -5,6 +5,7 @@ mod hypothesis;
 mod lab;
 mod others;
 mod refined;
+mod separate;
 mod systematic;
 mod walls;
 

@@ -1,4 +1,4 @@
-//! Other data and other experiments: a second recording of the same body, measurements that would tell hypotheses apart, contact.
+//! Other data and other looks: a second recording of the same body, times of contact, frames at rest.
 
 use super::hypothesis::{Prepared, is_own, lab_error, prepare};
 use super::lab::linearise;
@@ -128,51 +128,4 @@ pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, mo
     }
     let none = ready.free.len();
     linearise(&ready, &values, none)
-}
-
-/// How far two models are apart in motions that could be measured next: root mean square distance of nodes [m].
-pub(super) fn separations(base: &[Experiment], backend: Backend, a: &Model, b: &Model) -> Vec<(String, f64)> {
-    let first = &base[0];
-    let (low, high) = first.shape().bounds();
-    let size = (high - low).max_element();
-    let up = first.up();
-    let side = up.any_orthonormal_vector();
-    let g = first.scene.gravity.length().max(1.0);
-    let faster = (2.0 * g * size).sqrt();
-    let held = !first.plan.clamps.is_empty();
-    let mut scenarios: Vec<(String, DVec3, DVec3)> = vec![
-        (format!("a push of {:.2} m/s sideways at the start", 0.5 * faster), 0.5 * faster * side, DVec3::ZERO),
-        (format!("a spin of {:.1} rad/s about the vertical at the start", faster / size), DVec3::ZERO, faster / size * up),
-        (format!("a spin of {:.1} rad/s about a horizontal axis at the start", faster / size), DVec3::ZERO, faster / size * side),
-    ];
-    if !held {
-        scenarios.push((format!("a drop from {size:.2} m higher"), -faster * up, DVec3::ZERO));
-    }
-    let measurement = |m: &Model| m.changes.iter().any(Change::is_measurement);
-    if measurement(a) != measurement(b) {
-        // Another camera sees the motion itself.
-        scenarios.push(("the same motion seen by another camera".into(), DVec3::ZERO, DVec3::ZERO));
-    }
-    let motion = |m: &Model, v: DVec3, w: DVec3| -> Result<Vec<Vec<DVec3>>, Error> {
-        let ready = prepare(base, &m.changes)?;
-        let plan = &ready.experiments[0].plan;
-        let mut theta = ready.theta(0, &m.values);
-        for axis in 0..3u8 {
-            theta[plan.layout.index(ParamKey::Velocity(axis))] += v[usize::from(axis)];
-            theta[plan.layout.index(ParamKey::AngularVelocity(axis))] += w[usize::from(axis)];
-        }
-        let mut states = Vec::new();
-        backend.visit(plan, &theta, |_, s, _| {
-            states.push(s.displacement);
-            ControlFlow::Continue(())
-        })?;
-        Ok(states)
-    };
-    let apart = |(name, v, w): (String, DVec3, DVec3)| {
-        let (x, y) = (motion(a, v, w).ok()?, motion(b, v, w).ok()?);
-        let squares = x.iter().zip(&y).flat_map(|(x, y)| x.iter().zip(y)).map(|(x, y)| x.distance_squared(*y));
-        let (sum, n) = squares.fold((0.0, 0usize), |(s, n), d| (s + d, n + 1));
-        Some((name, (sum / n.max(1) as f64).sqrt()))
-    };
-    scenarios.into_iter().filter_map(apart).collect()
 }

@@ -6,7 +6,7 @@ use super::plots::{Curve, curves};
 use super::result::number;
 use crate::diagnosing::Diagnosed;
 use crate::residuals::ResidualSummary;
-use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Model, Verdict, stated};
+use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Model, Separated, Verdict, direction, stated};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -36,7 +36,11 @@ fn effect(f: &Found) -> Value {
         "held_out_gain": finite(f.held_out_gain),
         "accepted": f.accepted,
         "indistinguishable_from": f.indistinguishable_from,
-        "separated_by": f.separated_by.as_ref().map(|(what, by)| json!({ "measurement": what, "difference": by })),
+        "separated_by": f.separated_by.as_ref().filter(|s| !s.from.is_empty()).map(|s| json!({
+            "measurement": s.measurement, "difference": finite(s.difference), "noise": finite(s.noise),
+            "from": s.from, "not_from": s.not_from,
+        })),
+        "separation": f.separated_by.as_ref().map(Separated::sentence),
     })
 }
 
@@ -79,7 +83,7 @@ pub fn diagnosis_json(done: &Diagnosed) -> Value {
         })).collect::<Vec<_>>(),
         "not_tried": d.not_tried,
         "slack": d.slack.as_ref().map(|s| json!({
-            "share": finite(s.share),
+            "share": finite(s.share), "direction": s.words(),
             "windows": s.windows.iter().map(|w| json!({ "time": w.time, "values": w.values })).collect::<Vec<_>>(),
         })),
         "map": d.map.iter().map(|m| json!({
@@ -193,13 +197,15 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         writeln!(
             p,
             "<h2>What any load could explain</h2><p>A free force field, affine over the body and smooth in time, would explain {:.0} % of \
-             what is left. Its force per volume at the body's centre:</p><table><tr><th>time<th class=\"n\">x [N/m³]<th class=\"n\">y\
-             <th class=\"n\">z</tr>",
-            100.0 * slack.share
+             what is left; at the body's centre it {}. Its force per volume there:</p><table><tr><th>time<th class=\"n\">x [N/m³]\
+             <th class=\"n\">y<th class=\"n\">z<th>towards</tr>",
+            100.0 * slack.share,
+            slack.words()
         )?;
         for w in slack.windows.iter().filter(|w| w.values.len() >= 3) {
             let [x, y, z] = [0, 1, 2].map(|a| number(w.values[a]));
-            writeln!(p, "<tr><td>{:.3} s<td class=\"n\">{x}<td class=\"n\">{y}<td class=\"n\">{z}</tr>", w.time)?;
+            let towards = direction(w.force());
+            writeln!(p, "<tr><td>{:.3} s<td class=\"n\">{x}<td class=\"n\">{y}<td class=\"n\">{z}<td>{towards}</tr>", w.time)?;
         }
         writeln!(p, "</table>")?;
     }
@@ -222,8 +228,8 @@ fn effects(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
         if !f.indistinguishable_from.is_empty() {
             writeln!(p, " These data cannot tell it from <b>{}</b>.", escape(&f.indistinguishable_from.join(", ")))?;
         }
-        if let Some((what, by)) = &f.separated_by {
-            writeln!(p, " They would differ most in {}: by {:.3} mm.", escape(what), by * 1e3)?;
+        if let Some(s) = &f.separated_by {
+            writeln!(p, " {}", escape(&s.sentence()))?;
         }
         writeln!(p, "</p><table>")?;
         for (path, value, error, unit) in &f.parameters {
@@ -274,8 +280,8 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
         text += &format!("  {:width$}  {}{after}{unit}\n", n.path, fitted(&d.baseline, k));
     }
     for f in d.effects.iter().filter(|f| f.accepted) {
-        if let Some((what, by)) = &f.separated_by {
-            text += &format!("  to tell {} from the others: {what}; they differ by {:.3} mm there\n", f.kind, by * 1e3);
+        if let Some(next) = &f.separated_by {
+            text += &format!("  {}: {}\n", f.kind, next.sentence());
         }
     }
     let model = if done.experiments.len() == 1 { "model.toml" } else { "model-1.toml …" };

@@ -1,0 +1,355 @@
+//! Measurements that could be made next, simulated as their sensors would read them: every model with its own effects, those of the
+//! measurement among them, so that a biased camera is told from a stretched one just as wind is from drag.
+
+use super::hypothesis::{Prepared, prepare};
+use crate::embed::Embedding;
+use crate::engine::{Backend, between};
+use crate::experiment::Experiment;
+use crate::render::Pinhole;
+use crate::residuals::{pinhole, spread};
+use crate::synthetic::read_depths;
+use glam::{DAffine3, DQuat, DVec3};
+use palpate_diagnose::{Model, Separation, direction};
+use palpate_engine::Snapshot;
+use palpate_model::body::Body;
+use palpate_model::effects::sensors::Sensors;
+use palpate_model::observation::Observation;
+use palpate_model::params::ParamKey;
+use palpate_model::plan::Plan;
+use palpate_model::rotation::Polar;
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Frames that are compared, spread over the recording's.
+const FRAMES: usize = 12;
+/// Most columns and rows of a simulated depth image: differences of models are smooth.
+const PIXELS: usize = 96;
+
+/// Another way to load the body or to set it in motion.
+struct Trial {
+    what: String,
+    /// Added to the velocity at the start [m/s].
+    push: DVec3,
+    /// Added to the spin at the start [rad/s].
+    spin: DVec3,
+    /// Turns gravity.
+    turn: DQuat,
+}
+
+/// What several measurements would read of every rival, the models after the first, against the first one; those that could be simulated
+/// while `goes_on` says so.
+pub(super) fn separations(
+    base: &[Experiment],
+    backend: Backend,
+    models: &[&Model],
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Vec<Separation> {
+    let ready: Result<Vec<Prepared>, _> = models.iter().map(|m| prepare(base, &m.changes)).collect();
+    let (Ok(ready), watch) = (ready, Watch::new(&base[0])) else { return Vec::new() };
+    let mut out = Vec::new();
+    let simulate = |trial: &Trial| -> Option<Vec<Motion>> {
+        let one = |(m, r): (&&Model, &Prepared)| if goes_on() { watch.motion(r, &m.values, trial, backend) } else { None };
+        models.par_iter().zip(&ready).map(one).collect()
+    };
+    let mut compare = |measurement: String, motions: &[Motion], cameras: &[Pinhole], markers: bool| {
+        let seen: Vec<Seen> = motions.par_iter().map(|m| watch.read(m, cameras, markers)).collect();
+        let differences: Option<Vec<(f64, f64)>> = seen[1..].iter().map(|s| watch.apart(&seen[0], s)).collect();
+        out.extend(differences.map(|differences| Separation { measurement, differences }));
+    };
+    if !watch.cameras.is_empty()
+        && let Some(motions) =
+            simulate(&Trial { what: String::new(), push: DVec3::ZERO, spin: DVec3::ZERO, turn: DQuat::IDENTITY })
+    {
+        for (what, cameras) in watch.views(&motions[0], base[0].up()) {
+            compare(what, &motions, &cameras, false);
+        }
+    }
+    for trial in trials(&base[0]) {
+        if let Some(motions) = simulate(&trial) {
+            compare(trial.what, &motions, &watch.cameras, true);
+        }
+    }
+    out
+}
+
+/// Motions that start in another way, and loads from another side.
+fn trials(e: &Experiment) -> Vec<Trial> {
+    let (low, high) = e.shape().bounds();
+    let size = (high - low).max_element();
+    let up = e.up();
+    let side = up.any_orthonormal_vector();
+    let gravity = e.scene.gravity;
+    let speed = (2.0 * gravity.length().max(1.0) * size).sqrt();
+    let plain = |what: String| Trial { what, push: DVec3::ZERO, spin: DVec3::ZERO, turn: DQuat::IDENTITY };
+    let mut out = Vec::new();
+    if e.plan.clock.steps > 0 {
+        let rate = speed / size;
+        let pushed = plain(format!("a push of {:.2} m/s sideways at the start", 0.5 * speed));
+        out.push(Trial { push: 0.5 * speed * side, ..pushed });
+        out.push(Trial { spin: rate * up, ..plain(format!("a spin of {rate:.1} rad/s about the vertical at the start")) });
+        out.push(Trial { spin: rate * side, ..plain(format!("a spin of {rate:.1} rad/s about a horizontal axis at the start")) });
+        if e.plan.clamps.is_empty() && !e.plan.planes.is_empty() {
+            out.push(Trial { push: -speed * up, ..plain(format!("a drop from {size:.2} m higher")) });
+        }
+    }
+    // On the ground a body would slide away.
+    if gravity != DVec3::ZERO && e.plan.planes.is_empty() {
+        for (axis, angle) in [(side, FRAC_PI_2), (side.cross(up), FRAC_PI_2), (side, PI)] {
+            let turn = DQuat::from_axis_angle(axis, angle);
+            out.push(Trial {
+                turn,
+                ..plain(format!("the setup turned, so that gravity pulls towards {}", direction(turn * gravity)))
+            });
+        }
+    }
+    out
+}
+
+/// What watches, as the recording has it.
+struct Watch {
+    /// Without frames: nothing is compared with the recording.
+    observation: Arc<Observation>,
+    /// On the recording's clock [s].
+    times: Vec<f64>,
+    surface: Embedding,
+    triangles: Vec<[u32; 3]>,
+    /// As the recording states them.
+    cameras: Vec<Pinhole>,
+    /// The largest difference of a depth that counts [m]: where an outline has moved by a pixel, depth jumps by as much as the body is deep.
+    largest: f64,
+}
+
+/// A simulated motion, and what its model says of the sensors.
+struct Motion {
+    /// Node displacements of every frame [m].
+    frames: Vec<Vec<DVec3>>,
+    body: Arc<Body>,
+    sensors: Sensors,
+}
+
+/// What is read of a motion.
+#[derive(Default)]
+struct Seen {
+    /// By frame, camera and pixel [m]; infinite where nothing is.
+    depths: Vec<f64>,
+    /// By frame and marker [m].
+    markers: Vec<DVec3>,
+}
+
+impl Watch {
+    fn new(e: &Experiment) -> Watch {
+        let o = &e.plan.observation;
+        let all: Vec<usize> = (0..o.frames.len()).collect();
+        let count = if e.plan.clock.steps == 0 { 1 } else { FRAMES };
+        let (surface, triangles) = e.surface(0.5 * e.plan.body.grid.h);
+        Watch {
+            observation: Arc::new(o.without_frames()),
+            times: spread(&all, count).into_iter().map(|f| o.frames[f].time).collect(),
+            surface,
+            triangles,
+            cameras: e.recording().iter().flat_map(|r| &r.cameras).map(|c| coarse(pinhole(c))).collect(),
+            largest: e.plan.body.grid.h,
+        }
+    }
+
+    /// Simulates a model of the first scene; `None` where that fails.
+    fn motion(&self, ready: &Prepared, values: &[f64], trial: &Trial, backend: Backend) -> Option<Motion> {
+        let plan = Plan { observation: self.observation.clone(), ..ready.experiments[0].plan.clone() };
+        let mut theta = ready.theta(0, values);
+        let place = |key| plan.layout.index(key);
+        let gravity = trial.turn * DVec3::from_array([0u8, 1, 2].map(|a| theta[place(ParamKey::Gravity(a))]));
+        for a in 0..3u8 {
+            theta[place(ParamKey::Velocity(a))] += trial.push[usize::from(a)];
+            theta[place(ParamKey::AngularVelocity(a))] += trial.spin[usize::from(a)];
+            theta[place(ParamKey::Gravity(a))] = gravity[usize::from(a)];
+        }
+        let sensors = Sensors::new(&plan.layout, &theta);
+        let start = theta[place(ParamKey::TimeStart)] + sensors.ahead();
+        let mut waiting = self.times.iter().map(|t| t - start).peekable();
+        let (mut frames, mut last) = (Vec::new(), None::<Snapshot>);
+        let visit = |_, state: Snapshot, _| {
+            while let Some(t) = waiting.next_if(|t| *t <= state.time) {
+                frames.push(last.as_ref().map_or_else(|| state.displacement.clone(), |a| between(a, &state, t)));
+            }
+            last = Some(state);
+            ControlFlow::Continue(())
+        };
+        backend.visit(&plan, &theta, visit).ok()?;
+        // A body at rest has one state, and the last one is held.
+        let last = last?;
+        frames.extend(waiting.map(|_| last.displacement.clone()));
+        Some(Motion { frames, body: plan.body, sensors })
+    }
+
+    /// What cameras at these stated poses, and markers where they are wanted, read of a motion.
+    fn read(&self, m: &Motion, cameras: &[Pinhole], markers: bool) -> Seen {
+        let mut out = Seen::default();
+        for u in &m.frames {
+            let vertices = self.surface.deform(u);
+            for (number, stated) in cameras.iter().enumerate() {
+                let number = number as u32;
+                let camera =
+                    Pinhole { world_from_camera: m.sensors.true_pose(number, stated.world_from_camera), ..stated.clone() };
+                out.depths.extend(read_depths(&m.sensors, number, &camera, &vertices, &self.triangles).depth);
+            }
+            for number in (0..self.observation.markers.len()).filter(|_| markers) {
+                let site = m.sensors.site(&self.observation, number as u32);
+                let (p, f) = site.carry(|i| m.body.nodes[i] + u[i]);
+                out.markers.push(p + Polar::new(f).r * site.stalk);
+            }
+        }
+        out
+    }
+
+    /// Root mean square difference of readings and the noise of one [m], of depths or of markers, whichever shows more; `None` where nothing
+    /// is seen of both.
+    fn apart(&self, a: &Seen, b: &Seen) -> Option<(f64, f64)> {
+        let o = &self.observation;
+        let depths = a.depths.iter().zip(&b.depths).filter(|(a, b)| a.is_finite() && b.is_finite());
+        let depths = mean_square(depths.map(|(a, b)| (a - b).abs().min(self.largest).powi(2)));
+        let markers = mean_square(a.markers.iter().zip(&b.markers).map(|(a, b)| a.distance_squared(*b)));
+        // A marker has three coordinates.
+        let both = [depths.map(|d| (d.sqrt(), o.depth_noise)), markers.map(|d| (d.sqrt(), 3f64.sqrt() * o.marker_noise))];
+        both.into_iter().flatten().max_by(|x, y| (x.0 / x.1).total_cmp(&(y.0 / y.1)))
+    }
+
+    /// The cameras elsewhere: nearer and farther along the line to the middle of a motion, and a quarter turn around it.
+    fn views(&self, m: &Motion, up: DVec3) -> Vec<(String, Vec<Pinhole>)> {
+        let middle = |u: &Vec<DVec3>| {
+            let x = self.surface.deform(u);
+            x.iter().sum::<DVec3>() / x.len().max(1) as f64
+        };
+        let target = m.frames.iter().map(middle).sum::<DVec3>() / m.frames.len().max(1) as f64;
+        let which = if self.cameras.len() == 1 { "the camera" } else { "every camera" };
+        let at = |factor: f64| {
+            move |c: &Pinhole| DAffine3 {
+                translation: target + factor * (c.world_from_camera.translation - target),
+                ..c.world_from_camera
+            }
+        };
+        let around = |c: &Pinhole| {
+            let m = c.world_from_camera.matrix3;
+            // One that looks down sees the side by coming down.
+            let axis = if m.z_axis.dot(up).abs() < std::f64::consts::FRAC_1_SQRT_2 { up } else { m.x_axis };
+            let turn = DAffine3::from_quat(DQuat::from_axis_angle(axis, FRAC_PI_2));
+            DAffine3::from_translation(target) * turn * DAffine3::from_translation(-target) * c.world_from_camera
+        };
+        let stand = |pose: &dyn Fn(&Pinhole) -> DAffine3| {
+            self.cameras.iter().map(|c| Pinhole { world_from_camera: pose(c), ..c.clone() }).collect::<Vec<_>>()
+        };
+        vec![
+            (format!("{which} at 3/4 of its distance"), stand(&at(0.75))),
+            (format!("{which} at 1.5 times its distance"), stand(&at(1.5))),
+            (format!("{which} a quarter turn around the body"), stand(&around)),
+        ]
+    }
+}
+
+fn mean_square(squares: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = squares.fold((0.0, 0usize), |(s, n), d| (s + d, n + 1));
+    (n > 0).then(|| sum / n as f64)
+}
+
+/// The same camera with fewer and larger pixels.
+fn coarse(c: Pinhole) -> Pinhole {
+    let n = c.width.max(c.height).div_ceil(PIXELS).max(1);
+    let by = n as f64;
+    let middle = |x: f64| (x + 0.5) / by - 0.5;
+    Pinhole { width: c.width / n, height: c.height / n, fx: c.fx / by, fy: c.fy / by, cx: middle(c.cx), cy: middle(c.cy), ..c }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::Sensor;
+    use crate::synthetic::{Observers, observe};
+    use palpate_diagnose::{Change, Separated};
+    use palpate_model::effects::{Effect, find};
+
+    /// A block that hangs from its top, three cells of a centimetre long, at rest under its own weight.
+    const HANGING: &str = r#"
+        format = "scene/1"
+        [object]
+        shape = { box = { min = [0, 0, 0], max = [0.02, 0.02, 0.03] } }
+        cell_size = 0.01
+        [material]
+        density = 1000.0
+        youngs_modulus = 2.0e3
+        poisson_ratio = 0.4
+        [world]
+        gravity = [0.0, 0.0, -9.81]
+        [[clamp]]
+        box = { min = [-0.01, -0.01, 0.029], max = [0.03, 0.03, 0.04] }
+        [initial]
+        state = "static-equilibrium"
+        [time]
+        duration = 0
+    "#;
+
+    /// The block as a camera half a metre away has seen it, and a marker on its lower face.
+    fn seen(folder: &std::path::Path) -> Experiment {
+        let truth = Experiment::from_toml(HANGING, "hanging.toml").unwrap();
+        let camera = "eye=0.01,-0.49,0.015 target=0.01,0.01,0.015 fov=6 size=40x40".parse().unwrap();
+        let observers = Observers {
+            cameras: vec![camera],
+            markers: vec![("low".into(), DVec3::new(0.01, 0.01, 0.0))],
+            times: vec![0.0],
+            sensor: Sensor { noise: 5e-4, dropout: 0.0, depth_scale: 1e-4, seed: 1 },
+        };
+        let recording = observe(&truth, Backend::Cpu, &observers, |_| ControlFlow::Continue(())).unwrap();
+        palpate_io::write_recording(folder.join("seen"), &recording).unwrap();
+        let text = format!("{HANGING}\n[observation]\nrecording = \"seen\"\ncost = [\"sparse-surface\", \"markers\"]\n");
+        Experiment::from_toml(&text, folder.join("scene.toml")).unwrap()
+    }
+
+    /// A model with one effect at these values of its free numbers.
+    fn model(base: &[Experiment], kind: &str, values: &[f64]) -> Model {
+        let changes = vec![Change::Effect(Effect::absent(find(kind).unwrap()))];
+        let numbers = prepare(base, &changes).unwrap().numbers();
+        assert_eq!(numbers.len(), values.len(), "{kind}");
+        Model { changes, numbers, values: values.to_vec(), errors: vec![None; values.len()] }
+    }
+
+    fn best(base: &[Experiment], models: &[&Model], names: &[&str]) -> (Separated, Vec<Separation>) {
+        let ways = separations(base, Backend::Cpu, models, &|| true);
+        println!("{ways:#?}");
+        let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
+        (Separated::best(&ways, &names).unwrap(), ways)
+    }
+
+    #[test]
+    fn a_bias_is_told_from_a_scale_at_another_distance_and_from_its_twin_nowhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let base = [seen(folder.path())];
+        let bias = model(&base, "depth-bias", &[0.004]);
+        // What both read of the near face, 0.49 m away.
+        let scale = model(&base, "depth-scale", &[0.004 / 0.49]);
+        let (next, _) = best(&base, &[&bias, &scale], &["depth-scale"]);
+        assert_eq!(next.measurement, "the camera at 1.5 times its distance");
+        // Half the bias more, but for what the grid rounds off the body and pixels at its sides.
+        assert!((next.difference / 0.002 - 1.0).abs() < 0.1, "{next:?}");
+        assert_eq!(next.from, ["depth-scale"]);
+        // Two names that read the same everywhere cannot be told apart, and are said not to be.
+        let twin = model(&base, "depth-bias", &[0.0041]);
+        let (none, _) = best(&base, &[&bias, &twin], &["twin"]);
+        assert!(none.from.is_empty() && none.sentence().starts_with("None of the measurements"), "{none:?}");
+    }
+
+    #[test]
+    fn loads_on_a_body_at_rest_are_told_apart_by_turning_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let base = [seen(folder.path())];
+        // A fifth of the weight more: as a force that stays with the setup, and as a denser body.
+        let force = model(&base, "uniform-force", &[0.0, 0.0, -2000.0]);
+        let changes = vec![Change::Freed { name: "density", sentence: "", paths: vec!["material.density".into()] }];
+        let numbers = prepare(&base, &changes).unwrap().numbers();
+        let density = Model { changes, numbers, values: vec![1000.0 + 2000.0 / 9.81], errors: vec![None] };
+        let (next, ways) = best(&base, &[&force, &density], &["density"]);
+        assert!(next.measurement.starts_with("the setup turned, so that gravity pulls towards"), "{next:?}");
+        // As it hangs, both look the same from everywhere: solvers leave 1e-8 of a centimetre, depth at pixels of the outline more.
+        let views = ways.iter().filter(|w| w.measurement.contains("the camera"));
+        assert!(views.map(|w| w.differences[0].0).fold(0.0, f64::max) < 1e-6, "{ways:?}");
+    }
+}
