@@ -6,7 +6,7 @@ use support::command::{arg, palpate, succeed};
 
 #[test]
 fn help_teaches_and_versions_are_told() {
-    for command in ["simulate", "observe", "fit", "inspect"] {
+    for command in ["simulate", "observe", "fit", "inspect", "diagnose"] {
         let a = succeed(&[command, "--help"]);
         assert!(a.out.contains("Examples:") && a.out.contains(&format!("palpate {command}")), "{}", a.out);
     }
@@ -51,6 +51,10 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         (&["fit", s, "--out", o], &["block.toml", "fit.parameter"]),
         (&["fit", s, "--optimizer", "magic"], &["magic", "gauss-newton"]),
         (&["inspect", "no-such"], &["no-such"]),
+        (&["diagnose", s, "--out", o], &["block.toml", "observation", "recording"]),
+        (&["diagnose", s, "--out", o, "--budget", "0"], &["--budget 0", "> 0", "minutes"]),
+        (&["diagnose", s, "--out", o, "--budget", "soon"], &["--budget", "soon"]),
+        (&["diagnose", s, "--out", o, "--held-out", "no-such.toml"], &["no-such.toml", "no such file"]),
     ];
     for (arguments, words) in cases {
         let a = palpate(arguments);

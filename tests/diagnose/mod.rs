@@ -2,6 +2,7 @@
 
 mod blind;
 mod measured;
+mod resuming;
 mod stopping;
 
 use crate::cli::BLOCK;
