@@ -1,6 +1,6 @@
 //! A bounded number of conjugate-gradient iterations, one workgroup per member; every scalar stays on the device. Ends in the
 //! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: 0 = a Newton direction
-//! (a negative curvature asks for the convex tangent), 1 = a derivative (it is an error).
+//! (a negative curvature cuts it short), 1 = a derivative (it is an error).
 // use shared/mix
 // use shared/inertia
 // use shared/totals

@@ -1,4 +1,6 @@
-//! Where a member goes from conjugate gradients: to the line search, to the convex tangent, to an error, or on with iterations.
+//! Where a member goes from conjugate gradients: to the line search, to the convex tangent, to an error, or on with iterations. A
+//! curvature that is not positive cuts a Newton direction short: what was gathered by then leads down (Dembo & Steihaug, Math.
+//! Program. 26, 1983). Where that is nothing the convex tangent is asked for.
 
 var<storage, read> residual: array<vec4<f32>>;
 var<storage, read_write> direction: array<vec4<f32>>;
@@ -9,9 +11,12 @@ var<storage, read_write> health: array<Health>;
 const ACCEPTABLE = 1e-4;
 
 // `exact`: the solve is for a derivative; then a negative curvature is an error, and no line search follows.
-fn leave_cg(local: u32, member: u32, found: Newton, negative: bool, ended: bool, exact: bool) {
+fn leave_cg(local: u32, member: u32, found: Newton, bent: bool, over: bool, exact: bool) {
     var n = found;
     var broken = 0u;
+    let cut = bent && !exact && n.cg > 1u;
+    let negative = bent && !cut;
+    let ended = over || cut;
     if negative {
         n.total += n.cg;
         n.stage = WANTS_MATRIX;
@@ -27,7 +32,7 @@ fn leave_cg(local: u32, member: u32, found: Newton, negative: bool, ended: bool,
         let relative = sqrt(max(n.rz, 0.0)) / n.norm;
         // A poor Newton direction is the line search's business.
         let enough = select(0.5, ACCEPTABLE, exact);
-        if !(relative <= enough) {
+        if !(relative <= enough) && !cut {
             broken = UNSOLVED;
         }
         var slope = vec4(0.0);
