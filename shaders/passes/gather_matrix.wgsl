@@ -3,6 +3,7 @@
 // use shared/mix
 // use shared/fields
 // use shared/inertia
+// use shared/tangents
 
 var<storage, read> cells: array<Cell>;
 var<storage, read> elements: array<f32>;
@@ -11,7 +12,6 @@ var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> holds: array<vec2<u32>>;
 var<storage, read> hold_elements: array<f32>;
 var<storage, read> poses: array<ClampPose>;
-var<storage, read> tangents: array<vec4<f32>>;
 var<storage, read> place_rows: array<u32>;
 // 64 · cell + 8 · i + j.
 var<storage, read> places: array<u32>;
@@ -37,13 +37,13 @@ fn hold_block(start: u32, i: u32, j: u32) -> mat3x3<f32> {
     );
 }
 
-fn three(at: u32) -> mat3x3<f32> {
-    return mat3x3(tangents[at].xyz, tangents[at + 1u].xyz, tangents[at + 2u].xyz);
+fn sign_of(corner: u32) -> vec3<f32> {
+    return vec3(f32(corner & 1u), f32((corner >> 1u) & 1u), f32((corner >> 2u) & 1u)) * 2.0 - vec3(1.0);
 }
 
 // R Ω_i = −R [b_i]× G⁻¹.
 fn turned_omega(r: mat3x3<f32>, g: mat3x3<f32>, corner: u32) -> mat3x3<f32> {
-    let b = (vec3(f32(corner & 1u), f32((corner >> 1u) & 1u), f32((corner >> 2u) & 1u)) * 2.0 - vec3(1.0)) * (-0.25 / shape.h);
+    let b = sign_of(corner) * (-0.25 / shape.h);
     return r * (mat3x3(vec3(0.0, b.z, -b.y), vec3(-b.z, 0.0, b.x), vec3(b.y, -b.x, 0.0)) * g);
 }
 
@@ -71,6 +71,9 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         sum += (r * block * transpose(r)) * (mix.on_new * young);
         sum += turned_omega(r, g, i) * transpose(three(at + 6u + 3u * j));
         sum += three(at + 6u + 3u * i) * transpose(turned_omega(r, g, j));
+        if has_guard(at) {
+            sum += r * guard_block(at, sign_of(i), sign_of(j)) * transpose(r);
+        }
         for (var h = cells[e].hold_start; h < cells[e].hold_end; h++) {
             var instant = 0u;
             if call.mode != 0u {

@@ -1,8 +1,8 @@
 //! Elastic part of q = A p without a matrix: every cell applies R (s K + …) Rᵀ of its class (see tangent_cells), its clamps and its
 //! patches to its corners, for gather_product.
 // use shared/cells
+// use shared/tangents
 
-var<storage, read> tangents: array<vec4<f32>>;
 var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> holds: array<vec2<u32>>;
@@ -11,10 +11,6 @@ var<storage, read> poses: array<ClampPose>;
 var<storage, read> cg_scalars: array<vec4<f32>>;
 var<storage, read> cg_along: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
-
-fn three(at: u32) -> mat3x3<f32> {
-    return mat3x3(tangents[at].xyz, tangents[at + 1u].xyz, tangents[at + 2u].xyz);
-}
 
 fn hold_block(start: u32, i: u32, j: u32) -> mat3x3<f32> {
     let a = start + 72u * j + 3u * i;
@@ -49,6 +45,13 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let along_d = sum8(transpose(d) * x);
     let along_omega = sum8(transpose(omega) * x);
     y += omega * along_d + d * along_omega;
+    if has_guard(at) {
+        var a = mat3x3<f32>();
+        for (var j = 0u; j < 8u; j++) {
+            a += dyad(transpose(r) * cg_along[at_node(p.member, cell.nodes[j])].xyz, slope_of(sign_of(j)));
+        }
+        y += r * (guard_rate(at, a) * slope_of(sign_of(corner)));
+    }
     for (var k = cell.hold_start; k < cell.hold_end; k++) {
         var instant = 0u;
         if call.mode != 0u {

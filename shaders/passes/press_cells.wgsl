@@ -1,5 +1,7 @@
-//! Elastic and viscous force of every cell on its corners at the new state, and what clamps and planes do to them.
+//! Elastic and viscous force of every cell on its corners at the new state, with the guard against inversion; and what clamps and
+//! planes do to them.
 // use shared/corner
+// use shared/guard
 // use shared/supports
 
 var<storage, read> next: array<vec4<f32>>;
@@ -26,11 +28,15 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         before = c.mix.on_old * old_stress[c.at].xyz;
     }
     let y = (c.mix.on_new * c.young) * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, pose.q) + before;
-    let f = force(pose, y, c.sign);
-    let energy = 0.5 * dot(pose.q, y + before);
+    var f = vec4(force(pose, y, c.sign), 0.5 * dot(pose.q, y + before));
+    // A rotation that is given does not jump.
+    if !is_lagged() && is_guarded(pose.s) {
+        let g = guard_force(pose.s, c.sign, guard_unit(c.mix.fresh * c.young, cells[c.cell]));
+        f += vec4(pose.r * g.xyz, g.w);
+    }
     let support = support_of(cells[c.cell], c.member, c.number);
     if c.live {
-        cell_force[c.at] = vec4(f, energy);
+        cell_force[c.at] = f;
         cell_support[c.at] = support;
     }
 }

@@ -2,6 +2,7 @@
 //! the passes of clamps and planes, time and planes; of stiffness that varies, and of the stress-free shape. call.extra is the kind of the parameter, plus 32
 //! times the row of a field's slopes.
 // use shared/corner
+// use shared/guard
 // use shared/slopes
 // use shared/supports
 // use shared/keys
@@ -65,6 +66,10 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         f = force(fresh, factor * stiff(matrix, c.number, on_new * fresh.q + on_old * old.q), c.sign);
         if !is_lagged() {
             f += force(old, (factor * own) * stiff(matrix, c.number, old.q), c.sign);
+            // The guard is a multiple of the modulus, at the new state only, and damps nothing.
+            if kind != POISSON_RATIO && kind != STIFFNESS_DAMPING && is_guarded(fresh.s) {
+                f += fresh.r * guard_force(fresh.s, c.sign, guard_unit(factor * c.mix.fresh, cells[c.cell])).xyz;
+            }
         }
     }
     if kind == REST_SLOPE {

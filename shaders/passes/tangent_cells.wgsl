@@ -1,7 +1,8 @@
 //! What a cell's tangent H_ij = R (s K_ij + Ω_i D_jᵀ + D_i Ω_jᵀ) Rᵀ is made of, beside K: R, G⁻¹ and R D_i per corner
-//! (corotation.rs: D = B + ½QΩ − s(N − ½TΩ); without B and Q where the convex part is wanted). 30 vectors per cell: no 24 × 24
-//! matrix is ever stored.
+//! (corotation.rs: D = B + ½QΩ − s(N − ½TΩ); without B and Q where the convex part is wanted); and the guard against inversion, as
+//! shared/tangents.wgsl says. 30 vectors per cell: no 24 × 24 matrix is ever stored.
 // use shared/rank_six
+// use shared/guard
 // use shared/unstrained
 
 var<storage, read> next: array<vec4<f32>>;
@@ -39,7 +40,8 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         before = mix.on_old * old_stress[(p.member * shape.cells + e) * 8u + corner].xyz;
     }
     let y = centred(scale * stiff(matrix, corner, pose.q) + before);
-    var half = rank_six(pose, matrix, corner, sign, scale, y, newton[p.member].convex != 0u);
+    let convex = newton[p.member].convex != 0u;
+    var half = rank_six(pose, matrix, corner, sign, scale, y, convex);
     // A rotation that is given does not answer to the corners.
     if is_lagged() {
         half = mat3x3<f32>();
@@ -54,6 +56,20 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             for (var c = 0u; c < 3u; c++) {
                 tangents[at + c] = vec4(pose.r[c], 0.0);
                 tangents[at + 3u + c] = vec4(pose.g[c], 0.0);
+            }
+            // A rotation that is given does not jump.
+            if !is_lagged() && is_guarded(pose.s) {
+                let guard = guard_at(pose.s);
+                let unit = guard_unit(mix.fresh * young, cell);
+                let s = pose.s;
+                tangents[at].w = unit * guard.bend;
+                tangents[at + 1u].w = select(unit * guard.slope, 0.0, convex);
+                tangents[at + 2u].w = s[0].x;
+                tangents[at + 3u].w = s[0].y;
+                tangents[at + 4u].w = s[0].z;
+                tangents[at + 5u].w = s[1].y;
+                tangents[at + 6u].w = s[1].z;
+                tangents[at + 7u].w = s[2].z;
             }
         }
     }

@@ -67,7 +67,8 @@ struct Cell { // mirrored
     hold_start: u32,
     hold_end: u32,
     fraction: f32,
-    pad: array<u32, 2>,
+    whole: f32,
+    pad: u32,
 }
 
 struct Patch { // mirrored

@@ -59,7 +59,7 @@ impl Most {
             ("list_members", self.members + 16),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
             ("begin_solve", self.share() * (4 + 9 * self.masses) + 300),
-            ("gather_matrix", 8 * (1 + 2 * self.supports) + 12),
+            ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]
     }
@@ -128,7 +128,8 @@ impl Geometry {
                     hold_start: holds.partition_point(|h| h.1 < number) as u32,
                     hold_end: holds.partition_point(|h| h.1 <= number) as u32,
                     fraction: classes.fractions[e] as f32,
-                    pad: [0; 2],
+                    whole: cell.fraction as f32,
+                    pad: 0,
                 }
             })
             .collect();

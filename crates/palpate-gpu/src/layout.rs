@@ -161,10 +161,12 @@ pub struct Cell {
     pub hold_start: u32,
     /// One past the last.
     pub hold_end: u32,
-    /// Part of its volume that is filled.
+    /// Part of its volume that is filled and not held by a clamp.
     pub fraction: f32,
+    /// Part of its volume that is filled.
+    pub whole: f32,
     /// Fills up.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// A surface patch.

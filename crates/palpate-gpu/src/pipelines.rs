@@ -40,6 +40,8 @@ pub struct Kernel {
 pub struct Pipelines {
     /// How lanes talk.
     pub lanes: Lanes,
+    /// Values of overrides; tests put a wrong one in.
+    pub(crate) constant: fn(&str) -> Option<f64>,
     kernels: Vec<OnceLock<Result<Kernel, GpuError>>>,
 }
 
@@ -47,28 +49,30 @@ pub struct Pipelines {
 pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
 
 /// Value of an override: every constant that host and kernels share has its one source in `palpate-model`.
-fn constant(name: &str) -> Option<f64> {
+pub(crate) fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_width" => palpate_model::contact::WIDTH,
         "sdf_pieces" => palpate_model::distances::PIECES as f64,
         "smallest_pair" => palpate_model::rotation::SMALLEST_PAIR,
         "newton_determinant" => palpate_model::rotation::NEWTON_DETERMINANT,
+        "guard_start" => palpate_model::corotation::inversion::START,
+        "guard_strength" => palpate_model::corotation::inversion::STRENGTH,
         _ => return None,
     })
 }
 
 impl Pipelines {
     pub(crate) fn new(lanes: Lanes) -> Pipelines {
-        Pipelines { lanes, kernels: PASSES.iter().map(|_| OnceLock::new()).collect() }
+        Pipelines { lanes, constant, kernels: PASSES.iter().map(|_| OnceLock::new()).collect() }
     }
 
     /// The kernel of a pass.
     pub(crate) fn get(&self, gpu: &Gpu, pass: usize) -> Result<&Kernel, &GpuError> {
-        self.kernels[pass].get_or_init(|| compile(gpu, &PASSES[pass], self.lanes)).as_ref()
+        self.kernels[pass].get_or_init(|| compile(gpu, &PASSES[pass], self)).as_ref()
     }
 }
 
-pub(crate) fn compile(gpu: &Gpu, source: &PassSource, lanes: Lanes) -> Result<Kernel, GpuError> {
+pub(crate) fn compile(gpu: &Gpu, source: &PassSource, pipelines: &Pipelines) -> Result<Kernel, GpuError> {
     let device = &gpu.device;
     let entries: Vec<wgpu::BindGroupLayoutEntry> = source
         .bindings
@@ -97,12 +101,12 @@ pub(crate) fn compile(gpu: &Gpu, source: &PassSource, lanes: Lanes) -> Result<Ke
         bind_group_layouts: &[Some(&layout)],
         immediate_size: CALL_BYTES,
     });
-    let text = source.sources[usize::from(lanes == Lanes::Memory)];
+    let text = source.sources[usize::from(pipelines.lanes == Lanes::Memory)];
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label,
         source: wgpu::ShaderSource::Wgsl(std::borrow::Cow::Borrowed(text)),
     });
-    let constants: Vec<(&str, f64)> = source.overrides.iter().filter_map(|n| Some((*n, constant(n)?))).collect();
+    let constants: Vec<(&str, f64)> = source.overrides.iter().filter_map(|n| Some((*n, (pipelines.constant)(n)?))).collect();
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label,
         layout: Some(&whole),

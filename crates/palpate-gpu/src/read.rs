@@ -23,7 +23,12 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
     let (kind, what) = match h.code {
         0 => return None,
         1 => (FailureKind::NotFinite, "displacement, velocity or residual of a node".to_string()),
-        2 => (FailureKind::NewtonStalled, format!("{b} iterations left a scaled residual of {a:.1e} of the forces")),
+        2 => (
+            FailureKind::NewtonStalled,
+            format!(
+                "{b} iterations left a scaled residual of {a:.1e} of the forces (--backend cpu may get further with a crushed body)"
+            ),
+        ),
         3 => (FailureKind::LinearSolve, format!("{b} conjugate gradient iterations left a relative residual of {a:.1e}")),
         4 => (FailureKind::LinearSolve, "the matrix is not positive definite".to_string()),
         5 => (FailureKind::FellOut, format!("a node moved {} m", number(a.into()))),

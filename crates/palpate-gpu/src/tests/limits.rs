@@ -6,7 +6,7 @@ use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
-use crate::pipelines::{PASSES, PassSource, compile, pass};
+use crate::pipelines::{PASSES, PassSource, Pipelines, compile, pass};
 use crate::recorder::{Args, Recorder, Size};
 use crate::solve::{ALL, Per, SOLVE, Solve};
 use crate::tuning::Tuning;
@@ -187,7 +187,7 @@ fn a_kernel_that_does_not_compile_is_named() {
     {
         let source =
             PassSource { name: "broken", sources: [text; 2], lanes: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
-        let e = compile(&gpu, &source, Lanes::Memory).err().unwrap_or_else(|| panic!("{text} compiles"));
+        let e = compile(&gpu, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
         assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
         assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");
         // The device is none the worse.

@@ -2,6 +2,7 @@
 
 mod cell_laws;
 mod clocks;
+mod collapse;
 mod derivatives;
 mod effects;
 mod extremes;

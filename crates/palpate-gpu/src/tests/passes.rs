@@ -24,7 +24,10 @@ use palpate_model::plane::planes;
 use palpate_model::scene::Scene;
 
 /// What one pass computed: its name, numbers, and the part of the largest number that may differ.
-type Part = (&'static str, Vec<f64>, f64);
+pub(super) type Part = (&'static str, Vec<f64>, f64);
+
+/// Old displacement [m] and velocity [m/s], and the increment beyond free flight [m], at a node.
+type Given = fn(DVec3) -> [DVec3; 3];
 
 // Displacements have 24 bits of the increment and of the flight alone. Forces of cells are sums of products with strains of some
 // percent, each with an error of 6e-8 of the edge: 1e-6 of the force, times the bulk modulus over the shear modulus. Matrices and
@@ -36,7 +39,7 @@ const MATRIX: f64 = 2e-6;
 const SOLVED: f64 = 3e-5;
 const ENERGY: f64 = 1e-4;
 
-/// Old displacement [m] and velocity [m/s], and the increment beyond free flight [m], at a node: turned, stretched, waved.
+/// Turned, stretched, waved.
 fn given(x: DVec3) -> [DVec3; 3] {
     let wave = |f: f64| DVec3::new((f * x.y).sin(), (f * x.z + 1.0).cos(), (f * (x.x + x.y)).sin());
     let turn = DMat3::from_rotation_y(0.2);
@@ -65,8 +68,13 @@ fn vectors(v: &[[f32; 4]]) -> Vec<DVec3> {
     v.iter().map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into())).collect()
 }
 
+/// True without effects.
+fn without_effects(plan: &Plan) -> bool {
+    plan.layout.effects().next().is_none()
+}
+
 /// The device's numbers, with A of the CPU to check solutions by.
-fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
+pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
     let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     world.set_iterations(1);
@@ -74,7 +82,7 @@ fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
     let tally = backend.new_tally(world, &[]);
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let quantum = f64::from(world.geometry.shape.quantum);
-    let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| given(*x)).collect();
+    let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| (right.given)(*x)).collect();
     let mut old = vec![[0.0f32; 4]; 3 * n];
     for (i, [u, v, _]) in all.iter().enumerate() {
         let whole = (*u / quantum).round() * quantum;
@@ -108,6 +116,7 @@ fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
     let potential = |r: &[[f32; 4]]| r.iter().map(|v| f64::from(v[3])).sum::<f64>();
     let half = potential(&trial(0.5));
     let residual = trial(1.0);
+    let forces = three(&get("cell_force", 8 * plan.body.cells.len()));
     step(world, &now, &next, &tally, |s| s.assemble(ALL));
     let placed: Vec<[f32; 4]> = world.gpu.download(&next.0.buffer, 2 * n).unwrap_or_else(|e| panic!("{e}"));
     let u1: Vec<DVec3> = vectors(&placed[..n]).iter().zip(vectors(&placed[n..])).map(|(a, b)| *a + b).collect();
@@ -121,11 +130,18 @@ fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
         s.multiply(Product::Matrix, 0);
     });
     let (along, image) = (vectors(&get("cg_along", n)), get("cg_image", n));
+    // Without a matrix nothing knows of what effects add to it.
+    let free = without_effects(plan).then(|| {
+        step(world, &now, &next, &tally, |s| {
+            s.multiply(Product::Free, 0);
+        });
+        ("multiply_cells", right.off_product(&along, &vectors(&get("cg_image", n))), MATRIX)
+    });
     step(world, &now, &next, &tally, |s| s.solve());
     let solution = vectors(&get("direction", n));
-    vec![
+    let parts = vec![
         ("place_next", flat(&u1), PLACED),
-        ("press_cells", three(&get("cell_force", 8 * plan.body.cells.len())), FORCES),
+        ("press_cells", forces, FORCES),
         ("touch_patches and hold_cells", three(&get("sizes", 2 * n)[n..]), FORCES),
         ("gather_residual", three(&residual), FORCES),
         ("energies", vec![potential(&residual) - half], ENERGY),
@@ -133,7 +149,8 @@ fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
         ("invert_diagonal", flat(&along), FORCES),
         ("multiply_rows", right.off_product(&along, &vectors(&image)), MATRIX),
         ("iterate_cg", flat(&right.scaled(&right.product(&solution))), SOLVED),
-    ]
+    ];
+    parts.into_iter().chain(free).collect()
 }
 
 fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: impl FnOnce(&mut Solve)) {
@@ -141,14 +158,15 @@ fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: im
 }
 
 /// The CPU's numbers, and its matrix.
-struct Exact {
+pub(super) struct Exact {
+    given: Given,
     pattern: Pattern,
     matrix: Matrix,
     parts: Vec<(&'static str, Vec<f64>)>,
 }
 
 impl Exact {
-    fn new(plan: &Plan) -> Exact {
+    pub(super) fn new(plan: &Plan, given: Given) -> Exact {
         let physics = Physics::new(&plan.layout, &plan.theta);
         let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
         let pattern = Pattern::new(&plan.body);
@@ -194,7 +212,12 @@ impl Exact {
             let k = &elements.cell(e).k;
             let (a, b) = (multiply(k, &poses[0].q), multiply(k, &poses[1].q));
             let y = std::array::from_fn(|i| physics.youngs_modulus * ((mix.new + mix.rate) * a[i] - mix.rate * b[i]));
-            cells.extend(flat(&poses[0].force(&y)));
+            let mut force = flat(&poses[0].force(&y));
+            if let Some(guard) = poses[0].guard() {
+                let unit = mix.new * physics.youngs_modulus * body.cells[e].fraction * h.powi(3);
+                force.iter_mut().zip(flat(&guard.force())).for_each(|(f, g)| *f += unit * g);
+            }
+            cells.extend(force);
         }
         let residual = flat(&balance.residual(s));
         let energy = balance.potential(s) - balance.potential(States { u1: &u_half, ..s });
@@ -204,7 +227,7 @@ impl Exact {
         balance.tangent(s, false, &mut matrix);
         // Rows of blocks, as the device keeps them.
         let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
-        let mut exact = Exact { pattern, matrix, parts: Vec::new() };
+        let mut exact = Exact { given, pattern, matrix, parts: Vec::new() };
         let load = exact.scaled(&load(plan));
         exact.parts = vec![
             ("place_next", flat(&u1)),
@@ -217,6 +240,7 @@ impl Exact {
             ("multiply_rows", vec![0.0, 1.0]),
             ("iterate_cg", flat(&load)),
         ];
+        exact.parts.extend(without_effects(plan).then(|| ("multiply_cells", vec![0.0, 1.0])));
         exact
     }
 
@@ -240,7 +264,7 @@ impl Exact {
 }
 
 /// Passes that differ by more than they may.
-fn apart(found: &[Part], right: &Exact) -> Vec<&'static str> {
+pub(super) fn apart(found: &[Part], right: &Exact) -> Vec<&'static str> {
     let mut out = Vec::new();
     for ((name, a, allowed), (other, b)) in found.iter().zip(&right.parts) {
         assert_eq!((name, a.len()), (other, b.len()));
@@ -328,7 +352,7 @@ fn passes_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
     let backend = GpuBackend::on(gpu);
     let plan = plan(&scene());
-    let mut right = Exact::new(&plan);
+    let mut right = Exact::new(&plan, given);
     // Stiffness varies over the body: the CPU's cells by themselves were computed without.
     let factors = palpate_model::changes::Changes::new(&plan, &Physics::new(&plan.layout, &plan.theta)).modulus;
     if let Some(factors) = factors {
@@ -361,7 +385,7 @@ fn passes_with_laws_of_cells_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
     let backend = GpuBackend::on(gpu);
     let plan = plan(&lawful());
-    let right = Exact::new(&plan);
+    let right = Exact::new(&plan, given);
     // The CPU's cells by themselves were computed without laws.
     let others = |plan: &Plan| -> Vec<&str> {
         apart(&found(&backend, plan, &right), &right).into_iter().filter(|p| *p != "press_cells").collect()

@@ -18,7 +18,7 @@ use glam::{DMat3, DVec3};
 /// Distance d below which the barrier acts: stretches (1, 1, −0.6).
 pub const START: f64 = 0.15;
 /// Factor of the energy: cells of a torus that its own weight crushes come to rest at d of about 0.1.
-const STRENGTH: f64 = 0.1;
+pub const STRENGTH: f64 = 0.1;
 
 /// A cell close to the jump.
 #[derive(Clone, Copy, Debug)]
