@@ -1,9 +1,10 @@
 //! The numbers of a fit as JSON (`fit/1`), CSV and a short table.
 
 use crate::experiment::Experiment;
-use crate::fitting::{Fitted, total};
+use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
-use palpate_fit::Progress;
+use palpate_diagnose::stated;
+use palpate_fit::{FittedParameter, Progress};
 use serde_json::{Map, Value, json};
 
 /// A number for JSON; infinite and undefined ones become null.
@@ -135,28 +136,15 @@ pub fn number(x: f64) -> String {
 
 /// Short table for the terminal.
 pub fn summary(fitted: &Fitted) -> String {
-    let unit = |u: &str| if u == "1" { String::new() } else { format!(" {u}") };
-    let rows: Vec<[String; 3]> = fitted
-        .free
-        .iter()
-        .zip(&fitted.result.parameters)
-        .enumerate()
-        .map(|(i, (n, p))| {
-            let unit = unit(&p.unit);
-            let error = match p.standard_error {
-                Some(e) => format!("± {}{unit}", number(e)),
-                None => format!("{unit} (no standard error)").trim_start().to_string(),
-            };
-            let shift = fitted
-                .grid_shift
-                .as_ref()
-                .map_or(String::new(), |s| format!("; cells and step half as large: {:+.1} %", 100.0 * s[i] / p.value.abs()));
-            [n.label(), number(p.value), format!("{error}{shift}")]
-        })
-        .collect();
-    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
-    let (a, b) = (width(0), width(1));
-    let mut text: String = rows.iter().map(|[n, v, e]| format!("  {n:a$}  {v:>b$} {e}\n")).collect();
+    let width = fitted.free.iter().map(|n| n.label().chars().count()).max().unwrap_or(0);
+    let row = |(i, (n, p)): (usize, (&FreeNumber, &FittedParameter))| {
+        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+        let unsure = if p.standard_error.is_none() { " (no standard error)" } else { "" };
+        let shift = fitted.grid_shift.as_ref().map(|s| 100.0 * s[i] / p.value.abs());
+        let shift = shift.map_or(String::new(), |s| format!("; cells and step half as large: {s:+.1} %"));
+        format!("  {:width$}  {}{unit}{unsure}{shift}\n", n.label(), stated(p.value, p.standard_error))
+    };
+    let mut text: String = fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row).collect();
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let before = before.map_or(String::new(), |b| format!("{:.3} mm before, ", total(&b, |r| r.rms) * 1e3));
@@ -165,6 +153,9 @@ pub fn summary(fitted: &Fitted) -> String {
         rms * 1e3,
         noise * 1e3
     );
+    if fitted.grid_shift.is_none() && fitted.result.parameters.iter().any(|p| p.standard_error.is_some()) {
+        text += "\n  ± is what noise leaves open; what cells and time step add to it, --grid-check finds out";
+    }
     text += &mostly_unmatched(fitted).map_or(String::new(), |w| format!("\n  {w}"));
     text
 }
