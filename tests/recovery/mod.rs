@@ -52,18 +52,20 @@ fn a_falling_torus_tells_its_stiffness_from_starts_ten_times_off() {
 
 #[test]
 fn a_finer_simulation_is_understood_by_a_coarser_one() {
-    let truth = scenes::ball(0.0167, 2);
+    // Cells of 3 cm, 1.3 across the tube's radius, and a recording of cells and steps half as large.
+    let truth = scenes::torus(0.03);
     let watch = Watch {
-        cameras: cameras(DVec3::new(0.0, 0.0, 0.07), 0.6, 30.0, 1, 40),
-        noise: 0.1 * 0.0167,
-        every: 1,
+        cameras: cameras(DVec3::new(0.0, 0.0, 0.1), 1.0, 26.0, 1, 50),
+        noise: 0.1 * 0.03,
+        every: 2,
         refine: 2.0,
         seed: 4,
     };
-    let plan = study::plan(&truth, &study::record(&truth, &watch).unwrap(), 4.0).unwrap();
-    for (e, _) in from_each(&plan, 2000.0, &[0.1, 10.0]) {
-        // Three cells across the radius: the discretisation's own error.
-        assert!((e / 2000.0 - 1.0).abs() < 0.1, "{e} Pa");
+    let plan = study::plan(&truth, &study::record(&truth, &watch).unwrap(), 5.0).unwrap();
+    for (e, error) in from_each(&plan, 5000.0, &[10.0]) {
+        // The grid alone takes 3 % off E at these cells (`cargo xtask paper --only finer`); what is left up to the 5 % that the paper
+        // calls converged is one standard error of a recording as noisy as this one.
+        assert!((e / 5000.0 - 1.0).abs() < 0.05 && error < 0.02 * 5000.0, "{e} Pa ± {error} Pa");
     }
 }
 

@@ -24,7 +24,7 @@ enum Verb {
         /// Coarser cells, fewer starts and cases
         #[arg(long)]
         quick: bool,
-        /// One table alone: torus, ball, cameras, image, band, optimiser or gradient
+        /// One table alone: torus, finer, ball, cameras, image, band, optimiser or gradient
         #[arg(long, value_name = "TABLE")]
         only: Option<String>,
     },

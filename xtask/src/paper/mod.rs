@@ -1,6 +1,8 @@
 //! The published experiments of Weiss et al., Sparse Surface Constraints (CVPR 2020), repeated: synthetic recordings give
 //! their parameters back.
 
+pub mod finer;
+pub mod gradient;
 pub mod scenes;
 pub mod study;
 pub mod tables;

@@ -52,6 +52,13 @@ pub fn torus(cell: f64) -> Scene {
     s
 }
 
+/// A scene moved as a whole [m]: the same physics, cut by the lattice at other places.
+pub fn moved(mut scene: Scene, by: DVec3) -> Scene {
+    scene.object.pose.translation += by;
+    scene.planes.iter_mut().for_each(|p| p.point += by);
+    scene
+}
+
 /// A ball of radius 0.05 m above a tilted plane, thrown; E = 2000 Pa. Tilt and throw are drawn from `seed`.
 pub fn ball(cell: f64, seed: u64) -> Scene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

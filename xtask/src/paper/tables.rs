@@ -1,15 +1,15 @@
 //! The tables: the paper's figures beside ours.
 
+use super::finer::{self, Finer};
+use super::gradient::{self, Gradient};
 use super::scenes;
 use super::study::{self, Recovery, Search, Unknown, Watch};
 use crate::table;
 use glam::DVec3;
+use palpate::Error;
 use palpate::render::Pinhole;
-use palpate::{Backend, Error};
-use palpate_engine::{ParamBatch, Request};
 use palpate_model::params::ParamKey;
-use palpate_model::plan::Plan;
-use palpate_model::scene::{Optimizer, Scene};
+use palpate_model::scene::{Optimizer, Scene, Solver};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -49,25 +49,12 @@ pub struct Report {
     pub only: Option<String>,
     /// All recoveries.
     pub lines: Vec<Line>,
+    /// The torus from finer recordings.
+    pub finer: Vec<Finer>,
     /// Gradient checks.
     pub gradients: Vec<Gradient>,
-}
-
-/// Adjoint against central differences at one E.
-#[derive(Clone, Debug, Serialize)]
-pub struct Gradient {
-    /// E over the truth.
-    pub at: f64,
-    /// dJ/d ln E by the adjoint.
-    pub adjoint: f64,
-    /// Relative deviation of central differences of relative step 1e-4 [%].
-    pub central_percent: f64,
-    /// Of forward differences over 5 Pa, the paper's smaller step [%].
-    pub forward_5_percent: f64,
-    /// Of forward differences over 100 Pa, the paper's larger step [%].
-    pub forward_100_percent: f64,
-    /// Time of cost and adjoint gradient over that of the cost.
-    pub adjoint_cost: f64,
+    /// [`gradient::PAPER`], beside gradient checks.
+    pub gradients_paper_percent: Option<[f64; 3]>,
 }
 
 fn torus_cameras(count: usize, pixels: usize) -> Vec<Pinhole> {
@@ -119,13 +106,13 @@ fn run(report: &mut Report, case: Case) -> Result<(), Error> {
     Ok(())
 }
 
-/// Runs everything, or the table `only` (torus, ball, cameras, image, band, optimiser, gradient); `quick` takes coarser cells and
+/// Runs everything, or the table `only` (torus, finer, ball, cameras, image, band, optimiser, gradient); `quick` takes coarser cells and
 /// fewer starts and cases.
 ///
 /// # Errors
 /// A scene cannot be simulated, or no start of a fit can be evaluated.
 pub fn all(quick: bool, only: Option<String>) -> Result<Report, Error> {
-    const TABLES: [&str; 7] = ["torus", "ball", "cameras", "image", "band", "optimiser", "gradient"];
+    const TABLES: [&str; 8] = ["torus", "finer", "ball", "cameras", "image", "band", "optimiser", "gradient"];
     if let Some(t) = only.as_ref().filter(|t| !TABLES.contains(&t.as_str())) {
         return Err(Error::Input(format!("--only {t}: no such table; allowed are {}", TABLES.join(", "))));
     }
@@ -134,23 +121,25 @@ pub fn all(quick: bool, only: Option<String>) -> Result<Report, Error> {
     let starts = if quick { 3 } else { 20 };
     let few = if quick { 2 } else { 4 };
     let gauss_newton = |starts| Search { optimizer: Optimizer::GaussNewton, iterations: 30, starts, seed: 5 };
-    let torus = |table, name: String, paper, cell: f64, cameras, refine, band, search| Case {
+    let torus = |table, name: String, paper, cameras, band, search| Case {
         table,
         name,
         paper,
         scene: scenes::torus(cell),
-        watch: Watch { cameras, noise: 0.1 * cell, every: 1, refine, seed: 3 },
+        watch: Watch { cameras, noise: 0.1 * cell, every: 1, refine: 1.0, seed: 3 },
         band,
         search,
     };
     let paper_torus = "about 19/20, 2.39 %";
-    run(
-        &mut report,
-        torus("torus", "same grid".into(), paper_torus, cell, torus_cameras(1, 50), 1.0, 5.0, gauss_newton(starts)),
-    )?;
-    for h in if quick { vec![0.028] } else { vec![0.03, 0.024, 0.02] } {
-        let name = format!("data twice as fine, cell {h} m");
-        run(&mut report, torus("torus", name, "-", h, torus_cameras(1, 50), 2.0, 5.0, gauss_newton(few)))?;
+    run(&mut report, torus("torus", "same grid".into(), paper_torus, torus_cameras(1, 50), 5.0, gauss_newton(starts)))?;
+    if report.wants("finer") {
+        let ghost = Solver::default().ghost;
+        report.finer =
+            if quick { finer::finer(&[0.03], ghost, 2)? } else { finer::finer(&[0.03, 0.024, 0.02, 0.016], ghost, 3)? };
+        if !quick {
+            // A tenth of the penalty: how much of the error it makes.
+            report.finer.extend(finer::finer(&[0.03, 0.02], 0.1 * ghost, 3)?);
+        }
     }
     for seed in 1..=(if quick { 2 } else { 6 }) {
         let case = Case {
@@ -166,27 +155,24 @@ pub fn all(quick: bool, only: Option<String>) -> Result<Report, Error> {
     }
     // Figures 21 to 23; the paper's text swaps some labels between figures, the order here is that of the figures.
     for (count, paper) in [(1, "2.39 %"), (2, "8.94 %"), (4, "5.08 %"), (8, "4.46 %")] {
-        run(
-            &mut report,
-            torus("cameras", count.to_string(), paper, cell, torus_cameras(count, 50), 1.0, 5.0, gauss_newton(few)),
-        )?;
+        run(&mut report, torus("cameras", count.to_string(), paper, torus_cameras(count, 50), 5.0, gauss_newton(few)))?;
     }
     for (pixels, paper) in [(20, "18/20, 2.71 %"), (50, "4.62 %"), (100, "20/20, 3.05 %"), (200, "2.56 %")] {
         let name = format!("{pixels}²");
-        run(&mut report, torus("image", name, paper, cell, torus_cameras(1, pixels), 1.0, 5.0, gauss_newton(few)))?;
+        run(&mut report, torus("image", name, paper, torus_cameras(1, pixels), 5.0, gauss_newton(few)))?;
     }
     for (band, paper) in [(1.0, "10/14"), (2.0, "-"), (5.0, "13/14")] {
         let name = format!("{band} cells");
         // As many starts as the paper's.
         let starts = if quick { few } else { 14 };
-        run(&mut report, torus("band", name, paper, cell, torus_cameras(1, 50), 1.0, band, gauss_newton(starts)))?;
+        run(&mut report, torus("band", name, paper, torus_cameras(1, 50), band, gauss_newton(starts)))?;
     }
     use Optimizer::{GaussNewton, GradientDescent, Lbfgs, NelderMead, Rprop};
     for (optimizer, paper) in
         [(GaussNewton, "-"), (Lbfgs, "-"), (GradientDescent, "-"), (Rprop, "100 iterations"), (NelderMead, "-")]
     {
         let search = Search { optimizer, iterations: 100, starts: few.min(3), seed: 5 };
-        run(&mut report, torus("optimiser", format!("{optimizer:?}"), paper, cell, torus_cameras(1, 50), 1.0, 5.0, search))?;
+        run(&mut report, torus("optimiser", format!("{optimizer:?}"), paper, torus_cameras(1, 50), 5.0, search))?;
     }
     if !report.wants("gradient") {
         return Ok(report);
@@ -194,42 +180,9 @@ pub fn all(quick: bool, only: Option<String>) -> Result<Report, Error> {
     let watch = Watch { cameras: torus_cameras(1, 50), noise: 0.1 * cell, every: 1, refine: 1.0, seed: 3 };
     let truth = scenes::torus(cell);
     let plan = study::plan(&truth, &study::record(&truth, &watch)?, 5.0)?;
-    report.gradients = gradients(&plan, if quick { &[0.4, 2.5] } else { &[0.2, 0.4, 0.7, 0.9, 1.2, 2.5, 5.0] })?;
+    report.gradients_paper_percent = Some(gradient::PAPER);
+    report.gradients = gradient::gradients(&plan, if quick { &[0.4, 2.5] } else { &[0.2, 0.4, 0.7, 0.9, 1.2, 2.5, 5.0] })?;
     Ok(report)
-}
-
-fn gradients(plan: &Plan, at: &[f64]) -> Result<Vec<Gradient>, Error> {
-    let mut evaluator = Backend::Auto.evaluator(plan, 1)?;
-    let place = plan.layout.index(ParamKey::YoungsModulus);
-    let truth = plan.theta[place];
-    let mut evaluate = |e: f64, gradient: bool| {
-        let mut theta = plan.theta.clone();
-        theta[place] = e;
-        let request = Request { gradient, sensitivities: Vec::new() };
-        let clock = Instant::now();
-        let r = evaluator.evaluate(&ParamBatch::from_rows(&[theta]), &request).remove(0);
-        let seconds = clock.elapsed().as_secs_f64();
-        r.failure.map_or(Ok(()), |f| Err(Error::Failed(f.to_string())))?;
-        Ok::<_, Error>((r.cost, r.gradient.get(place).copied().unwrap_or(0.0), seconds))
-    };
-    let one = |&at: &f64| {
-        let e = at * truth;
-        let d = 1e-4 * e;
-        let (cost, _, forward) = evaluate(e, false)?;
-        let (_, adjoint, both) = evaluate(e, true)?;
-        let central = (evaluate(e + d, false)?.0 - evaluate(e - d, false)?.0) / (2.0 * d);
-        let (small, large) = ((evaluate(e + 5.0, false)?.0 - cost) / 5.0, (evaluate(e + 100.0, false)?.0 - cost) / 100.0);
-        let off = |g: f64| 100.0 * (g / adjoint - 1.0).abs();
-        Ok(Gradient {
-            at,
-            adjoint: adjoint * e,
-            central_percent: off(central),
-            forward_5_percent: off(small),
-            forward_100_percent: off(large),
-            adjoint_cost: both / forward,
-        })
-    };
-    at.iter().map(one).collect()
 }
 
 impl Report {
@@ -259,22 +212,11 @@ impl Report {
             }));
             table::print(name, &rows);
         }
-        if self.gradients.is_empty() {
-            return;
+        if !self.finer.is_empty() {
+            finer::print(&self.finer);
         }
-        let head = ["E / truth", "dJ/d ln E", "central 1e-4", "forward 5 Pa", "forward 100 Pa", "gradient / cost"];
-        let mut rows = vec![head.map(String::from).to_vec()];
-        rows.extend(self.gradients.iter().map(|g| {
-            let percent = |p: f64| format!("{p:.4} %");
-            vec![
-                g.at.to_string(),
-                format!("{:+.5}", g.adjoint),
-                percent(g.central_percent),
-                percent(g.forward_5_percent),
-                percent(g.forward_100_percent),
-                format!("{:.2}", g.adjoint_cost),
-            ]
-        }));
-        table::print("deviation of differences from the adjoint (time ratio: cost and gradient over cost alone)", &rows);
+        if !self.gradients.is_empty() {
+            gradient::print(&self.gradients);
+        }
     }
 }
