@@ -46,6 +46,7 @@ fn main() {
             .expect("a String takes all");
     }
     writeln!(out, "];\n/// Numbers of the passes in [`PASSES`].\npub mod pass {{\n{indices}}}").expect("a String takes all");
+    out.push_str(&constants(&shaders));
     for (name, (span, members)) in structs {
         writeln!(out, "const _: () = {{\n    assert!(size_of::<crate::layout::{name}>() == {span}, \"size of {name}\");")
             .expect("text");
@@ -60,6 +61,27 @@ fn main() {
     }
     let path = Path::new(&env::var("OUT_DIR").expect("cargo sets it")).join("shaders.rs");
     fs::write(path, out).expect("OUT_DIR is writable");
+}
+
+/// Shared files whose whole numbers Rust uses as well.
+const NUMBERED: [&str; 3] = ["laws", "points", "structs"];
+
+/// Lines `const NAME = 1u;` of these files as Rust.
+fn constants(shaders: &Path) -> String {
+    let mut out = String::from("/// Numbers that kernels and host share, by the file in `shaders/shared`.\npub mod shared {\n");
+    for file in NUMBERED {
+        let text = fs::read_to_string(shaders.join(format!("shared/{file}.wgsl"))).expect("the file is there");
+        writeln!(out, "    /// `{file}.wgsl`.\n    pub mod {file} {{").expect("a String takes all");
+        for line in text.lines() {
+            let Some((name, value)) = line.strip_prefix("const ").and_then(|l| l.split_once(" = ")) else { continue };
+            if let Some(number) = value.strip_suffix("u;").and_then(|v| v.parse::<u32>().ok()) {
+                writeln!(out, "        #[allow(missing_docs)]\n        pub const {name}: u32 = {number};")
+                    .expect("a String takes all");
+            }
+        }
+        out.push_str("    }\n");
+    }
+    out + "}\n"
 }
 
 /// A pass with everything it uses.

@@ -44,10 +44,14 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let matrix = grip_at(m, p.member, which, hold);
     var total = vec3(0.0);
     var energy = 0.0;
-    // New state, then old.
-    for (var instant = 0u; instant < 2u; instant++) {
+    // New state, then old; the argument, which is the same for all lanes, may ask for one of them or none.
+    let first = select(0u, 1u, what == 1u || what == 5u);
+    var end = select(2u, 1u, what == 0u);
+    if what == 6u {
+        end = 0u;
+    }
+    for (var instant = first; instant < end; instant++) {
         let weight = select(mix.fresh, mix.old, instant == 1u);
-        let skipped = weight == 0.0 || what == 6u || (what == 0u && instant == 1u) || ((what == 1u || what == 5u) && instant == 0u);
         var at = 0u;
         if call.mode != 0u {
             at = call.step + 1u - instant;
@@ -86,7 +90,7 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
                 g += pose.turn * hold_stiff(((row * shape.members + p.member) * shape.holds + hold) * 576u, corner, d);
             }
         }
-        if !skipped {
+        if weight != 0.0 {
             total += (weight * factor) * g;
             energy += 0.5 * weight * factor * dot(d, f);
         }

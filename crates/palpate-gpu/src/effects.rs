@@ -9,6 +9,9 @@ use crate::error::GpuError;
 use crate::layout::EffectSite;
 use crate::memory::Maker;
 use crate::pipelines::pass;
+use crate::pipelines::shared::laws;
+use crate::pipelines::shared::points::{AT_CONTACT, AT_NODES, AT_SURFACE, COLUMN};
+pub(crate) use crate::pipelines::shared::points::{BACK, BY_OLD, FORCE, STIFFNESS};
 use crate::recorder::Named;
 use crate::solve::{Per, Solve};
 use palpate_model::changes::{self, Changes};
@@ -18,24 +21,16 @@ use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::{InitialShape, RotationUpdate};
 use std::collections::HashMap;
 
-/// Questions to a law, as `shared/points.wgsl` numbers them.
-pub(crate) const FORCE: u32 = 0;
-pub(crate) const STIFFNESS: u32 = 1;
-pub(crate) const BY_OLD: u32 = 2;
-pub(crate) const BACK: u32 = 3;
-
 /// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
 pub(crate) fn column(kind: u32, index: u32) -> u32 {
-    4 + (kind << 4) + (index << 8)
+    COLUMN + (kind << 4) + (index << 8)
 }
 
-const NODES: u32 = 0;
-const SURFACE: u32 = 1;
-const CONTACT: u32 = 2;
+/// Where laws act, beside the places that points have.
 const CELLS: u32 = 3;
 
-/// Most laws of cells of a plan (`shared/laws.wgsl`).
-const MOST_LAWS: usize = 16;
+/// Most laws of cells of a plan.
+const MOST_LAWS: usize = laws::MOST_LAWS as usize;
 
 /// Bits of `Shape::fields`.
 const MODULUS: u32 = 1;
@@ -83,9 +78,9 @@ impl Effects {
             let count = places.len() as u32;
             let mut field = None;
             let site = match law.site {
-                Site::Nodes(_) => Some(NODES),
-                Site::Surface(_) => Some(SURFACE),
-                Site::Contact(_) => Some(CONTACT),
+                Site::Nodes(_) => Some(AT_NODES),
+                Site::Surface(_) => Some(AT_SURFACE),
+                Site::Contact(_) => Some(AT_CONTACT),
                 Site::Modulus(_) | Site::Density(_) => {
                     e.bits |= if matches!(law.site, Site::Modulus(_)) { MODULUS } else { DENSITY };
                     field = Some(e.slope_rows);
@@ -125,12 +120,12 @@ impl Effects {
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
                 e.cells.push((number, EffectSite { law, site, first: e.stride, count, ..EffectSite::default() }));
             } else if let Some(site) = site {
-                e.bits |= if site == NODES { 0 } else { PATCHES };
+                e.bits |= if site == AT_NODES { 0 } else { PATCHES };
                 let slopes = if shares(plan, law, &plan.theta[places]).is_some() { e.rows + 1 } else { u32::MAX };
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
                 let point = EffectSite { law, site, first: e.stride, count, measures: e.rows, slopes, stride: 0, rows: 0 };
                 e.points.push((number, point));
-                if site == NODES {
+                if site == AT_NODES {
                     e.rows += if slopes == u32::MAX { 1 } else { 1 + count };
                 }
             }
@@ -171,7 +166,7 @@ impl Effects {
 
     /// True when some effect acts on nodes.
     pub(crate) fn on_nodes(&self) -> bool {
-        self.points.iter().any(|p| p.1.site == NODES)
+        self.points.iter().any(|p| p.1.site == AT_NODES)
     }
 
     /// True when the body starts in a stress-free shape of its own.
@@ -219,7 +214,7 @@ impl Effects {
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {
             physics.effects.iter().for_each(|p| put(&mut data[0], p));
-            for (number, site) in self.points.iter().filter(|p| p.1.site == NODES) {
+            for (number, site) in self.points.iter().filter(|p| p.1.site == AT_NODES) {
                 let law = plan.layout.effects().nth(*number).map(|e| e.0);
                 let shared = law.and_then(|law| shares(plan, law, &physics.effects[*number]));
                 match shared.filter(|_| site.slopes != u32::MAX) {
@@ -311,7 +306,7 @@ impl Solve<'_, '_> {
     fn press(&mut self, pass: usize, per: Per, [section, question]: [u32; 2], only: Option<usize>, more: &Named) {
         let world = self.world;
         for (k, (number, site)) in world.geometry.effects.points.iter().enumerate() {
-            if (site.site == NODES) == matches!(per, Per::Node) && only.is_none_or(|o| o == *number) {
+            if (site.site == AT_NODES) == matches!(per, Per::Node) && only.is_none_or(|o| o == *number) {
                 self.run_with(pass, section, per, k as u32 + (question << 8), more);
             }
         }

@@ -38,10 +38,11 @@ use shots::Shots;
 use std::collections::HashMap;
 use tables::{BandTables, SiteTables};
 
-/// Most loop iterations of one invocation: software adapters silently leave every loop beyond.
-pub(crate) const MOST_LOOPS: u64 = 65_535;
+/// Most loop iterations of one invocation: software adapters silently leave every loop beyond 65,535, and what short loops add is
+/// not counted.
+pub(crate) const MOST_LOOPS: u64 = 62_000;
 /// Points that one group of eight lanes goes through at most for a cell; more are dealt out to more groups.
-const POINTS_OF_STRIPE: usize = 20_000;
+const POINTS_OF_STRIPE: usize = 12_500;
 /// Device memory for scratch [B]; fewer looks are worked on together when they need more.
 const SCRATCH: u64 = 256 << 20;
 /// Most workgroups that share a sum (`PARTS` in `shared/reduce.wgsl`).

@@ -2,6 +2,7 @@
 
 use crate::error::GpuError;
 use crate::layout::Health;
+use crate::pipelines::shared::structs as code;
 use crate::world::{State, Tally, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, Failure, FailureKind, number};
@@ -21,18 +22,20 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
     let p = &world.batch.physics[member];
     let [a, b] = h.detail;
     let (kind, what) = match h.code {
-        0 => return None,
-        1 => (FailureKind::NotFinite, "displacement, velocity or residual of a node".to_string()),
-        2 => (
+        code::WELL => return None,
+        code::NOT_FINITE => (FailureKind::NotFinite, "displacement, velocity or residual of a node".to_string()),
+        code::STALLED => (
             FailureKind::NewtonStalled,
             format!(
                 "{b} iterations left a scaled residual of {a:.1e} of the forces (--backend cpu may get further with a crushed body)"
             ),
         ),
-        3 => (FailureKind::LinearSolve, format!("{b} conjugate gradient iterations left a relative residual of {a:.1e}")),
-        4 => (FailureKind::LinearSolve, "the matrix is not positive definite".to_string()),
-        5 => (FailureKind::FellOut, format!("a node moved {} m", number(a.into()))),
-        6 => (
+        code::UNSOLVED => {
+            (FailureKind::LinearSolve, format!("{b} conjugate gradient iterations left a relative residual of {a:.1e}"))
+        }
+        code::INDEFINITE => (FailureKind::LinearSolve, "the matrix is not positive definite".to_string()),
+        code::FELL_OUT => (FailureKind::FellOut, format!("a node moved {} m", number(a.into()))),
+        code::BAD_PARAMETER => (
             FailureKind::BadParameter,
             format!(
                 "material.youngs_modulus = {}, material.poisson_ratio = {}, material.density = {}",

@@ -2,7 +2,7 @@
 //! only says how often to ask.
 
 use crate::effects;
-use crate::pipelines::pass;
+use crate::pipelines::{pass, shared::structs};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::tuning::Product;
 use crate::world::{KINDS, State, Tally, World};
@@ -10,11 +10,11 @@ use crate::world::{KINDS, State, Tally, World};
 /// What `touch_patches` is told where planes have nothing to say.
 pub(crate) const NO_TOUCH: u32 = 5;
 
-/// Sections of the roster.
-pub(crate) const ALL: u32 = 0;
-pub(crate) const MATRIX: u32 = 1;
-pub(crate) const SOLVE: u32 = 2;
-pub(crate) const TRIAL: u32 = 3;
+/// Sections of the roster: all, or those at one stage.
+pub(crate) const ALL: u32 = structs::IDLE;
+pub(crate) const MATRIX: u32 = structs::WANTS_MATRIX;
+pub(crate) const SOLVE: u32 = structs::WANTS_SOLVE;
+pub(crate) const TRIAL: u32 = structs::WANTS_TRIAL;
 
 /// What the items of a dispatch are: the kinds of `list_members`.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,6 @@
 //! What benchmarks are told: every dispatch is counted, the kernels that are timed are those that run; an evaluation waits once.
 
+use super::effects::with;
 use super::products::crowded;
 use super::scenes::{ball, device, own_device, plan, spread};
 use crate::memory::Maker as _;
@@ -8,7 +9,8 @@ use crate::pipelines::{PASSES, pass};
 use crate::recorder::{Args, QUERIES, Recorder, Size};
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
-use std::collections::HashMap;
+use palpate_model::scene::Scene;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::Ordering;
 
 #[test]
@@ -86,4 +88,45 @@ fn an_evaluation_waits_once() {
     let all = rollout.evaluate(&ParamBatch::from_rows(&spread(&plan, 2)), &request);
     assert!(all.iter().all(|e| e.failure.is_none() && e.matched > 100 && e.curvature.is_some()));
     assert_eq!(gpu.waits.load(Ordering::Relaxed) - before, 1);
+}
+
+/// Passes that a step, its adjoint and its tangent dispatch, forward and back from a static start.
+fn dispatched(backend: &GpuBackend, scene: &Scene) -> BTreeSet<&'static str> {
+    let plan = plan(scene);
+    let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    world.time_passes(true);
+    let all: Vec<usize> = (0..plan.layout.len()).collect();
+    let mut tally = backend.new_tally(&world, &all);
+    let [mut now, mut next] = [0; 2].map(|_| backend.new_state(&world));
+    let [mut tangent, mut tangent_next] = [0; 2].map(|_| backend.new_tangent(&world, &all));
+    let [adj, mut adj_now] = [0; 2].map(|_| backend.new_adjoint(&world));
+    backend.start(&mut world, &mut now, &mut tally);
+    backend.start_tangent(&mut world, &now, &mut tangent, &mut tally);
+    backend.step(&mut world, 0, &now, &mut next, &mut tally);
+    backend.step_tangent(&mut world, 0, &now, &next, &tangent, &mut tangent_next, &mut tally);
+    backend.step_adjoint(&mut world, 0, &now, &next, &adj, &mut adj_now, &mut tally);
+    backend.start_adjoint(&mut world, &now, &adj_now, &mut tally);
+    assert!(backend.read(&world, &tally).iter().all(|e| e.failure.is_none()));
+    world.pass_times().into_iter().map(|t| t.0).collect()
+}
+
+#[test]
+fn scenes_without_effects_dispatch_none_of_their_passes() {
+    let Some(gpu) = device(None) else { return };
+    if gpu.tick().is_none() {
+        return;
+    }
+    let backend = GpuBackend::on(gpu);
+    let of_effects = |p: &&str| ["press_nodes", "press_patches"].contains(p) || p.ends_with("_laws");
+    let mut scene = crowded();
+    let plain = dispatched(&backend, &scene);
+    assert!(plain.contains("hold_cells") && plain.contains("step_back"), "{plain:?}");
+    assert_eq!(plain.iter().filter(|p| of_effects(p)).count(), 0, "{plain:?}");
+    with(&mut scene, "uniform-force", &[("force", &[100.0, 0.0, 0.0])]);
+    with(&mut scene, "coulomb-friction", &[("coefficient", &[0.3])]);
+    with(&mut scene, "strain-stiffening", &[("coefficient", &[5.0])]);
+    let full = dispatched(&backend, &scene);
+    let known: Vec<&str> = PASSES.iter().map(|p| p.name).filter(of_effects).collect();
+    assert!(known.len() >= 7 && known.iter().all(|p| full.contains(p)), "{known:?} {full:?}");
 }
