@@ -1,4 +1,5 @@
-//! Diagnosis of measured recordings whose scene lacks something that their documentation states: docs/real-data.md discusses what is found.
+//! Diagnosis of measured recordings: of scenes that lack something which their documentation states, and of one that should lack nothing.
+//! docs/diagnose.md discusses what is found.
 
 use palpate::{DiagnoseOptions, Diagnosed, diagnose};
 use support::data::data_dir;
@@ -51,4 +52,19 @@ fn a_lidar_that_reads_through_silicone_is_biased_and_the_bar_not_soft() {
     assert_eq!(found.kind, "depth-bias", "{found:?}");
     // The recording's README: 23.3 mm ± 3 mm over the bar.
     assert!((value(&d, "bias") - 0.0233).abs() < 0.003, "{found:?}");
+}
+
+#[test]
+fn the_unloaded_beam_lacks_nothing_that_its_markers_could_show() {
+    let Some(data) = data_dir() else { return };
+    // The first three periods instead of all seven, and every second frame.
+    let short = [("duration = 1.0", "duration = 0.45"), ("to = 1.06", "to = 0.52, every = 2")];
+    let scene = open(&data, "beam-gravity", &short);
+    let d = diagnose(&[scene], None, DiagnoseOptions::default()).unwrap();
+    println!("{}\n{}", d.diagnosis.sentence(), d.seconds);
+    let found = &d.diagnosis;
+    assert_eq!(found.verdict.name(), "adequate", "{}", found.sentence());
+    assert!(found.effects.is_empty() && found.p_value > 0.01, "{}", found.p_value);
+    // Every marker's place is stated to 0.8 mm: half of that is left.
+    assert!(found.before.rms < found.before.noise && found.before.noise > 0.8e-3, "{:?}", found.before);
 }
