@@ -35,45 +35,6 @@ pub enum Lanes {
     Memory,
 }
 
-/// One adapter, for lists.
-#[derive(Clone, Debug)]
-pub struct AdapterReport {
-    /// Name and driver.
-    pub name: String,
-    /// Discrete, integrated, software.
-    pub kind: wgpu::DeviceType,
-    /// Vulkan, Metal, DX12.
-    pub api: wgpu::Backend,
-    /// Its limits.
-    pub limits: wgpu::Limits,
-    /// True with subgroups of at least eight lanes.
-    pub subgroups: bool,
-    /// True when passes can be timed.
-    pub timestamps: bool,
-    /// Why it cannot be used, if it cannot.
-    pub refusal: Option<GpuError>,
-}
-
-impl AdapterReport {
-    /// The largest buffer that a kernel can bind [B].
-    pub fn largest_buffer(&self) -> u64 {
-        self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
-    }
-
-    /// True when this is an adapter that the choice means.
-    pub fn is_meant(&self, choice: &Choice) -> bool {
-        match choice {
-            Choice::Auto => true,
-            Choice::Named(name) => self.name.to_lowercase().contains(&name.to_lowercase()),
-        }
-    }
-
-    /// True for adapters that compute on the CPU.
-    pub fn is_software(&self) -> bool {
-        self.kind == wgpu::DeviceType::Cpu
-    }
-}
-
 /// Features without which no kernel runs: small arguments of a dispatch.
 const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 /// Features that are used where they are.
@@ -85,17 +46,17 @@ pub(crate) const WIDTH: u32 = 256;
 /// Workgroup memory of the hungriest kernel [B], and some to spare.
 pub(crate) const WORKGROUP_BYTES: u32 = 16_384;
 
-fn instance() -> wgpu::Instance {
+pub(crate) fn instance() -> wgpu::Instance {
     // Indirect arguments come from our own kernels, so the validating dispatch before each of them is left out.
     let flags = wgpu::InstanceFlags::default().difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(wgpu::InstanceDescriptor { flags, ..wgpu::InstanceDescriptor::new_without_display_handle() })
 }
 
-fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+pub(crate) fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
 }
 
-fn rank(kind: wgpu::DeviceType) -> u8 {
+pub(crate) fn rank(kind: wgpu::DeviceType) -> u8 {
     match kind {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -106,7 +67,7 @@ fn rank(kind: wgpu::DeviceType) -> u8 {
 }
 
 /// Why an adapter cannot run the kernels.
-fn refused(adapter: &wgpu::Adapter) -> Option<GpuError> {
+pub(crate) fn refused(adapter: &wgpu::Adapter) -> Option<GpuError> {
     refusal(&adapter.get_info().name, adapter.features(), &adapter.limits())
 }
 
@@ -122,27 +83,6 @@ pub(crate) fn refusal(name: &str, features: wgpu::Features, limits: &wgpu::Limit
     need("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS)
         .or_else(|| need("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, WIDTH))
         .or_else(|| need("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, WORKGROUP_BYTES))
-}
-
-/// Every adapter of this machine, the one that [`Choice::Auto`] takes first.
-pub fn adapters() -> Vec<AdapterReport> {
-    let mut found: Vec<AdapterReport> = all(&instance())
-        .iter()
-        .map(|a| {
-            let info = a.get_info();
-            AdapterReport {
-                name: format!("{} ({})", info.name, info.driver_info),
-                kind: info.device_type,
-                api: info.backend,
-                limits: a.limits(),
-                subgroups: a.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
-                timestamps: a.features().contains(wgpu::Features::TIMESTAMP_QUERY),
-                refusal: refused(a),
-            }
-        })
-        .collect();
-    found.sort_by_key(|a| (a.refusal.is_some(), rank(a.kind)));
-    found
 }
 
 /// How lanes talk after what the probe of subgroups said. A driver that lists subgroups and cannot compile or run a kernel with them

@@ -6,6 +6,7 @@
 // wgpu's handles hash and compare by identity; what changes behind them is no part of a key.
 #![allow(clippy::mutable_key_type)]
 
+mod adapters;
 mod backend;
 mod backward;
 mod choices;
@@ -30,8 +31,9 @@ mod tests;
 mod tuning;
 mod world;
 
+pub use adapters::{AdapterReport, adapters};
 pub use backend::GpuBackend;
-pub use device::{AdapterReport, Choice, Gpu, Lanes, adapters};
+pub use device::{Choice, Gpu, Lanes};
 pub use error::GpuError;
 pub use measure::{CgSpeed, Traffic};
 pub use memory::{Load, Memory, memory};
