@@ -285,7 +285,8 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
         }
     }
     let model = if done.experiments.len() == 1 { "model.toml" } else { "model-1.toml …" };
-    text + &format!("  corrected scene: {}\n  report: {}", folder.join(model).display(), folder.join("report.html").display())
+    let what = if d.model == d.baseline { "scene with these values" } else { "corrected scene" };
+    text + &format!("  {what}: {}\n  report: {}", folder.join(model).display(), folder.join("report.html").display())
 }
 
 /// Name of a sensor: a camera, or a coordinate of a marker.
