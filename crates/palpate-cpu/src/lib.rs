@@ -15,6 +15,6 @@ mod simulate;
 mod world;
 
 pub use backend::CpuBackend;
-pub use memory::{Memory, memory};
+pub use memory::{Memory, Sizes};
 pub use newton::Effort;
 pub use world::{Adjoint, State, Tally, Tangent, World};

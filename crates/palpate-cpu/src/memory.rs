@@ -1,6 +1,6 @@
 //! How much memory simulations take, from the sizes of what they keep; found before anything is computed.
 
-use crate::linear::DIRECT_STEP;
+use crate::linear::{Purpose, is_direct};
 use crate::passes::posed::Posed;
 use glam::{DMat3, DVec3};
 use palpate_engine::Request;
@@ -10,7 +10,6 @@ use palpate_model::elements::Classes;
 use palpate_model::observation::ObservedPoint;
 use palpate_model::pattern::Pattern;
 use palpate_model::plan::Plan;
-use palpate_model::scene::LinearSolver;
 
 /// Vectors over all nodes that a solve keeps at a time: forces, directions, conjugate gradients.
 const VECTORS: usize = 16;
@@ -41,42 +40,56 @@ impl Memory {
     }
 }
 
-/// Memory that one evaluation of `members` simulations takes on so many threads, an estimate. Matrices of cells are kept for each of the
-/// `ratios` different Poisson's ratios in the batch.
-pub fn memory(plan: &Plan, members: usize, ratios: usize, threads: usize, request: &Request) -> Memory {
-    let body = &plan.body;
-    let (nodes, cells) = (body.nodes.len(), body.cells.len());
-    let pattern = Pattern::new(body);
-    let blocks = pattern.blocks.columns.len();
-    let classes = Classes::new(plan);
-    let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
-    let points: usize = plan.observation.frames.iter().map(|f| f.points.len()).sum();
-    let band = &body.band;
-    let tables = cells * size_of::<Cell>()
-        + band.cells.len() * size_of::<BandCell>()
-        + band.nodes.len() * size_of::<DVec3>()
-        + band.columns.len() * (size_of::<u32>() + size_of::<f64>())
-        + 4 * body.grid.len()
-        + 8 * pattern.cell_list.len()
-        + 4 * blocks
-        + points * (size_of::<ObservedPoint>() + 8);
-    let vector = nodes * size_of::<DVec3>();
-    let direct = match plan.solver.linear {
-        LinearSolver::Cholesky => true,
-        LinearSolver::ConjugateGradient => false,
-        LinearSolver::Auto => nodes <= DIRECT_STEP[1],
-    };
-    let factor = (8.0 * FILL * (nodes as f64).powf(4.0 / 3.0)) as usize;
-    // A copy is padded to vector registers.
-    let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
-    let solve = copy + cells * (size_of::<Posed>() + size_of::<V24>()) + VECTORS * vector;
-    let kept = if request.gradient { plan.clock.steps + 3 } else { 2 };
-    let bytes = |n: usize| n as u64;
-    Memory {
-        shared: bytes(tables + ratios * (classes.parts.len() + held) * MATRICES),
-        matrices: bytes(members * blocks * size_of::<DMat3>()),
-        solves: bytes(members.min(threads.max(1)) * solve),
-        states: bytes(members * 2 * kept * vector),
-        tangents: bytes(members * 4 * request.sensitivities.len() * vector),
+/// Sizes that the memory of any batch follows from, found once for a plan.
+#[derive(Clone, Debug)]
+pub struct Sizes<'a> {
+    plan: &'a Plan,
+    /// Of what all members share, but for the matrices of cells [B].
+    tables: usize,
+    /// Blocks of the matrix.
+    blocks: usize,
+    /// Matrices of cells for one Poisson's ratio.
+    matrices: usize,
+}
+
+impl<'a> Sizes<'a> {
+    /// Of a plan.
+    pub fn new(plan: &'a Plan) -> Sizes<'a> {
+        let (body, band) = (&plan.body, &plan.body.band);
+        let pattern = Pattern::new(body);
+        let blocks = pattern.blocks.columns.len();
+        let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
+        let points: usize = plan.observation.frames.iter().map(|f| f.points.len()).sum();
+        let tables = body.cells.len() * size_of::<Cell>()
+            + band.cells.len() * size_of::<BandCell>()
+            + band.nodes.len() * size_of::<DVec3>()
+            + band.columns.len() * (size_of::<u32>() + size_of::<f64>())
+            + 4 * body.grid.len()
+            + 8 * pattern.cell_list.len()
+            + 4 * blocks
+            + points * (size_of::<ObservedPoint>() + 8);
+        Sizes { plan, tables, blocks, matrices: Classes::new(plan).parts.len() + held }
+    }
+
+    /// Memory that one evaluation of `members` simulations takes on so many threads, an estimate. Matrices of cells are kept for each of
+    /// the `ratios` different Poisson's ratios in the batch.
+    pub fn memory(&self, members: usize, ratios: usize, threads: usize, request: &Request) -> Memory {
+        let Sizes { plan, tables, blocks, matrices } = *self;
+        let (nodes, cells) = (plan.body.nodes.len(), plan.body.cells.len());
+        let vector = nodes * size_of::<DVec3>();
+        let factor = (8.0 * FILL * (nodes as f64).powf(4.0 / 3.0)) as usize;
+        // A copy is padded to vector registers. With many right-hand sides larger bodies are factorised as well.
+        let direct = is_direct(plan.solver.linear, nodes, Purpose::Step(usize::MAX));
+        let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
+        let solve = copy + cells * (size_of::<Posed>() + size_of::<V24>()) + VECTORS * vector;
+        let kept = if request.gradient { plan.clock.steps + 3 } else { 2 };
+        let bytes = |n: usize| n as u64;
+        Memory {
+            shared: bytes(tables + ratios * matrices * MATRICES),
+            matrices: bytes(members * blocks * size_of::<DMat3>()),
+            solves: bytes(members.min(threads.max(1)) * solve),
+            states: bytes(members * 2 * kept * vector),
+            tangents: bytes(members * 4 * request.sensitivities.len() * vector),
+        }
     }
 }

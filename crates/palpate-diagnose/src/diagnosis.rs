@@ -2,9 +2,10 @@
 
 use crate::laboratory::Model;
 use crate::locate::{Place, direction};
-use crate::quantity::stated;
+use crate::quantity::{millimetres as mm, stated};
 use crate::separation::Separated;
 use glam::DVec3;
+use palpate_model::params::unit_behind;
 
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -204,7 +205,6 @@ impl Diagnosis {
     }
 
     fn answer(&self) -> String {
-        let mm = |x: f64| format!("{:.3} mm", x * 1e3);
         let apart =
             format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
         let p = |p: f64| if p <= 0.002 { "p ≤ 0.002".to_string() } else { format!("p = {p:.3}") };
@@ -250,7 +250,7 @@ impl Diagnosis {
                     .map(|e| {
                         let numbers = e.parameters.iter().map(|(path, v, se, unit)| {
                             let name = path.splitn(3, '.').last().unwrap_or(path);
-                            format!("{name} {}{}", stated(*v, *se), if unit == "1" { String::new() } else { format!(" {unit}") })
+                            format!("{name} {}{}", stated(*v, *se), unit_behind(unit))
                         });
                         let others = if e.indistinguishable_from.is_empty() {
                             String::new()
@@ -278,8 +278,8 @@ impl Diagnosis {
     /// What keeps the answer from being the whole one.
     fn caution(&self) -> String {
         format!(
-            " What is left still has structure ({:.3} mm, p = {:.3}): something else is missing as well, or this is only the nearest that is known.",
-            self.structure.1 * 1e3,
+            " What is left still has structure ({}, p = {:.3}): something else is missing as well, or this is only the nearest that is known.",
+            mm(self.structure.1),
             self.p_value_after
         )
     }

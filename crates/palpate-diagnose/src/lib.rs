@@ -24,7 +24,7 @@ pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, Slack
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
 pub use linear::least_squares;
 pub use locate::{Place, direction};
-pub use quantity::stated;
+pub use quantity::{millimetres, stated};
 pub use separation::{Separated, Separation};
 pub use workflow::{Options, diagnose};
 

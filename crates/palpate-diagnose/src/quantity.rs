@@ -5,6 +5,11 @@ const DIGITS: i32 = 4;
 /// Most digits of a number whose standard error is tiny.
 const MOST: i32 = 7;
 
+/// A distance [m] in millimetres.
+pub fn millimetres(x: f64) -> String {
+    format!("{:.3} mm", x * 1e3)
+}
+
 /// Decimal exponent of the first digit.
 fn exponent(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() { 0 } else { x.abs().log10().floor() as i32 }

@@ -1,5 +1,7 @@
 //! Which measurement should be made next to tell what is named from what explains the data as well.
 
+use crate::quantity::millimetres;
+
 /// One measurement that could be made next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
@@ -48,8 +50,7 @@ impl Separated {
 
     /// For reports.
     pub fn sentence(&self) -> String {
-        let mm = |x: f64| format!("{:.3} mm", x * 1e3);
-        let (by, noise) = (mm(self.difference), mm(self.noise));
+        let (by, noise) = (millimetres(self.difference), millimetres(self.noise));
         if self.from.is_empty() {
             return format!(
                 "None of the measurements tried would tell them apart: {by} at most, where a reading has a noise of {noise}."

@@ -1,6 +1,6 @@
 //! Why a member of a batch stopped.
 
-use palpate_model::params::Layout;
+use palpate_model::params::{Layout, unit_behind};
 use std::fmt;
 
 /// A member that stopped: what happened, when, and what may help.
@@ -40,8 +40,7 @@ impl Failure {
     pub fn with_values(mut self, layout: &Layout, theta: &[f64]) -> Failure {
         let stated = layout.keys.iter().zip(theta).filter(|(_, v)| **v != 0.0).map(|(k, v)| {
             let spec = k.spec();
-            let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
-            format!("{} = {}{unit}", spec.path, number(*v))
+            format!("{} = {}{}", spec.path, number(*v), unit_behind(spec.unit))
         });
         self.detail = format!("{}, with {}", self.detail, stated.collect::<Vec<_>>().join(", "));
         self

@@ -18,7 +18,7 @@ use crate::multistart::StartRun;
 use crate::optimise::Sample;
 use crate::problem::Problem;
 use crate::settings::ErrorModel;
-use palpate_model::params::Transform;
+use palpate_model::params::{Transform, unit_behind};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Correlation beyond which two parameters are reported together.
@@ -205,14 +205,10 @@ pub fn compare_starts(problem: &Problem, runs: &[StartRun], best: usize, u: &Unc
             f.path,
             equal.len(),
             runs.len(),
-            unit(&f.unit)
+            unit_behind(&f.unit)
         ));
     }
     sentences
-}
-
-fn unit(unit: &str) -> String {
-    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
 struct Names<'p, 'a> {
@@ -231,7 +227,7 @@ impl Names<'_, '_> {
         } else {
             let chart = &self.problem.charts()[i];
             let (low, high) = (chart.value(z - spread), chart.value(z + spread));
-            format!("anything from {low:.3e} to {high:.3e}{} around {value:.3e}", unit(&f.unit))
+            format!("anything from {low:.3e} to {high:.3e}{} around {value:.3e}", unit_behind(&f.unit))
         };
         format!("{} is not determined: {range} changes the fit no more than the noise does", f.path)
     }

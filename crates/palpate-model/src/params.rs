@@ -56,6 +56,11 @@ pub enum ParamKey {
     },
 }
 
+/// A unit as it stands behind a number: with a space, and nothing for plain numbers.
+pub fn unit_behind(unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
 /// What is known about a parameter before any scene is read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamSpec {

@@ -23,23 +23,7 @@ fn shared() -> Option<(MutexGuard<'static, ()>, GpuBackend)> {
 }
 
 /// A soft block on a clamp, pushed sideways, and a fit of its stiffness to what a camera sees of it.
-const BLOCK: &str = r#"
-format = "scene/1"
-[object]
-shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
-cell_size = 0.02
-[material]
-density = 1000.0
-youngs_modulus = 2.0e4
-poisson_ratio = 0.4
-[[clamp]]
-box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
-[initial]
-velocity = [0.6, 0.0, 0.0]
-[time]
-step = 0.01
-steps = 8
-"#;
+const BLOCK: &str = include_str!("../tests/block.toml");
 const FIT: &str = r#"
 [observation]
 recording = "seen"

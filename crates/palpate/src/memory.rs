@@ -56,14 +56,13 @@ impl Demand {
     /// as they fit.
     pub fn on_cpu(&self, plan: &Plan, threads: usize) -> (usize, palpate_cpu::Memory) {
         let threads = if threads == 0 { rayon::current_num_threads() } else { threads };
+        let sizes = palpate_cpu::Sizes::new(plan);
+        let last = sizes.memory(1, 1, threads, &self.last());
         let of = |members| {
-            let during = palpate_cpu::memory(plan, members, self.ratios(plan, members), threads, &self.request());
-            let last = palpate_cpu::memory(plan, 1, 1, threads, &self.last());
+            let during = sizes.memory(members, self.ratios(plan, members), threads, &self.request());
             if last.total() > during.total() { last } else { during }
         };
-        let fits = |members| self.asked.is_some() || of(members).total() <= BATCH_MEMORY;
-        let members = largest(self.most(), fits);
-        (members, of(members))
+        largest(self.most(), of, |m| self.asked.is_some() || m.total() <= BATCH_MEMORY)
     }
 
     /// The same on a device whose largest buffer is `room` [B]. Where not even one simulation fits, one is the answer: to make it
@@ -76,9 +75,9 @@ impl Demand {
             let load = |request| Load { members, ratios: self.ratios(plan, members), request, room };
             palpate_gpu::memory(plan, &load(&self.request()))
         };
-        let fits = |members| of(members).is_ok_and(|m| m.largest <= room && (self.asked.is_some() || m.total() <= BATCH_MEMORY));
-        let members = largest(self.most(), fits);
-        let during = of(members)?;
+        let fits = |m: &palpate_gpu::Memory| m.largest <= room && (self.asked.is_some() || m.total() <= BATCH_MEMORY);
+        let (members, during) = largest(self.most(), of, |m| m.as_ref().is_ok_and(fits));
+        let during = during?;
         // Memory of states is kept for the next batch of the same size. The last evaluation is one member.
         let gradient = members == 1 && self.request().gradient;
         let request = Request { gradient, ..self.last() };
@@ -88,17 +87,20 @@ impl Demand {
     }
 }
 
-/// The largest number up to `most` that fits, at least 1; whatever is larger than one that does not fit does not fit either.
-fn largest(most: usize, fits: impl Fn(usize) -> bool) -> usize {
-    if fits(most) {
-        return most;
+/// The largest number up to `most` of which what it takes fits, at least 1, and what it takes; whatever is larger than one that does
+/// not fit does not fit either.
+fn largest<T>(most: usize, of: impl Fn(usize) -> T, fits: impl Fn(&T) -> bool) -> (usize, T) {
+    let all = of(most);
+    if most == 1 || fits(&all) {
+        return (most, all);
     }
-    let (mut low, mut high) = (1, most);
-    while high - low > 1 {
-        let middle = low + (high - low) / 2;
-        if fits(middle) { low = middle } else { high = middle }
+    let (mut low, mut high) = ((1, None), most);
+    while high - low.0 > 1 {
+        let middle = low.0 + (high - low.0) / 2;
+        let taken = of(middle);
+        if fits(&taken) { low = (middle, Some(taken)) } else { high = middle }
     }
-    low
+    (low.0, low.1.unwrap_or_else(|| of(1)))
 }
 
 /// The largest buffer of the device that would be used [B]; without any no limit is known.
@@ -117,7 +119,7 @@ mod tests {
     fn the_largest_that_fits_is_found() {
         for most in 1..20 {
             for limit in 0..25 {
-                assert_eq!(largest(most, |n| n <= limit), limit.clamp(1, most), "{most} {limit}");
+                assert_eq!(largest(most, |n| n, |n| *n <= limit).0, limit.clamp(1, most), "{most} {limit}");
             }
         }
     }

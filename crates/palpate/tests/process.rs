@@ -8,23 +8,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 /// A soft block on a clamp, pushed sideways.
-const BLOCK: &str = r#"
-format = "scene/1"
-[object]
-shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }
-cell_size = 0.02
-[material]
-density = 1000.0
-youngs_modulus = 2.0e4
-poisson_ratio = 0.4
-[[clamp]]
-box = { min = [-0.01, -0.01, -0.01], max = [0.05, 0.05, 0.001] }
-[initial]
-velocity = [0.6, 0.0, 0.0]
-[time]
-step = 0.01
-steps = 6
-"#;
+const BLOCK: &str = include_str!("block.toml");
 
 /// The program in an environment that is the same everywhere. Where no session gives it a folder, Mesa's Wayland layer complains
 /// on stderr, which is not the program's line.
@@ -143,7 +127,7 @@ fn inspect_foresees_the_memory_of_a_fit_on_the_cpu() {
     // What the program takes by itself is the same for both: the difference is the body's.
     let taken = ["0.02", "0.004"].map(|h| {
         let file = path("fit.toml");
-        let scene = BLOCK.replace("cell_size = 0.02", &format!("cell_size = {h}")).replace("steps = 6", "steps = 3");
+        let scene = BLOCK.replace("cell_size = 0.02", &format!("cell_size = {h}")).replace("steps = 8", "steps = 3");
         fs::write(&file, scene + fit).expect("writable");
         let (code, json, err) = run(program().args(["inspect", "--json"]).arg(&file));
         assert_eq!(code, 0, "{err}");

@@ -133,11 +133,11 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
         lines: Vec::new(),
     };
     for s in subjects(large, quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
-        let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, 5e4)?;
+        let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, &[])?;
         cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
         let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
-        let mut plan = plan(body, RotationUpdate::Converged, 5e4);
+        let mut plan = plan(body, RotationUpdate::Converged, &[]);
         plan.clock.steps = plan.clock.steps.min(STEPS);
         report.lines.push(cpu.clone());
         let mut took = 0.0;

@@ -66,13 +66,13 @@ pub fn all(large: bool, only: &str) -> Result<Report, String> {
             for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
                 let name = format!("dragon, {rotation:?}").to_lowercase();
                 if wanted(&name) {
-                    let line = one(&name, &sdf, 0.3 / 5.0 / 6.0, rotation, 5e4)?;
+                    let line = one(&name, &sdf, 0.3 / 5.0 / 6.0, rotation, &[])?;
                     add(Line { paper: Some(PAPER_DRAGON), ..line });
                 }
             }
             // Beside the first: effects that are absent cost nothing.
             if wanted("dragon, effects absent") {
-                add(one_with("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, RotationUpdate::Converged, 5e4, &effects())?);
+                add(one("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, RotationUpdate::Converged, &effects())?);
             }
         }
         None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
@@ -86,7 +86,7 @@ pub fn all(large: bool, only: &str) -> Result<Report, String> {
         for (kind, shape, across) in [("ball", ball, balls[k]), ("block", block, blocks[k])] {
             let name = format!("{kind} {}", SIZES[k]);
             if wanted(&name) {
-                add(one(&name, &placed(shape), 0.2 / across, RotationUpdate::Converged, 5e4)?);
+                add(one(&name, &placed(shape), 0.2 / across, RotationUpdate::Converged, &[])?);
             }
         }
     }
@@ -106,23 +106,18 @@ pub(crate) fn data() -> Option<std::path::PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// A body that is dropped from just above the ground and watched in every step.
-pub(super) fn plan(body: Body, rotation: RotationUpdate, youngs_modulus: f64) -> Plan {
-    plan_with(body, rotation, youngs_modulus, &[])
-}
-
 /// Every effect that needs nothing but a body and a plane.
 fn effects() -> Vec<usize> {
     (0..effects::ALL.len()).filter(|k| !matches!(effects::ALL[*k].family, Family::Measurement)).collect()
 }
 
-/// The same with effects of these laws, all of them absent.
-fn plan_with(body: Body, rotation: RotationUpdate, youngs_modulus: f64, laws: &[usize]) -> Plan {
+/// A body that is dropped from just above the ground and watched in every step, with effects of these laws, all of them absent.
+pub(super) fn plan(body: Body, rotation: RotationUpdate, laws: &[usize]) -> Plan {
     let layout = Layout::new(1, 0, laws);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let value = |k: &ParamKey| match k {
-        ParamKey::YoungsModulus => youngs_modulus,
+        ParamKey::YoungsModulus => 5e4,
         ParamKey::PoissonRatio => 0.45,
         ParamKey::Density => 1000.0,
         ParamKey::MassDamping => 0.1,
@@ -174,25 +169,14 @@ pub(super) fn blocks(body: &Body) -> usize {
     pairs.len()
 }
 
-pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, youngs_modulus: f64) -> Result<Line, String> {
-    one_with(name, shape, h, rotation, youngs_modulus, &[])
-}
-
-fn one_with(
-    name: &str,
-    shape: &dyn Shape,
-    h: f64,
-    rotation: RotationUpdate,
-    youngs_modulus: f64,
-    laws: &[usize],
-) -> Result<Line, String> {
+pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, laws: &[usize]) -> Result<Line, String> {
     reserve();
     PeakAlloc.reset_peak_usage();
     let before = PeakAlloc.current_usage();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
     let build = clock.elapsed().as_secs_f64();
-    let plan = plan_with(body, rotation, youngs_modulus, laws);
+    let plan = plan(body, rotation, laws);
     let body = &plan.body;
     let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
     let mut taken = Seconds::default();

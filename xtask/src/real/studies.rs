@@ -94,15 +94,17 @@ fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted
     Ok(row)
 }
 
-/// Each recording by itself, and the beams with one modulus.
-fn recordings(data: &Path) -> Result<Vec<Row>, Error> {
+/// Each recording by itself, and the beams with one modulus; the fits of the beams by themselves are handed on.
+fn recordings(data: &Path) -> Result<(Vec<Row>, [Fitted; 2]), Error> {
     let mut rows = Vec::new();
     let mut own = |r: &Recorded| {
         let experiment = open(data, r.scene, &[])?;
-        rows.push(told(row(r.name, r, &experiment, &fit(&experiment)?, 0)?));
-        Ok::<_, Error>(experiment)
+        let fitted = fit(&experiment)?;
+        rows.push(told(row(r.name, r, &experiment, &fitted, 0)?));
+        Ok::<_, Error>((experiment, fitted))
     };
-    let beams = [own(&BEAMS[0])?, own(&BEAMS[1])?];
+    let ((unloaded, first), (loaded, second)) = (own(&BEAMS[0])?, own(&BEAMS[1])?);
+    let beams = [unloaded, loaded];
     for r in &CANTILEVERS {
         own(r)?;
     }
@@ -110,21 +112,20 @@ fn recordings(data: &Path) -> Result<Vec<Row>, Error> {
     for (s, (beam, name)) in beams.iter().zip(["both beams, one E: own weight", "both beams, one E: with 52 g"]).enumerate() {
         rows.insert(2 + s, told(row(name, &BEAMS[s], beam, &joint, s)?));
     }
-    Ok(rows)
+    Ok((rows, [first, second]))
 }
 
 /// E and damping of one beam, only the start fitted to the other.
-fn predictions(data: &Path) -> Result<Vec<Row>, Error> {
+fn predictions(data: &Path, own: &[Fitted; 2]) -> Result<Vec<Row>, Error> {
     let mut rows = Vec::new();
     for (from, to) in [(0, 1), (1, 0)] {
-        let fitted = fit(&open(data, BEAMS[from].scene, &[])?)?;
         let scene = BEAMS[to].scene;
         let text = read(scene)?;
         let mut changes = vec![];
         for path in [MODULUS, DAMPING] {
             let key = path.trim_start_matches("material.");
             let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default().to_string();
-            changes.push((line, format!("{key} = {}", found(&fitted, path))));
+            changes.push((line, format!("{key} = {}", found(&own[from], path))));
             changes.push((free(&text, path), String::new()));
         }
         let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
@@ -248,8 +249,8 @@ fn print(title: &str, rows: &[Row]) {
 pub fn run() -> Result<PathBuf, String> {
     let data = crate::bench::data().ok_or("no recordings: set PALPATE_DATA to their folder")?;
     let all = || -> Result<Report, Error> {
-        let (recordings, predictions, loads) = (recordings(&data)?, predictions(&data)?, loads(&data)?);
-        Ok(Report { date: table::today(), recordings, predictions, loads })
+        let (recordings, own) = recordings(&data)?;
+        Ok(Report { date: table::today(), recordings, predictions: predictions(&data, &own)?, loads: loads(&data)? })
     };
     let report = all().map_err(|e| e.to_string())?;
     print("Fits of measured recordings (simulated / measured)", &report.recordings);

@@ -25,7 +25,7 @@ const MOST_ITERATIONS: usize = 4000;
 const DIRECT_STATIC: usize = 9000;
 /// Largest body (nodes) whose factor is cheaper than the iterations of one solve of a time step, and with several right-hand
 /// sides: clamps and ν near ½ cost block-Jacobi hundreds of iterations, a factor of 1000 nodes about 20 ms.
-pub(crate) const DIRECT_STEP: [usize; 2] = [900, 1800];
+const DIRECT_STEP: [usize; 2] = [900, 1800];
 /// Smallest body (nodes) for which the second level of the preconditioner pays.
 const COARSE_FROM: usize = 600;
 /// Edge of a group of nodes on the second level.
@@ -93,25 +93,26 @@ pub enum Trouble {
     Unconverged(f64),
 }
 
+/// True where the matrix of so many nodes is factorised.
+pub(crate) fn is_direct(choice: LinearSolver, nodes: usize, purpose: Purpose) -> bool {
+    match (choice, purpose) {
+        (LinearSolver::Cholesky, _) => true,
+        (LinearSolver::ConjugateGradient, _) => false,
+        (LinearSolver::Auto, Purpose::Static) => nodes <= DIRECT_STATIC,
+        (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP[usize::from(columns > 2)],
+    }
+}
+
 impl Solvers {
     /// Solvers for a choice made in the scene.
     pub fn new(choice: LinearSolver) -> Solvers {
         Solvers { choice, analysis: OnceLock::new(), coarsening: OnceLock::new() }
     }
 
-    fn direct(&self, nodes: usize, purpose: Purpose) -> bool {
-        match (self.choice, purpose) {
-            (LinearSolver::Cholesky, _) => true,
-            (LinearSolver::ConjugateGradient, _) => false,
-            (LinearSolver::Auto, Purpose::Static) => nodes <= DIRECT_STATIC,
-            (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP[usize::from(columns > 2)],
-        }
-    }
-
     /// Factorises or preconditions a matrix. A second level that is there already is used as it is; else it is made.
     pub fn prepare<'a>(&'a self, task: Task<'a>, level: &'a mut Option<Level>) -> Result<Prepared<'a>, Trouble> {
         let rows = &task.pattern.blocks;
-        if self.direct(rows.len(), task.purpose) {
+        if is_direct(self.choice, rows.len(), task.purpose) {
             let analysis = self.analysis.get_or_init(|| Analysis::new(rows));
             let analysis = analysis.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
             return analysis.factor(task.matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);

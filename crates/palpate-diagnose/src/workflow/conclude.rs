@@ -6,6 +6,7 @@ use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, Readings};
 use crate::linear::least_squares;
 use crate::null::{Adequacy, Block, LARGEST};
+use crate::quantity::millimetres;
 use palpate_engine::Source;
 
 /// Distance over what noise and discretisation explain beyond which a recording that no fit has seen counts as not met: bodies simulated
@@ -131,8 +132,8 @@ impl Session<'_> {
 fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&String>) -> Vec<String> {
     let level = held_out.map(|(before, after)| if verdict == Verdict::MissingEffect { after } else { before });
     let missed = level.filter(|l| l.rms > MET * l.noise).map(|l| {
-        let mm = |x: f64| format!("{:.3} mm", x * 1e3);
-        format!("The second recording is not explained: it is {} apart, noise and grid explain {}.", mm(l.rms), mm(l.noise))
+        let (apart, explained) = (millimetres(l.rms), millimetres(l.noise));
+        format!("The second recording is not explained: it is {apart} apart, noise and grid explain {explained}.")
     });
     let failed = failure.map(|e| format!("The second recording took no part: {e}."));
     missed.into_iter().chain(failed).collect()

@@ -6,7 +6,8 @@ use super::plots::{Curve, curves};
 use super::result::number;
 use crate::diagnosing::Diagnosed;
 use crate::residuals::ResidualSummary;
-use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Model, Separated, Verdict, direction, stated};
+use palpate_diagnose::{Found, FoundNumber, Level, MapEntry, Model, Separated, Verdict, direction, millimetres, stated};
+use palpate_model::params::unit_behind;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -134,7 +135,6 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
     if d.interrupted {
         writeln!(p, "<p class=\"w\">The diagnosis was interrupted; this is what was known until then.</p>")?;
     }
-    let mm = |x: f64| format!("{:.3} mm", x * 1e3);
     writeln!(
         p,
         "<h2>Before and after</h2><p>Distances, root mean square, and what noise and grid explain of them.</p><table><tr><th>data\
@@ -144,7 +144,13 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
     let mut row = |name: &str, b: Level, a: Level| {
         write!(p, "<tr><td>{name}")?;
         for l in [b, a] {
-            write!(p, "<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{:.2}", mm(l.rms), mm(l.noise), l.rms / l.noise)?;
+            write!(
+                p,
+                "<td class=\"n\">{}<td class=\"n\">{}<td class=\"n\">{:.2}",
+                millimetres(l.rms),
+                millimetres(l.noise),
+                l.rms / l.noise
+            )?;
         }
         writeln!(p, "</tr>")
     };
@@ -276,8 +282,7 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
     let width = d.baseline.numbers.iter().map(|n| n.path.chars().count()).max().unwrap_or(0);
     for (k, n) in d.baseline.numbers.iter().enumerate() {
         let after = if d.model == d.baseline { String::new() } else { format!("  →  {}", fitted(&d.model, k)) };
-        let unit = if n.unit == "1" { String::new() } else { format!(" {}", n.unit) };
-        text += &format!("  {:width$}  {}{after}{unit}\n", n.path, fitted(&d.baseline, k));
+        text += &format!("  {:width$}  {}{after}{}\n", n.path, fitted(&d.baseline, k), unit_behind(&n.unit));
     }
     for f in d.effects.iter().filter(|f| f.accepted) {
         if let Some(next) = &f.separated_by {

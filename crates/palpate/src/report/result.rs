@@ -5,6 +5,7 @@ use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
+use palpate_model::params::unit_behind;
 use serde_json::{Map, Value, json};
 
 /// A number for JSON; infinite and undefined ones become null.
@@ -138,7 +139,7 @@ pub fn number(x: f64) -> String {
 pub fn summary(fitted: &Fitted) -> String {
     let width = fitted.free.iter().map(|n| n.label().chars().count()).max().unwrap_or(0);
     let row = |(i, (n, p)): (usize, (&FreeNumber, &FittedParameter))| {
-        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+        let unit = unit_behind(&p.unit);
         let unsure = if p.standard_error.is_none() { " (no standard error)" } else { "" };
         let shift = fitted.grid_shift.as_ref().map(|s| 100.0 * s[i] / p.value.abs());
         let shift = shift.map_or(String::new(), |s| format!("; cells and step half as large: {s:+.1} %"));
