@@ -120,6 +120,43 @@ fn a_fit_whose_device_is_lost_keeps_its_best_and_resumes_to_the_same_bits() {
     assert_eq!(result(&broken), result(&whole), "to the last bit");
 }
 
+#[test]
+fn a_diagnosis_whose_device_is_lost_says_so_and_blames_no_candidate() {
+    let Some((_alone, _)) = shared() else { return };
+    let folder = recorded();
+    let (scene, out) = (folder.path().join("slow.toml"), folder.path().join("why"));
+    let slow =
+        BLOCK.replace("[0.6, 0.0, 0.0]", "[0.2, 0.0, 0.0]") + "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n";
+    std::fs::write(&scene, slow).expect("writable");
+    let arguments =
+        ["diagnose", &scene.display().to_string(), "--backend", "gpu", "--pictures", "0", "--out", &out.display().to_string()]
+            .map(String::from);
+    let (code, err) = std::thread::scope(|scope| {
+        let run = scope.spawn(|| command(&arguments.each_ref().map(String::as_str)));
+        // Every fit opens a device where there is none, so one is lost again and again, from when the search begins.
+        while !run.is_finished() {
+            std::thread::sleep(Duration::from_millis(20));
+            if out.join("checkpoint.jsonl").exists()
+                && let Ok(device) = gpu()
+            {
+                device.gpu().destroy();
+            }
+        }
+        run.join().expect("a diagnosis does not panic")
+    });
+    println!("{err}");
+    assert_eq!(code, 1, "{err}");
+    let errors: Vec<&str> = err.lines().filter(|l| l.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{err}");
+    for word in ["slow.toml", "the device was lost", "--backend cpu", "--resume"] {
+        assert!(errors[0].contains(word), "\"{word}\" is not in: {err}");
+    }
+    let text = std::fs::read_to_string(out.join("diagnosis.json")).expect("what was known is written");
+    let known: Value = serde_json::from_str(&text).expect("it is JSON");
+    assert_eq!((&known["verdict"], &known["interrupted"]), (&"undecided".into(), &true.into()), "{text}");
+    assert!(known["error"].as_str().is_some_and(|e| e.contains("lost")), "{text}");
+}
+
 /// What `inspect` says before, and what the device's allocator says during the fit: starts side by side with a tape, and one start
 /// with derivatives.
 #[test]

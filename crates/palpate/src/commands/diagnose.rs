@@ -79,6 +79,8 @@ fn write_all(
     let scale = 2.0 * d.before.rms.max(d.before.noise).max(1e-9);
     // Whoever interrupts does not want to wait for pictures.
     let count = if d.interrupted { 0 } else { a.pictures };
+    // A device that failed may fail again; the report needs none.
+    let backend = if done.broken.is_some() { Backend::Cpu } else { backend };
     for (s, e) in experiments.iter().enumerate() {
         let after = &done.experiments[s];
         residuals.push((e.residuals(backend, &done.theta_before[s])?, after.residuals(backend, &after.plan().theta)?));
@@ -124,6 +126,12 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         console.print(&result.to_string());
     } else {
         console.print(&diagnosis_summary(&done, &folder));
+    }
+    if let Some(why) = &done.broken {
+        return Err(Error::Failed(format!(
+            "{why}; what was known by then is in {}, --resume goes on from there",
+            folder.display()
+        )));
     }
     Ok(if done.diagnosis.interrupted { INTERRUPTED } else { 0 })
 }

@@ -18,11 +18,11 @@ use palpate_diagnose::{
     Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start,
 };
 use palpate_engine::Rollout;
-use palpate_fit::{FitScene, Hooks, Problem, Progress, Settings, Status, Tolerance, Want};
+use palpate_fit::{FitScene, Hooks, Problem, Progress, Sample, Settings, Status, Tolerance, Want};
 use palpate_model::scene::Optimizer;
 use rayon::prelude::*;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Most bytes of tangents of one simulation that computes the sensitivities of several hypotheses.
@@ -44,6 +44,8 @@ pub(super) struct Lab<'a> {
     setting: Setting,
     deadline: Option<Instant>,
     interrupt: Interrupt,
+    /// Why the device failed, if it did: the end of the search, as if it had been interrupted.
+    broken: OnceLock<String>,
     checkpoint: Checkpoint,
     finer: Option<Vec<Experiment>>,
     /// Refinements whose time is set aside of the search's.
@@ -90,6 +92,7 @@ impl<'a> Lab<'a> {
             setting,
             deadline,
             interrupt: options.interrupt.clone(),
+            broken: OnceLock::new(),
             checkpoint,
             finer: None,
             set_aside: Vec::new(),
@@ -107,6 +110,15 @@ impl<'a> Lab<'a> {
         }
     }
 
+    /// Why the device failed, if it did.
+    pub fn broken(&self) -> Option<String> {
+        self.broken.get().cloned()
+    }
+
+    fn limits(&self) -> Limits<'_> {
+        Limits { interrupt: &self.interrupt, broken: &self.broken, deadline: self.deadline }
+    }
+
     fn key(&self, start: &Start, effort: (usize, f64)) -> String {
         let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
         let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
@@ -114,20 +126,31 @@ impl<'a> Lab<'a> {
     }
 }
 
-/// When to stop: asked to, or out of time.
+/// When to stop: asked to, without a device, or out of time.
 #[derive(Clone, Copy)]
-struct Limits<'a> {
+pub(super) struct Limits<'a> {
     interrupt: &'a Interrupt,
+    broken: &'a OnceLock<String>,
     deadline: Option<Instant>,
 }
 
 impl Limits<'_> {
     fn check(&self) -> Result<(), LabError> {
         match self {
-            l if l.interrupt.is_raised() => Err(LabError::Interrupted),
+            l if l.is_over() => Err(LabError::Interrupted),
             l if l.deadline.is_some_and(|d| Instant::now() > d) => Err(LabError::NoTime),
             _ => Ok(()),
         }
+    }
+
+    fn is_over(&self) -> bool {
+        self.interrupt.is_raised() || self.broken.get().is_some()
+    }
+
+    /// The device failed: nothing more can be computed with it. The first reason counts; what follows is its consequence.
+    pub(super) fn break_off(&self, why: String) -> LabError {
+        self.broken.get_or_init(|| why);
+        LabError::Interrupted
     }
 }
 
@@ -166,7 +189,11 @@ fn cost(base: &[Experiment], backend: Backend, limits: Limits, (changes, values)
     limits.check()?;
     let (mut problem, _) = problem(base, backend, (changes, values), NEWTON * 1e-3)?;
     let values = problem.free().iter().map(|f| f.start.0).collect();
-    Ok(problem.evaluate_values(&[values], Want::Cost).first().map_or(f64::INFINITY, |s| s.cost))
+    let Some(sample) = problem.evaluate_values(&[values], Want::Cost).into_iter().next() else { return Ok(f64::INFINITY) };
+    match sample {
+        Sample { broken: true, failure, .. } => Err(limits.break_off(failure.unwrap_or_default())),
+        s => Ok(s.cost),
+    }
 }
 
 /// Fits one hypothesis; when the time is over, what was reached until then.
@@ -196,9 +223,9 @@ fn fit(
     let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| LabError::Failed(e.to_string()))?;
     if let Some(why) = result.broken {
-        return Err(LabError::Failed(why));
+        return Err(limits.break_off(why));
     }
-    if limits.interrupt.is_raised() {
+    if limits.is_over() {
         return Err(LabError::Interrupted);
     }
     let model = Model {
@@ -306,7 +333,7 @@ impl Laboratory for Lab<'_> {
 
     fn costs(&mut self, tries: &[Try]) -> Vec<f64> {
         let (base, backend) = (&self.base, self.backend);
-        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        let limits = self.limits();
         tries.par_iter().map(|t| cost(base, backend, limits, t).unwrap_or(f64::INFINITY)).collect()
     }
 
@@ -323,7 +350,7 @@ impl Laboratory for Lab<'_> {
             })
             .collect();
         let (base, backend) = (&self.base, self.backend);
-        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        let limits = self.limits();
         let answers: Vec<Result<Fit, LabError>> = tries
             .par_iter()
             .zip(known)
@@ -352,7 +379,7 @@ impl Laboratory for Lab<'_> {
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
         let base = &self.base;
-        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline };
+        let limits = self.limits();
         // As few simulations as there are threads, where tangents leave room: each costs its steps and one factorisation per step.
         let nodes = base.iter().map(|e| e.plan.body.nodes.len()).max().unwrap_or(1);
         let most = (MEMORY / (TANGENT * nodes)).max(1);
@@ -361,7 +388,7 @@ impl Laboratory for Lab<'_> {
     }
 
     fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
-        if self.interrupt.is_raised() {
+        if self.limits().is_over() {
             return Err(LabError::Interrupted);
         }
         let began = Instant::now();
@@ -388,7 +415,7 @@ impl Laboratory for Lab<'_> {
     }
 
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError> {
-        self.held_out.map(|e| held_out(e, &self.base, self.backend, model)).transpose()
+        self.held_out.map(|e| held_out(e, &self.base, self.backend, self.limits(), model)).transpose()
     }
 
     fn held_out_finer(
@@ -406,7 +433,7 @@ impl Laboratory for Lab<'_> {
             for (_, moves) in moves.iter().filter(|m| m.0 == name) {
                 model.values.iter_mut().zip(moves).for_each(|(v, d)| *v += d / factor);
             }
-            fields.push(difference(name, &held_out(&e, base, backend, &model)?, coarse, factor));
+            fields.push(difference(name, &held_out(&e, base, backend, self.limits(), &model)?, coarse, factor));
         }
         self.set_aside("held out", began);
         Ok(fields)
@@ -415,7 +442,7 @@ impl Laboratory for Lab<'_> {
     fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation> {
         // What else may be missing comes first.
         let quarter = |d: Instant| Instant::now() + d.saturating_duration_since(Instant::now()) / 4;
-        let limits = Limits { interrupt: &self.interrupt, deadline: self.deadline.map(quarter) };
+        let limits = Limits { deadline: self.deadline.map(quarter), ..self.limits() };
         let models: Vec<&Model> = std::iter::once(&named).chain(rivals).copied().collect();
         separations(&self.base, self.backend, &models, &|| limits.check().is_ok())
     }
@@ -431,7 +458,7 @@ impl Laboratory for Lab<'_> {
     }
 
     fn interrupted(&self) -> bool {
-        self.interrupt.is_raised()
+        self.limits().is_over()
     }
 
     fn say(&mut self, what: &str) {

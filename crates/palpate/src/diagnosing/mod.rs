@@ -58,6 +58,8 @@ pub struct Diagnosed {
     pub added: Vec<Effect>,
     /// Found values of every scene's numbers by path, for writing scenes.
     pub values: Vec<Vec<(String, f64)>>,
+    /// Why the device failed, if it did: the search ended there, as if it had been interrupted.
+    pub broken: Option<String>,
     /// Wall-clock time [s].
     pub seconds: f64,
 }
@@ -105,6 +107,9 @@ pub fn diagnose(
                 ..FitOptions::default()
             },
         )?;
+        if let Some(why) = &f.result.broken {
+            return Err(Error::Failed(format!("the baseline's fit: {why}")));
+        }
         for (e, theta) in base.iter_mut().zip(&f.result.theta) {
             e.plan.theta.clone_from(theta);
         }
@@ -114,7 +119,7 @@ pub fn diagnose(
     let (backend, known, free) = (options.backend, &base, &fitted);
     let plain = hypothesis::prepare(&base, &[])?;
     let values = plain.own_values();
-    let diagnosis = with_threads(threads, move || {
+    let (diagnosis, broken) = with_threads(threads, move || {
         let deadline = options.budget.map(|b| clock + b);
         let mut lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
         let numbers = lab.numbers(&[]).map_err(failed)?;
@@ -123,7 +128,12 @@ pub fn diagnose(
             parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
         });
         let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
-        palpate_diagnose::diagnose(&mut lab, model, &options.statistics).map_err(failed)
+        let found = palpate_diagnose::diagnose(&mut lab, model, &options.statistics);
+        match (found, lab.broken()) {
+            (Ok(diagnosis), broken) => Ok((diagnosis, broken)),
+            (Err(_), Some(why)) => Err(Error::Failed(why)),
+            (Err(e), None) => Err(failed(e)),
+        }
     })??;
     let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
     let model = &diagnosis.model;
@@ -152,6 +162,7 @@ pub fn diagnose(
         theta_before,
         experiments: corrected,
         values,
+        broken,
         seconds: clock.elapsed().as_secs_f64(),
         diagnosis,
     })

@@ -1,6 +1,7 @@
 //! Other data and other looks: a second recording of the same body, times of contact, frames at rest.
 
 use super::hypothesis::{Prepared, is_own, lab_error, prepare};
+use super::lab::Limits;
 use super::lab::linearise;
 use crate::engine::Backend;
 use crate::error::Error;
@@ -65,7 +66,13 @@ pub(super) fn still_frames(e: &Experiment, backend: Backend) -> Result<Vec<usize
 
 /// Residuals of a recording that no fit has seen: what describes the body comes from the model, what belongs to the recording (how the
 /// motion starts) keeps its scene's values, or is fitted where that scene or the model leaves it free.
-pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, model: &Model) -> Result<Readings, LabError> {
+pub(super) fn held_out(
+    e: &Experiment,
+    base: &[Experiment],
+    backend: Backend,
+    limits: Limits,
+    model: &Model,
+) -> Result<Readings, LabError> {
     let trained = prepare(base, &model.changes).map_err(lab_error)?;
     // A label of another scene's number means nothing here.
     let changes: Vec<Change> = model
@@ -122,7 +129,7 @@ pub(super) fn held_out(e: &Experiment, base: &[Experiment], backend: Backend, mo
         let settings = Settings { iterations: 12, ..Settings::new(Optimizer::GaussNewton) };
         let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(|e| LabError::Failed(e.to_string()))?;
         if let Some(why) = found.broken {
-            return Err(LabError::Failed(why));
+            return Err(limits.break_off(why));
         }
         open.iter().zip(&found.parameters).for_each(|(k, p)| values[*k] = p.value);
     }

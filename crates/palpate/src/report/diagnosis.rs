@@ -93,6 +93,7 @@ pub fn diagnosis_json(done: &Diagnosed) -> Value {
         "caveats": d.caveats,
         "something_remains": d.remains,
         "interrupted": d.interrupted,
+        "error": done.broken,
         "seconds": done.seconds,
     })
 }
@@ -132,7 +133,9 @@ fn write_page(p: &mut String, input: &DiagnosisInput) -> std::fmt::Result {
          <h1>{title}</h1><p>{}</p>",
         escape(&d.sentence())
     )?;
-    if d.interrupted {
+    if let Some(why) = &input.done.broken {
+        writeln!(p, "<p class=\"w\">The search was broken off ({}); this is what was known until then.</p>", escape(why))?;
+    } else if d.interrupted {
         writeln!(p, "<p class=\"w\">The diagnosis was interrupted; this is what was known until then.</p>")?;
     }
     writeln!(
