@@ -30,6 +30,10 @@ pub struct Bench {
     pub no_slack: bool,
     /// True once somebody has asked to stop.
     pub stopped: bool,
+    /// Iterations that there is time for.
+    pub iterations: usize,
+    /// Stiffness beyond which no fit gets anywhere.
+    pub marsh: f64,
 }
 
 /// A smooth pattern over place and time that a name stands for; a magnet pulls at one spot only.
@@ -115,6 +119,8 @@ impl Bench {
             slow: Vec::new(),
             no_slack: false,
             stopped: false,
+            iterations: usize::MAX,
+            marsh: f64::INFINITY,
         }
     }
 
@@ -203,8 +209,9 @@ impl Laboratory for Bench {
                 (0..r.columns).map(|k| r.sensitivity.iter().skip(k).step_by(r.columns).copied().collect()).collect();
             let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
             let y: Vec<f64> = r.rows.iter().map(|r| r.row.value.unwrap()).collect();
+            let stuck = if values[0].abs() > self.marsh { 0.0 } else { 1.0 };
             let step = least_squares(&chosen, &y, 0.0).unwrap();
-            let values = values.iter().zip(&step).map(|(v, s)| v + s).collect::<Vec<f64>>();
+            let values = values.iter().zip(&step).map(|(v, s)| v + stuck * s).collect::<Vec<f64>>();
             let cost = self.readings(changes, &values, values.len()).cost;
             let errors = vec![None; values.len()];
             Ok(Fit {
@@ -247,6 +254,10 @@ impl Laboratory for Bench {
 
     fn out_of_time(&self) -> bool {
         false
+    }
+
+    fn iterations_left(&self) -> usize {
+        self.iterations
     }
 
     fn interrupted(&self) -> bool {

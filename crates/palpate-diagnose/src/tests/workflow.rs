@@ -97,6 +97,19 @@ fn an_answer_says_what_there_was_no_time_for() {
 }
 
 #[test]
+fn where_the_baseline_went_astray_candidates_start_from_home_first() {
+    let mut bench = Bench::new(5, &[(&Bench::first_pattern("uniform-force"), -1.5 * NOISE)], false);
+    let mut baseline = bench.baseline();
+    // Fifty times the size of a change that matters, where fits stay where they are, and time for three candidates.
+    baseline.values[0] = 0.05;
+    (bench.marsh, bench.iterations) = (0.02, 27);
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    let (first, stiffness) = (&d.effects[0], d.model.values[0]);
+    assert_eq!((d.verdict, first.kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", d.sentence());
+    assert!(stiffness.abs() < NOISE, "the stiffness is back: {stiffness}");
+}
+
+#[test]
 fn who_stops_before_the_noise_is_known_is_told_no_more_than_that() {
     let mut bench = Bench::new(9, &[(&Bench::first_pattern("uniform-force"), -2.0 * NOISE)], false);
     let baseline = bench.baseline();

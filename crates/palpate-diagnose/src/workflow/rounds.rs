@@ -12,6 +12,10 @@ use crate::separation::Separated;
 /// start from.
 pub(super) const FAR: f64 = 0.3;
 
+/// The same, from which on a number makes up for what is missing where it cannot be right: what shows there shows nothing of the
+/// body, and the place where it was before comes first.
+const LOST: f64 = 10.0;
+
 /// Share of the sum of squares that a wall must take away where it stands first, without any fit, to be fitted.
 const WALL: f64 = 0.3;
 /// So many of them are.
@@ -77,9 +81,11 @@ impl Session<'_> {
                 tries.push((state, v));
             }
         }
-        let home = if round == 1 && self.affordable() > tries.len() { self.home(state)? } else { None };
+        let lost = strayed(state, LOST);
+        let home = if round == 1 && (lost || self.affordable() > tries.len()) { self.home(state)? } else { None };
         if let Some((home, variants)) = &home {
-            tries.extend(variants.iter().map(|v| (home, v)));
+            let place = if lost { 0 } else { tries.len() };
+            tries.splice(place..place, variants.iter().map(|v| (home, v)));
         }
         self.shorten(&mut tries);
         let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
@@ -183,9 +189,7 @@ impl Session<'_> {
     /// make up best for what is missing may lie where nothing else can be seen any more.
     fn home(&mut self, state: &State) -> Result<Option<(State, Vec<Variant>)>, LabError> {
         let model = &state.model;
-        let size = |n: &Number| if n.start == 0.0 { n.scale } else { n.start.abs() };
-        let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > FAR * size(n);
-        if !model.values.iter().zip(&model.numbers).any(far) {
+        if !strayed(state, FAR) {
             return Ok(None);
         }
         let values: Vec<f64> = model.numbers.iter().map(|n| n.start).collect();
@@ -282,6 +286,13 @@ impl Session<'_> {
         };
         f.changes().iter().map(&mut found).collect()
     }
+}
+
+/// True if a fitted number has gone further from its start than this share of its size.
+fn strayed(state: &State, share: f64) -> bool {
+    let size = |n: &Number| if n.start == 0.0 { n.scale } else { n.start.abs() };
+    let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > share * size(n);
+    state.model.values.iter().zip(&state.model.numbers).any(far)
 }
 
 #[cfg(test)]
