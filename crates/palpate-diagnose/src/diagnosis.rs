@@ -60,7 +60,7 @@ pub struct Found {
     pub sentence: String,
     /// Its numbers.
     pub parameters: Vec<FoundNumber>,
-    /// Probability of such an improvement by chance, times the number of candidates.
+    /// Probability of such an improvement by chance, times the number of starts of candidates, or of pairs of them.
     pub p_value: f64,
     /// Share of the gap that it closed when it was added, on data left out.
     pub held_out_gain: f64,

@@ -132,6 +132,8 @@ struct Session<'a> {
     noise: Shapes,
     /// Variants of the baseline, scored while the noise was being found out; the first round takes them over.
     scored: Option<Vec<Variant>>,
+    /// Variants among which the round chooses.
+    looks: usize,
     tried: Vec<Tried>,
     not_tried: Vec<String>,
     /// True when the time was over before everything was tried.
@@ -165,6 +167,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         design_effect: 1.0,
         noise: Shapes::default(),
         scored: None,
+        looks: 0,
         tried: Vec::new(),
         not_tried: Vec::new(),
         no_time: false,

@@ -60,6 +60,7 @@ impl Session<'_> {
             Some(v) => v,
             None => self.variants(state)?,
         };
+        self.looks = variants.len();
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(most_promising);
         let mut seen: Vec<usize> = Vec::new();
@@ -88,14 +89,14 @@ impl Session<'_> {
             tries.splice(place..place, variants.iter().map(|v| (home, v)));
         }
         self.shorten(&mut tries);
-        let mut fitted = self.fitted(state, &tries, &STARTS, count)?;
+        let mut fitted = self.fitted(state, &tries, &STARTS)?;
         let mut explained = self.explained(state, &fitted);
         if !explained && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
             let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
             let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
             if !further.is_empty() {
-                fitted.extend(self.fitted(state, &further, &CAREFUL, count)?);
+                fitted.extend(self.fitted(state, &further, &CAREFUL)?);
                 explained = self.explained(state, &fitted);
             }
         }
@@ -108,7 +109,7 @@ impl Session<'_> {
             pairs.iter().for_each(|(_, p)| self.note(round, p));
             let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
             if !tries.is_empty() {
-                fitted.extend(self.fitted(state, &tries, &STARTS, count)?);
+                fitted.extend(self.fitted(state, &tries, &STARTS)?);
                 fitted = ranked(fitted);
             }
         }
@@ -152,7 +153,6 @@ impl Session<'_> {
         state: &State,
         tries: &[(&State, &Variant)],
         shares: &[f64],
-        count: f64,
     ) -> Result<Vec<Fitted>, LabError> {
         let arrived = self.race(state, tries, shares)?;
         let jobs: Vec<(Vec<Change>, Vec<f64>)> =
@@ -161,7 +161,7 @@ impl Session<'_> {
         let mut fitted: Vec<Fitted> = Vec::new();
         for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
             match readings {
-                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings, count)?),
+                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings)?),
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(why) => self.missed(&v.kind(), &why),
             }
@@ -208,12 +208,15 @@ impl Session<'_> {
     }
 
     /// What a fitted candidate is worth.
-    fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, count: f64) -> Result<Fitted, LabError> {
+    fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings) -> Result<Fitted, LabError> {
         let new = self.beside(state, model, readings)?;
         let (with, without) = (new.squares(), state.squares());
         let freedom = v.columns.len();
+        // Bonferroni: every start was looked at, and a pair is one of all pairs of them.
+        let n = self.looks as f64;
+        let looks = if v.changes.len() > 1 { 0.5 * n * (n - 1.0).max(1.0) } else { n };
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
-        let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * count).min(1.0);
+        let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * looks).min(1.0);
         let gain = self.gain(state, &new);
         Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, effects: v.changes.len() })
     }
