@@ -20,7 +20,7 @@ const LOST: f64 = 10.0;
 const WALL: f64 = 0.3;
 /// So many of them are.
 const WALLS: usize = 3;
-/// Mean square of residuals, in units of their noise, up to which an explanation is not looked for elsewhere.
+/// Mean square of residuals, in units of their noise (or noise and grid), up to which an explanation is not looked for elsewhere.
 const CLOSE: f64 = 2.0;
 /// Further starts of candidates at unknown places: in all, and of each.
 const ELSEWHERE: (usize, usize) = (10, 3);
@@ -169,13 +169,22 @@ impl Session<'_> {
         Ok(fitted)
     }
 
-    /// True if the best of the candidates leaves little more than noise.
-    fn explained(&self, state: &State, fitted: &[Fitted]) -> bool {
+    /// True if the best of the candidates leaves little more than noise, or than noise and its own errors of the discretisation: an
+    /// effect that makes up for these is none.
+    fn explained(&mut self, state: &State, fitted: &[Fitted]) -> bool {
         let loss = |s: &State| s.predicted[0].loss();
-        let best = fitted.iter().map(|f| &f.state).min_by(|a, b| loss(a).total_cmp(&loss(b)));
-        best.is_some_and(|s| {
-            loss(s) <= loss(state) && self.over_noise(&s.readings) <= CLOSE && !self.is_missing(&self.adequacy(s), s)
-        })
+        let Some(best) = fitted.iter().map(|f| &f.state).min_by(|a, b| loss(a).total_cmp(&loss(b))) else { return false };
+        if loss(best) > loss(state) {
+            return false;
+        }
+        if self.over_noise(&best.readings) <= CLOSE && !self.is_missing(&self.adequacy(best), best) {
+            return true;
+        }
+        // Where its body goes they are others than the baseline's.
+        let fields = self.finer(&best.model);
+        let own = State { frame: self.frame(&best.table, &fields), fields, ..best.clone() };
+        let level = self.level_of(&own.readings, 0.0, &own.fields);
+        level.rms.powi(2) <= CLOSE * level.noise.powi(2) && !self.is_missing(&self.adequacy(&own), &own)
     }
 
     /// Mean square of residuals in units of their noise.
