@@ -3,6 +3,7 @@
 use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
+use super::limits::Limits;
 use super::others::{contact_times, held_out, still_frames};
 use super::refined::{GRID, STEP, difference, finer, halved};
 use super::separate::separations;
@@ -123,34 +124,6 @@ impl<'a> Lab<'a> {
         let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
         let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
         format!("{prints:?} {theta:?} {start:?} {effort:?}")
-    }
-}
-
-/// When to stop: asked to, without a device, or out of time.
-#[derive(Clone, Copy)]
-pub(super) struct Limits<'a> {
-    interrupt: &'a Interrupt,
-    broken: &'a OnceLock<String>,
-    deadline: Option<Instant>,
-}
-
-impl Limits<'_> {
-    fn check(&self) -> Result<(), LabError> {
-        match self {
-            l if l.is_over() => Err(LabError::Interrupted),
-            l if l.deadline.is_some_and(|d| Instant::now() > d) => Err(LabError::NoTime),
-            _ => Ok(()),
-        }
-    }
-
-    fn is_over(&self) -> bool {
-        self.interrupt.is_raised() || self.broken.get().is_some()
-    }
-
-    /// The device failed: nothing more can be computed with it. The first reason counts; what follows is its consequence.
-    pub(super) fn break_off(&self, why: String) -> LabError {
-        self.broken.get_or_init(|| why);
-        LabError::Interrupted
     }
 }
 

@@ -3,6 +3,7 @@
 mod checkpoint;
 mod hypothesis;
 mod lab;
+mod limits;
 mod others;
 mod refined;
 mod separate;
