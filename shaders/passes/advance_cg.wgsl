@@ -35,7 +35,7 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         direction[a] += alpha * cg_along[a];
         let r = cg_rest[a].xyz - alpha * cg_image[a].xyz;
         cg_rest[a] = vec4(r, 0.0);
-        left.x = dot(r, scaled(a, r));
+        left.x = dot(r, scaled(at_node(p.home, p.item), r));
     }
     let rz = total(local, left).x;
     if local == 0u {

@@ -1,4 +1,5 @@
-//! Prepares conjugate gradients for a derivative: A x = rhs with the exact tangent at a converged state.
+//! Prepares conjugate gradients for a derivative: A x = rhs with the exact tangent at a converged state, as column call.extra of
+//! every member. What goes wrong with a column is kept for end_exact.
 // use shared/grid
 // use shared/totals
 // use shared/precondition
@@ -22,37 +23,38 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !p.runs {
         return;
     }
+    let system = call.extra * shape.members + p.member;
     var state = vec4(0.0);
     for (var i = local; i < shape.nodes; i += 256u) {
-        let a = at_node(p.member, i);
-        let r = rhs[a].xyz;
-        let z = scaled(a, r);
+        let a = at_node(system, i);
+        let r = rhs[at_node(p.member, i)].xyz;
+        let z = scaled(at_node(p.member, i), r);
         direction[a] = vec4(0.0);
         cg_rest[a] = vec4(r, 0.0);
         cg_along[a] = vec4(z, 0.0);
-        state += vec4(dot(r, z), inverses[2u * a + 1u].w, 0.0, 0.0);
+        state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
     }
     let s = total(local, state);
-    first_cg(local, p.member, s.x);
+    first_cg(local, system, s.x);
     if local != 0u {
         return;
     }
-    var n = newton[p.member];
+    var n = newton[system];
     n.rz = s.x;
     n.norm = sqrt(max(s.x, 0.0));
     n.goal = FINEST * n.norm;
     n.cg = 0u;
     n.stage = select(IDLE, WANTS_SOLVE, n.norm > 0.0);
-    var broken = 0u;
+    var broken = WELL;
     if s.y > 0.0 {
         broken = INDEFINITE;
     }
     if !(n.norm <= 3e38) {
         broken = NOT_FINITE;
     }
-    if broken != 0u {
+    if broken != WELL {
         n.stage = IDLE;
-        health[p.member] = Health(broken, call.step + call.mode, vec2(n.norm, 0.0));
     }
-    newton[p.member] = n;
+    health[system] = Health(broken, call.step + call.mode, vec2(n.norm, 0.0));
+    newton[system] = n;
 }

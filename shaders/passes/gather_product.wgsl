@@ -25,7 +25,7 @@ fn gather_product(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     var curvature = vec4(0.0);
     if p.live {
         let a = at_node(p.member, p.item);
-        var q = heavy_row(m, mix.inertia, p.member, p.item) + (mix.drag * node_mass(m, p.member, p.item)) * cg_along[a].xyz;
+        var q = heavy_row(m, mix.inertia, p) + (mix.drag * node_mass(m, p.member, p.item)) * cg_along[a].xyz;
         for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
             q += cell_force[p.member * shape.cells * 8u + node_list[k]].xyz;
         }

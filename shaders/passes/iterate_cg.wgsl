@@ -1,4 +1,4 @@
-//! A bounded number of conjugate-gradient iterations, one workgroup per member; every scalar stays on the device. Ends in the
+//! A bounded number of conjugate-gradient iterations, one workgroup per member and column; every scalar stays on the device. Ends in the
 //! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: 0 = a Newton direction
 //! (a negative curvature cuts it short), 1 = a derivative (it is an error).
 // use shared/mix
@@ -21,7 +21,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if !p.runs {
         return;
     }
-    let m = members[p.member];
+    let m = members[p.home];
     let mix = mix_of(m);
     var n = newton[p.member];
     workgroupBarrier();
@@ -34,10 +34,10 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         storageBarrier();
         var curvature = vec4(0.0);
         for (var i = local; i < shape.nodes; i += 256u) {
-            var q = (mix.inertia * node_mass(m, p.member, i)) * cg_along[at_node(p.member, i)].xyz;
+            var q = (mix.inertia * node_mass(m, p.home, i)) * cg_along[at_node(p.member, i)].xyz;
             for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
                 let x = cg_along[at_node(p.member, columns[k])].xyz;
-                let v = (p.member * shape.blocks + k) * 9u;
+                let v = (p.home * shape.blocks + k) * 9u;
                 q += vec3(
                     values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
                     values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
@@ -51,7 +51,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
                     for (var j = 0u; j < 8u; j++) {
                         x += mass_sites[s].weights[j] * cg_along[at_node(p.member, mass_sites[s].nodes[j])].xyz;
                     }
-                    q += (mix.inertia * mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner]) * x;
+                    q += (mix.inertia * mass_values[p.home * shape.masses + s] * mass_sites[s].weights[corner]) * x;
                 }
             }
             let a = at_node(p.member, i);
@@ -71,7 +71,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             direction[a] += alpha * cg_along[a];
             let r = cg_rest[a].xyz - alpha * cg_image[a].xyz;
             cg_rest[a] = vec4(r, 0.0);
-            left.x += dot(r, scaled(a, r));
+            left.x += dot(r, scaled(at_node(p.home, i), r));
         }
         let rz = total(local, left).x;
         let beta = rz / n.rz;
@@ -82,7 +82,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
         for (var i = local; i < shape.nodes; i += 256u) {
             let a = at_node(p.member, i);
-            cg_along[a] = vec4(scaled(a, cg_rest[a].xyz), 0.0) + beta * cg_along[a];
+            cg_along[a] = vec4(scaled(at_node(p.home, i), cg_rest[a].xyz), 0.0) + beta * cg_along[a];
         }
     }
     leave_cg(local, p.member, n, negative, ended, call.extra == 1u);

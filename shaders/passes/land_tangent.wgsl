@@ -1,4 +1,4 @@
-//! The new tangent from the solved increment δ: du₁ = du + Δt dv + δ, dv₁ = dv + δ/(θΔt).
+//! The new tangent from the solved increment δ, column call.extra of the solve: du₁ = du + Δt dv + δ, dv₁ = dv + δ/(θΔt).
 // use shared/grid
 
 var<storage, read> tangent: array<vec4<f32>>;
@@ -14,6 +14,7 @@ fn land_tangent(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let a = at_node(p.member, p.item);
     let v = part(1u) + a;
-    tangent_next[a] = tangent[a] + shape.dt * tangent[v] + direction[a];
-    tangent_next[v] = tangent[v] + direction[a] / (shape.theta * shape.dt);
+    let solved = direction[at_node(call.extra * shape.members + p.member, p.item)];
+    tangent_next[a] = tangent[a] + shape.dt * tangent[v] + solved;
+    tangent_next[v] = tangent[v] + solved / (shape.theta * shape.dt);
 }

@@ -1,6 +1,7 @@
 //! Lists who takes part in what comes next (section 0: all that are well; 1, 2, 3: those that want a matrix, a solve, a trial)
 //! and writes the sizes of the dispatches for each list, so that work that nobody wants shrinks to nothing. `gate` is the size of
-//! later listings: nothing once nobody wants anything.
+//! later listings: nothing once nobody wants anything. call.extra: columns of each member that are solved for at the same time; those
+//! of a member follow each other, so that they find its matrix in the caches.
 // use shared/structs
 
 var<uniform> shape: Shape;
@@ -31,14 +32,16 @@ fn groups_of(kind: u32) -> u32 {
 
 @compute @workgroup_size(4)
 fn list_members(@builtin(local_invocation_index) section: u32) {
-    let start = section * (shape.members + 1u);
+    let start = section * (call.extra * shape.members + 1u);
     var count = 0u;
     var busy = 0u;
-    for (var b = 0u; b < shape.members; b++) {
-        if health[b].code == WELL && (section == 0u || newton[b].stage == section) {
+    for (var k = 0u; k < call.extra * shape.members; k++) {
+        let b = k / call.extra;
+        let system = (k % call.extra) * shape.members + b;
+        if health[b].code == WELL && (section == 0u || newton[system].stage == section) {
             count += 1u;
-            roster[start + count] = b;
-            busy |= newton[b].stage;
+            roster[start + count] = system;
+            busy |= newton[system].stage;
         }
     }
     roster[start] = count;

@@ -17,13 +17,13 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     if !p.runs || cg_scalars[4u * p.member + parity()].z != 0.0 {
         return;
     }
-    let m = members[p.member];
+    let m = members[p.home];
     var q = vec3(0.0);
     if p.live {
         let end = block_rows[p.item + 1u];
         for (var k = block_rows[p.item] + local % 8u; k < end; k += 8u) {
             let x = cg_along[at_node(p.member, columns[k])].xyz;
-            let v = (p.member * shape.blocks + k) * 9u;
+            let v = (p.home * shape.blocks + k) * 9u;
             q += vec3(
                 values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
                 values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
@@ -35,7 +35,7 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     workgroupBarrier();
     var curvature = vec4(0.0);
     if p.live && local % 8u == 0u {
-        q = heavy_row(m, mix_of(m).inertia, p.member, p.item);
+        q = heavy_row(m, mix_of(m).inertia, p);
         for (var i = 0u; i < 8u; i++) {
             q += shares[local + i].xyz;
         }

@@ -39,5 +39,5 @@ fn turn_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
         beta = rz / before.x;
     }
     let a = at_node(p.member, p.item);
-    cg_along[a] = vec4(scaled(a, cg_rest[a].xyz), 0.0) + beta * cg_along[a];
+    cg_along[a] = vec4(scaled(at_node(p.home, p.item), cg_rest[a].xyz), 0.0) + beta * cg_along[a];
 }

@@ -1,5 +1,6 @@
-//! Which member and which item an invocation works on. Members that take part stand in a section of the roster; their
-//! workgroups follow each other, and grids wider than a device allows are folded into two dimensions.
+//! Which member and which item an invocation works on. Members that take part stand in a section of the roster, which starts where
+//! call.roster says; their workgroups follow each other, and grids wider than a device allows are folded into two dimensions. In
+//! solves for several columns at once every column of a member counts as one: column q of member b has the number q B + b.
 // use shared/structs
 
 var<uniform> shape: Shape;
@@ -7,6 +8,8 @@ var<storage, read> roster: array<u32>;
 
 struct Place {
     member: u32,
+    // The member whose matrix and parameters these are.
+    home: u32,
     item: u32,
     // Whole workgroups run or not; an item beyond the end is not live and must not write.
     runs: bool,
@@ -17,10 +20,12 @@ fn find_place(group: vec3<u32>, groups: vec3<u32>, local: u32, items: u32, width
     let each = max((items + width - 1u) / width, 1u);
     let flat = group.x + group.y * groups.x;
     let slot = flat / each;
-    let section = call.roster * (shape.members + 1u);
     var p: Place;
-    p.runs = slot < roster[section];
-    p.member = roster[section + 1u + min(slot, shape.members - 1u)];
+    p.runs = slot < roster[call.roster];
+    if p.runs {
+        p.member = roster[call.roster + 1u + slot];
+    }
+    p.home = p.member % shape.members;
     p.item = (flat % each) * width + local;
     p.live = p.runs && p.item < items;
     return p;

@@ -2,10 +2,10 @@
 //! all of them see the same numbers and take the same decisions. call.extra: bit 0 = parity of the iteration, bit 1 = products
 //! were made in groups of 256 nodes (else of 32).
 
-// [B][4]: of even and of odd iterations (rᵀ M⁻¹ r, iterations so far, 0 going on | 1 ended | 2 negative curvature, 0), then of even
+// Of each column of a solve [4]: of even and of odd iterations (rᵀ M⁻¹ r, iterations so far, 0 going on | 1 ended | 2 negative curvature, 0), then of even
 // and odd updates (1 if the curvature was not positive, 0, 0, 0).
 var<storage, read_write> cg_scalars: array<vec4<f32>>;
-// [2][B][groups of 32 nodes]: parts of pᵀ A p, parts of rᵀ M⁻¹ r.
+// Of each column [2][groups of 32 nodes]: parts of pᵀ A p, parts of rᵀ M⁻¹ r.
 var<storage, read_write> cg_parts: array<f32>;
 
 const NARROW = 32u;
@@ -17,7 +17,7 @@ fn groups_of_nodes(width: u32) -> u32 {
 
 // Where the parts of a member start: 0 = pᵀ A p, 1 = rᵀ M⁻¹ r.
 fn parts_at(member: u32, which: u32) -> u32 {
-    return (which * shape.members + member) * groups_of_nodes(NARROW);
+    return (2u * member + which) * groups_of_nodes(NARROW);
 }
 
 // Width of the groups that products were made in.

@@ -35,12 +35,14 @@ fn leave_cg(local: u32, member: u32, found: Newton, bent: bool, over: bool, exac
         if !(relative <= enough) && !cut {
             broken = UNSOLVED;
         }
-        var slope = vec4(0.0);
-        for (var i = local; i < shape.nodes; i += 256u) {
-            let a = at_node(member, i);
-            slope.x += dot(residual[a].xyz, direction[a].xyz);
+        if !exact {
+            var slope = vec4(0.0);
+            for (var i = local; i < shape.nodes; i += 256u) {
+                let a = at_node(member, i);
+                slope.x += dot(residual[a].xyz, direction[a].xyz);
+            }
+            n.slope = total(local, slope).x;
         }
-        n.slope = total(local, slope).x;
     }
     if local == 0u {
         if broken != 0u {

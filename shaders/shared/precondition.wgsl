@@ -2,6 +2,7 @@
 
 var<storage, read> inverses: array<vec4<f32>>;
 
+// `a`: a node of the member whose matrix it is.
 fn scaled(a: u32, r: vec3<f32>) -> vec3<f32> {
     let s = inverses[2u * a];
     let t = inverses[2u * a + 1u];

@@ -1,9 +1,10 @@
 //! Adjoint and tangent of start and step, with the exact tangent at the converged state.
 
 use crate::effects;
+use crate::geometry::columns;
 use crate::pipelines::pass;
 use crate::solve::{ALL, Per, Solve};
-use crate::world::{Adjoint, State, Tally, Tangent, VECTOR, World};
+use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
 use palpate_model::scene::InitialShape;
 
 /// Adjoint of step k: adds to dJ/d(now) and to dJ/dθ.
@@ -42,28 +43,40 @@ pub(crate) fn start_adjoint(world: &World, first: &State, adj: &Adjoint, tally: 
 /// Tangent of the start along the tangent's own directions.
 pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tally: &Tally) {
     let blank = State(world.lend(3));
+    let room = ColumnRoom::new(world, tangent.directions.len());
     let half = VECTOR * u64::from(world.geometry.shape.nodes) * world.members() as u64;
     let keys = &world.plan.layout.keys;
     world.record(|r| {
         r.clear(&blank.0.buffer);
-        let moved = world.plan.initial == InitialShape::StaticEquilibrium;
-        if moved {
-            Solve::new(world, r, None, &blank, first, tally).linearise();
-        }
+        tangent.parts.iter().for_each(|part| r.clear(&part.buffer));
+        let mut s = Solve::new(world, r, None, &blank, first, tally);
+        room.lend_to(&mut s);
+        s.list();
         for (part, p) in tangent.parts.iter().zip(&tangent.directions) {
-            r.clear(&part.buffer);
-            let mut s = Solve::new(world, r, None, &blank, first, tally);
-            s.list();
             if s.velocity_column(keys[*p]) {
-                s.recorder.copy_part(&world.buffers["column"], &part.buffer, half, half);
+                let column = (&world.buffers["column"], 0);
+                s.recorder.copy_part([column, (&part.buffer, half)], half);
                 if s.shape_column(keys[*p]) {
-                    s.recorder.copy_part(&world.buffers["column"], &part.buffer, 0, half);
+                    s.recorder.copy_part([column, (&part.buffer, 0)], half);
                 }
-            } else if let Some(column) = s.column_of(keys[*p]).filter(|_| moved) {
-                s.column(Some(column));
+            }
+        }
+        if world.plan.initial != InitialShape::StaticEquilibrium {
+            return;
+        }
+        s.linearise();
+        let moved: Vec<_> =
+            tangent.parts.iter().zip(&tangent.directions).filter(|(_, p)| s.moves_equilibrium(keys[**p])).collect();
+        for together in moved.chunks(room.columns) {
+            for (q, (_, p)) in together.iter().enumerate() {
+                let column = s.column_of(keys[**p]);
+                s.column(column);
                 s.run(pass::SUM_OLD, ALL, Per::Node, 0);
-                s.solve();
-                s.recorder.copy_part(&world.buffers["direction"], &part.buffer, 0, half);
+                s.begin_column(q);
+            }
+            s.solve_columns(together.len());
+            for (q, (part, _)) in together.iter().enumerate() {
+                s.recorder.copy_part([(room.solved(world), q as u64 * half), (&part.buffer, 0)], half);
             }
         }
     });
@@ -72,23 +85,57 @@ pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tal
 /// Tangent of step k.
 pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, old: &Tangent, new: &Tangent, tally: &Tally) {
     let keys = &world.plan.layout.keys;
+    let room = ColumnRoom::new(world, old.directions.len());
+    let flight = &world.buffers["trial"];
+    let all: Vec<_> = old.parts.iter().zip(&new.parts).zip(&old.directions).collect();
     world.record(|r| {
         let mut s = Solve::new(world, r, Some(k), now, next, tally);
+        room.lend_to(&mut s);
         s.linearise();
-        for ((from, to), p) in old.parts.iter().zip(&new.parts).zip(&old.directions) {
-            let from = &from.buffer;
-            let column = s.column_of(keys[*p]);
-            s.column(column);
-            let flight = &world.buffers["trial"];
-            s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
-            s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
-            s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, 5, &[("probe", from)]);
-            s.couple_patches(effects::BY_OLD, &[("probe", from)]);
-            s.couple_cells(0, &[("probe", from)]);
-            s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
-            s.press_nodes(ALL, effects::BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
-            s.solve();
-            s.run_with(pass::LAND_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("tangent_next", &to.buffer)]);
+        for together in all.chunks(room.columns) {
+            for (q, ((from, _), p)) in together.iter().enumerate() {
+                let from = &from.buffer;
+                let column = s.column_of(keys[**p]);
+                s.column(column);
+                s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
+                s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
+                s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, 5, &[("probe", from)]);
+                s.couple_patches(effects::BY_OLD, &[("probe", from)]);
+                s.couple_cells(0, &[("probe", from)]);
+                s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
+                s.press_nodes(ALL, effects::BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
+                s.begin_column(q);
+            }
+            s.solve_columns(together.len());
+            for (q, ((from, to), _)) in together.iter().enumerate() {
+                let ends = [("tangent", &from.buffer), ("tangent_next", &to.buffer)];
+                s.run_with(pass::LAND_TANGENT, ALL, Per::Node, q as u32, &ends);
+            }
         }
     });
+}
+
+/// Vectors of the columns that are solved for at the same time.
+struct ColumnRoom {
+    /// How many columns there is room for.
+    columns: usize,
+    /// Those of [`COLUMN_VECTORS`], unless it is a single column.
+    loans: Vec<Loan>,
+}
+
+impl ColumnRoom {
+    fn new(world: &World, wanted: usize) -> ColumnRoom {
+        let columns = wanted.clamp(1, columns(world.members() as u64) as usize);
+        let count = if columns > 1 { COLUMN_VECTORS.len() } else { 0 };
+        ColumnRoom { columns, loans: (0..count).map(|_| world.lend(columns as u64)).collect() }
+    }
+
+    fn lend_to<'a>(&'a self, s: &mut Solve<'a, '_>) {
+        s.own.extend(COLUMN_VECTORS.iter().zip(&self.loans).map(|(name, loan)| (*name, &loan.buffer)));
+    }
+
+    /// Where the solutions lie, one column after another.
+    fn solved<'a>(&'a self, world: &'a World) -> &'a wgpu::Buffer {
+        self.loans.first().map_or(&world.buffers[COLUMN_VECTORS[0]], |loan| &loan.buffer)
+    }
 }

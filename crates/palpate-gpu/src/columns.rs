@@ -159,16 +159,23 @@ impl Solve<'_, '_> {
 
     /// ∂v/∂p of the start → `column`; false for parameters that the velocity does not depend on.
     pub(crate) fn velocity_column(&mut self, key: ParamKey) -> bool {
-        let (kind, axis) = match key {
-            ParamKey::Velocity(a) => (6, a.into()),
-            ParamKey::AngularVelocity(a) => (7, a.into()),
-            _ => match self.start_row(key) {
-                Some(row) => (START_SPIN, row),
-                None => return false,
-            },
-        };
-        self.column(Some(Column { kind, index: axis, cells: None, press: None }));
+        let Some((kind, index)) = self.velocity_kind(key) else { return false };
+        self.column(Some(Column { kind, index, cells: None, press: None }));
         true
+    }
+
+    /// Kind and index of ∂v/∂p of the start.
+    fn velocity_kind(&self, key: ParamKey) -> Option<(u32, u32)> {
+        match key {
+            ParamKey::Velocity(a) => Some((6, a.into())),
+            ParamKey::AngularVelocity(a) => Some((7, a.into())),
+            _ => self.start_row(key).map(|row| (START_SPIN, row)),
+        }
+    }
+
+    /// True when a static start depends on this parameter.
+    pub(crate) fn moves_equilibrium(&self, key: ParamKey) -> bool {
+        self.velocity_kind(key).is_none() && self.column_of(key).is_some()
     }
 
     /// dJ/dp += dJ/dv · ∂v/∂p + dJ/du · ∂u/∂p of the start.

@@ -23,6 +23,17 @@ const MOST_ITERATIONS: usize = 2000;
 /// Most CG iterations of one dispatch: the rest of a long chunk is lost when a member converges early in it.
 const LONGEST_CHUNK: u64 = 512;
 
+/// Most columns of a member (derivatives by so many parameters) that are solved for at the same time.
+const COLUMNS: u64 = 8;
+
+/// Columns that a batch of so many members is solved for at the same time: one invocation lists them all.
+pub(crate) fn columns(members: u64) -> u64 {
+    ((LOOPS - LISTING) / members.max(1)).clamp(1, COLUMNS)
+}
+
+/// Loop iterations of a listing beside those over members and columns.
+const LISTING: u64 = 16;
+
 /// What the loops of the kernels of a step run over, at most.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Most {
@@ -56,7 +67,7 @@ impl Most {
         // 600: rotations by Jacobi's method, and sums over the corners of a cell.
         let cell = 600 + self.supports;
         [
-            ("list_members", self.members + 16),
+            ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
             ("begin_solve", self.share() * (4 + 9 * self.masses) + 300),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),

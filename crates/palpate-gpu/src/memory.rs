@@ -2,11 +2,11 @@
 
 use crate::device::whole;
 use crate::error::GpuError;
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, columns};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::observe;
 use crate::tuning::MANY;
-use crate::world::{VECTOR, tally_sizes, work};
+use crate::world::{COLUMN_VECTORS, VECTOR, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
@@ -73,7 +73,7 @@ pub struct Memory {
     pub work: u64,
     /// States: all steps when a gradient is asked for, two otherwise; and adjoints.
     pub states: u64,
-    /// Derivatives of two states along every direction.
+    /// Derivatives of two states along every direction, and what solving for them takes.
     pub tangents: u64,
     /// The largest single buffer, which must not exceed the device's.
     pub largest: u64,
@@ -124,7 +124,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
         constants: all(&constants),
         work: all(&space),
         states: vectors(3 * kept.max(2)) + if request.gradient { vectors(4) } else { 0 },
-        tangents: vectors(4 * q as u64),
+        tangents: vectors(4 * q as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
         largest,
     })
 }

@@ -84,7 +84,7 @@ pub struct Args {
     pub step: u32,
     /// 0 = static balance, 1 = step.
     pub mode: u32,
-    /// Section of the roster: which members take part.
+    /// Where the section of the roster starts whose members take part.
     pub roster: u32,
     /// Whatever the pass says.
     pub extra: u32,
@@ -163,10 +163,10 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Copies the first `bytes` of a buffer to a place in another.
-    pub fn copy_part(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, at: u64, bytes: u64) {
+    /// Copies `bytes` from a place in a buffer to a place in another.
+    pub fn copy_part(&mut self, [from, to]: [(&wgpu::Buffer, u64); 2], bytes: u64) {
         self.open = None;
-        self.encoder.copy_buffer_to_buffer(from, 0, to, at, bytes);
+        self.encoder.copy_buffer_to_buffer(from.0, from.1, to.0, to.1, bytes);
     }
 
     /// Sets a buffer to zero.

@@ -52,6 +52,8 @@ pub(crate) struct Solve<'a, 'r> {
     pub(crate) step: Option<usize>,
     /// Names of this balance's own buffers.
     pub(crate) own: Vec<(&'static str, &'a wgpu::Buffer)>,
+    /// Columns of each member that the roster lists: more than one while several are solved for at the same time.
+    columns: u32,
 }
 
 impl<'a, 'r> Solve<'a, 'r> {
@@ -71,7 +73,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
             ("probe", &world.buffers["direction"]),
         ];
-        Solve { world, recorder, step, own }
+        Solve { world, recorder, step, own, columns: 1 }
     }
 
     /// One dispatch over the members of a section of the roster.
@@ -90,7 +92,8 @@ impl<'a, 'r> Solve<'a, 'r> {
         if empty {
             return;
         }
-        let args = Args { step: self.step.unwrap_or(0) as u32, mode: u32::from(self.step.is_some()), roster: section, extra };
+        let roster = section * (self.columns * shape.members + 1);
+        let args = Args { step: self.step.unwrap_or(0) as u32, mode: u32::from(self.step.is_some()), roster, extra };
         let offset = 12 * (section as usize * KINDS + per as usize) as u64;
         let named: Vec<_> = more.iter().chain(&self.own).copied().collect();
         self.recorder.run(pass, &named, Size::Indirect(offset), args);
@@ -99,14 +102,15 @@ impl<'a, 'r> Solve<'a, 'r> {
     /// Lists anew who takes part in what, and whether [`Solve::relist`] has anything to do from here on.
     pub(crate) fn list(&mut self) {
         let own = self.own.clone();
-        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, Args::default());
+        let args = Args { extra: self.columns, ..Args::default() };
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, args);
     }
 
     /// Lists anew, unless the last [`Solve::list`] found nobody who wants anything. (A dispatch may not write its own size, so
     /// these leave the gate as it is.)
     fn relist(&mut self) {
         let own: Vec<_> = [("gate", &self.world.buffers["no_gate"])].into_iter().chain(self.own.iter().copied()).collect();
-        self.recorder.run(pass::LIST_MEMBERS, &own, Size::Gate, Args::default());
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::Gate, Args { extra: self.columns, ..Args::default() });
     }
 
     /// What the old state leaves for the whole solve.
@@ -188,7 +192,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             for i in 0..BLOCK {
                 self.iterate(i % 2);
             }
-            self.run(pass::CLOSE_CG, SOLVE, Per::Member, 4 * exact);
+            self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, 4 * exact, &self.failures(exact));
             if block % GATED == 0 { self.list() } else { self.relist() }
         }
     }
@@ -196,13 +200,20 @@ impl<'a, 'r> Solve<'a, 'r> {
     /// One iteration by many workgroups a member, of this parity.
     pub(crate) fn iterate(&mut self, parity: u32) {
         self.run(pass::TURN_CG, SOLVE, Per::Wide, parity);
-        let width = self.multiply(self.world.product, parity);
+        // Columns of a member find its matrix in the caches; without a matrix each would need corner forces of its own.
+        let product = if self.columns > 1 { Product::Matrix } else { self.world.product };
+        let width = self.multiply(product, parity);
         self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, parity + width);
     }
 
     /// A chunk of iterations by one workgroup a member; `exact` as `iterate_cg` has it.
     pub(crate) fn iterate_chunk(&mut self, exact: u32) {
-        self.run(pass::ITERATE_CG, SOLVE, Per::Member, exact);
+        self.run_with(pass::ITERATE_CG, SOLVE, Per::Member, exact, &self.failures(exact));
+    }
+
+    /// Where a solve says that it failed: columns of a derivative have a place of their own each.
+    fn failures(&self, exact: u32) -> Vec<(&'static str, &'a wgpu::Buffer)> {
+        (exact == 1).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
     }
 
     /// A times `cg_along` → `cg_image`; returns how the parts of pᵀ A p lie, for `advance_cg`.
@@ -245,8 +256,24 @@ impl<'a, 'r> Solve<'a, 'r> {
 
     /// Solves with the tangent of [`Solve::linearise`]: `rhs` → `direction`.
     pub(crate) fn solve(&mut self) {
-        self.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        self.begin_column(0);
+        self.solve_columns(1);
+    }
+
+    /// Makes `rhs` column q of the next [`Solve::solve_columns`].
+    pub(crate) fn begin_column(&mut self, q: usize) {
+        self.run_with(pass::BEGIN_EXACT, ALL, Per::Member, q as u32, &self.failures(1));
+    }
+
+    /// Solves for as many columns as were begun, all at the same time, into as many vectors `direction`.
+    pub(crate) fn solve_columns(&mut self, count: usize) {
+        self.columns = count as u32;
         self.list();
         self.conjugate_gradients(1, self.world.geometry.shape.most);
+        self.columns = 1;
+        let groups = self.world.members().div_ceil(64);
+        let args = Args { extra: count as u32, ..Args::default() };
+        self.recorder.run(pass::END_EXACT, &self.own, Size::All { members: 1, groups }, args);
+        self.list();
     }
 }

@@ -3,7 +3,7 @@
 use crate::choices::Choices;
 use crate::device::Gpu;
 use crate::error::GpuError;
-use crate::geometry::Geometry;
+use crate::geometry::{self, Geometry};
 use crate::layout::{Health, Newton, Shape};
 use crate::members::Batch;
 use crate::memory::Maker as _;
@@ -47,7 +47,7 @@ pub struct World {
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 24] = [
+const WORK: [Work; 21] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -69,10 +69,18 @@ const WORK: [Work; 24] = [
     ("old_turn", |s| s.cells, VECTOR),
     ("touches", |s| 3 * s.patches, VECTOR),
     ("hold_forces", |s| 8 * s.holds, VECTOR),
+];
+
+/// The same per column of a member that is solved for at the same time as others.
+const OF_COLUMN: [Work; 4] = [
     ("cg_scalars", |_| 4, VECTOR),
     ("cg_parts", |s| 2 * s.nodes.div_ceil(32), 4),
     ("newton", |_| 1, size_of::<Newton>() as u64),
+    ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
+
+/// Vectors that such a column has of its own while several are solved for; one alone uses those of the work space.
+pub(crate) const COLUMN_VECTORS: [&str; 4] = ["direction", "cg_rest", "cg_along", "cg_image"];
 
 /// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
 fn modes(fields: u32) -> u32 {
@@ -88,10 +96,12 @@ pub(crate) const KINDS: usize = 8;
 
 /// Work buffers of a batch, with their bytes.
 pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
-    let own = WORK.iter().map(|(name, items, bytes)| (*name, u64::from(items(shape)) * bytes * members as u64));
+    let systems = geometry::columns(members as u64) * members as u64;
+    let each = WORK.iter().map(|w| (w, members as u64)).chain(OF_COLUMN.iter().map(|w| (w, systems)));
+    let own = each.map(|((name, items, bytes), count)| (*name, u64::from(items(shape)) * bytes * count));
     let shared: [(&'static str, u64); 5] = [
         ("shape", size_of::<Shape>() as u64),
-        ("roster", 4 * (SECTIONS * (members + 1)) as u64),
+        ("roster", 4 * SECTIONS as u64 * (systems + 1)),
         ("arguments", 12 * (SECTIONS * KINDS) as u64),
         ("gate", 12),
         // Where listings that may not change `gate` write instead.

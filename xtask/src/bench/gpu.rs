@@ -21,6 +21,8 @@ const BATCHES: [usize; 3] = [1, 8, 64];
 const STEPS: usize = 4;
 /// Longest time for one body and batch [s].
 const PATIENCE: f64 = 600.0;
+/// Derivatives by parameters that are timed together.
+const COLUMNS: usize = 8;
 /// Passes that are printed.
 const SHOWN: usize = 8;
 
@@ -53,6 +55,10 @@ pub struct Device {
     pub batch: usize,
     /// Times faster than the CPU's step: forward, cost, adjoint; of one member.
     pub over_cpu: [f64; 3],
+    /// Seconds of a step's derivative by one parameter, of one member: by itself, and of [`COLUMNS`] that are computed together. (Files
+    /// of earlier versions lack it.)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<[f64; 2]>,
     /// How conjugate gradients multiply, and with how many workgroups a member.
     pub product: String,
     /// A whole iteration of conjugate gradients, as steps run it. (Files of earlier versions lack it.)
@@ -70,6 +76,9 @@ impl Device {
     pub fn print(&self, name: &str) {
         let [f, c, a] = self.over_cpu.map(|x| format!("{x:.2}"));
         println!("  {name}: times faster than the CPU: forward {f}, cost {c}, adjoint {a}");
+        if let Some([alone, together]) = self.columns.map(|c| c.map(|s| 1e3 * s)) {
+            println!("    derivative by a parameter: {alone:.2} ms alone, {together:.2} ms as one of {COLUMNS}");
+        }
         if let Some(t) = &self.iteration {
             println!("    iteration of CG ({}): {}", self.product, t.text());
         }
@@ -166,6 +175,8 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
 /// Seconds of forward, cost and adjoint of every step, and bytes of the device.
 struct Run {
     seconds: [Vec<f64>; 3],
+    /// Of one derivative and of [`COLUMNS`], every step.
+    columns: [Vec<f64>; 2],
     failure: Option<String>,
 }
 
@@ -188,6 +199,20 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, Str
         seconds[1].push(clock.elapsed().as_secs_f64());
         tape.push(next);
     }
+    let mut columns = [Vec::new(), Vec::new()];
+    for (count, seconds) in [1, COLUMNS].into_iter().zip(&mut columns) {
+        let directions: Vec<usize> = (0..count).collect();
+        let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(world, &directions));
+        backend.start_tangent(world, &tape[0], &mut old, &mut tally);
+        wait()?;
+        for k in 0..steps {
+            let clock = Instant::now();
+            backend.step_tangent(world, k, &tape[k], &tape[k + 1], &old, &mut new, &mut tally);
+            wait()?;
+            seconds.push(clock.elapsed().as_secs_f64() / count as f64);
+            std::mem::swap(&mut old, &mut new);
+        }
+    }
     let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
     wait()?;
     for k in (0..steps).rev() {
@@ -200,7 +225,7 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, Str
         backend.clear_adjoint(&mut adj_now);
     }
     let failure = backend.read(world, &tally).into_iter().find_map(|e| e.failure).map(|f| f.to_string());
-    Ok(Run { seconds, failure })
+    Ok(Run { seconds, columns, failure })
 }
 
 fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -> Result<Line, String> {
@@ -227,7 +252,9 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -
     world.time_passes(false);
     let run = run(&backend, &mut world, steps)?;
     let speed = world.cg_speed().map_err(|e| e.to_string())?;
-    let [forward, cost, adjoint] = run.seconds.map(|s| Times::of(s.into_iter().map(|x| x / batch as f64).collect()));
+    let of_member = |s: Vec<f64>| Times::of(s.into_iter().map(|x| x / batch as f64).collect());
+    let [forward, cost, adjoint] = run.seconds.map(of_member);
+    let columns = run.columns.map(|s| of_member(s).median);
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
     Ok(Line {
         name: format!("gpu {} × {batch}", cpu.name),
@@ -244,6 +271,7 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -
         gpu: Some(Device {
             batch,
             over_cpu: [ratio(&cpu.forward, &forward), ratio(&cpu.cost, &cost), ratio(&cpu.adjoint, &adjoint)],
+            columns: Some(columns),
             product: format!("{}, {}", speed.product.name(), if speed.many { "many workgroups" } else { "one workgroup" }),
             iteration: Some(Traffic::new(speed.iteration, copy)),
             products: speed.products.iter().map(|(p, t)| (p.name().to_string(), Traffic::new(*t, copy))).collect(),

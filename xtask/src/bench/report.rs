@@ -226,6 +226,7 @@ mod tests {
         let device = Device {
             batch: 8,
             over_cpu: [1.0; 3],
+            columns: Some([2e-3, 1e-3]),
             product: "csr, many workgroups".into(),
             iteration: Some(traffic),
             products: vec![("csr".into(), traffic), ("free".into(), traffic)],

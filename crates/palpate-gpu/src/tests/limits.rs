@@ -106,7 +106,7 @@ fn listed(gpu: &Gpu, members: usize) -> u32 {
     let world: HashMap<&'static str, wgpu::Buffer> = buffers.into_iter().collect();
     let (mut groups, mut times) = (HashMap::new(), HashMap::new());
     let mut r = Recorder::new(gpu, &world, &mut groups, false);
-    r.run(pass::LIST_MEMBERS, &[], Size::All { members: 1, groups: 1 }, Args::default());
+    r.run(pass::LIST_MEMBERS, &[], Size::All { members: 1, groups: 1 }, Args { extra: 1, ..Args::default() });
     r.submit(&mut times);
     let roster: Vec<u32> = gpu.download(&world["roster"], SECTIONS * (members + 1)).unwrap_or_else(|e| panic!("{e}"));
     roster[3 * (members + 1)]

@@ -1,7 +1,7 @@
 //! No invocation loops longer than adapters allow: bounds are read off the shaders' own loops and evaluated at the largest sizes
 //! that a build accepts. A loop whose header is not known here fails the test.
 
-use crate::geometry::{LOOPS, Most};
+use crate::geometry::{LOOPS, Most, columns};
 use crate::observe::MOST_LOOPS;
 use crate::pipelines::PASSES;
 use std::collections::HashMap;
@@ -33,6 +33,8 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("hold_start") || has("patch_start") => most.supports,
         () if has("shape.planes") => most.planes,
         () if has("shape.masses") => most.masses,
+        () if has("call.extra * shape.members") => columns(most.members) * most.members,
+        () if has("q < call.extra") => columns(most.members),
         () if has("shape.members") => most.members,
         () if has("i < count; i += 256u") => most.nodes.div_ceil(32 * 256),
         () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),

@@ -3,6 +3,7 @@
 mod cell_laws;
 mod clocks;
 mod collapse;
+mod columns;
 mod derivatives;
 mod effects;
 mod extremes;
