@@ -3,6 +3,7 @@
 mod bound;
 mod choose;
 mod conclude;
+mod needed;
 mod pairs;
 mod prune;
 mod race;
@@ -99,6 +100,8 @@ struct Fitted {
     p_value: f64,
     gain: f64,
     freedom: usize,
+    /// Of these, numbers that the recording asks for.
+    needed: usize,
     /// Effects that it adds.
     effects: usize,
 }

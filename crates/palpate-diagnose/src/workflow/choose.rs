@@ -48,7 +48,7 @@ impl Session<'_> {
         let as_close = |i: usize, to: usize| predicted(i).excess() < 2.0 * predicted(to).excess() + 0.5 * predicted(to).floor;
         // Fewer numbers that follow the readings more closely are no worse, whatever the grid's error does to the prediction of either.
         let cost = |i: usize| fitted[i].state.readings.cost;
-        let fits_better = |i: usize, to: usize| fitted[i].freedom < fitted[to].freedom && cost(i) <= cost(to);
+        let fits_better = |i: usize, to: usize| fitted[i].needed < fitted[to].needed && cost(i) <= cost(to);
         let small = PRICE_OF_MISFIT * state.predicted[0].excess();
         let as_good = |i: usize, to: usize| {
             let (by, z) = worse_by(&self.cells, predicted(to), predicted(i));
@@ -59,21 +59,21 @@ impl Session<'_> {
         // A second effect is chosen from as many as the first (Chen & Chen, Biometrika 95, 2008).
         let choice = 2.0 * count.max(1.0).ln() * misfit(predicted(best)).max(1.0);
         let worth =
-            |i: &usize| predicted(*i).loss() + price * fitted[*i].freedom as f64 + choice * (fitted[*i].effects - 1) as f64;
+            |i: &usize| predicted(*i).loss() + price * fitted[*i].needed as f64 + choice * (fitted[*i].effects - 1) as f64;
         let able = (0..fitted.len()).filter(|i| passes(*i));
         let leader = able.clone().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(best);
         // Of what the data cannot tell from that, the plainest (Breiman et al., Classification and Regression Trees, 1984: one standard error).
         let plainer = |i: &usize| {
             fitted[*i].effects <= fitted[leader].effects
-                && fitted[*i].freedom < fitted[leader].freedom
+                && fitted[*i].needed < fitted[leader].needed
                 && as_good(*i, leader)
                 && as_good(*i, best)
         };
-        let by_freedom = |a: &usize, b: &usize| fitted[*a].freedom.cmp(&fitted[*b].freedom).then(worth(a).total_cmp(&worth(b)));
+        let by_freedom = |a: &usize, b: &usize| fitted[*a].needed.cmp(&fitted[*b].needed).then(worth(a).total_cmp(&worth(b)));
         let first = able.clone().filter(plainer).min_by(by_freedom).unwrap_or(leader);
         // What predicts the same with as many numbers is named in the table's order: the plainer cause first.
         let like_first = |i: &usize| {
-            (fitted[*i].freedom, fitted[*i].effects) == (fitted[first].freedom, fitted[first].effects)
+            (fitted[*i].needed, fitted[*i].effects) == (fitted[first].needed, fitted[first].effects)
                 && predicted(*i).loss() - predicted(first).loss() < 2.0 * share
         };
         let winner = able.filter(like_first).min_by_key(|i| fitted[*i].candidate).unwrap_or(first);

@@ -103,7 +103,7 @@ impl Session<'_> {
         let mut fitted = ranked(fitted);
         // There must be room for both.
         if round < self.options.rounds && !self.lab.out_of_time() {
-            let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].freedom);
+            let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].needed);
             let fewer_than = if explained { named } else { usize::MAX };
             let pairs = self.pairs(state, &fitted, &variants, fewer_than)?;
             pairs.iter().for_each(|(_, p)| self.note(round, p));
@@ -227,7 +227,8 @@ impl Session<'_> {
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * looks).min(1.0);
         let gain = self.gain(state, &new);
-        Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, effects: v.changes.len() })
+        let needed = self.needed(state, &new, v);
+        Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, needed, effects: v.changes.len() })
     }
 
     /// Share of the gap that one model leaves which another closes, on data left out, in whichever way of leaving some out it is least.
