@@ -64,6 +64,16 @@ fn result(folder: &Path) -> Value {
     value
 }
 
+/// A run on a device that was lost ends with one error, which names the scene, the reason and the ways out.
+fn ends_with_the_device(code: i32, err: &str, scene: &str) {
+    assert_eq!(code, 1, "{err}");
+    let errors: Vec<&str> = err.lines().filter(|l| l.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{err}");
+    for word in [scene, "the device was lost", "--backend cpu", "--resume"] {
+        assert!(errors[0].contains(word), "\"{word}\" is not in: {err}");
+    }
+}
+
 #[test]
 fn a_lost_device_is_opened_anew() {
     let Some((_alone, first)) = shared() else { return };
@@ -103,12 +113,7 @@ fn a_fit_whose_device_is_lost_keeps_its_best_and_resumes_to_the_same_bits() {
         device.gpu().destroy();
         fit.join().expect("the fit does not panic")
     });
-    assert_eq!(code, 1, "{err}");
-    let errors: Vec<&str> = err.lines().filter(|l| l.starts_with("error: ")).collect();
-    assert_eq!(errors.len(), 1, "{err}");
-    for word in ["fit.toml", "the device was lost", "--backend cpu", "--resume"] {
-        assert!(errors[0].contains(word), "\"{word}\" is not in: {err}");
-    }
+    ends_with_the_device(code, &err, "fit.toml");
     let cut = result(&broken);
     assert_eq!(cut["status"], "broken-off", "{cut}");
     assert!(cut["parameters"][0]["value"].is_f64() && cut["residual"]["rms"].is_f64(), "the best so far is written: {cut}");
@@ -144,13 +149,7 @@ fn a_diagnosis_whose_device_is_lost_says_so_and_blames_no_candidate() {
         }
         run.join().expect("a diagnosis does not panic")
     });
-    println!("{err}");
-    assert_eq!(code, 1, "{err}");
-    let errors: Vec<&str> = err.lines().filter(|l| l.starts_with("error: ")).collect();
-    assert_eq!(errors.len(), 1, "{err}");
-    for word in ["slow.toml", "the device was lost", "--backend cpu", "--resume"] {
-        assert!(errors[0].contains(word), "\"{word}\" is not in: {err}");
-    }
+    ends_with_the_device(code, &err, "slow.toml");
     let text = std::fs::read_to_string(out.join("diagnosis.json")).expect("what was known is written");
     let known: Value = serde_json::from_str(&text).expect("it is JSON");
     assert_eq!((&known["verdict"], &known["interrupted"]), (&"undecided".into(), &true.into()), "{text}");

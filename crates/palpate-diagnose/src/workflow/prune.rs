@@ -132,7 +132,7 @@ pub(super) mod tests {
             design_effect: 1.0,
             noise: Default::default(),
             scored: None,
-            looks: 0,
+            finer: None,
             tried: Vec::new(),
             not_tried: Vec::new(),
             no_time: false,

@@ -48,12 +48,11 @@ impl Session<'_> {
         let wanted = |c: &Change| c.is_kin(old[0]) && (old.len() > 1 || c.kind() != old[0].kind());
         let mut variants = self.variants_of(&without, wanted)?;
         variants.sort_by(most_promising);
-        self.looks = variants.len();
         let mut best: Vec<&Variant> = variants.iter().collect();
         keep_first(&mut best, |v| v.candidate);
         best.truncate(FITS);
         let tries: Vec<(&State, &Variant)> = best.into_iter().map(|v| (&without, v)).collect();
-        let fitted = ranked(self.fitted(&without, &tries, &STARTS)?);
+        let fitted = ranked(self.fitted(&without, &tries, &STARTS, variants.len())?);
         let freedom = state.model.values.len() - without.model.values.len();
         Ok(fitted.into_iter().find(|f| self.is_as_good(&f.state, state, freedom as f64 - f.freedom as f64)))
     }

@@ -4,7 +4,7 @@ use super::race::{CAREFUL, STARTS};
 use super::{Fitted, Session, State, Variant, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
-use crate::laboratory::{LabError, Model, Number, Readings};
+use crate::laboratory::{Field, LabError, Model, Number, Readings};
 use crate::score::f_tail;
 use crate::separation::Separated;
 
@@ -60,7 +60,7 @@ impl Session<'_> {
             Some(v) => v,
             None => self.variants(state)?,
         };
-        self.looks = variants.len();
+        let looks = variants.len();
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(most_promising);
         let mut seen: Vec<usize> = Vec::new();
@@ -89,14 +89,14 @@ impl Session<'_> {
             tries.splice(place..place, variants.iter().map(|v| (home, v)));
         }
         self.shorten(&mut tries);
-        let mut fitted = self.fitted(state, &tries, &STARTS)?;
+        let mut fitted = self.fitted(state, &tries, &STARTS, looks)?;
         let mut explained = self.explained(state, &fitted);
         if !explained && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
             let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
             let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
             if !further.is_empty() {
-                fitted.extend(self.fitted(state, &further, &CAREFUL)?);
+                fitted.extend(self.fitted(state, &further, &CAREFUL, looks)?);
                 explained = self.explained(state, &fitted);
             }
         }
@@ -109,7 +109,7 @@ impl Session<'_> {
             pairs.iter().for_each(|(_, p)| self.note(round, p));
             let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
             if !tries.is_empty() {
-                fitted.extend(self.fitted(state, &tries, &STARTS)?);
+                fitted.extend(self.fitted(state, &tries, &STARTS, looks)?);
                 fitted = ranked(fitted);
             }
         }
@@ -147,12 +147,13 @@ impl Session<'_> {
         self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
     }
 
-    /// Fits variants and judges what arrives.
+    /// Fits variants, of so many that were looked at, and judges what arrives.
     pub(super) fn fitted(
         &mut self,
         state: &State,
         tries: &[(&State, &Variant)],
         shares: &[f64],
+        looks: usize,
     ) -> Result<Vec<Fitted>, LabError> {
         let arrived = self.race(state, tries, shares)?;
         let jobs: Vec<(Vec<Change>, Vec<f64>)> =
@@ -161,7 +162,7 @@ impl Session<'_> {
         let mut fitted: Vec<Fitted> = Vec::new();
         for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
             match readings {
-                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings)?),
+                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings, looks)?),
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(why) => self.missed(&v.kind(), &why),
             }
@@ -177,21 +178,19 @@ impl Session<'_> {
         if loss(best) > loss(state) {
             return false;
         }
-        if self.over_noise(&best.readings) <= CLOSE && !self.is_missing(&self.adequacy(best), best) {
+        if self.is_noise(best, &[]) {
             return true;
         }
         // Where its body goes they are others than the baseline's.
         let fields = self.finer(&best.model);
         let own = State { frame: self.frame(&best.table, &fields), fields, ..best.clone() };
-        let level = self.level_of(&own.readings, 0.0, &own.fields);
-        level.rms.powi(2) <= CLOSE * level.noise.powi(2) && !self.is_missing(&self.adequacy(&own), &own)
+        self.is_noise(&own, &own.fields)
     }
 
-    /// Mean square of residuals in units of their noise.
-    fn over_noise(&self, readings: &Readings) -> f64 {
-        let squares = readings.rows.iter().filter_map(|r| Some(r.row.value?.powi(2) / self.variance(r)));
-        let (sum, n) = squares.fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
-        sum / f64::max(n, 1.0)
+    /// True if a model leaves little more than noise, or than noise and these errors of the discretisation, and nothing with structure.
+    fn is_noise(&self, state: &State, finer: &[Field]) -> bool {
+        let level = self.level_of(&state.readings, 0.0, finer);
+        level.rms.powi(2) <= CLOSE * level.noise.powi(2) && !self.is_missing(&self.adequacy(state), state)
     }
 
     /// The scene where the baseline's fit started, with the candidates that promise most there, where that is far away: the numbers that
@@ -216,13 +215,13 @@ impl Session<'_> {
         Ok(Some((home, others)))
     }
 
-    /// What a fitted candidate is worth.
-    fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings) -> Result<Fitted, LabError> {
+    /// What a fitted candidate is worth, one of so many that were looked at.
+    fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, looks: usize) -> Result<Fitted, LabError> {
         let new = self.beside(state, model, readings)?;
         let (with, without) = (new.squares(), state.squares());
         let freedom = v.columns.len();
         // Bonferroni: every start was looked at, and a pair is one of all pairs of them.
-        let n = self.looks as f64;
+        let n = looks as f64;
         let looks = if v.changes.len() > 1 { 0.5 * n * (n - 1.0).max(1.0) } else { n };
         let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * looks).min(1.0);
