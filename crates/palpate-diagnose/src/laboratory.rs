@@ -4,6 +4,7 @@ use crate::change::Change;
 use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::ResidualRow;
+use palpate_model::params::Transform;
 use std::sync::Arc;
 
 /// Why the laboratory has no answer.
@@ -70,6 +71,31 @@ pub struct Number {
     pub bounds: (f64, f64),
     /// A change that matters.
     pub scale: f64,
+    /// How a fit sees it.
+    pub transform: Transform,
+}
+
+impl Number {
+    /// How far it may go down and up from its start. Where a linear estimate of a relative change goes far, only the logarithm of what is
+    /// there can follow: its steps are counted along that, in the number's own unit at the start.
+    pub fn room(&self) -> (f64, f64) {
+        let (low, high) = self.bounds;
+        match self.transform {
+            Transform::Relative => {
+                let whole = 1.0 + self.start;
+                (whole * ((1.0 + low) / whole).ln(), whole * ((1.0 + high) / whole).ln())
+            }
+            _ => (low - self.start, high - self.start),
+        }
+    }
+
+    /// Its value after a step from its start, counted as [`Number::room`] does.
+    pub fn after(&self, step: f64) -> f64 {
+        match self.transform {
+            Transform::Relative => (1.0 + self.start) * (step / (1.0 + self.start)).exp() - 1.0,
+            _ => self.start + step,
+        }
+    }
 }
 
 /// A fitted model: changes of the scene, and the value of every free number (the scene's own first, then change by change).
@@ -216,4 +242,30 @@ pub trait Laboratory {
     fn interrupted(&self) -> bool;
     /// Hears what is going on.
     fn say(&mut self, what: &str);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_relative_change_goes_as_far_as_its_logarithm() {
+        let number = |start, transform| Number {
+            path: "effect.0.change".into(),
+            unit: "1".into(),
+            start,
+            bounds: (-0.999, 1e3),
+            scale: 0.5,
+            transform,
+        };
+        for start in [-0.9, 0.0, 4.0] {
+            let n = number(start, Transform::Relative);
+            let (low, high) = n.room();
+            assert!((n.after(low) + 0.999).abs() < 1e-12 && (n.after(high) / 1e3 - 1.0).abs() < 1e-12, "{low} {high}");
+            // A small step is one of the number itself.
+            assert!((n.after(1e-6) - start - 1e-6).abs() < 1e-10);
+        }
+        assert_eq!(number(0.5, Transform::Linear).room(), (-1.499, 999.5));
+        assert_eq!(number(0.5, Transform::Linear).after(0.25), 0.75);
+    }
 }

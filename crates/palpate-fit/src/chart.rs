@@ -5,8 +5,9 @@
 //! | `Log` | ln(v / typical) | typical · exp z | v |
 //! | `Logit` | ln((v − a)/(b − v)) | a + (b − a)/(1 + exp(−z)) | (v − a)(b − v)/(b − a) |
 //! | `Linear` | v / typical | z · typical | typical |
+//! | `Relative` | ln(1 + v) | exp z − 1 | 1 + v |
 //!
-//! Bounds of `Log` and `Linear` become a box in z that optimisers project on. `Logit` cannot leave its bounds; its box only
+//! Bounds of `Log`, `Linear` and `Relative` become a box in z that optimisers project on. `Logit` cannot leave its bounds; its box only
 //! keeps z from running away when the data push the value into a bound.
 
 use palpate_model::params::Transform;
@@ -48,6 +49,11 @@ impl Chart {
             Transform::Log if lower <= 0.0 => {
                 return Err(format!("lower bound {lower} must be positive, because the parameter is fitted as its logarithm"));
             }
+            Transform::Relative if lower <= -1.0 => {
+                return Err(format!(
+                    "lower bound {lower} must be above -1, because the logarithm of 1 + the parameter is fitted"
+                ));
+            }
             Transform::Logit if !(lower.is_finite() && upper.is_finite()) => {
                 return Err(format!("bounds [{lower}, {upper}] must be finite, because the parameter is fitted as a logit"));
             }
@@ -61,6 +67,7 @@ impl Chart {
         let v = match self.transform {
             Transform::Log => self.typical * z.exp(),
             Transform::Linear => self.typical * z,
+            Transform::Relative => z.exp_m1(),
             Transform::Logit => {
                 // Measured from the nearer bound, so that no digits are lost there.
                 let range = self.upper - self.lower;
@@ -76,6 +83,7 @@ impl Chart {
         match self.transform {
             Transform::Log => (v / self.typical).ln(),
             Transform::Linear => v / self.typical,
+            Transform::Relative => v.ln_1p(),
             Transform::Logit => ((v - self.lower) / (self.upper - v)).ln().clamp(-LOGIT_END, LOGIT_END),
         }
     }
@@ -85,6 +93,7 @@ impl Chart {
         match self.transform {
             Transform::Log => self.typical * z.exp(),
             Transform::Linear => self.typical,
+            Transform::Relative => z.exp(),
             Transform::Logit => {
                 let e = (-z.abs()).exp();
                 (self.upper - self.lower) * e / ((1.0 + e) * (1.0 + e))
@@ -118,9 +127,13 @@ impl Chart {
         }
     }
 
-    /// True if values are compared by their ratio.
-    pub fn is_log(&self) -> bool {
-        self.transform == Transform::Log
+    /// The value at a share of the way from one to another: evenly by ratios of what is fitted as a logarithm.
+    pub fn between(&self, (a, b): (f64, f64), share: f64) -> f64 {
+        match self.transform {
+            Transform::Log => (a.ln() + share * (b.ln() - a.ln())).exp().clamp(a, b),
+            Transform::Relative => (a.ln_1p() + share * (b.ln_1p() - a.ln_1p())).exp_m1().clamp(a, b),
+            Transform::Logit | Transform::Linear => a + share * (b - a),
+        }
     }
 }
 
@@ -134,6 +147,7 @@ mod tests {
             (new(Transform::Log, 1e5, 1e-3, 1e13), vec![1e-3, 0.7, 1e5, 3.3e5, 1e13]),
             (new(Transform::Logit, 0.1, -0.5, 0.4999), vec![-0.499, -0.1, 0.0, 0.3, 0.45, 0.499]),
             (new(Transform::Linear, 9.81, -20.0, f64::INFINITY), vec![-20.0, -9.81, 0.0, 5.0]),
+            (new(Transform::Relative, 0.5, -0.999, 1e3), vec![-0.999, -0.3, 0.0, 2e-9, 0.5, 1e3]),
         ]
     }
 
@@ -179,6 +193,7 @@ mod tests {
         assert!(refused(Transform::Linear, 2.0, 1.0));
         assert!(refused(Transform::Linear, f64::NAN, 1.0));
         assert!(refused(Transform::Log, 0.0, 1.0));
+        assert!(refused(Transform::Relative, -1.0, 1.0));
         assert!(refused(Transform::Logit, 0.0, f64::INFINITY));
     }
 }

@@ -34,12 +34,12 @@ enum Message {
     Done(Box<StartRun>),
 }
 
-/// Draws the start of a run in physical values `[q]`: log-uniform for parameters fitted as logarithms, else uniform.
+/// Draws the start of a run in physical values `[q]`: log-uniform for parameters fitted as logarithms (of 1 + v for relative changes), else uniform.
 pub fn draw(free: &[FreeParameter], charts: &[Chart], rng: &mut ChaCha8Rng) -> Vec<f64> {
     let one = |(f, c): (&FreeParameter, &Chart)| {
         let share: f64 = rng.random();
         let (a, b) = (f.start.0.max(f.bounds.0), f.start.1.min(f.bounds.1));
-        if c.is_log() { (a.ln() + share * (b.ln() - a.ln())).exp().clamp(a, b) } else { a + share * (b - a) }
+        c.between((a, b), share)
     };
     free.iter().zip(charts).map(one).collect()
 }

@@ -250,6 +250,7 @@ impl Names<'_, '_> {
             let term = |f: &crate::FreeParameter| match f.transform {
                 Transform::Log => format!("ln {}", short(&f.path)),
                 Transform::Logit => format!("logit {}", short(&f.path)),
+                Transform::Relative => format!("ln(1 + {})", short(&f.path)),
                 Transform::Linear => format!("{}/{}", short(&f.path), f.typical),
             };
             let sign = if y < 0.0 { '−' } else { '+' };

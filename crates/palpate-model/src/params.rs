@@ -14,6 +14,9 @@ pub enum Transform {
     Logit,
     /// Any real number: fitted as it is, divided by `ParamSpec::typical`.
     Linear,
+    /// A change v of something relative to its size, above −1: fitted as the logarithm of the factor 1 + v, so that forty times less is
+    /// as near as forty times more.
+    Relative,
 }
 
 /// One fittable number of a scene.

@@ -7,6 +7,7 @@ use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
 use palpate_model::effects::{Effect, find};
+use palpate_model::params::Transform;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -177,7 +178,15 @@ impl Laboratory for Bench {
     }
 
     fn numbers(&self, changes: &[Change]) -> Result<Vec<Number>, LabError> {
-        let number = |path: String, start: f64, bounds: (f64, f64)| Number { path, unit: "1".into(), start, bounds, scale: 1e-3 };
+        let transform = Transform::Linear;
+        let number = |path: String, start: f64, bounds: (f64, f64)| Number {
+            path,
+            unit: "1".into(),
+            start,
+            bounds,
+            scale: 1e-3,
+            transform,
+        };
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let mut out = vec![number("stiffness".into(), 0.0, free), number("damping".into(), 0.0, free)];
         for c in changes {

@@ -59,7 +59,7 @@ fn rise(state: &State, first: usize, v: &Variant, dropped: &BTreeSet<usize>) -> 
     let mut kept = Basis::default();
     for (i, c) in state.table.columns.iter().enumerate() {
         match i.checked_sub(first).filter(|k| dropped.contains(k)) {
-            Some(k) => y.iter_mut().zip(c).for_each(|(y, c)| *y += (v.start[k] - state.model.values[i]) * c),
+            Some(k) => y.iter_mut().zip(c).for_each(|(y, c)| *y += (v.numbers[k].start - state.model.values[i]) * c),
             None => kept.add(&extended(c, n)),
         }
     }

@@ -3,7 +3,7 @@
 
 use super::variants::{Variant, most_promising};
 use super::{Fitted, Session, State, keep_first};
-use crate::laboratory::{LabError, Model};
+use crate::laboratory::{LabError, Model, Number};
 use crate::score::Score;
 use std::rc::Rc;
 
@@ -95,15 +95,15 @@ fn as_fitted(state: &State, f: &Fitted) -> (State, Variant) {
     let (mut from, fitted) = (f.state.clone(), &f.state.model);
     from.model = Model { values: fitted.values[..own].to_vec(), ..state.model.clone() };
     let columns = from.table.columns.split_off(own);
-    let start = fitted.values[own..].to_vec();
+    let stands = |(n, v): (&Number, &f64)| Number { start: *v, ..n.clone() };
+    let numbers: Vec<Number> = fitted.numbers[own..].iter().zip(&fitted.values[own..]).map(stands).collect();
     let half = Variant {
         candidate: f.candidate,
         changes: f.changes().to_vec(),
-        amplitudes: vec![true; start.len()],
-        bounds: fitted.numbers[own..].iter().zip(&start).map(|(n, v)| (n.bounds.0 - v, n.bounds.1 - v)).collect(),
-        score: Score { step: vec![0.0; start.len()], ..Score::default() },
+        amplitudes: vec![true; numbers.len()],
+        score: Score { step: vec![0.0; numbers.len()], ..Score::default() },
         columns,
-        start,
+        numbers,
     };
     (from, half)
 }
@@ -116,8 +116,7 @@ fn joined(a: &Variant, b: &Variant) -> Variant {
         changes: [&a.changes[..], &b.changes].concat(),
         columns: [&a.columns[..], &b.columns].concat(),
         amplitudes: [&a.amplitudes[..], &b.amplitudes].concat(),
-        start: [&a.start[..], &b.start].concat(),
-        bounds: [&a.bounds[..], &b.bounds].concat(),
+        numbers: [&a.numbers[..], &b.numbers].concat(),
         score: Score { step: [&a.score.step[..], &b.score.step].concat(), ..b.score.clone() },
     }
 }

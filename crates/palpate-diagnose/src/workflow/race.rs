@@ -117,12 +117,15 @@ pub(super) fn moves(state: &State, y: &[f64]) -> Vec<f64> {
 fn start(state: &State, v: &Variant, share: f64) -> Start {
     let mut changes = state.model.changes.clone();
     changes.extend_from_slice(&v.changes);
-    let step = |k: usize| share * v.score.step[k].clamp(v.bounds[k].0, v.bounds[k].1);
+    let step = |k: usize| {
+        let (least, most) = v.numbers[k].room();
+        share * v.score.step[k].clamp(least, most)
+    };
     let mut y = state.table.y.clone();
     for (k, c) in v.columns.iter().enumerate() {
         y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
     }
     let own = state.model.values.iter().zip(moves(state, &y)).map(|(v, d)| v + d);
-    let values = own.chain((0..v.start.len()).map(|k| v.start[k] + step(k))).collect();
+    let values = own.chain((0..v.numbers.len()).map(|k| v.numbers[k].after(step(k)))).collect();
     Start { changes, values, reach: f64::INFINITY }
 }

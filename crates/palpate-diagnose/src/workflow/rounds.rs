@@ -318,8 +318,7 @@ mod tests {
             changes: vec![Change::Effect(Effect::absent(find(kind).unwrap()))],
             columns: Vec::new(),
             amplitudes: amplitudes.to_vec(),
-            start: Vec::new(),
-            bounds: Vec::new(),
+            numbers: Vec::new(),
             score: crate::score::Score { share, ..Default::default() },
         }
     }

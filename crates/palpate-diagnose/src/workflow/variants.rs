@@ -2,7 +2,7 @@
 
 use super::{Session, State};
 use crate::change::{Candidate, Change, candidates};
-use crate::laboratory::LabError;
+use crate::laboratory::{LabError, Number};
 use crate::null::extended;
 use crate::score::{Score, score};
 
@@ -20,8 +20,8 @@ pub(super) struct Variant {
     pub columns: Vec<Vec<f64>>,
     /// Which of them count at "absent".
     pub amplitudes: Vec<bool>,
-    pub start: Vec<f64>,
-    pub bounds: Vec<(f64, f64)>,
+    /// Its free numbers, where it is absent.
+    pub numbers: Vec<Number>,
     pub score: Score,
 }
 
@@ -87,16 +87,15 @@ impl Session<'_> {
             }
             let mut changes = state.model.changes.clone();
             changes.push(change.clone());
-            let numbers = self.lab.numbers(&changes)?;
+            let numbers = self.lab.numbers(&changes)?.split_off(own);
             let mut values = state.model.values.clone();
-            values.extend(numbers[own..].iter().map(|n| n.start));
+            values.extend(numbers.iter().map(|n| n.start));
             out.push(Variant {
                 candidate,
                 columns: Vec::new(),
                 amplitudes: change.amplitudes(),
                 changes: vec![change],
-                start: values[own..].to_vec(),
-                bounds: numbers[own..].iter().map(|n| (n.bounds.0 - n.start, n.bounds.1 - n.start)).collect(),
+                numbers,
                 score: Score::default(),
             });
             tries.push((changes, values));
@@ -134,7 +133,7 @@ impl Session<'_> {
                 let mut changes = state.model.changes.clone();
                 changes.extend_from_slice(&v.changes);
                 let own = state.model.values.iter().copied();
-                (changes, own.chain(v.start.iter().zip(sizes).map(|(s, size)| s + size)).collect::<Vec<f64>>())
+                (changes, own.chain(v.numbers.iter().zip(sizes).map(|(n, size)| n.start + size)).collect::<Vec<f64>>())
             })
             .collect();
         let whole = state.squares();
@@ -149,7 +148,7 @@ impl Session<'_> {
         let n = state.frame.fields.len();
         let chosen: Vec<usize> = (0..v.columns.len()).filter(|k| v.amplitudes[*k]).collect();
         let columns: Vec<Vec<f64>> = chosen.iter().map(|k| extended(&v.columns[*k], n)).collect();
-        let bounds: Vec<(f64, f64)> = chosen.iter().map(|k| v.bounds[*k]).collect();
+        let bounds: Vec<(f64, f64)> = chosen.iter().map(|k| v.numbers[*k].room()).collect();
         let groups: Vec<String> = v.changes.iter().flat_map(Change::groups).collect();
         let groups: Vec<String> = chosen.iter().map(|k| groups[*k].clone()).collect();
         let mut s = score(&state.frame, &columns, &bounds, &groups);

@@ -7,6 +7,7 @@
 use super::law::{Input, Number, Place, PointLaw, dot};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
 use crate::contact;
+use crate::params::Transform;
 
 pub(super) const LAW: Law = Law {
     kind: "contact-stiffness",
@@ -17,8 +18,11 @@ pub(super) const LAW: Law = Law {
     site: Site::Contact(&ContactStiffness),
 };
 
-const PARAMS: [EffectParam; 1] =
-    [number("change", "1", [-0.999, 1e3, 0.5], Unstated::Absent(0.0), "change of the contact stiffness, relative to it")];
+// What a body sinks in goes with 1/(1 + c): over decades a step of the logarithm does alike, one of c itself does nothing or too much.
+const PARAMS: [EffectParam; 1] = [EffectParam {
+    transform: Transform::Relative,
+    ..number("change", "1", [-0.999, 1e3, 0.5], Unstated::Absent(0.0), "change of the contact stiffness, relative to it")
+}];
 
 struct ContactStiffness;
 

@@ -160,7 +160,7 @@ impl Prepared {
             };
             let start = if k < self.given { guess } else { own[k] };
             let scale = if f.transform == Transform::Log && start > 0.0 { start } else { f.typical };
-            Number { path: n.label(), unit: f.unit.clone(), start, bounds: f.bounds, scale }
+            Number { path: n.label(), unit: f.unit.clone(), start, bounds: f.bounds, scale, transform: f.transform }
         };
         self.names.iter().zip(&self.free).enumerate().map(number).collect()
     }
