@@ -35,6 +35,8 @@ pub struct Bench {
     pub iterations: usize,
     /// Stiffness beyond which no fit gets anywhere.
     pub marsh: f64,
+    /// Size of what a finer computation would change [m].
+    pub grid: f64,
 }
 
 /// A smooth pattern over place and time that a name stands for; a magnet pulls at one spot only.
@@ -122,6 +124,7 @@ impl Bench {
             stopped: false,
             iterations: usize::MAX,
             marsh: f64::INFINITY,
+            grid: 2e-4,
         }
     }
 
@@ -249,7 +252,7 @@ impl Laboratory for Bench {
 
     fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
         let at = |i: usize| pattern("grid", self.rest[i % POINTS], (i / POINTS) as f64 / FRAMES as f64);
-        let change = (0..FRAMES * POINTS).map(|i| Some(2e-4 * at(i))).collect();
+        let change = (0..FRAMES * POINTS).map(|i| Some(self.grid * at(i))).collect();
         Ok(vec![Field { name: "grid", change, rough: Field::REFINED }])
     }
 

@@ -82,6 +82,15 @@ fn what_is_missing_does_not_hide_behind_the_discretisation() {
 }
 
 #[test]
+fn what_bends_to_the_grid_does_not_leave_the_right_effect_behind() {
+    let mut bench = Bench::new(5, &[(&Bench::first_pattern("air-drag"), -1.5 * NOISE), ("grid", 3.0 * NOISE)], false);
+    bench.grid = -3.0 * NOISE;
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "air-drag"), "{}", d.sentence());
+}
+
+#[test]
 fn an_answer_says_what_there_was_no_time_for() {
     let (a, b) = (Bench::first_pattern("uniform-force"), Bench::first_pattern("depth-bias"));
     let mut bench = Bench::new(9, &[(&a, -2.0 * NOISE), (&b, 0.5 * NOISE)], false);

@@ -2,8 +2,8 @@
 //! Talwalkar, *AISTATS* 2016).
 
 use super::{Session, State, Variant, keep_first};
-use crate::laboratory::{Fit, LabError, Number, Start};
-use crate::linear::least_squares;
+use crate::laboratory::{Fit, LabError, Number, Readings, Start};
+use crate::linear::{dot, least_squares};
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
 /// behind after it and still go on. The last lap brings what is compared to its optimum.
@@ -65,7 +65,8 @@ impl Session<'_> {
             let patient = |r: &(&Variant, Option<Fit>)| {
                 lap < PATIENCE.0 && r.0.score.share >= PATIENCE.1 * most && r.1.as_ref().is_some_and(searches)
             };
-            let stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
+            let mut stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
+            self.spare(state, &running, lag, &mut stays);
             let mut keep = stays.iter();
             jobs.retain(|_| *keep.next().unwrap_or(&false));
             let mut keep = stays.iter();
@@ -75,6 +76,35 @@ impl Session<'_> {
         arrived.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         keep_first(&mut arrived, |(v, _)| v.candidate);
         Ok(arrived)
+    }
+
+    /// Lets those go on that have arrived and leave, but for errors of the discretisation, hardly more than the leader. Where these are
+    /// larger than noise, a free effect that bends to them costs less than the right one, which cannot.
+    fn spare(&mut self, state: &State, running: &[(&Variant, Option<Fit>)], lag: f64, stays: &mut [bool]) {
+        if self.grid(state) <= self.reading_noise(&state.readings).powi(2) {
+            return;
+        }
+        let cost = |i: &usize| running[*i].1.as_ref().map_or(f64::INFINITY, |f| f.cost);
+        let Some(leader) = (0..running.len()).min_by(|a, b| cost(a).total_cmp(&cost(b))) else { return };
+        let arrived = |i: &usize| running[*i].1.as_ref().is_some_and(|f| f.settled) && cost(i) < state.readings.cost;
+        let behind: Vec<usize> = (0..running.len()).filter(|i| !stays[*i] && arrived(i)).collect();
+        if behind.is_empty() {
+            return;
+        }
+        let open: Vec<usize> = std::iter::once(leader).chain(behind).collect();
+        let models =
+            open.iter().filter_map(|i| running[*i].1.as_ref()).map(|f| (f.model.changes.clone(), f.model.values.clone()));
+        let answers = self.lab.linearise(&models.collect::<Vec<_>>());
+        let left: Vec<f64> = answers.into_iter().map(|r| r.map_or(f64::INFINITY, |r| self.left(state, &r))).collect();
+        let worst = left[0] + lag * (state.squares() - left[0]).max(0.0);
+        open.iter().zip(&left).for_each(|(i, left)| stays[*i] |= *left <= worst);
+    }
+
+    /// Sum of squares that another model of the same recordings leaves, but for what its numbers and the discretisation explain.
+    fn left(&self, state: &State, readings: &Readings) -> f64 {
+        let table = self.cells.table(readings, Some(&state.table));
+        let left = self.frame(&table, &state.fields).left();
+        dot(&left, &left)
     }
 
     /// Where each fit starts: along the linear estimate, as far as that lowers the cost.
