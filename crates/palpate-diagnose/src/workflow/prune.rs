@@ -37,8 +37,10 @@ impl Session<'_> {
     /// had ended in another valley, and what looks like an effect only showed the way out of it.
     pub(super) fn better_baseline(&mut self, before: &State, next: &State, added: usize) -> Option<State> {
         let size = |k: usize| before.model.values[k].abs().max(before.model.numbers[k].scale);
-        let far = |k: usize| (next.model.values[k] - before.model.values[k]).abs() > FAR * size(k);
-        if self.lab.interrupted() || !(0..before.model.values.len()).any(far) {
+        let has_moved = |to: &State| {
+            (0..before.model.values.len()).any(|k| (to.model.values[k] - before.model.values[k]).abs() > FAR * size(k))
+        };
+        if self.lab.interrupted() || !has_moved(next) {
             return None;
         }
         self.lab.say("is the effect needed, or only the numbers that were fitted with it?");
@@ -46,7 +48,9 @@ impl Session<'_> {
         let newest: Vec<usize> = (changes - added..changes).collect();
         let mut less = self.refitted_without(next, &newest).ok()?;
         let freedom = next.model.values.len() - before.model.values.len();
-        if !self.is_as_good(&less, next, freedom as f64) {
+        // Back where it was, or no better: the same round would follow for ever.
+        let is_better = has_moved(&less) && less.predicted[0].loss() < before.predicted[0].loss();
+        if !is_better || !self.is_as_good(&less, next, freedom as f64) {
             return None;
         }
         self.refine(&mut less);
