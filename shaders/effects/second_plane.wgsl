@@ -1,8 +1,7 @@
 //! Twin of palpate-model/src/effects/second_plane.rs.
 
 fn second_plane() -> Dual {
-    let level = cosine(param(3u));
-    let n = Three(mul(level, cosine(param(2u))), mul(level, sine(param(2u))), sine(param(3u)));
-    let distance = dot3(n, x_from(vector(4u))) + param(1u);
+    let n = vector(2u);
+    let distance = mul(dot3(n, x_from(vector(5u))), reciprocal(root(dot3(n, n)))) + param(1u);
     return mul(energy_of(distance, mul(param(0u), z[STIFFNESS_AT])), measure);
 }

@@ -97,9 +97,8 @@ fn contact_stiffness_is_that_of_a_stiffer_plane() {
 
 #[test]
 fn second_plane_is_a_plane() {
-    // Azimuth 0.3, elevation 1.2; the block's centre is 5 cm high.
-    let (a, e): (f64, f64) = (0.3, 1.2);
-    let normal = DVec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
+    // The block's centre is 5 cm high.
+    let normal = DVec3::new(0.35, 0.1, 0.93).normalize();
     let make = |planes, effects| {
         let mut s = block(0.04, 2e4);
         s.initial.velocity = DVec3::new(0.1, 0.0, -1.0);
@@ -109,7 +108,9 @@ fn second_plane_is_a_plane() {
         s
     };
     let known = make(vec![scenes::plane(DVec3::new(0.0, 0.0, 0.05) - 0.03 * normal, normal)], vec![]);
-    let place = [("stiffness", 0, 1.0), ("distance", 0, 0.03), ("azimuth", 0, a), ("elevation", 0, e)];
+    // Of any length.
+    let n = 1.7 * normal;
+    let place = [("stiffness", 0, 1.0), ("distance", 0, 0.03), ("normal", 0, n.x), ("normal", 1, n.y), ("normal", 2, n.z)];
     let unknown = make(vec![], vec![effect("second-plane", &place)]);
     let (off, moved) = apart(&known, &unknown);
     println!("off by {off:.1e} of {moved:.1e} m; without any plane {:.1e}", apart(&known, &make(vec![], vec![])).0);

@@ -246,8 +246,7 @@ fn at_walls(effect: &Effect, walls: &[Wall]) -> Vec<Effect> {
         let n = wall.normal;
         for (v, p) in e.values.iter_mut().zip(effect.law().params) {
             match p.key {
-                "azimuth" => *v = Some(n.y.atan2(n.x)),
-                "elevation" => *v = Some(n.z.clamp(-1.0, 1.0).asin()),
+                "normal" => *v = p.axis.map(|a| n[usize::from(a)]),
                 "distance" => *v = Some(wall.distance),
                 _ => {}
             }
@@ -296,13 +295,11 @@ mod tests {
         let planes = candidates(&setting).into_iter().find(|c| c.kind() == "second-plane").unwrap();
         let [Change::Effect(e)] = &planes.variants[..] else { panic!("{planes:?}") };
         let value = |key: &str| e.law().params.iter().position(|p| p.key == key).and_then(|s| e.values[s]).unwrap();
-        let (azimuth, elevation) = (value("azimuth"), value("elevation"));
-        let (c, s) = (elevation.cos(), elevation.sin());
-        assert!((DVec3::new(c * azimuth.cos(), c * azimuth.sin(), s) - normal).length() < 1e-12);
-        assert_eq!(value("distance"), 0.07);
-        // Stiffness, distance and two angles: the point that distances are counted from stays.
-        assert_eq!(planes.variants[0].free_slots().len(), 4);
-        assert_eq!(planes.variants[0].blunt().map(|sizes| sizes.len()), Some(4));
+        let first = value("normal");
+        assert_eq!((first, value("distance")), (normal.x, 0.07));
+        // Stiffness, distance and a direction: the point that distances are counted from stays.
+        assert_eq!(planes.variants[0].free_slots().len(), 5);
+        assert_eq!(planes.variants[0].blunt().map(|sizes| sizes.len()), Some(5));
         // Without such planes it is tried all around.
         setting.walls.clear();
         assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));

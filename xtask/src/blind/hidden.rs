@@ -6,7 +6,8 @@
 use glam::DVec3;
 use palpate::Error;
 use palpate_model::effects::{ALL, Effect, Unstated, find};
-use palpate_model::scene::Scene;
+use palpate_model::scene::{Object, Scene};
+use palpate_model::shape::shape_of;
 
 /// Root mean square change of readings of a weak effect, in standard deviations of the noise.
 pub const WEAK: f64 = 3.0;
@@ -40,8 +41,8 @@ pub const TABLE: &[Hidden] = &[
     h("adhesion", "ball", &[("pressure", &[1e3])], &[]),
     h("adhesion", "torus", &[("pressure", &[100.0])], &[("range", &[0.004])]),
     // A wall down the slope; a shelf below the falling beam. They come nearer with the amplitude.
-    h("second-plane", "ball", &[("distance", &[0.07])], &[("stiffness", &[0.5]), ("azimuth", &[3.1]), ("elevation", &[0.2])]),
-    h("second-plane", "beam", &[("distance", &[0.04])], &[("stiffness", &[0.5]), ("azimuth", &[0.0]), ("elevation", &[1.5])]),
+    h("second-plane", "ball", &[("distance", &[0.07])], &[("stiffness", &[0.5]), ("normal", &[-0.979, 0.041, 0.199])]),
+    h("second-plane", "beam", &[("distance", &[0.04])], &[("stiffness", &[0.5]), ("normal", &[0.071, 0.0, 0.997])]),
     h("contact-stiffness", "ball", &[("change", &[-0.3])], &[]),
     h("contact-stiffness", "torus", &[("change", &[-0.3])], &[]),
     h("contact-dissipation", "ball", &[("dissipation", &[0.5])], &[]),
@@ -207,9 +208,25 @@ impl Hidden {
                 }
             }
         }
+        if self.name == "second-plane" && cuts(&effect, &scene.object) {
+            return Err(Error::Input(format!("amplitude {amplitude}: the plane would stand inside the body at rest")));
+        }
         scene.effects.push(effect);
         Ok(out)
     }
+}
+
+/// True if a plane of this effect cuts the body at rest: no body starts within a wall.
+fn cuts(effect: &Effect, object: &Object) -> bool {
+    let shape = shape_of(object);
+    let value = |key: &str, axis: usize| {
+        effect.law().params.iter().position(|p| p.key == key).and_then(|s| effect.values[s + axis]).unwrap_or(0.0)
+    };
+    let normal = DVec3::from_array([0, 1, 2].map(|a| value("normal", a))).normalize();
+    let (low, high) = shape.bounds();
+    let surface = shape.surface(0.1 * (high - low).max_element());
+    let along = |p: &DVec3| normal.dot(*p - 0.5 * (low + high));
+    surface.vertices.iter().map(along).fold(f64::INFINITY, f64::min) < -value("distance", 0)
 }
 
 fn unknown(name: &str, key: &str) -> Error {

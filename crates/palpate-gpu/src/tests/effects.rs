@@ -258,7 +258,7 @@ fn evaluations_with_loads_agree() {
         &[("stiffness", &[40.0]), ("attachment", &[-0.03, 0.0, 0.06]), ("anchor", &[-0.1, 0.02, 0.1]), ("radius", &[0.02])],
     );
     with(&mut s, "air-drag", &[("coefficient", &[5.0]), ("fluid_density", &[50.0])]);
-    let place: &[(&str, &[f64])] = &[("stiffness", &[0.5]), ("distance", &[0.045]), ("azimuth", &[3.0]), ("elevation", &[0.3])];
+    let place: &[(&str, &[f64])] = &[("stiffness", &[0.5]), ("distance", &[0.045]), ("normal", &[-2.0, 0.3, 0.6])];
     with(&mut s, "second-plane", place);
     with(&mut s, "time-offset", &[("offset", &[-4e-3])]);
     compare(&seen(&s));

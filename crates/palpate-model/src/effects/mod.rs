@@ -142,7 +142,7 @@ pub enum Trial {
     Score,
     /// Flat or not smooth at "absent", or it acts at an unknown place: short fits from spread starts.
     Starts,
-    /// The same, from planes that the measured body does not cross and the simulated one does (`azimuth`, `elevation` and `distance` from its centre).
+    /// The same, from planes that the measured body does not cross and the simulated one does (`normal` and `distance` from its centre).
     Walls,
     /// Not tried by itself.
     Never,

@@ -1,13 +1,14 @@
 //! A plane that the scene does not know: a wall, a table's edge, a tilted floor. Place and tilt are parameters.
 //!
 //! The contact law of `palpate_model::contact` at the new state, as for the scene's own planes, with `stiffness` times their default
-//! penalty. The body stays on the side that the normal n = (cos ε cos α, cos ε sin α, sin ε) points to, for azimuth α and elevation
-//! ε; the plane lies at `distance` from `point` against n, so that turning it leaves it near the body. Without friction.
+//! penalty. The body stays on the side that the normal points to; of that only the direction counts (two angles would leave a fit stuck
+//! where the normal is their pole). The plane lies at `distance` from `point` against it, so that turning it leaves it near the body.
+//! Without friction.
 
-use super::law::{Input, Number, Place, PointLaw, dot, sub};
-use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, number};
+use super::field::along;
+use super::law::{Input, Number, Place, PointLaw, sub};
+use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, direction, number};
 use crate::contact;
-use std::f64::consts::TAU;
 
 pub(super) const LAW: Law = Law {
     kind: "second-plane",
@@ -20,7 +21,9 @@ pub(super) const LAW: Law = Law {
 
 const POINT: &str = "point that the distance is counted from";
 
-const PARAMS: [EffectParam; 7] = [
+const NORMAL: &str = "from the plane to the side where the body stays";
+
+const PARAMS: [EffectParam; 8] = [
     number("stiffness", "1", [0.0, 1e3, 1.0], Unstated::Absent(0.0), "contact stiffness over the default 10 E/h"),
     number(
         "distance",
@@ -29,8 +32,9 @@ const PARAMS: [EffectParam; 7] = [
         Unstated::Stated(0.05),
         "distance of the plane from the point, against its normal",
     ),
-    number("azimuth", "rad", [-TAU, TAU, 0.5], Unstated::Stated(0.0), "angle of the normal in the x-y plane, from x towards y"),
-    number("elevation", "rad", [-TAU, TAU, 0.5], Unstated::Stated(0.0), "angle of the normal above the x-y plane"),
+    direction("normal", 0, NORMAL),
+    direction("normal", 1, NORMAL),
+    direction("normal", 2, NORMAL),
     EffectParam { default: Unstated::Reference, ..component("point", 0, "m", 0.01, POINT) },
     EffectParam { default: Unstated::Reference, ..component("point", 1, "m", 0.01, POINT) },
     EffectParam { default: Unstated::Reference, ..component("point", 2, "m", 0.01, POINT) },
@@ -40,8 +44,7 @@ struct SecondPlane;
 
 /// Distance above the plane [m].
 fn gap<D: Number>(at: &Input<D>) -> D {
-    let ((sa, ca), (se, ce)) = (at.p(2).sin_cos(), at.p(3).sin_cos());
-    dot([ce * ca, ce * sa, se], sub(at.x(), at.vector(4))) + at.p(1)
+    along(sub(at.x(), at.vector(5)), at.vector(2)) + at.p(1)
 }
 
 impl PointLaw for SecondPlane {

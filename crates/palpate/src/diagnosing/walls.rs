@@ -17,6 +17,8 @@ const PLACES: usize = 400;
 const BEYOND: usize = 5;
 /// Standard deviations of a reading by which the simulated body must go through.
 const DEPTH: f64 = 3.0;
+/// Distance from a wall up to which a place lies against it, in cells; never less than noise is wide.
+const TOUCHING: f64 = 0.1;
 /// Mean distance between readings and the simulated body, in cells, up to which they tell where the measured one is.
 const NEAR: f64 = 0.5;
 /// Fewest readings that tell where a body is.
@@ -25,11 +27,11 @@ const FEWEST: usize = 12;
 const RIDGE: f64 = 1.0;
 /// Ridge on where it is as a whole: a camera may see one side only.
 const SMALL: f64 = 1e-3;
-/// Planes that are returned at most, and the cosine between normals above which the deeper one stands for both.
+/// Planes that are returned at most, and the cosine between normals above which the one that keeps more out stands for both.
 const MOST: usize = 8;
 const ALIKE: f64 = 0.9;
 
-/// Walls around the recordings of all experiments, the one that the simulation crosses deepest first: with the values of the baseline, and with
+/// Walls around the recordings of all experiments, the one that keeps out most of the simulation first: with the values of the baseline, and with
 /// those that its fit started from, for a body that something keeps up may have been made stiff enough to stay where it was seen.
 pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
     let ready = prepare(base, &[]).map_err(lab_error)?;
@@ -51,7 +53,7 @@ pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
     Ok(out)
 }
 
-/// Walls that the simulation with these values crosses, and how deep [m].
+/// Walls that the simulation with these values crosses, and how far beyond what lies against them would be [m], in all.
 fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabError> {
     let readings = linearise(ready, values, ready.free.len())?;
     let noise = readings.rows.iter().map(|r| r.row.noise).fold(0.0, f64::max);
@@ -79,14 +81,18 @@ fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabErro
         let mut along: Vec<f64> = points.iter().map(|p| normal.dot(*p)).collect();
         *along.select_nth_unstable_by(BEYOND, f64::total_cmp).1
     };
+    let near = f64::max(DEPTH * noise, TOUCHING * ready.experiments[0].plan.body.grid.h);
     let wall = |i: usize| {
         let z = 1.0 - 2.0 * (i as f64 + 0.5) / DIRECTIONS as f64;
         let (s, c) = (i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
         let normal = DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z);
         let at = lowest(&measured, normal);
-        (at - lowest(&simulated, normal), Wall { normal, distance: -at })
+        // What lies against the wall while the simulation goes on through it; a plane askew touches the measured body at an edge.
+        let pairs = measured.iter().zip(&simulated).map(|(m, s)| (normal.dot(*m) - at, at - normal.dot(*s)));
+        let kept_out = pairs.filter(|(gap, _)| *gap < near).map(|(_, beyond)| beyond.max(0.0)).sum();
+        (at - lowest(&simulated, normal), (kept_out, Wall { normal, distance: -at }))
     };
-    Ok((0..DIRECTIONS).map(wall).filter(|(depth, _)| *depth > DEPTH * noise).collect())
+    Ok((0..DIRECTIONS).map(wall).filter(|(depth, _)| *depth > DEPTH * noise).map(|w| w.1).collect())
 }
 
 /// How far [m] the measured body is from the simulated one, affine in the rest place: readings say it along their normals alone, and nothing of
