@@ -55,7 +55,7 @@ pub struct Device {
     pub batch: usize,
     /// Times faster than the CPU's step: forward, cost, adjoint; of one member.
     pub over_cpu: [f64; 3],
-    /// Seconds of a step's derivative by one parameter, of one member: by itself, and of [`COLUMNS`] that are computed together. (Files
+    /// Seconds of a step's derivative by one parameter, of one member: by itself, and as one of eight that are computed together. (Files
     /// of earlier versions lack it.)
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<[f64; 2]>,
@@ -175,7 +175,7 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
 /// Seconds of forward, cost and adjoint of every step, and bytes of the device.
 struct Run {
     seconds: [Vec<f64>; 3],
-    /// Of one derivative and of [`COLUMNS`], every step.
+    /// Of one derivative and of as many as are timed together, every step.
     columns: [Vec<f64>; 2],
     failure: Option<String>,
 }
