@@ -294,9 +294,10 @@ mod tests {
         setting.walls = vec![Wall { normal, distance: 0.07 }];
         let planes = candidates(&setting).into_iter().find(|c| c.kind() == "second-plane").unwrap();
         let [Change::Effect(e)] = &planes.variants[..] else { panic!("{planes:?}") };
-        let value = |key: &str| e.law().params.iter().position(|p| p.key == key).and_then(|s| e.values[s]).unwrap();
-        let first = value("normal");
-        assert_eq!((first, value("distance")), (normal.x, 0.07));
+        let first = |key: &str| e.law().params.iter().position(|p| p.key == key).unwrap();
+        let stated: Vec<f64> = (0..3).map(|axis| e.values[first("normal") + axis].unwrap()).collect();
+        assert!((DVec3::from_slice(&stated) - normal).length() < 1e-12);
+        assert_eq!(e.values[first("distance")], Some(0.07));
         // Stiffness, distance and a direction: the point that distances are counted from stays.
         assert_eq!(planes.variants[0].free_slots().len(), 5);
         assert_eq!(planes.variants[0].blunt().map(|sizes| sizes.len()), Some(5));

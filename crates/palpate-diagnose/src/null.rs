@@ -47,24 +47,36 @@ pub fn extended(v: &[f64], fields: usize) -> Vec<f64> {
     v.iter().copied().chain(std::iter::repeat_n(0.0, fields)).collect()
 }
 
+/// What a refit of these columns `[m]` and of the fields `[fields][m]` absorbs `[m + fields]`.
+pub fn absorbed_by<'a>(columns: impl Iterator<Item = &'a Vec<f64>>, fields: &[Vec<f64>]) -> Basis {
+    let mut basis = Basis::default();
+    columns.for_each(|c| basis.add(&extended(c, fields.len())));
+    for (k, f) in fields.iter().enumerate() {
+        let mut column = extended(f, fields.len());
+        column[f.len() + k] = 1.0;
+        basis.add(&column);
+    }
+    basis
+}
+
 impl Frame {
     /// A model's table with fields of errors and the shares of them that are not known.
     pub fn new(table: &Table, fields: Vec<Vec<f64>>, rough: Vec<f64>) -> Frame {
         let n = fields.len();
         let free = Basis::new(table.columns.iter());
-        let mut absorbed = Basis::default();
-        table.columns.iter().for_each(|c| absorbed.add(&extended(c, n)));
-        for (k, f) in fields.iter().enumerate() {
-            let mut column = extended(f, n);
-            column[f.len() + k] = 1.0;
-            absorbed.add(&column);
-        }
+        let absorbed = absorbed_by(table.columns.iter(), &fields);
         Frame { y: extended(&table.y, n), absorbed, free, fields, rough }
     }
 
     /// Residuals after the refit `[m + fields]`.
     pub fn left(&self) -> Vec<f64> {
         self.absorbed.without(&self.y)
+    }
+
+    /// Sum of squares of that.
+    pub fn squares(&self) -> f64 {
+        let left = self.left();
+        dot(&left, &left)
     }
 
     /// What of the fields free numbers do not absorb `[fields][m]`: only that shows in residuals.

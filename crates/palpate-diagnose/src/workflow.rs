@@ -16,7 +16,6 @@ use crate::change::Change;
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
-use crate::linear::dot;
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
@@ -87,8 +86,7 @@ struct State {
 impl State {
     /// Sum of squares that the model leaves, but for what its free numbers and the discretisation explain.
     fn squares(&self) -> f64 {
-        let left = self.frame.left();
-        dot(&left, &left)
+        self.frame.squares()
     }
 }
 

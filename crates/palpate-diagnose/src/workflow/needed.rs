@@ -4,8 +4,8 @@
 use super::choose::price;
 use super::{Session, State, Variant, met};
 use crate::change::Change;
-use crate::linear::{Basis, dot};
-use crate::null::extended;
+use crate::linear::dot;
+use crate::null::absorbed_by;
 use std::collections::BTreeSet;
 
 impl Session<'_> {
@@ -57,21 +57,13 @@ fn removable(v: &Variant, dropped: &BTreeSet<usize>) -> Vec<Vec<usize>> {
 /// Sum of squares that remains when some of a candidate's numbers are where they were before and all others are fitted again; `first` is
 /// the place of its first number among the model's.
 fn rise(state: &State, first: usize, v: &Variant, dropped: &BTreeSet<usize>) -> f64 {
-    let n = state.frame.fields.len();
     let mut y = state.frame.y.clone();
-    let mut kept = Basis::default();
-    for (i, c) in state.table.columns.iter().enumerate() {
-        match i.checked_sub(first).filter(|k| dropped.contains(k)) {
-            Some(k) => y.iter_mut().zip(c).for_each(|(y, c)| *y += (v.numbers[k].start - state.model.values[i]) * c),
-            None => kept.add(&extended(c, n)),
-        }
+    for k in dropped {
+        let back = v.numbers[*k].start - state.model.values[first + k];
+        y.iter_mut().zip(&state.table.columns[first + k]).for_each(|(y, c)| *y += back * c);
     }
-    for (k, f) in state.frame.fields.iter().enumerate() {
-        let mut column = extended(f, n);
-        column[f.len() + k] = 1.0;
-        kept.add(&column);
-    }
-    let left = kept.without(&y);
+    let kept = (0..).zip(&state.table.columns).filter(|(i, _)| *i < first || !dropped.contains(&(i - first)));
+    let left = absorbed_by(kept.map(|(_, c)| c), &state.frame.fields).without(&y);
     dot(&left, &left)
 }
 

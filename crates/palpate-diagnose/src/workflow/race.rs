@@ -3,7 +3,7 @@
 
 use super::{Session, State, Variant, keep_first};
 use crate::laboratory::{Fit, LabError, Number, Readings, Start};
-use crate::linear::{dot, least_squares};
+use crate::linear::least_squares;
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
 /// behind after it and still go on. The last lap brings what is compared to its optimum.
@@ -102,9 +102,7 @@ impl Session<'_> {
 
     /// Sum of squares that another model of the same recordings leaves, but for what its numbers and the discretisation explain.
     fn left(&self, state: &State, readings: &Readings) -> f64 {
-        let table = self.cells.table(readings, Some(&state.table));
-        let left = self.frame(&table, &state.fields).left();
-        dot(&left, &left)
+        self.frame(&self.cells.table(readings, Some(&state.table)), &state.fields).squares()
     }
 
     /// Where each fit starts: along the linear estimate, as far as that lowers the cost.

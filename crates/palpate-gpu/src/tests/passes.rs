@@ -125,7 +125,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
     let rhs: Vec<[f32; 4]> = load(plan).iter().map(single).collect();
     world.gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&rhs));
     step(world, &now, &next, &tally, |s| {
-        s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        s.begin_column(0);
         s.list();
         s.multiply(Product::Matrix, 0);
     });

@@ -4,8 +4,7 @@ use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, spread};
 use crate::choices::Choices;
 use crate::observe::rollout_tests::{differences, seen, watched};
-use crate::pipelines::pass;
-use crate::solve::{ALL, Per, Solve};
+use crate::solve::Solve;
 use crate::tuning;
 use crate::world::World;
 use crate::{GpuBackend, Product, Tuning};
@@ -44,7 +43,7 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
     world.record(|r| {
         let mut s = Solve::new(world, r, Some(0), &now, &next, &tally);
         s.linearise();
-        s.run(pass::BEGIN_EXACT, ALL, Per::Member, 0);
+        s.begin_column(0);
         s.list();
         s.multiply(product, 0);
     });
