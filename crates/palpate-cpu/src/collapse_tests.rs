@@ -16,8 +16,13 @@ use palpate_model::scene::*;
 
 /// A torus of density 1000 kg/m³ that falls on its edge; at 500 Pa its own weight strains it by several hundred per cent.
 fn torus(youngs_modulus: f64) -> Plan {
+    build_plan(&scene(youngs_modulus), Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Its scene.
+pub(crate) fn scene(youngs_modulus: f64) -> Scene {
     let axis = DVec3::new(1.0, 0.2, 0.5).normalize();
-    let scene = Scene {
+    Scene {
         path: "in-code.toml".into(),
         title: String::new(),
         object: Object {
@@ -42,8 +47,7 @@ fn torus(youngs_modulus: f64) -> Plan {
         solver: Solver::default(),
         observation: None,
         fit: None,
-    };
-    build_plan(&scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
+    }
 }
 
 /// Steps that are solved before the first failure, and that failure.

@@ -12,6 +12,8 @@ mod memory;
 mod newton;
 pub mod passes;
 mod simulate;
+#[cfg(test)]
+mod solver_choice_tests;
 mod world;
 
 pub use backend::CpuBackend;

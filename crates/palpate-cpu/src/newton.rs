@@ -64,7 +64,8 @@ fn task<'a>(
     purpose: Purpose,
     digits: Digits,
 ) -> Task<'a> {
-    Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits }
+    let inertia = balance.share_of_inertia(matrix);
+    Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits, inertia }
 }
 
 /// A tangent made ready for directions; the matrix is what it was made from.

@@ -56,6 +56,11 @@ impl Analysis {
         Ok(Analysis { structure, symbolic: Arc::new(symbolic), entries })
     }
 
+    /// Entries of the factor.
+    pub fn entries(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
     /// Factorises; the error names the first pivot that is not positive.
     pub fn factor(&self, matrix: &Matrix) -> Result<Factor, String> {
         let values = self

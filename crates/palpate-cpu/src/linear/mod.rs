@@ -23,11 +23,23 @@ use std::sync::OnceLock;
 const MOST_ITERATIONS: usize = 4000;
 /// Largest body (nodes) whose Cholesky factor is worth its cost in a static problem: 3D fill grows like N^(4/3).
 const DIRECT_STATIC: usize = 9000;
-/// Largest body (nodes) whose factor is cheaper than the iterations of one solve of a time step, and with several right-hand
+/// Largest body (nodes) whose factor may be cheaper than the iterations of one solve of a time step, and with several right-hand
 /// sides: clamps and ν near ½ cost block-Jacobi hundreds of iterations, a factor of 1000 nodes about 20 ms.
 const DIRECT_STEP: [usize; 2] = [900, 1800];
+/// Iterations of CG with block-Jacobi times the root of the share of inertia, of a direction of Newton's method and of a derivative. They are as
+/// many as 1/√(smallest eigenvalue), and what bends softly resists by its inertia alone. On balls, beams and a torus of 176
+/// to 1514 nodes in steps of 1 to 10 ms between 2.5 and 4, and between 15 and 21.
+const ITERATIONS: [f64; 2] = [3.5, 20.0];
+/// Directions that Newton's method takes in a step for each of its factors.
+const DIRECTIONS: f64 = 3.0;
+/// Time of a factorisation per entry of the factor, over that of an iteration per block of the matrix (ibid.: 9 to 16 ns over 2.3 to 4.1 ns).
+const FACTOR: f64 = 3.7;
+/// Time of a solve with a factor, over that of the factorisation.
+const SUBSTITUTION: f64 = 0.05;
 /// Smallest body (nodes) for which the second level of the preconditioner pays.
 const COARSE_FROM: usize = 600;
+/// Iterations of CG up to which block-Jacobi alone is faster than with it.
+const PLAIN: f64 = 15.0;
 /// Edge of a group of nodes on the second level.
 const GROUP: i64 = 4;
 
@@ -74,6 +86,8 @@ pub struct Task<'a> {
     pub purpose: Purpose,
     /// How exactly CG sees the matrix.
     pub digits: Digits,
+    /// Share of inertia in the matrix' diagonal; 0 in a static problem.
+    pub inertia: f64,
 }
 
 /// A matrix made ready for solves.
@@ -93,13 +107,26 @@ pub enum Trouble {
     Unconverged(f64),
 }
 
-/// True where the matrix of so many nodes is factorised.
+/// True where the matrix of so many nodes may be factorised.
 pub(crate) fn is_direct(choice: LinearSolver, nodes: usize, purpose: Purpose) -> bool {
     match (choice, purpose) {
         (LinearSolver::Cholesky, _) => true,
         (LinearSolver::ConjugateGradient, _) => false,
         (LinearSolver::Auto, Purpose::Static) => nodes <= DIRECT_STATIC,
         (LinearSolver::Auto, Purpose::Step(columns)) => nodes <= DIRECT_STEP[usize::from(columns > 2)],
+    }
+}
+
+impl Task<'_> {
+    /// True if CG takes less time than a factor with so many entries: where steps are short, a few iterations do.
+    fn is_easy(&self, entries: usize) -> bool {
+        let Purpose::Step(columns) = self.purpose else { return false };
+        let factor = FACTOR * entries as f64 / self.pattern.blocks.columns.len() as f64;
+        let root = self.inertia.sqrt();
+        match self.digits {
+            Digits::Few => DIRECTIONS * ITERATIONS[0] < factor * root,
+            Digits::All => columns as f64 * ITERATIONS[1] < factor * (1.0 + SUBSTITUTION * columns as f64) * root,
+        }
     }
 }
 
@@ -115,13 +142,15 @@ impl Solvers {
         if is_direct(self.choice, rows.len(), task.purpose) {
             let analysis = self.analysis.get_or_init(|| Analysis::new(rows));
             let analysis = analysis.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
-            return analysis.factor(task.matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
+            if self.choice == LinearSolver::Cholesky || !task.is_easy(analysis.entries()) {
+                return analysis.factor(task.matrix).map(Prepared::Direct).map_err(Trouble::Indefinite);
+            }
         }
         let operator: Box<dyn Operator> = match task.digits {
             Digits::Few => Box::new(Packed::new(rows, task.matrix, |v| v as f32)),
             Digits::All => Box::new(Packed::new(rows, task.matrix, |v| v)),
         };
-        if rows.len() < COARSE_FROM {
+        if rows.len() < COARSE_FROM || ITERATIONS[0] < PLAIN * task.inertia.sqrt() {
             return Ok(Prepared::Iterative(operator, Box::new(task.diagonal)));
         }
         let coarsening = self.coarsening.get_or_init(|| Coarsening::new(task.body, task.pattern, GROUP));
