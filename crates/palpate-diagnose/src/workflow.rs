@@ -4,6 +4,7 @@ mod bound;
 mod choose;
 mod conclude;
 mod needed;
+mod own_errors;
 mod pairs;
 mod prune;
 mod race;
@@ -133,8 +134,8 @@ struct Session<'a> {
     noise: Shapes,
     /// Variants of the baseline, scored while the noise was being found out; the first round takes them over.
     scored: Option<Vec<Variant>>,
-    /// The last answer of [`Session::finer`], with the model that it was asked about: a candidate that is chosen was measured already.
-    finer: Option<(Model, Vec<Field>)>,
+    /// Answers of [`Session::finer`], with the models that it was asked about: a candidate that is chosen was measured already.
+    finer: Vec<(Model, Vec<Field>)>,
     tried: Vec<Tried>,
     not_tried: Vec<String>,
     /// True when the time was over before everything was tried.
@@ -168,7 +169,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
         design_effect: 1.0,
         noise: Shapes::default(),
         scored: None,
-        finer: None,
+        finer: Vec::new(),
         tried: Vec::new(),
         not_tried: Vec::new(),
         no_time: false,
@@ -271,15 +272,16 @@ impl Session<'_> {
     /// What a finer grid and half the step would change, and what the recording's systematic errors may have changed. A scene that is too
     /// large to be refined, or fails there, has no estimate, and neither has one whose diagnosis was asked to stop.
     fn finer(&mut self, model: &Model) -> Vec<Field> {
-        if let Some((_, known)) =
-            self.finer.as_ref().filter(|(of, _)| (&of.changes, &of.values) == (&model.changes, &model.values))
-        {
+        let same = |of: &Model| (&of.changes, &of.values) == (&model.changes, &model.values);
+        if let Some((_, known)) = self.finer.iter().find(|(of, _)| same(of)) {
             return known.clone();
         }
         self.lab.say("discretisation error: finer grid, half step");
         let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
         all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
-        self.finer = Some((model.clone(), all.clone()));
+        if !self.lab.interrupted() {
+            self.finer.push((model.clone(), all.clone()));
+        }
         all
     }
 

@@ -106,6 +106,27 @@ fn an_answer_says_what_there_was_no_time_for() {
 }
 
 #[test]
+fn an_answer_that_leaves_much_is_none_where_time_cut_the_search_short() {
+    let hidden = Bench::first_pattern("uniform-force");
+    let answer = |slow| {
+        let mut bench = Bench::new(6, &[(&hidden, -10.0 * NOISE), ("magnet", 4.0 * NOISE)], false);
+        bench.slow = slow;
+        let baseline = bench.baseline();
+        diagnose(&mut bench, baseline, &Options::default()).unwrap()
+    };
+    let whole = answer(vec![]);
+    assert_eq!(
+        (whole.verdict, whole.effects[0].kind.as_str()),
+        (Verdict::MissingEffect, "uniform-force"),
+        "{}",
+        whole.sentence()
+    );
+    let hurried = answer(vec!["depth-bias"]);
+    assert_eq!(hurried.verdict, Verdict::Undecided, "{}", hurried.sentence());
+    assert!(hurried.sentence().contains("the known effect that helps most, uniform-force,"), "{}", hurried.sentence());
+}
+
+#[test]
 fn where_the_baseline_went_astray_candidates_start_from_home_first() {
     let mut bench = Bench::new(5, &[(&Bench::first_pattern("uniform-force"), -1.5 * NOISE)], false);
     let mut baseline = bench.baseline();

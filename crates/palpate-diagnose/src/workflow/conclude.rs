@@ -1,5 +1,6 @@
 //! The verdict: levels before and after, and the gap that is closed.
 
+use super::own_errors::CLOSE;
 use super::{Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
@@ -68,6 +69,8 @@ impl Session<'_> {
         let adequate = !self.is_missing(adequacy, &state);
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,
+            // It may be the nearest of those that there was time for.
+            (false, 1) if self.no_time && after.rms.powi(2) > CLOSE * after.noise.powi(2) => Verdict::Undecided,
             // What follows one recording and not the other has only bent to it.
             (true, 1) if held_out.is_none() || gap_closed >= self.options.enough => Verdict::MissingEffect,
             (false, 1) if gap_closed >= self.options.enough => Verdict::MissingEffect,

@@ -136,7 +136,7 @@ pub(super) mod tests {
             design_effect: 1.0,
             noise: Default::default(),
             scored: None,
-            finer: None,
+            finer: Vec::new(),
             tried: Vec::new(),
             not_tried: Vec::new(),
             no_time: false,

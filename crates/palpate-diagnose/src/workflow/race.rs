@@ -7,7 +7,10 @@ use crate::linear::least_squares;
 
 /// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
 /// behind after it and still go on. The last lap brings what is compared to its optimum.
-const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.02), (25, 2e-5, 1.0)];
+pub(super) const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.02), (25, 2e-5, 1.0)];
+/// Iterations that a fit takes after a lap, in the mean, and fewest that go on however little time there is.
+const TO_THE_END: usize = 6;
+const FEWEST: usize = 2;
 /// A fit may gain as many times again what it gained in a lap.
 const STAMINA: f64 = 2.0;
 /// Shares of the linear estimate that a fit may start from: the first at which the cost is lower than without.
@@ -67,6 +70,7 @@ impl Session<'_> {
             };
             let mut stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
             self.spare(state, &running, lag, &mut stays);
+            self.hurry(&running, promises, &mut stays);
             let mut keep = stays.iter();
             jobs.retain(|_| *keep.next().unwrap_or(&false));
             let mut keep = stays.iter();
@@ -98,6 +102,22 @@ impl Session<'_> {
         let left: Vec<f64> = answers.into_iter().map(|r| r.map_or(f64::INFINITY, |r| self.left(state, &r))).collect();
         let worst = left[0] + lag * (state.squares() - left[0]).max(0.0);
         open.iter().zip(&left).for_each(|(i, left)| stays[*i] |= *left <= worst);
+    }
+
+    /// Where time is short only so many go on, those that promise most, as may come to an end.
+    fn hurry(
+        &mut self,
+        running: &[(&Variant, Option<Fit>)],
+        promises: impl Fn(&(&Variant, Option<Fit>)) -> f64,
+        stays: &mut [bool],
+    ) {
+        let most = (self.lab.iterations_left() / TO_THE_END).max(FEWEST);
+        let mut left: Vec<usize> = (0..running.len()).filter(|i| stays[*i]).collect();
+        left.sort_by(|a, b| promises(&running[*a]).total_cmp(&promises(&running[*b])));
+        for i in left.into_iter().skip(most) {
+            stays[i] = false;
+            self.missed(&running[i].0.kind(), &LabError::NoTime);
+        }
     }
 
     /// Sum of squares that another model of the same recordings leaves, but for what its numbers and the discretisation explain.

@@ -52,7 +52,7 @@ impl Session<'_> {
         keep_first(&mut best, |v| v.candidate);
         best.truncate(FITS);
         let tries: Vec<(&State, &Variant)> = best.into_iter().map(|v| (&without, v)).collect();
-        let fitted = ranked(self.fitted(&without, &tries, &STARTS, variants.len())?);
+        let fitted = ranked(self.fitted(&without, &tries, &STARTS, variants.len(), Vec::new())?);
         let freedom = state.model.values.len() - without.model.values.len();
         Ok(fitted.into_iter().find(|f| self.is_as_good(&f.state, state, freedom as f64 - f.freedom as f64)))
     }

@@ -1,10 +1,11 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
-use super::race::{CAREFUL, STARTS};
+use super::own_errors::MEASURED;
+use super::race::{CAREFUL, LAPS, STARTS};
 use super::{Fitted, Session, State, Variant, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
-use crate::laboratory::{Field, LabError, Model, Number, Readings};
+use crate::laboratory::{LabError, Model, Number};
 use crate::score::f_tail;
 use crate::separation::Separated;
 
@@ -20,8 +21,6 @@ const LOST: f64 = 10.0;
 const WALL: f64 = 0.3;
 /// So many of them are.
 const WALLS: usize = 3;
-/// Mean square of residuals, in units of their noise (or noise and grid), up to which an explanation is not looked for elsewhere.
-const CLOSE: f64 = 2.0;
 /// Further starts of candidates at unknown places: in all, and of each.
 const ELSEWHERE: (usize, usize) = (10, 3);
 
@@ -89,17 +88,16 @@ impl Session<'_> {
             tries.splice(place..place, variants.iter().map(|v| (home, v)));
         }
         self.shorten(&mut tries);
-        let mut fitted = self.fitted(state, &tries, &STARTS, looks)?;
-        let mut explained = self.explained(state, &fitted);
-        if !explained && !self.lab.out_of_time() {
+        let mut fitted = self.fitted(state, &tries, &STARTS, looks, Vec::new())?;
+        if !self.explained(state, &fitted) && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
             let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
             let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
             if !further.is_empty() {
-                fitted.extend(self.fitted(state, &further, &CAREFUL, looks)?);
-                explained = self.explained(state, &fitted);
+                fitted = self.fitted(state, &further, &CAREFUL, looks, fitted)?;
             }
         }
+        let explained = self.explained(state, &fitted);
         let mut fitted = ranked(fitted);
         // There must be room for both.
         if round < self.options.rounds && !self.lab.out_of_time() {
@@ -109,8 +107,7 @@ impl Session<'_> {
             pairs.iter().for_each(|(_, p)| self.note(round, p));
             let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
             if !tries.is_empty() {
-                fitted.extend(self.fitted(state, &tries, &STARTS, looks)?);
-                fitted = ranked(fitted);
+                fitted = ranked(self.fitted(state, &tries, &STARTS, looks, fitted)?);
             }
         }
         for f in &fitted {
@@ -126,9 +123,10 @@ impl Session<'_> {
         (self.lab.iterations_left() / RACE).max(FEWEST)
     }
 
-    /// Leaves out what there is no time for: of every candidate the best start comes before a second one of any.
+    /// Leaves out what there is no time for: of every candidate the best start comes before a second one of any. Half of the time is for the
+    /// first lap, in which all of them run.
     fn shorten(&mut self, tries: &mut Vec<(&State, &Variant)>) {
-        let affordable = self.affordable();
+        let affordable = (self.lab.iterations_left() / (2 * LAPS[0].0)).max(FEWEST);
         if affordable < tries.len() {
             let mut seen = Vec::new();
             tries.sort_by_cached_key(|(_, v)| {
@@ -147,50 +145,41 @@ impl Session<'_> {
         self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
     }
 
-    /// Fits variants, of so many that were looked at, and judges what arrives.
+    /// Fits variants, of so many that were looked at, judges what arrives, and adds it to what was fitted before.
     pub(super) fn fitted(
         &mut self,
         state: &State,
         tries: &[(&State, &Variant)],
         shares: &[f64],
         looks: usize,
+        before: Vec<Fitted>,
     ) -> Result<Vec<Fitted>, LabError> {
         let arrived = self.race(state, tries, shares)?;
         let jobs: Vec<(Vec<Change>, Vec<f64>)> =
             arrived.iter().map(|(_, f)| (f.model.changes.clone(), f.model.values.clone())).collect();
         self.lab.say(&format!("judging {} candidates", jobs.len()));
-        let mut fitted: Vec<Fitted> = Vec::new();
+        let mut fitted = before;
+        let old = fitted.len();
+        let mut variants: Vec<&Variant> = Vec::new();
         for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
             match readings {
-                Ok(readings) => fitted.push(self.judge(state, v, fit.model, readings, looks)?),
+                Ok(readings) => {
+                    let new = self.beside(state, fit.model, readings)?;
+                    fitted.push(self.judge(state, v, new, looks));
+                    variants.push(v);
+                }
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(why) => self.missed(&v.kind(), &why),
             }
         }
+        for k in self.rivals(state, &fitted, old) {
+            if self.lab.iterations_left() < MEASURED {
+                break;
+            }
+            let own = self.beside_its_own(&fitted[k].state);
+            fitted[k] = self.judge(state, variants[k - old], own, looks);
+        }
         Ok(fitted)
-    }
-
-    /// True if the best of the candidates leaves little more than noise, or than noise and its own errors of the discretisation: an
-    /// effect that makes up for these is none.
-    fn explained(&mut self, state: &State, fitted: &[Fitted]) -> bool {
-        let loss = |s: &State| s.predicted[0].loss();
-        let Some(best) = fitted.iter().map(|f| &f.state).min_by(|a, b| loss(a).total_cmp(&loss(b))) else { return false };
-        if loss(best) > loss(state) {
-            return false;
-        }
-        if self.is_noise(best, &[]) {
-            return true;
-        }
-        // Where its body goes they are others than the baseline's.
-        let fields = self.finer(&best.model);
-        let own = State { frame: self.frame(&best.table, &fields), fields, ..best.clone() };
-        self.is_noise(&own, &own.fields)
-    }
-
-    /// True if a model leaves little more than noise, or than noise and these errors of the discretisation, and nothing with structure.
-    fn is_noise(&self, state: &State, finer: &[Field]) -> bool {
-        let level = self.level_of(&state.readings, 0.0, finer);
-        level.rms.powi(2) <= CLOSE * level.noise.powi(2) && !self.is_missing(&self.adequacy(state), state)
     }
 
     /// The scene where the baseline's fit started, with the candidates that promise most there, where that is far away: the numbers that
@@ -216,8 +205,7 @@ impl Session<'_> {
     }
 
     /// What a fitted candidate is worth, one of so many that were looked at.
-    fn judge(&mut self, state: &State, v: &Variant, model: Model, readings: Readings, looks: usize) -> Result<Fitted, LabError> {
-        let new = self.beside(state, model, readings)?;
+    fn judge(&self, state: &State, v: &Variant, new: State, looks: usize) -> Fitted {
         let (with, without) = (new.squares(), state.squares());
         let freedom = v.columns.len();
         // Bonferroni: every start was looked at, and a pair is one of all pairs of them.
@@ -227,7 +215,7 @@ impl Session<'_> {
         let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * looks).min(1.0);
         let gain = self.gain(state, &new);
         let needed = self.needed(state, &new, v);
-        Ok(Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, needed, effects: v.changes.len() })
+        Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, needed, effects: v.changes.len() }
     }
 
     /// Share of the gap that one model leaves which another closes, on data left out, in whichever way of leaving some out it is least.

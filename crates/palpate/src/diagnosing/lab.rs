@@ -69,8 +69,11 @@ impl<'a> Lab<'a> {
         let points: Vec<_> = body.patches.iter().map(|p| p.point).collect();
         let regions = Regions::new(&points, 4);
         let nearest = |c: &glam::DVec3| points.iter().copied().min_by(|a, b| a.distance(*c).total_cmp(&b.distance(*c)));
-        let contact = base.iter().map(|e| contact_times(e, options.backend)).collect::<Result<_, _>>()?;
-        let still = base.iter().map(|e| still_frames(e, options.backend)).collect::<Result<_, _>>()?;
+        let backend = options.backend;
+        let (contact, (still, walls)) = rayon::join(
+            || base.iter().map(|e| contact_times(e, backend)).collect::<Result<_, _>>(),
+            || (base.iter().map(|e| still_frames(e, backend)).collect::<Result<_, _>>(), walls(base).unwrap_or_default()),
+        );
         let most = |f: fn(&Experiment) -> usize| base.iter().map(f).max().unwrap_or(0);
         let setting = Setting {
             center: body.center,
@@ -81,9 +84,9 @@ impl<'a> Lab<'a> {
             cameras: most(|e| e.plan.observation.cameras.len()),
             markers: most(|e| e.plan.observation.markers.len()),
             held: held(base),
-            contact,
-            still,
-            walls: walls(base).unwrap_or_default(),
+            contact: contact?,
+            still: still?,
+            walls,
         };
         let checkpoint = Checkpoint::open(options.checkpoints.as_ref().map(|(f, r)| (f.as_path(), *r)))?;
         Ok(Lab {
