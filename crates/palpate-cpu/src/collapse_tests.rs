@@ -3,6 +3,7 @@
 
 use crate::CpuBackend;
 use crate::linear::vector::dot;
+use crate::newton::Effort;
 use crate::passes::cells::{corners, zeros};
 use crate::simulate;
 use crate::world::{MemberState, MemberTangent, World};
@@ -50,34 +51,46 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
     }
 }
 
-/// Steps that are solved before the first failure, and that failure.
-fn run(plan: &Plan) -> (usize, Option<Failure>) {
+/// A simulation as far as it went.
+pub(crate) struct Ran {
+    /// Steps that were solved before the first failure.
+    pub solved: usize,
+    pub failure: Option<Failure>,
+    /// Displacement then [m].
+    pub u: Vec<DVec3>,
+    pub effort: Effort,
+}
+
+/// Simulates to the end, or to the first failure.
+pub(crate) fn run(plan: &Plan) -> Ran {
     let backend = CpuBackend;
     let mut world = backend.build(plan, 1).unwrap();
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     let mut tally = backend.new_tally(&world, &[]);
     let (mut now, mut next) = (backend.new_state(&world), backend.new_state(&world));
     backend.start(&mut world, &mut now, &mut tally);
-    for k in 0..plan.clock.steps {
-        backend.step(&mut world, k, &now, &mut next, &mut tally);
-        if let Some(failure) = backend.read(&world, &tally).remove(0).failure {
-            return (k, Some(failure));
+    let (mut solved, mut failure) = (0, None);
+    while solved < plan.clock.steps && failure.is_none() {
+        backend.step(&mut world, solved, &now, &mut next, &mut tally);
+        failure = backend.read(&world, &tally).remove(0).failure;
+        if failure.is_none() {
+            solved += 1;
+            std::mem::swap(&mut now, &mut next);
         }
-        std::mem::swap(&mut now, &mut next);
     }
-    (plan.clock.steps, None)
+    Ran { solved, failure, u: now.members.swap_remove(0).u, effort: world.effort(0) }
 }
 
 #[test]
 fn a_torus_that_bears_its_weight_is_solved_to_the_end() {
-    let (solved, failure) = run(&torus(5000.0));
+    let Ran { solved, failure, .. } = run(&torus(5000.0));
     assert!(failure.is_none(), "{solved} of 40 steps: {failure:?}");
 }
 
 #[test]
 fn a_torus_that_its_weight_crushes_is_solved_to_the_end() {
     for youngs_modulus in [500.0, 1000.0, 2000.0] {
-        let (solved, failure) = run(&torus(youngs_modulus));
+        let Ran { solved, failure, .. } = run(&torus(youngs_modulus));
         assert!(failure.is_none(), "{youngs_modulus} Pa: {solved} of 40 steps: {failure:?}");
     }
 }

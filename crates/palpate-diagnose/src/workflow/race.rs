@@ -70,7 +70,9 @@ impl Session<'_> {
             };
             let mut stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
             self.spare(state, &running, lag, &mut stays);
-            self.hurry(&running, promises, &mut stays);
+            if !last {
+                self.hurry(&running, promises, &mut stays);
+            }
             let mut keep = stays.iter();
             jobs.retain(|_| *keep.next().unwrap_or(&false));
             let mut keep = stays.iter();
@@ -104,7 +106,7 @@ impl Session<'_> {
         open.iter().zip(&left).for_each(|(i, left)| stays[*i] |= *left <= worst);
     }
 
-    /// Where time is short only so many go on, those that promise most, as may come to an end.
+    /// Where time is short only so many of those that are not at their optimum yet go on as may come to it, those that promise most.
     fn hurry(
         &mut self,
         running: &[(&Variant, Option<Fit>)],
@@ -112,7 +114,8 @@ impl Session<'_> {
         stays: &mut [bool],
     ) {
         let most = (self.lab.iterations_left() / TO_THE_END).max(FEWEST);
-        let mut left: Vec<usize> = (0..running.len()).filter(|i| stays[*i]).collect();
+        let fits_on = |i: &usize| stays[*i] && running[*i].1.as_ref().is_none_or(|f| !f.settled);
+        let mut left: Vec<usize> = (0..running.len()).filter(fits_on).collect();
         left.sort_by(|a, b| promises(&running[*a]).total_cmp(&promises(&running[*b])));
         for i in left.into_iter().skip(most) {
             stays[i] = false;
