@@ -20,6 +20,7 @@ use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
+use crate::score::Score;
 use crate::still::still_ratio;
 use palpate_engine::Source;
 use variants::{Variant, most_promising};
@@ -388,7 +389,12 @@ impl Session<'_> {
         let mut variants = variants;
         for v in &mut variants {
             v.columns.iter_mut().flatten().for_each(|c| *c /= factor.sqrt());
-            v.score = self.score(state, v);
+            // A wall was not scored by its columns.
+            v.score = if v.blunt().is_none() {
+                self.score(state, v)
+            } else {
+                Score { gain: v.score.share * state.squares(), ..std::mem::take(&mut v.score) }
+            };
         }
         self.scored = Some(variants);
     }

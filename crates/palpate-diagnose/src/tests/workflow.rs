@@ -7,6 +7,7 @@ use crate::laboratory::Laboratory;
 use crate::noise::design_effect;
 use crate::null::{Frame, test};
 use crate::{Options, diagnose};
+use palpate_model::effects::{ALL, find};
 
 #[test]
 fn hidden_effects_are_named_and_the_gap_closes() {
@@ -103,6 +104,18 @@ fn an_answer_says_what_there_was_no_time_for() {
         "{}",
         d.sentence()
     );
+}
+
+#[test]
+fn a_wall_is_tried_for_what_it_does_from_the_first_round_on() {
+    let law = &ALL[find("second-plane").unwrap()];
+    // Small amplitudes tell nothing of a wall: it is scored at its typical size, and this one stands there.
+    let mut bench = Bench::new(5, &[(&Bench::first_pattern("second-plane"), -law.params[0].typical)], false);
+    let baseline = bench.baseline();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    let tried = d.tried.iter().find(|t| t.kind == "second-plane").unwrap();
+    assert!(tried.round == 1 && tried.promised > 0.3 && tried.held_out_gain.is_some(), "{tried:?}");
+    assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "second-plane"), "{}", d.sentence());
 }
 
 #[test]
