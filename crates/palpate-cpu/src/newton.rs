@@ -157,10 +157,13 @@ pub fn solve(
 /// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
 fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
     let body = &balance.plan.body;
-    let squares = balance.pattern.blocks.diagonal.iter().zip(body.nodes.iter().zip(u)).map(|(&k, (x, u))| {
-        let d = matrix.values[k];
-        (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0 * (*x + *u).length_squared()
-    });
+    let squares = balance
+        .pattern
+        .blocks
+        .diagonal
+        .iter()
+        .zip(body.nodes.iter().zip(u))
+        .map(|(&k, (x, u))| matrix.mean_diagonal(k) * (*x + *u).length_squared());
     // Each of the 81 products of a row rounds once; their errors add like a random walk.
     9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
 }

@@ -83,14 +83,18 @@ impl Change {
         }
     }
 
-    /// Sizes of the free numbers that show whether the change helps, where small ones do not tell.
-    pub fn blunt(&self) -> Option<Vec<f64>> {
-        let Change::Effect(e) = self else { return None };
-        let size = |s: usize| match e.law().params[s].default {
-            Unstated::Absent(_) => e.law().params[s].typical,
+    /// True for an effect that is tried so.
+    pub fn is_tried(&self, how: Trial) -> bool {
+        matches!(self, Change::Effect(e) if e.law().trial == how)
+    }
+
+    /// Typical sizes of the free numbers that are amplitudes, zero for others and for what is freed.
+    pub fn typical(&self) -> Vec<f64> {
+        let size = |slot: usize| match self {
+            Change::Effect(e) if matches!(e.law().params[slot].default, Unstated::Absent(_)) => e.law().params[slot].typical,
             _ => 0.0,
         };
-        (e.law().trial == Trial::Walls).then(|| self.free_slots().into_iter().map(size).collect())
+        self.free_slots().into_iter().map(size).collect()
     }
 
     /// Which of [`Change::free_slots`] have a derivative at "absent": amplitudes, or all freed numbers.
@@ -163,7 +167,7 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
             let variants = match l.trial {
                 Trial::Walls if !setting.walls.is_empty() => at_walls(&effect, &setting.walls),
                 Trial::Starts | Trial::Walls => spread(&effect, setting),
-                Trial::Score | Trial::Never => vec![effect],
+                Trial::Score | Trial::Saturates | Trial::Never => vec![effect],
             };
             out.push(Candidate { variants: variants.into_iter().map(Change::Effect).collect() });
         }
@@ -300,7 +304,8 @@ mod tests {
         assert_eq!(e.values[first("distance")], Some(0.07));
         // Stiffness, distance and a direction: the point that distances are counted from stays.
         assert_eq!(planes.variants[0].free_slots().len(), 5);
-        assert_eq!(planes.variants[0].blunt().map(|sizes| sizes.len()), Some(5));
+        assert!(planes.variants[0].is_tried(Trial::Walls));
+        assert_eq!(planes.variants[0].typical().len(), 5);
         // Without such planes it is tried all around.
         setting.walls.clear();
         assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));

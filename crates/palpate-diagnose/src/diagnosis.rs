@@ -32,6 +32,9 @@ impl Verdict {
     }
 }
 
+/// Mean square, over what noise and discretisation would leave, up to which a model is close to a measurement.
+const CLOSE: f64 = 2.0;
+
 /// How far measurement and model are apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Level {
@@ -45,6 +48,11 @@ impl Level {
     /// What noise does not explain [m²], not negative.
     pub fn gap(&self) -> f64 {
         (self.rms * self.rms - self.noise * self.noise).max(0.0)
+    }
+
+    /// True where little more is left than noise and discretisation: an explanation is not looked for elsewhere then.
+    pub fn is_close(&self) -> bool {
+        self.rms * self.rms <= CLOSE * self.noise * self.noise
     }
 }
 

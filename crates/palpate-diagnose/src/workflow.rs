@@ -389,8 +389,8 @@ impl Session<'_> {
         let mut variants = variants;
         for v in &mut variants {
             v.columns.iter_mut().flatten().for_each(|c| *c /= factor.sqrt());
-            // A wall was not scored by its columns.
-            v.score = if v.blunt().is_none() {
+            // What starts from a size was not scored by its columns.
+            v.score = if v.blunt.is_none() {
                 self.score(state, v)
             } else {
                 Score { gain: v.score.share * state.squares(), ..std::mem::take(&mut v.score) }

@@ -41,6 +41,7 @@ the effect before it compares (in reverse order of the scene); `palpate observe`
 fn trial(law: &Law) -> &'static str {
     match law.trial {
         Trial::Score => "by its derivative where it is absent",
+        Trial::Saturates => "by its derivative where it is absent, and from a typical size",
         Trial::Starts | Trial::Walls => "by short fits from several starts",
         Trial::Never => "not by itself",
     }

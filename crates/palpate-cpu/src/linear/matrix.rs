@@ -12,6 +12,14 @@ pub struct Matrix {
     pub values: Vec<DMat3>,
 }
 
+impl Matrix {
+    /// Mean of the three diagonal numbers of the block at a place.
+    pub fn mean_diagonal(&self, place: usize) -> f64 {
+        let block = self.values[place];
+        (block.x_axis.x + block.y_axis.y + block.z_axis.z) / 3.0
+    }
+}
+
 /// Something that can be multiplied by a vector.
 pub trait Operator {
     /// y = A x.

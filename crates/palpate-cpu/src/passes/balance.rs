@@ -120,8 +120,7 @@ impl<'a> Balance<'a> {
     pub fn share_of_inertia(&self, matrix: &Matrix) -> f64 {
         let Some(t) = self.inertia else { return 0.0 };
         let mass: f64 = self.plan.body.node_volume.iter().enumerate().map(|(i, w)| self.density(i) * w).sum();
-        let diagonal = self.pattern.blocks.diagonal.iter().map(|k| &matrix.values[*k]);
-        t.displacement * mass / diagonal.map(|d| (d.x_axis.x + d.y_axis.y + d.z_axis.z) / 3.0).sum::<f64>()
+        t.displacement * mass / self.pattern.blocks.diagonal.iter().map(|k| matrix.mean_diagonal(*k)).sum::<f64>()
     }
 
     /// Adds inertia, mass damping and weight.

@@ -1,6 +1,5 @@
 //! The verdict: levels before and after, and the gap that is closed.
 
-use super::own_errors::CLOSE;
 use super::{Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
@@ -70,7 +69,7 @@ impl Session<'_> {
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,
             // It may be the nearest of those that there was time for.
-            (false, 1) if self.no_time && after.rms.powi(2) > CLOSE * after.noise.powi(2) => Verdict::Undecided,
+            (false, 1) if self.no_time && !after.is_close() => Verdict::Undecided,
             // What follows one recording and not the other has only bent to it.
             (true, 1) if held_out.is_none() || gap_closed >= self.options.enough => Verdict::MissingEffect,
             (false, 1) if gap_closed >= self.options.enough => Verdict::MissingEffect,

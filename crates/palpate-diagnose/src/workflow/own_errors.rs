@@ -4,8 +4,6 @@
 use super::{Fitted, Session, State};
 use crate::laboratory::Field;
 
-/// Mean square of residuals, in units of their noise (or noise and grid), up to which an explanation is not looked for elsewhere.
-pub(super) const CLOSE: f64 = 2.0;
 /// Candidates that are measured beside errors of their own.
 const RIVALS: usize = 4;
 /// Iterations of fits that there must be time for to measure one: it takes about as long.
@@ -46,7 +44,6 @@ impl Session<'_> {
 
     /// True if a model leaves little more than noise, or than noise and these errors of the discretisation, and nothing with structure.
     fn is_noise(&self, state: &State, finer: &[Field]) -> bool {
-        let level = self.level_of(&state.readings, 0.0, finer);
-        level.rms.powi(2) <= CLOSE * level.noise.powi(2) && !self.is_missing(&self.adequacy(state), state)
+        self.level_of(&state.readings, 0.0, finer).is_close() && !self.is_missing(&self.adequacy(state), state)
     }
 }

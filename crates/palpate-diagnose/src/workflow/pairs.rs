@@ -104,6 +104,7 @@ fn as_fitted(state: &State, f: &Fitted) -> (State, Variant) {
         score: Score { step: vec![0.0; numbers.len()], ..Score::default() },
         columns,
         numbers,
+        blunt: None,
     };
     (from, half)
 }
@@ -117,6 +118,7 @@ fn joined(a: &Variant, b: &Variant) -> Variant {
         columns: [&a.columns[..], &b.columns].concat(),
         amplitudes: [&a.amplitudes[..], &b.amplitudes].concat(),
         numbers: [&a.numbers[..], &b.numbers].concat(),
+        blunt: None,
         score: Score { step: [&a.score.step[..], &b.score.step].concat(), ..b.score.clone() },
     }
 }
@@ -124,7 +126,7 @@ fn joined(a: &Variant, b: &Variant) -> Variant {
 /// The best variants of plain effects, of variants sorted by what they promise.
 fn plain(variants: &[Variant]) -> Vec<&Variant> {
     let mut plain: Vec<&Variant> =
-        variants.iter().filter(|v| v.is_certain() && v.blunt().is_none() && v.columns.len() <= PLAIN).collect();
+        variants.iter().filter(|v| v.is_certain() && v.blunt.is_none() && v.columns.len() <= PLAIN).collect();
     keep_first(&mut plain, |v| v.candidate);
     plain
 }

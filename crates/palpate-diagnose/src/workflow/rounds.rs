@@ -28,9 +28,9 @@ const ELSEWHERE: (usize, usize) = (10, 3);
 const RACE: usize = 9;
 const FEWEST: usize = 3;
 
-/// A wall that helps as it stands: what others promise after a fit does not compare.
+/// A wall, or another effect at a size, that helps as it stands: what others promise after a fit does not compare.
 fn is_wall(v: &Variant) -> bool {
-    v.blunt().is_some() && v.score.share > WALL
+    v.blunt.is_some() && v.score.share > WALL
 }
 
 /// The most promising further starts of candidates at unknown places, of variants sorted by what they promise.
@@ -307,6 +307,7 @@ mod tests {
             columns: Vec::new(),
             amplitudes: amplitudes.to_vec(),
             numbers: Vec::new(),
+            blunt: (kind == "second-plane").then(Vec::new),
             score: crate::score::Score { share, ..Default::default() },
         }
     }

@@ -5,6 +5,7 @@ use crate::change::{Candidate, Change, candidates};
 use crate::laboratory::{LabError, Number};
 use crate::null::extended;
 use crate::score::{Score, score};
+use palpate_model::effects::Trial;
 
 /// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
 const FIRST_STARTS: usize = 8;
@@ -12,6 +13,7 @@ const FIRST_STARTS: usize = 8;
 const REACH: f64 = 0.25;
 
 /// A variant of a candidate with its columns where it is absent.
+#[derive(Clone)]
 pub(super) struct Variant {
     pub candidate: usize,
     /// What it adds: one change, or two at once.
@@ -22,6 +24,8 @@ pub(super) struct Variant {
     pub amplitudes: Vec<bool>,
     /// Its free numbers, where it is absent.
     pub numbers: Vec<Number>,
+    /// Sizes of its numbers that it starts from, where small ones do not tell whether it helps.
+    pub blunt: Option<Vec<f64>>,
     pub score: Score,
 }
 
@@ -34,11 +38,6 @@ impl Variant {
     /// Its name, of two joined by a plus.
     pub fn kind(&self) -> String {
         Change::kinds(&self.changes)
-    }
-
-    /// Sizes of its numbers that show whether it helps, where small ones do not tell ([`Change::blunt`]).
-    pub fn blunt(&self) -> Option<Vec<f64>> {
-        if let [change] = &self.changes[..] { change.blunt() } else { None }
     }
 
     /// True where every number has a derivative at "absent": there is one place to start from.
@@ -71,6 +70,11 @@ impl Session<'_> {
         let within = |n: usize| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
         let more: Vec<_> = later.into_iter().filter(|(n, _)| within(*n)).collect();
         scored.extend(self.scored(state, more)?);
+        let saturates = |v: &&Variant| v.changes.iter().all(|c| c.is_tried(Trial::Saturates));
+        let sized = |v: &Variant| Variant { blunt: Some(v.changes.iter().flat_map(Change::typical).collect()), ..v.clone() };
+        let mut sizes: Vec<Variant> = scored.iter().filter(saturates).map(sized).collect();
+        self.score_by_size(state, &mut sizes);
+        scored.extend(sizes);
         Ok(scored)
     }
 
@@ -94,6 +98,7 @@ impl Session<'_> {
                 candidate,
                 columns: Vec::new(),
                 amplitudes: change.amplitudes(),
+                blunt: change.is_tried(Trial::Walls).then(|| change.typical()),
                 changes: vec![change],
                 numbers,
                 score: Score::default(),
@@ -114,20 +119,20 @@ impl Session<'_> {
                 Err(LabError::NoTime) => self.missed(&v.kind(), &LabError::NoTime),
             }
         }
-        self.score_walls(state, &mut kept);
+        self.score_by_size(state, &mut kept);
         Ok(kept)
     }
 
     /// Scores variants of which small amplitudes tell nothing by what amplitudes of typical size really do: a body that has fallen deep through a
     /// wall is thrown out of it by the softest one.
-    fn score_walls(&mut self, state: &State, variants: &mut [Variant]) {
-        let mut walls: Vec<(&mut Variant, Vec<f64>)> = Vec::new();
+    fn score_by_size(&mut self, state: &State, variants: &mut [Variant]) {
+        let mut blunt: Vec<(&mut Variant, Vec<f64>)> = Vec::new();
         for v in variants {
-            if let Some(sizes) = v.blunt() {
-                walls.push((v, sizes));
+            if let Some(sizes) = v.blunt.clone() {
+                blunt.push((v, sizes));
             }
         }
-        let tries: Vec<_> = walls
+        let tries: Vec<_> = blunt
             .iter()
             .map(|(v, sizes)| {
                 let mut changes = state.model.changes.clone();
@@ -137,7 +142,7 @@ impl Session<'_> {
             })
             .collect();
         let whole = state.squares();
-        for ((v, sizes), cost) in walls.into_iter().zip(self.lab.costs(&tries)) {
+        for ((v, sizes), cost) in blunt.into_iter().zip(self.lab.costs(&tries)) {
             v.columns.iter_mut().flatten().for_each(|c| *c = 0.0);
             let share = (1.0 - cost / state.readings.cost).max(0.0);
             v.score = Score { gain: share * whole, share, step: sizes, ..self.score(state, v) };
@@ -156,5 +161,33 @@ impl Session<'_> {
         chosen.iter().zip(&s.step).for_each(|(k, x)| step[*k] = *x);
         s.step = step;
         s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::prune::tests::{Step, left};
+    use super::*;
+    use crate::diagnosis::Found;
+    use crate::tests::bench::Bench;
+
+    /// Checks how friction is tried where the recording hides twice its typical size.
+    const FRICTION: Step = |s: &mut Session, state: State, _: &mut Vec<Found>| {
+        let variants = s.variants(&state).unwrap();
+        let friction: Vec<&Variant> = variants.iter().filter(|v| v.kind() == "coulomb-friction").collect();
+        let [slides, sticks] = &friction[..] else { panic!("{} starts", friction.len()) };
+        assert!(slides.blunt.is_none() && slides.score.share > 0.99);
+        assert_eq!(sticks.score.step, sticks.changes[0].typical());
+        // Half of it takes less than all away: the other numbers stay where they made up for it.
+        assert!((0.3..0.6).contains(&sticks.score.share), "{}", sticks.score.share);
+        // Drag slows a body down however much of it there is.
+        assert_eq!(variants.iter().filter(|v| v.kind() == "air-drag").count(), 1);
+        state
+    };
+
+    #[test]
+    fn what_saturates_is_tried_from_its_typical_size_too() {
+        let hidden = Bench::first_pattern("coulomb-friction");
+        left(FRICTION, ["depth-bias", "uniform-force"], &[(&hidden, -0.6)]);
     }
 }

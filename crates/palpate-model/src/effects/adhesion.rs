@@ -14,7 +14,7 @@ pub(super) const LAW: Law = Law {
     family: Family::Contact,
     sentence: "the body sticks to the ground and must be pulled off",
     params: &PARAMS,
-    trial: Trial::Score,
+    trial: Trial::Saturates,
     site: Site::Contact(&Adhesion),
 };
 

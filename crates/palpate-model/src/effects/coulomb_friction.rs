@@ -16,7 +16,7 @@ pub(super) const LAW: Law = Law {
     family: Family::Contact,
     sentence: "the ground holds the body back by friction",
     params: &PARAMS,
-    trial: Trial::Score,
+    trial: Trial::Saturates,
     site: Site::Contact(&Friction),
 };
 

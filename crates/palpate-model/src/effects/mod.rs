@@ -140,6 +140,9 @@ pub enum Numbered {
 pub enum Trial {
     /// Its amplitudes have a derivative at "absent" that tells whether it helps.
     Score,
+    /// The same, but from some size on it holds the body fast and more of it changes nothing, which no derivative shows: fits start from
+    /// its typical size as well.
+    Saturates,
     /// Flat or not smooth at "absent", or it acts at an unknown place: short fits from spread starts.
     Starts,
     /// The same, from planes that the measured body does not cross and the simulated one does (`normal` and `distance` from its centre).
