@@ -1,4 +1,4 @@
-//! Looks at every member's new state once per step: all numbers, still in the world, solve finished?
+//! Looks at every member's new state once per step: all numbers, still in the world, solve finished? call.extra: 1 = it was given less than it is allowed.
 // use shared/grid
 // use shared/totals
 
@@ -46,6 +46,9 @@ fn check_state(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     if count > 0.0 {
         broken = NOT_FINITE;
+    }
+    if n.stage != IDLE && call.extra != 0u {
+        broken = HURRIED;
     }
     if broken != 0u {
         health[p.member] = Health(broken, call.step + call.mode, vec2(select(n.norm / n.scale, far, broken == FELL_OUT), f32(n.iteration)));

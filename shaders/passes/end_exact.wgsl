@@ -1,7 +1,9 @@
-//! After a solve for call.extra columns of every member: the first column that failed is the member's failure.
+//! After a solve for call.extra columns of every member: the first column that failed is the member's failure, and so is one
+//! that was given too few iterations to come to an end.
 // use shared/structs
 
 var<uniform> shape: Shape;
+var<storage, read> newton: array<Newton>;
 var<storage, read> column_health: array<Health>;
 var<storage, read_write> health: array<Health>;
 
@@ -11,7 +13,10 @@ fn end_exact(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     for (var q = 0u; q < call.extra; q++) {
-        let found = column_health[q * shape.members + id.x];
+        var found = column_health[q * shape.members + id.x];
+        if newton[q * shape.members + id.x].stage == WANTS_SOLVE {
+            found.code = HURRIED;
+        }
         if found.code != WELL {
             health[id.x] = found;
             return;

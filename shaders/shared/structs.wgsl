@@ -128,6 +128,8 @@ const INDEFINITE = 4u;
 const FELL_OUT = 5u;
 const BAD_PARAMETER = 6u;
 const NO_CLAMP = 7u;
+// Cut off before it had all the iterations that it is allowed.
+const HURRIED = 8u;
 
 struct Health { // mirrored
     code: u32,

@@ -46,6 +46,15 @@ pub trait Backend: Send {
     /// A zeroed tally.
     fn new_tally(&self, world: &Self::World, directions: &[usize]) -> Self::Tally;
 
+    /// Told before a rollout whether it is looked at on the way: one that is cannot be computed again. So it is assumed until
+    /// somebody says otherwise.
+    fn watch(&self, _world: &mut Self::World, _watched: bool) {}
+    /// True after [`Backend::read`] when members were cut off because less was planned for them than they are allowed: the same rollout,
+    /// computed again, gives them more.
+    fn again(&self, _world: &mut Self::World) -> bool {
+        false
+    }
+
     /// The initial state: rest or static equilibrium, with its velocity.
     fn start(&self, world: &mut Self::World, first: &mut Self::State, tally: &mut Self::Tally);
     /// Step k (from time k Δt to (k + 1) Δt).

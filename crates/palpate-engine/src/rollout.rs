@@ -45,8 +45,18 @@ impl<B: Backend> Rollout<B> {
     }
 
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        loop {
+            let all = self.attempt(theta, request);
+            if !self.backend.again(&mut self.world) {
+                return all;
+            }
+        }
+    }
+
+    fn attempt(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
         let b = &self.backend;
         let w = &mut self.world;
+        b.watch(w, false);
         b.set_params(w, theta);
         let directions = &request.sensitivities;
         let mut tally = b.new_tally(w, directions);
@@ -115,6 +125,7 @@ impl<B: Backend> Rollout<B> {
     ) -> Result<Evaluation, Failure> {
         let b = &self.backend;
         let w = &mut self.world;
+        b.watch(w, true);
         b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
         let mut tally = b.new_tally(w, &[]);
         let mut now = b.new_state(w);
@@ -164,6 +175,7 @@ impl<B: Backend> Rollout<B> {
     pub fn linearise(&mut self, theta: &[f64], directions: &[usize]) -> Result<Linearised, Failure> {
         let b = &self.backend;
         let w = &mut self.world;
+        b.watch(w, true);
         b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
         let mut tally = b.new_tally(w, directions);
         let mut now = b.new_state(w);

@@ -1,6 +1,7 @@
 //! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits.
 
 use crate::device::{Choice, Gpu};
+use crate::effort::{Effort, Level};
 use crate::error::GpuError;
 use crate::tuning::Tuning;
 use crate::world::{Adjoint, State, Tally, Tangent, World};
@@ -15,6 +16,7 @@ use std::sync::Arc;
 pub struct GpuBackend {
     gpu: Arc<Gpu>,
     tuning: Option<Tuning>,
+    levels: Option<&'static [Effort]>,
 }
 
 impl GpuBackend {
@@ -28,12 +30,18 @@ impl GpuBackend {
 
     /// On an open device.
     pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
-        GpuBackend { gpu, tuning: None }
+        GpuBackend { gpu, tuning: None, levels: None }
     }
 
     /// The same with given ways to solve, instead of those that the environment or a measurement chooses.
     pub fn tuned(self, tuning: Tuning) -> GpuBackend {
         GpuBackend { tuning: Some(tuning), ..self }
+    }
+
+    /// The same with other levels of effort than those of its device.
+    #[cfg(test)]
+    pub(crate) fn levels(self, levels: &'static [Effort]) -> GpuBackend {
+        GpuBackend { levels: Some(levels), ..self }
     }
 
     /// The device.
@@ -54,7 +62,10 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        let world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
+        let mut world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
+        if let Some(levels) = self.levels {
+            world.effort = Level::of(levels);
+        }
         match self.gpu.take_trouble() {
             Some(e) => Err(e.into()),
             None => Ok(world),
@@ -83,6 +94,14 @@ impl Backend for GpuBackend {
 
     fn new_tally(&self, world: &World, directions: &[usize]) -> Tally {
         Tally::new(world, directions)
+    }
+
+    fn watch(&self, world: &mut World, watched: bool) {
+        world.effort.watch(watched);
+    }
+
+    fn again(&self, world: &mut World) -> bool {
+        world.effort.rise()
     }
 
     fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {

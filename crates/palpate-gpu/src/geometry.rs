@@ -234,9 +234,4 @@ impl Geometry {
         buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
         Ok(Geometry { shape, classes, holds, effects })
     }
-
-    /// CG dispatches that one solve may need.
-    pub(crate) fn chunks(&self) -> usize {
-        self.shape.most.div_ceil(self.shape.chunk) as usize
-    }
 }

@@ -13,6 +13,7 @@ mod choices;
 mod columns;
 pub mod device;
 mod effects;
+mod effort;
 pub mod error;
 mod forward;
 mod geometry;

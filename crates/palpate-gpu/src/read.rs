@@ -44,6 +44,11 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
                 number(p.density)
             ),
         ),
+        code::HURRIED => {
+            // Nobody sees it: the rollout is computed again.
+            world.effort.fell_short();
+            (FailureKind::NewtonStalled, "more iterations are needed than were planned".to_string())
+        }
         _ => (FailureKind::NoEquilibrium, "no clamp holds the body".to_string()),
     };
     // A start that does not converge has no equilibrium.

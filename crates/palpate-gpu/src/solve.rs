@@ -2,6 +2,7 @@
 //! only says how often to ask.
 
 use crate::effects;
+use crate::effort::{Effort, FULL};
 use crate::pipelines::{pass, shared::structs};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::tuning::Product;
@@ -153,13 +154,20 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
     }
 
+    /// What solves are given: a static problem, which is solved once and may take long, everything.
+    fn effort(&self) -> Effort {
+        if self.step.is_some() { self.world.effort.effort() } else { FULL }
+    }
+
     /// Newton's method from free flight.
     pub(crate) fn newton(&mut self, iterations: usize) {
         self.list();
         self.prepare();
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.list();
-        for round in 0..iterations + SPARE_ROUNDS {
+        let full = iterations + SPARE_ROUNDS;
+        let effort = self.effort();
+        for round in 0..effort.rounds.min(full) {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
             self.run(pass::TOUCH_PATCHES, TRIAL, Per::Patch, 0);
             self.press_patches(TRIAL, effects::FORCE, None, &[]);
@@ -172,17 +180,19 @@ impl<'a, 'r> Solve<'a, 'r> {
             self.assemble(MATRIX);
             self.run(pass::BEGIN_SOLVE, MATRIX, Per::Member, 0);
             self.relist();
-            self.conjugate_gradients(0, if round < EARLY { ROUND } else { LATE_ROUND });
+            let budget = if round < EARLY { ROUND } else { LATE_ROUND };
+            // One workgroup alone has all it is allowed in every round.
+            let budget = if self.world.many { budget } else { self.world.geometry.shape.most };
+            self.conjugate_gradients(0, effort.iterations.min(budget));
         }
         self.run(pass::FINISH_STEP, ALL, Per::Node, 0);
-        self.run(pass::CHECK_STATE, ALL, Per::Member, 0);
+        self.run(pass::CHECK_STATE, ALL, Per::Member, u32::from(effort != FULL));
     }
 
-    /// Solves of all members that want one. Where many workgroups share a solve at most `budget` iterations of it: the rest comes
-    /// in the next round.
+    /// At least so many iterations of the solves of all members that want one: the rest comes in the next round.
     fn conjugate_gradients(&mut self, exact: u32, budget: u32) {
         if !self.world.many {
-            for _ in 0..self.world.geometry.chunks() {
+            for _ in 0..budget.div_ceil(self.world.geometry.shape.chunk) {
                 self.iterate_chunk(exact);
                 self.relist();
             }
@@ -269,7 +279,8 @@ impl<'a, 'r> Solve<'a, 'r> {
     pub(crate) fn solve_columns(&mut self, count: usize) {
         self.columns = count as u32;
         self.list();
-        self.conjugate_gradients(1, self.world.geometry.shape.most);
+        let most = self.world.geometry.shape.most;
+        self.conjugate_gradients(1, self.effort().derivative.min(most));
         self.columns = 1;
         let groups = self.world.members().div_ceil(64);
         let args = Args { extra: count as u32, ..Args::default() };

@@ -2,6 +2,7 @@
 
 use crate::choices::Choices;
 use crate::device::Gpu;
+use crate::effort::Level;
 use crate::error::GpuError;
 use crate::geometry::{self, Geometry};
 use crate::layout::{Health, Newton, Shape};
@@ -41,6 +42,7 @@ pub struct World {
     /// True when many workgroups share the solve of a member.
     pub(crate) many: bool,
     pub(crate) product: Product,
+    pub(crate) effort: Level,
 }
 
 /// One work buffer: name, items per member as a function of the shape, bytes per item.
@@ -120,6 +122,7 @@ impl World {
             buffers.insert(name, gpu.buffer(name, bytes)?);
         }
         let observer = Observer::new(&gpu, plan, capacity)?;
+        let effort = Level::new(!gpu.is_software());
         let mut world = World {
             gpu,
             plan: plan.clone(),
@@ -134,6 +137,7 @@ impl World {
             timed: false,
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
+            effort,
         };
         if world.geometry.effects.on_nodes() || world.geometry.effects.on_cells() {
             // What effects add to blocks is in the matrix alone.

@@ -6,6 +6,7 @@ mod collapse;
 mod columns;
 mod derivatives;
 mod effects;
+mod efforts;
 mod extremes;
 mod faults;
 mod forward;
