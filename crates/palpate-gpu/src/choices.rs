@@ -1,12 +1,11 @@
 //! Choices that a measurement made, kept in the user's cache folder: a later process on the same device makes the same choice, and so
 //! computes the same bits. A file that cannot be read or written does no harm: then each process measures for itself.
 
-use crate::tuning::Product;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-/// Name of the file in the cache folder: one choice a line, product and key with a tab between; the first of a key counts.
-const FILE: &str = "palpate/products.txt";
+/// Name of the file in the cache folder: one choice a line, name and key with a tab between; the first of a key counts.
+const FILE: &str = "palpate/choices.txt";
 
 /// Where choices are kept.
 #[derive(Clone, Debug)]
@@ -26,18 +25,18 @@ impl Choices {
         Choices { file: Some(file) }
     }
 
-    /// What was chosen for a key.
-    pub(crate) fn get(&self, key: &str) -> Option<Product> {
+    /// Which of these names was chosen for a key.
+    pub(crate) fn get(&self, key: &str, names: [&str; 2]) -> Option<usize> {
         let text = std::fs::read_to_string(self.file.as_ref()?).ok()?;
         let line = text.lines().filter_map(|l| l.split_once('\t')).find(|l| l.1 == key)?;
-        Product::named(line.0)
+        names.iter().position(|name| *name == line.0)
     }
 
     /// Keeps a choice unless there is one for the key, and returns what counts from now on: another process may have been faster.
-    pub(crate) fn keep(&self, key: &str, product: Product) -> Product {
-        self.get(key).unwrap_or_else(|| {
-            self.append(&format!("{}\t{key}\n", product.name()));
-            self.get(key).unwrap_or(product)
+    pub(crate) fn keep(&self, key: &str, names: [&str; 2], chosen: usize) -> usize {
+        self.get(key, names).unwrap_or_else(|| {
+            self.append(&format!("{}\t{key}\n", names[chosen]));
+            self.get(key, names).unwrap_or(chosen)
         })
     }
 
@@ -67,16 +66,18 @@ fn cache_folder(var: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> {
 mod tests {
     use super::*;
 
+    const NAMES: [&str; 2] = ["csr", "free"];
+
     #[test]
     fn the_first_choice_of_a_key_stays() {
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
         let choices = || Choices::at(folder.path().join("deep").join(FILE));
-        assert_eq!(choices().get("a"), None);
-        assert_eq!(choices().keep("a", Product::Free), Product::Free);
-        assert_eq!(choices().keep("b", Product::Matrix), Product::Matrix);
+        assert_eq!(choices().get("a", NAMES), None);
+        assert_eq!(choices().keep("a", NAMES, 1), 1);
+        assert_eq!(choices().keep("b", NAMES, 0), 0);
         // A process that measured otherwise does as the first did.
-        assert_eq!(choices().keep("a", Product::Matrix), Product::Free);
-        assert_eq!((choices().get("a"), choices().get("b")), (Some(Product::Free), Some(Product::Matrix)));
+        assert_eq!(choices().keep("a", NAMES, 0), 1);
+        assert_eq!((choices().get("a", NAMES), choices().get("b", NAMES)), (Some(1), Some(0)));
     }
 
     #[test]
@@ -84,11 +85,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
         let file = folder.path().join("choices");
         std::fs::write(&file, "nonsense\nfast\ta\n").unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(Choices::at(file.clone()).get("a"), None);
+        assert_eq!(Choices::at(file.clone()).get("a", NAMES), None);
         // No folder can be where a file is; and there may be no place at all.
         for choices in [Choices::at(file.join("below")), Choices { file: None }] {
-            assert_eq!(choices.keep("a", Product::Free), Product::Free);
-            assert_eq!(choices.get("a"), None);
+            assert_eq!(choices.keep("a", NAMES, 1), 1);
+            assert_eq!(choices.get("a", NAMES), None);
         }
     }
 

@@ -1,20 +1,25 @@
 //! Ways to solve of which one is faster: one or many workgroups a member, with an assembled matrix or without.
 
 use crate::choices::Choices;
+use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Newton;
 use crate::solve::{SOLVE, Solve};
 use crate::world::{State, Tally, World};
 use palpate_engine::ParamBatch;
+use palpate_model::plan::Plan;
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 /// From so many nodes on, many workgroups share the conjugate gradients of a member: one workgroup alone then cannot draw a
-/// device's memory bandwidth, while below, three dispatches an iteration cost more than they save.
+/// device's memory bandwidth. Below, a graphics processor is asked which is faster, down to [`FEW`] nodes; on a software adapter three
+/// dispatches an iteration cost more than they save.
 pub const MANY: usize = 4096;
-/// The product without a matrix must be this much faster, so that chance does not decide between equals: which one runs decides
-/// the last bits of a result.
+/// Bodies of fewer nodes are left to one workgroup.
+const FEW: usize = 256;
+/// What is not the plain way must be this much faster, so that chance does not decide between equals: which one runs decides the last
+/// bits of a result.
 const CLEARLY: f64 = 0.8;
 /// Products that are timed.
 const REPEATS: usize = 8;
@@ -85,6 +90,38 @@ impl Tuning {
     }
 }
 
+/// Names of the choice between one and many workgroups.
+const WORKGROUPS: [&str; 2] = ["one", "many"];
+
+impl Tuning {
+    /// With the choice between one and many workgroups made for a body of so many nodes, where a device is to be asked: for one member
+    /// alone, because a member must get the same bits alone and in any batch.
+    pub(crate) fn on_device(self, gpu: &Arc<Gpu>, plan: &Plan) -> Result<Tuning, GpuError> {
+        let asked = self == Tuning::default() && !gpu.is_software() && (FEW..MANY).contains(&plan.body.nodes.len());
+        if asked { Tuning::measured(gpu, plan, &Choices::of_user()) } else { Ok(self) }
+    }
+
+    /// The same, asked.
+    pub(crate) fn measured(gpu: &Arc<Gpu>, plan: &Plan, choices: &Choices) -> Result<Tuning, GpuError> {
+        static KNOWN: Known = Mutex::new(None);
+        let alone = |many_from, product| World::new(gpu.clone(), plan, 1, Tuning { many_from, product });
+        let (mut one, mut many) = (alone(usize::MAX, Some(Product::Matrix))?, alone(0, None)?);
+        let key = format!("{}, {} parameters", key(&one), plan.layout.len());
+        let product = many.product;
+        let chosen = once(&key, WORKGROUPS, choices, &KNOWN, || {
+            let iteration = |world: &mut World| {
+                world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+                world.cg_speed().map(|speed| speed.iteration.seconds)
+            };
+            Ok([iteration(&mut one)?, iteration(&mut many)?])
+        })?;
+        Ok(Tuning { many_from: if chosen == 0 { usize::MAX } else { 0 }, product: Some(product) })
+    }
+}
+
+/// Choices of this process.
+type Known = Mutex<Option<HashMap<String, usize>>>;
+
 /// What a choice holds for: adapter and driver, nodes, cells, kinds of cells.
 fn key(world: &World) -> String {
     let s = &world.geometry.shape;
@@ -92,26 +129,39 @@ fn key(world: &World) -> String {
     format!("{device}: {} nodes, {} cells of {} kinds", s.nodes, s.cells, s.classes)
 }
 
-/// The faster product for a body on its device: measured once, so that a user gets the same bits twice.
-pub(crate) fn faster(world: &mut World, choices: &Choices) -> Result<Product, GpuError> {
-    // For where nothing can be kept: a process gives the same bits twice in any case.
-    static KNOWN: Mutex<Option<HashMap<String, Product>>> = Mutex::new(None);
-    let key = key(world);
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(p) = choices.get(&key).or_else(|| known.as_ref()?.get(&key).copied()) {
-        return Ok(p);
+/// Which of two ways is faster: measured once [s], so that a user gets the same bits twice.
+fn once(
+    key: &str,
+    names: [&str; 2],
+    choices: &Choices,
+    known: &Known,
+    measure: impl FnOnce() -> Result<[f64; 2], GpuError>,
+) -> Result<usize, GpuError> {
+    // Where nothing can be kept a process gives the same bits twice in any case.
+    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(k) = choices.get(key, names).or_else(|| known.as_ref()?.get(key).copied()) {
+        return Ok(k);
     }
-    world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&world.plan.theta.clone())));
-    world.set_iterations(1);
-    let [matrix, free] = [Product::Matrix, Product::Free].map(|p| time(world, p));
-    let product = choices.keep(&key, choose(matrix?, free?));
-    known.get_or_insert_default().insert(key, product);
-    Ok(product)
+    let chosen = choices.keep(key, names, choose(measure()?));
+    known.get_or_insert_default().insert(key.to_string(), chosen);
+    Ok(chosen)
 }
 
-/// The product to take when these take so long [s].
-fn choose(matrix: f64, free: f64) -> Product {
-    if free < CLEARLY * matrix { Product::Free } else { Product::Matrix }
+/// The faster product for a body on its device.
+pub(crate) fn faster(world: &mut World, choices: &Choices) -> Result<Product, GpuError> {
+    static KNOWN: Known = Mutex::new(None);
+    let both = [Product::Matrix, Product::Free];
+    let chosen = once(&key(world), both.map(Product::name), choices, &KNOWN, || {
+        world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&world.plan.theta.clone())));
+        world.set_iterations(1);
+        Ok([time(world, both[0])?, time(world, both[1])?])
+    })?;
+    Ok(both[chosen])
+}
+
+/// Which to take when the plain way and another one take so long [s].
+fn choose([plain, other]: [f64; 2]) -> usize {
+    usize::from(other < CLEARLY * plain)
 }
 
 /// Seconds of a product of every member with a matrix of zeros, which takes as long as any.
@@ -151,11 +201,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_matrix_is_left_only_for_what_is_clearly_faster() {
-        assert_eq!(choose(1e-3, 0.5e-3), Product::Free);
+    fn the_plain_way_is_left_only_for_what_is_clearly_faster() {
+        assert_eq!(choose([1e-3, 0.5e-3]), 1);
         // Equals, measured twice with a tenth of noise either way: the same answer.
-        for (matrix, free) in [(1.0, 1.0), (1.1, 0.9), (0.9, 1.1), (1e-6, 1e-6)] {
-            assert_eq!(choose(matrix, free), Product::Matrix);
+        for times in [[1.0, 1.0], [1.1, 0.9], [0.9, 1.1], [1e-6, 1e-6]] {
+            assert_eq!(choose(times), 0);
         }
         assert_eq!(
             [Product::Matrix, Product::Free].map(|p| Product::named(p.name())),

@@ -114,6 +114,7 @@ pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
 
 impl World {
     pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
+        let tuning = tuning.on_device(&gpu, plan)?;
         let mut buffers = Buffers::new();
         let capacity = members.max(1);
         let many = plan.body.nodes.len() >= tuning.many_from;

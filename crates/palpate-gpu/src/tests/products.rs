@@ -151,3 +151,26 @@ fn a_measurement_chooses_a_product_for_large_bodies_and_keeps_it() {
     let small = GpuBackend::on(gpu).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     assert!(world.many && !small.many);
 }
+
+#[test]
+fn a_measurement_chooses_between_one_and_many_workgroups_and_keeps_it() {
+    let Some(gpu) = device(None) else { return };
+    let plan = plan(&ball(0.03));
+    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+    let choices = Choices::at(folder.path().join("choices.txt"));
+    let measured = || Tuning::measured(&gpu, &plan, &choices).unwrap_or_else(|e| panic!("{e}"));
+    let chosen = measured();
+    let line = std::fs::read_to_string(folder.path().join("choices.txt")).unwrap_or_else(|e| panic!("{e}"));
+    let names = ["many", "one"];
+    let is_one = usize::from(chosen.many_from > 0);
+    assert!(line.starts_with(names[is_one]) && line.contains(&gpu.name), "{line}");
+    // Another process does as the first one did.
+    std::fs::write(folder.path().join("choices.txt"), line.replacen(names[is_one], names[1 - is_one], 1))
+        .unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(usize::from(measured().many_from > 0), 1 - is_one);
+    // A software adapter is not asked, and neither is one that was told.
+    if gpu.is_software() {
+        assert_eq!(Tuning::default().on_device(&gpu, &plan), Ok(Tuning::default()));
+    }
+    assert_eq!(many(Product::Free).on_device(&gpu, &plan), Ok(many(Product::Free)));
+}
