@@ -20,13 +20,18 @@ pub(super) const LAW: Law = Law {
 };
 
 const PARAMS: [EffectParam; 6] = [
-    component("square", 0, "1", 0.5, SQUARE),
-    component("square", 1, "1", 0.5, SQUARE),
-    component("square", 2, "1", 0.5, SQUARE),
-    component("mixed", 0, "1", 0.5, MIXED),
-    component("mixed", 1, "1", 0.5, MIXED),
-    component("mixed", 2, "1", 0.5, MIXED),
+    amplitude("square", 0, SQUARE),
+    amplitude("square", 1, SQUARE),
+    amplitude("square", 2, SQUARE),
+    amplitude("mixed", 0, MIXED),
+    amplitude("mixed", 1, MIXED),
+    amplitude("mixed", 2, MIXED),
 ];
+
+/// Within a factor of a thousand, as far as stiffness may differ from one part to another in other laws.
+const fn amplitude(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
+    EffectParam { lower: -7.0, upper: 7.0, ..component(key, axis, "1", 0.5, doc) }
+}
 
 struct Modes;
 
