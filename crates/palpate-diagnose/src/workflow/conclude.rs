@@ -1,6 +1,6 @@
 //! The verdict: levels before and after, and the gap that is closed.
 
-use super::{Progress, Session, State};
+use super::{Options, Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, Readings};
@@ -12,8 +12,17 @@ use palpate_engine::Source;
 /// Distance over what noise and discretisation explain beyond which a recording that no fit has seen counts as not met: bodies simulated
 /// by another method, with nothing missing, stay below 1.2.
 const MET: f64 = 1.5;
+/// The same for an effect that is not quite the right one: what leaves more must close as much of the gap as a patchwork of several.
+const OFF: f64 = 2.5;
 /// Ridge that keeps errors of the discretisation apart that look the same.
 const SMALL: f64 = 1e-3;
+
+impl Options {
+    /// The share of the gap that a single effect must close to be an explanation, when it leaves so much of a second recording.
+    fn enough_of_one(&self, left: Option<Level>) -> f64 {
+        if left.is_some_and(|l| l.rms > OFF * l.noise) { self.enough.max(self.enough_of_several) } else { self.enough }
+    }
+}
 
 impl Session<'_> {
     /// Distance of a model from the measurement, and what noise and discretisation explain of it.
@@ -66,13 +75,14 @@ impl Session<'_> {
         });
         let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
         let adequate = !self.is_missing(adequacy, &state);
+        let enough = self.options.enough_of_one(held_out.map(|(_, after)| after));
         let verdict = match (adequate, out.accepted.len()) {
             (true, 0) => Verdict::Adequate,
             // It may be the nearest of those that there was time for.
             (false, 1) if self.no_time && !after.is_close() => Verdict::Undecided,
             // What follows one recording and not the other has only bent to it.
-            (true, 1) if held_out.is_none() || gap_closed >= self.options.enough => Verdict::MissingEffect,
-            (false, 1) if gap_closed >= self.options.enough => Verdict::MissingEffect,
+            (true, 1) if held_out.is_none() || gap_closed >= enough => Verdict::MissingEffect,
+            (false, 1) if gap_closed >= enough => Verdict::MissingEffect,
             (_, 2..) if gap_closed >= self.options.enough_of_several => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if out.interrupted || self.no_time => Verdict::Undecided,
@@ -139,4 +149,18 @@ fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&
     });
     let failed = failure.map(|e| format!("The second recording took no part: {e}."));
     missed.into_iter().chain(failed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_that_leaves_much_of_the_second_recording_must_close_more_of_the_gap() {
+        let options = Options::default();
+        let left = |rms: f64| Some(Level { rms, noise: 1e-3 });
+        assert_eq!(options.enough_of_one(None), options.enough);
+        assert_eq!(options.enough_of_one(left(2e-3)), options.enough);
+        assert_eq!(options.enough_of_one(left(3e-3)), options.enough_of_several);
+    }
 }
