@@ -7,7 +7,7 @@
 //! `effects/cells` for every law of cells.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use naga::{AddressSpace, StorageAccess, TypeInner};
+use naga::{AddressSpace, Expression, Literal, StorageAccess, TypeInner};
 use palpate_model::contact::DEFAULT_STIFFNESS;
 use palpate_model::effects::{self, Law, Site, cell, law};
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,12 +27,13 @@ fn main() {
     names.sort();
     let mut out = String::new();
     let mut structs = BTreeMap::new();
+    let mut numbers = BTreeMap::new();
     let mut indices = String::new();
     writeln!(out, "/// Every kernel, by name.\npub static PASSES: [PassSource; {}] = [", names.len())
         .expect("a String takes all");
     for (index, name) in names.iter().enumerate() {
         let variants: Vec<Linked> = VARIANTS.iter().map(|v| link(&shaders, name, v)).collect();
-        let facts: Vec<Facts> = variants.iter().map(|v| Facts::of(name, v, &mut structs)).collect();
+        let facts: Vec<Facts> = variants.iter().map(|v| Facts::of(name, v, &mut structs, &mut numbers)).collect();
         let same = variants[0].text == variants[1].text;
         assert!(same || facts[0].bindings == facts[1].bindings, "variants of {name} bind different buffers");
         let sources: Vec<&str> = variants.iter().map(|v| v.text.as_str()).collect();
@@ -46,7 +47,7 @@ fn main() {
             .expect("a String takes all");
     }
     writeln!(out, "];\n/// Numbers of the passes in [`PASSES`].\npub mod pass {{\n{indices}}}").expect("a String takes all");
-    out.push_str(&constants(&shaders));
+    out.push_str(&constants(&shaders, &numbers));
     for (name, (span, members)) in structs {
         writeln!(out, "const _: () = {{\n    assert!(size_of::<crate::layout::{name}>() == {span}, \"size of {name}\");")
             .expect("text");
@@ -64,34 +65,48 @@ fn main() {
 }
 
 /// Shared files whose whole numbers Rust uses as well.
-const NUMBERED: [&str; 3] = ["laws", "points", "structs"];
+const NUMBERED: [&str; 8] = ["asks", "directions", "keys", "laws", "points", "reduce", "roster", "structs"];
 
-/// Lines `const NAME = 1u;` of these files as Rust.
-fn constants(shaders: &Path) -> String {
+/// Whole numbers by file and name, as naga computed them.
+type Numbers = BTreeMap<(String, String), u32>;
+
+/// Numbers of these files as Rust.
+fn constants(shaders: &Path, numbers: &Numbers) -> String {
     let mut out = String::from("/// Numbers that kernels and host share, by the file in `shaders/shared`.\npub mod shared {\n");
     for file in NUMBERED {
-        let text = fs::read_to_string(shaders.join(format!("shared/{file}.wgsl"))).expect("the file is there");
         writeln!(out, "    /// `{file}.wgsl`.\n    pub mod {file} {{").expect("a String takes all");
-        for line in text.lines() {
-            let Some((name, value)) = line.strip_prefix("const ").and_then(|l| l.split_once(" = ")) else { continue };
-            if let Some(number) = value.strip_suffix("u;").and_then(|v| v.parse::<u32>().ok()) {
-                writeln!(out, "        #[allow(missing_docs)]\n        pub const {name}: u32 = {number};")
-                    .expect("a String takes all");
-            }
+        for name in constants_of(shaders, file) {
+            let number = numbers
+                .get(&(file.to_string(), name.clone()))
+                .unwrap_or_else(|| panic!("shaders/shared/{file}.wgsl: {name} is no u32, or no pass uses the file"));
+            writeln!(out, "        #[allow(missing_docs)]\n        pub const {name}: u32 = {number};")
+                .expect("a String takes all");
         }
         out.push_str("    }\n");
     }
     out + "}\n"
 }
 
+/// Names of the constants that a shared file declares.
+fn constants_of(shaders: &Path, file: &str) -> Vec<String> {
+    let text = fs::read_to_string(shaders.join(format!("shared/{file}.wgsl"))).expect("the file is there");
+    let name = |line: &str| Some(line.strip_prefix("const ")?.split_once(['=', ':'])?.0.trim().to_string());
+    text.lines().filter_map(name).collect()
+}
+
 /// A pass with everything it uses.
 struct Linked {
     text: String,
+    /// Constants of the shared files in it that Rust uses as well.
+    shared: Vec<(String, String)>,
 }
 
 fn link(shaders: &Path, name: &str, variant: &str) -> Linked {
     let mut text = String::new();
-    include(shaders, &format!("passes/{name}"), variant, &mut BTreeSet::new(), &mut text);
+    let mut done = BTreeSet::new();
+    include(shaders, &format!("passes/{name}"), variant, &mut done, &mut text);
+    let used = NUMBERED.into_iter().filter(|file| done.contains(&format!("shared/{file}")));
+    let shared = used.flat_map(|file| constants_of(shaders, file).into_iter().map(|name| (file.to_string(), name))).collect();
     let mut number = 0;
     let lines: Vec<String> = text
         .lines()
@@ -104,7 +119,7 @@ fn link(shaders: &Path, name: &str, variant: &str) -> Linked {
             }
         })
         .collect();
-    Linked { text: lines.join("\n") }
+    Linked { text: lines.join("\n"), shared }
 }
 
 fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
@@ -200,7 +215,7 @@ struct Facts {
 type Structs = BTreeMap<String, (u32, Vec<(String, u32)>)>;
 
 impl Facts {
-    fn of(pass: &str, linked: &Linked, structs: &mut Structs) -> Facts {
+    fn of(pass: &str, linked: &Linked, structs: &mut Structs, numbers: &mut Numbers) -> Facts {
         let module = naga::front::wgsl::parse_str(&linked.text)
             .unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {}", e.emit_to_string(&linked.text)));
         let capabilities = Capabilities::SUBGROUP | Capabilities::IMMEDIATES;
@@ -241,6 +256,14 @@ impl Facts {
             {
                 let members = members.iter().map(|m| (m.name.clone().expect("fields have names"), m.offset)).collect();
                 structs.insert(name.clone(), (*span, members));
+            }
+        }
+        for key in &linked.shared {
+            let constant = module.constants.iter().find(|(_, c)| c.name.as_ref() == Some(&key.1));
+            if let Some((_, c)) = constant
+                && let Expression::Literal(Literal::U32(number)) = module.global_expressions[c.init]
+            {
+                numbers.insert(key.clone(), number);
             }
         }
         let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();

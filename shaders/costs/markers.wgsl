@@ -19,7 +19,7 @@ struct Mark { // mirrored
 }
 
 // A marker at one look.
-struct Carried {
+struct Carried { // mirrored
     turn: mat3x3<f32>,
     // G⁻¹ of the polar decomposition.
     pair: mat3x3<f32>,

@@ -1,5 +1,5 @@
-//! Adds ∂r/∂p of the laws of cells to what press_column left. call.extra is the kind of the parameter, plus 32 times the row of a
-//! field's slopes; for a law's own parameter 32 · (16 · law + number).
+//! Adds ∂r/∂p of the laws of cells to what press_column left. call.extra is the kind of the parameter, plus KEYS times the row of a
+//! field's slopes; for a law's own parameter KEYS · (SLOTS · law + number).
 // use effects/cells
 // use shared/slopes
 // use shared/keys
@@ -10,8 +10,8 @@ var<storage, read_write> cell_force: array<vec4<f32>>;
 fn column_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
-    let kind = call.extra % 32u;
-    let index = call.extra / 32u;
+    let kind = call.extra % KEYS;
+    let index = call.extra / KEYS;
     let fresh = new_side(c);
     let old = old_side(c);
     let w = way_of(c, fresh, old);
@@ -42,11 +42,11 @@ fn column_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         // The increment does not see it: both states shift alike.
         change.y = ds_old[0];
     } else if kind == EFFECT {
-        law = index / 16u;
+        law = index / SLOTS;
     }
-    let r = ask(c, ENERGY_PART, fresh.s, ds, law, index % 16u);
-    let before = ask(c, ENERGY_PART, old.s, ds_old, law, index % 16u);
-    let loss = loss_of(c, w, old, change, law, index % 16u);
+    let r = ask(c, ENERGY_PART, fresh.s, ds, law, index % SLOTS);
+    let before = ask(c, ENERGY_PART, old.s, ds_old, law, index % SLOTS);
+    let loss = loss_of(c, w, old, change, law, index % SLOTS);
     // Body-frame forces of the two poses for E = 1, the old one without its weight.
     var y = c.mix.fresh * (stress(c, fresh, r.bend) + r.first[0] * kq) + loss.y * kd + loss.z * w.kd;
     var y_old = stress(c, old, before.bend) + before.first[0] * kq_old;

@@ -1,6 +1,7 @@
-//! Adds the derivative of the laws of cells by the old state, times the vector `probe` (call.extra 0), or its transpose (1), to what
+//! Adds the derivative of the laws of cells by the old state, times the vector `probe` (ALONG), or its transpose, to what
 //! couple_old left.
 // use effects/cells
+// use shared/asks
 
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
@@ -17,7 +18,7 @@ fn couple_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let by_d = loss_of(c, w, old, vec2(1.0, 0.0), NONE, 0u);
     let by_old = loss_of(c, w, old, vec2(0.0, 1.0), NONE, 0u).z;
     var f = vec3(0.0);
-    if call.extra == 0u {
+    if call.extra == ALONG {
         let dq = strain_rate(old.pose, d, c.sign);
         let along = by_old * mean(c, old.kq, dq) - by_d.z * mean(c, w.kd, dq);
         f = force(fresh.pose, c.young * (along * w.kd - by_d.y * stiff(matrix, c.number, dq)), c.sign);

@@ -1,6 +1,7 @@
-//! Derivative of the cells' force by the old state, times the vector `probe` (call.extra 0), or its transpose (1); with what the
+//! Derivative of the cells' force by the old state, times the vector `probe` (ALONG), or its transpose; with what the
 //! clamps' pass and the effects' left for the old state. Twin of `by_old` and `by_old_transposed` of the CPU backend.
 // use shared/corner
+// use shared/asks
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
@@ -28,7 +29,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let old = held_pose(turning.turn, u0, c.sign);
         let arms = c.mix.on_new * fresh.z + c.mix.on_old * old.z;
         let y = (c.mix.on_new * c.young) * stiff(matrix, c.number, from_rest(fresh.q, c.at)) + c.mix.on_old * before;
-        if call.extra == 0u {
+        if call.extra == ALONG {
             let omega = spin_body(turning, centred(transpose(turning.r) * d), c.sign);
             let dq = c.mix.on_old * strain_rate(old, d, c.sign) - cross(omega, arms);
             f = force(fresh, c.young * stiff(matrix, c.number, dq) + cross(omega, y), c.sign);
@@ -40,7 +41,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
     } else {
         let fresh = free_pose(u1, c.sign);
-        if call.extra == 0u {
+        if call.extra == ALONG {
             f = force(fresh, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(turning, d, c.sign)), c.sign);
         } else {
             f = force(turning, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(fresh, d, c.sign)), c.sign);
@@ -56,7 +57,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     // Effects on patches leave their share where contact has its force.
-    if (shape.fields & 4u) != 0u {
+    if (shape.fields & FIELD_PATCHES) != 0u {
         for (var k = cells[c.cell].patch_start; k < cells[c.cell].patch_end; k++) {
             f -= patches[k].weights[c.number] * touches[3u * (c.member * shape.patches + k)].xyz;
         }

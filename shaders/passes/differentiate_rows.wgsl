@@ -2,16 +2,15 @@
 // use shared/hexahedron
 // use costs/markers
 // use shared/found
+// use shared/directions
 
 var<storage, read> changes: array<vec4<f32>>;
-// Directions that change the measurement: 1 + 3 · marker + axis of an offset, READING + number of what moves readings, else 0.
+// As shared/directions says.
 var<storage, read> own_directions: array<u32>;
 // [points][readings]: derivatives of the true points.
 var<storage, read> reading_slopes: array<vec4<f32>>;
 // [slots][Q][most rows]
 var<storage, read_write> slopes: array<f32>;
-
-const READING = 0x80000000u;
 
 fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -> vec3<f32> {
     var c = carrier;
@@ -48,7 +47,7 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
     if item < shot.point_count {
         let f = found[s.slot * sight.points + item];
         var d = 0.0;
-        if f.cell != 0xffffffffu {
+        if f.cell != NONE {
             var change = vec3(0.0);
             for (var i = 0u; i < 8u; i++) {
                 change += shape_at(f.xi, i) * changes[base + band_cells[f.cell].nodes[i]].xyz;

@@ -1,7 +1,8 @@
-//! dJ/dp −= z · ∂r/∂p for the parameter call.extra (mod 2¹⁶); with 2¹⁶ on top dJ/dp += dJ/dv · ∂v/∂p of the start, `probe`
-//! then being an adjoint, and with 2¹⁷ dJ/dp += dJ/du · ∂u/∂p. One workgroup per member, fixed order.
+//! dJ/dp −= z · ∂r/∂p for the parameter call.extra (modulo OF_VELOCITY); with OF_VELOCITY on top dJ/dp += dJ/dv · ∂v/∂p of the start, `probe`
+//! then being an adjoint, and with OF_SHAPE dJ/dp += dJ/du · ∂u/∂p. One workgroup per member, fixed order.
 // use shared/grid
 // use shared/totals
+// use shared/asks
 
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> column: array<vec4<f32>>;
@@ -14,8 +15,8 @@ fn dot_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if !p.runs {
         return;
     }
-    let start = call.extra >= 65536u;
-    let of_velocity = start && call.extra < 131072u;
+    let start = call.extra >= OF_VELOCITY;
+    let of_velocity = start && call.extra < OF_SHAPE;
     var sum = vec4(0.0);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
@@ -23,6 +24,6 @@ fn dot_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     }
     let s = total(local, sum).x;
     if local == 0u {
-        gradient[p.member * shape.parameters + call.extra % 65536u] += select(-s, s, start);
+        gradient[p.member * shape.parameters + call.extra % OF_VELOCITY] += select(-s, s, start);
     }
 }

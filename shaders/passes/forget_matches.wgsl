@@ -11,6 +11,6 @@ fn forget_matches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if !s.runs || s.item >= shots[s.look.shot].point_count {
         return;
     }
-    keys[s.slot * sight.points + s.item] = 0xffffffffu;
-    owners[s.slot * sight.points + s.item] = 0xffffffffu;
+    keys[s.slot * sight.points + s.item] = NONE;
+    owners[s.slot * sight.points + s.item] = NONE;
 }

@@ -1,5 +1,5 @@
-//! ∂r/∂p per node: corners of cells from press_column, and what acts on nodes. call.extra = kind + 32 · index + 2¹⁶ if cells
-//! take part. For initial velocities it is ∂v/∂p of the start.
+//! ∂r/∂p per node: corners of cells from press_column, and what acts on nodes. call.extra = kind + KEYS · index + OF_CELLS if
+//! cells take part. For initial velocities it is ∂v/∂p of the start.
 // use shared/mix
 // use shared/inertia
 // use shared/keys
@@ -56,13 +56,13 @@ fn gather_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     if !p.live {
         return;
     }
-    let kind = call.extra % 32u;
-    let index = (call.extra / 32u) % 2048u;
+    let kind = call.extra % KEYS;
+    let index = (call.extra % OF_CELLS) / KEYS;
     let m = members[p.member];
     let mix = mix_of(m);
     let a = at_node(p.member, p.item);
     var f = vec3(0.0);
-    if call.extra >= 65536u {
+    if call.extra >= OF_CELLS {
         for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
             f += cell_force[p.member * shape.cells * 8u + node_list[k]].xyz;
         }

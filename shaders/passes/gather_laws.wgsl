@@ -30,7 +30,7 @@ fn gather_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let e = places[k] / 64u;
         let i = (places[k] / 8u) % 8u;
         let j = places[k] % 8u;
-        let turn = (p.member * shape.cells + e) * 30u;
+        let turn = (p.member * shape.cells + e) * TANGENT_VECTORS;
         let r = mat3x3(tangents[turn].xyz, tangents[turn + 1u].xyz, tangents[turn + 2u].xyz);
         let a = (slot * 2u * shape.classes + cells[e].kind) * 576u + 72u * j + 3u * i;
         let block = mat3x3(

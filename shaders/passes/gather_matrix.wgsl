@@ -64,7 +64,7 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let young = young_at(m, p.member, e);
         let i = (places[k] / 8u) % 8u;
         let j = places[k] % 8u;
-        let at = (p.member * shape.cells + e) * 30u;
+        let at = (p.member * shape.cells + e) * TANGENT_VECTORS;
         let r = three(at);
         let g = three(at + 3u);
         let block = element_block((m.slot * 2u * shape.classes + cells[e].kind) * 576u, i, j);

@@ -1,10 +1,8 @@
-//! Forces of the clamps on the corners of their cells, with their energy. call.extra: 0 = of the new state, weighted with θ;
-//! 1 = of the old state, weighted with 1 − θ; 2, 3, 4 = derivative of both by Young's modulus, Poisson's ratio, time;
-//! 5 = the old state's matrix times the vector `probe`; 6 = nothing; 7, 8 + 256 · row = derivative by a parameter of a
-//! stiffness that varies over the body, in time, with its slopes in that row; 9 + 256 · row = by the stress-free shape; 10 + 256 · row
-//! + 2¹⁶ · matrix = by how effects hold the clamps, with the poses' slopes in that row, and the matrices' slopes in row matrix − 1.
+//! Forces of the clamps on the corners of their cells, with their energy, or what else call.extra asks for (shared/asks): by the
+//! effects' parameters with the row of their slopes, and of the matrices' slopes.
 // use shared/holds
 // use shared/slopes
+// use shared/asks
 
 // [rows][B][steps + 1][clamps].
 var<storage, read> hold_slopes: array<HoldSlope>;
@@ -26,28 +24,28 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let node = cells[site.x].nodes[corner];
     let a = at_node(p.member, node);
     let x = rest[node].xyz;
-    let what = call.extra % 256u;
+    let what = call.extra % HOLD_ROW;
     var which = 0u;
     var factor = young_at(m, p.member, site.x);
-    if what == 2u {
+    if what == HOLD_YOUNG {
         factor /= m.young;
     }
-    if what == 7u {
-        factor = modulus_slope(m, p.member, site.x, call.extra / 256u);
+    if what == HOLD_SLOPE {
+        factor = modulus_slope(m, p.member, site.x, call.extra / HOLD_ROW);
     }
-    if what == 8u {
-        factor = aging_slope(m, p.member, site.x, call.extra / 256u);
+    if what == HOLD_AGING {
+        factor = aging_slope(m, p.member, site.x, call.extra / HOLD_ROW);
     }
-    if what == 3u {
+    if what == HOLD_POISSON {
         which = 1u;
     }
     let matrix = grip_at(m, p.member, which, hold);
     var total = vec3(0.0);
     var energy = 0.0;
     // New state, then old; the argument, which is the same for all lanes, may ask for one of them or none.
-    let first = select(0u, 1u, what == 1u || what == 5u);
-    var end = select(2u, 1u, what == 0u);
-    if what == 6u {
+    let first = select(0u, 1u, what == HOLD_OLD || what == HOLD_PROBE);
+    var end = select(2u, 1u, what == HOLD_NEW);
+    if what == NO_HOLD {
         end = 0u;
     }
     for (var instant = first; instant < end; instant++) {
@@ -65,28 +63,28 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         if has_rest() {
             d -= rests[a].xyz;
         }
-        if what == 5u {
+        if what == HOLD_PROBE {
             d = transpose(pose.turn) * probe[a].xyz;
         }
-        if what == 9u {
-            d = -rest_slope(call.extra / 256u, a);
+        if what == HOLD_REST {
+            d = -rest_slope(call.extra / HOLD_ROW, a);
         }
         let f = hold_stiff(matrix, corner, d);
         var g = pose.turn * f;
-        if what == 4u || what == 10u {
+        if what == HOLD_TIME || what == HOLD_GRIP {
             var turn = pose.turn_rate;
             var shift = pose.shift_rate.xyz;
-            if what == 10u {
-                let row = (call.extra / 256u) % 256u;
+            if what == HOLD_GRIP {
+                let row = (call.extra % HOLD_MATRIX) / HOLD_ROW;
                 let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + at) * shape.clamps + site.y];
                 turn = slope.turn;
                 shift = slope.shift.xyz;
             }
             let rate = transpose(turn) * (u + x - pose.shift.xyz) - transpose(pose.turn) * shift;
             g = turn * f + pose.turn * hold_stiff(matrix, corner, rate);
-            if call.extra >= 65536u {
+            if call.extra >= HOLD_MATRIX {
                 // The matrix itself: rows of slopes follow the members' own two matrices.
-                let row = 2u + call.extra / 65536u - 1u;
+                let row = 2u + call.extra / HOLD_MATRIX - 1u;
                 g += pose.turn * hold_stiff(((row * shape.members + p.member) * shape.holds + hold) * 576u, corner, d);
             }
         }

@@ -3,6 +3,7 @@
 //! later listings: nothing once nobody wants anything. call.extra: columns of each member that are solved for at the same time; those
 //! of a member follow each other, so that they find its matrix in the caches.
 // use shared/structs
+// use shared/roster
 
 var<uniform> shape: Shape;
 var<storage, read_write> roster: array<u32>;
@@ -11,26 +12,21 @@ var<storage, read_write> gate: array<u32>;
 var<storage, read> newton: array<Newton>;
 var<storage, read> health: array<Health>;
 
-const SECTIONS = 4u;
-const KINDS = 8u;
-const WIDEST = 65535u;
-
-// Workgroups of one member, by what the items are: one, nodes, cells, blocks, patches, clamp cells, nodes of
-// wide workgroups, rows of eight lanes.
+// Workgroups of one member, by what the items are.
 fn groups_of(kind: u32) -> u32 {
     switch kind {
-        case 1u: { return (shape.nodes + 63u) / 64u; }
-        case 2u: { return (shape.cells + 7u) / 8u; }
-        case 3u: { return (shape.blocks + 63u) / 64u; }
-        case 4u: { return (shape.patches + 63u) / 64u; }
-        case 6u: { return (shape.nodes + 255u) / 256u; }
-        case 7u: { return (shape.nodes + 31u) / 32u; }
-        case 5u: { return (shape.holds + 7u) / 8u; }
+        case PER_NODE: { return (shape.nodes + 63u) / 64u; }
+        case PER_CELL: { return (shape.cells + 7u) / 8u; }
+        case PER_BLOCK: { return (shape.blocks + 63u) / 64u; }
+        case PER_PATCH: { return (shape.patches + 63u) / 64u; }
+        case PER_HOLD: { return (shape.holds + 7u) / 8u; }
+        case PER_WIDE: { return (shape.nodes + WIDE - 1u) / WIDE; }
+        case PER_ROW: { return (shape.nodes + NARROW - 1u) / NARROW; }
         default: { return 1u; }
     }
 }
 
-@compute @workgroup_size(4)
+@compute @workgroup_size(SECTIONS)
 fn list_members(@builtin(local_invocation_index) section: u32) {
     let start = section * (call.extra * shape.members + 1u);
     var count = 0u;
@@ -38,14 +34,14 @@ fn list_members(@builtin(local_invocation_index) section: u32) {
     for (var k = 0u; k < call.extra * shape.members; k++) {
         let b = k / call.extra;
         let system = (k % call.extra) * shape.members + b;
-        if health[b].code == WELL && (section == 0u || newton[system].stage == section) {
+        if health[b].code == WELL && (section == IDLE || newton[system].stage == section) {
             count += 1u;
             roster[start + count] = system;
             busy |= newton[system].stage;
         }
     }
     roster[start] = count;
-    if section == 0u {
+    if section == IDLE {
         gate[0] = select(0u, 1u, busy != 0u);
         gate[1] = 1u;
         gate[2] = 1u;

@@ -2,6 +2,7 @@
 //! patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents
+// use shared/asks
 
 var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
@@ -26,7 +27,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
                   @builtin(local_invocation_index) local: u32) {
     lanes_start(local);
     let p = find_place(group, groups, local / 8u, shape.cells, 8u);
-    if !p.runs || cg_scalars[4u * p.member + (call.extra & 1u)].z != 0.0 {
+    if !p.runs || cg_scalars[4u * p.member + (call.extra & ODD)].z != 0.0 {
         return;
     }
     let e = min(p.item, shape.cells - 1u);
@@ -35,7 +36,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let m = members[p.member];
     let mix = mix_of(m);
     let young = young_at(m, p.member, e);
-    let at = (p.member * shape.cells + e) * 30u;
+    let at = (p.member * shape.cells + e) * TANGENT_VECTORS;
     let r = three(at);
     let d = three(at + 6u + 3u * corner);
     // R Ω_i = −R [b_i]× G⁻¹.

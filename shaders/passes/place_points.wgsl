@@ -21,7 +21,7 @@ fn place_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     var f: Found;
     f.cell = owners[at];
     var row = vec2(0.0, -1.0);
-    if f.cell != 0xffffffffu {
+    if f.cell != NONE {
         let e = load_hexahedron(s.slot, f.cell, shot);
         let point = points[shot.point_start + s.item];
         let y = point.xyz + e.offset;
@@ -40,7 +40,7 @@ fn place_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             f.gradient = p.gradient;
             row = vec2(p.phi, sight.depth * depth_weight(p.phi, sight.band));
         } else {
-            f.cell = 0xffffffffu;
+            f.cell = NONE;
         }
     }
     found[at] = f;

@@ -1,6 +1,6 @@
 //! Corner forces of ∂r/∂p for the parameters that act in cells: Young's modulus, Poisson's ratio, stiffness damping, and, through
-//! the passes of clamps and planes, time and planes; of stiffness that varies, and of the stress-free shape. call.extra is the kind of the parameter, plus 32
-//! times the row of a field's slopes.
+//! the passes of clamps and planes, time and planes; of stiffness that varies, and of the stress-free shape. call.extra is the kind of the parameter, plus
+//! KEYS times the row of a field's slopes.
 // use shared/corner
 // use shared/guard
 // use shared/slopes
@@ -29,7 +29,7 @@ fn by_rest(c: Corner, row: u32) -> vec3<f32> {
 fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
-    let kind = call.extra % 32u;
+    let kind = call.extra % KEYS;
     var f = vec3(0.0);
     if kind == YOUNGS_MODULUS || kind == POISSON_RATIO || kind == STIFFNESS_DAMPING || kind == MODULUS_SLOPE || kind == AGING_SLOPE {
         let u0 = (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz);
@@ -37,10 +37,10 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let matrix = matrix_at(c.m.slot, select(0u, 1u, kind == POISSON_RATIO), cells[c.cell].kind);
         var factor = select(c.young, c.young / c.m.young, kind == YOUNGS_MODULUS);
         if kind == MODULUS_SLOPE {
-            factor = modulus_slope(c.m, c.member, c.cell, call.extra / 32u);
+            factor = modulus_slope(c.m, c.member, c.cell, call.extra / KEYS);
         }
         if kind == AGING_SLOPE {
-            factor = aging_slope(c.m, c.member, c.cell, call.extra / 32u);
+            factor = aging_slope(c.m, c.member, c.cell, call.extra / KEYS);
         }
         var on_new = c.mix.on_new;
         var on_old = c.mix.on_old;
@@ -73,7 +73,7 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         }
     }
     if kind == REST_SLOPE {
-        f = by_rest(c, call.extra / 32u);
+        f = by_rest(c, call.extra / KEYS);
     }
     if kind != STIFFNESS_DAMPING {
         f += support_of(cells[c.cell], c.member, c.number).xyz;

@@ -1,5 +1,5 @@
-//! What an effect does to every node, added to what the balance's own passes left there. call.extra: number of the effect; from bit 8
-//! on the question (shared/points.wgsl); of a derivative by a parameter, from bit 12 on its kind and from bit 16 on its index.
+//! What an effect does to every node, added to what the balance's own passes left there. call.extra: the effect and the
+//! question (shared/points.wgsl).
 //! `forces` is the residual (with the energy), the right-hand side of a tangent, the adjoint of the old state or a column.
 // use effects/points
 
@@ -23,10 +23,10 @@ fn press_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !p.live {
         return;
     }
-    let effect = effects[call.extra & 255u];
-    let what = (call.extra >> 8u) & 15u;
-    let kind = (call.extra >> 12u) & 15u;
-    let index = call.extra >> 16u;
+    let effect = effects[asked_effect()];
+    let what = asked_question();
+    let kind = asked_kind();
+    let index = asked_index();
     let m = members[p.member];
     let a = at_node(p.member, p.item);
     let v = part(2u) + a;

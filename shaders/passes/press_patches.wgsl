@@ -18,10 +18,10 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     if !p.live {
         return;
     }
-    let effect = effects[call.extra & 255u];
-    let what = (call.extra >> 8u) & 15u;
-    let kind = (call.extra >> 12u) & 15u;
-    let index = call.extra >> 16u;
+    let effect = effects[asked_effect()];
+    let what = asked_question();
+    let kind = asked_kind();
+    let index = asked_index();
     let m = members[p.member];
     let site = patches[p.item];
     var whole = vec3(0.0);
@@ -71,10 +71,10 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             if what == COLUMN && kind == YOUNGS_MODULUS {
                 change[PLANE_AT + 4u] = plane.scales * DEFAULT_STIFFNESS / shape.h;
             }
-            if what == COLUMN && kind == PLANE && index / 8u == k {
-                switch index % 8u {
-                    case 2u: { change[PLANE_AT + 3u] = 1.0; }
-                    case 3u: {
+            if what == COLUMN && kind == PLANE && index / PLANE_ASKS == k {
+                switch index % PLANE_ASKS {
+                    case PLANE_HEIGHT: { change[PLANE_AT + 3u] = 1.0; }
+                    case PLANE_THETA: {
                         for (var i = 0u; i < 3u; i++) {
                             change[PLANE_AT + i] = plane.by_theta[i];
                         }

@@ -21,7 +21,7 @@ fn pull_readings(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     var sum = 0.0;
     for (var i = local; i < shot.point_count; i += 64u) {
         let f = found[s.slot * sight.points + i];
-        if f.cell != 0xffffffffu {
+        if f.cell != NONE {
             let row = rows[s.slot * sight.rows + i];
             sum += row.x * row.y * dot(f.gradient, reading_slopes[(shot.point_start + i) * sight.readings + s.group].xyz);
         }

@@ -1,6 +1,7 @@
-//! Derivative of the looks' displacements along one of Q directions (`mode` = Q + 65536 · direction): the Hermite curve of the
+//! Derivative of the looks' displacements along one of Q directions (`mode` = Q + DIRECTION · direction): the Hermite curve of the
 //! tangents, and the curve's own speed for directions that shift the clock.
 // use shared/look
+// use shared/directions
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
@@ -20,8 +21,8 @@ fn see_tangents(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     if !s.runs || node >= sight.nodes {
         return;
     }
-    let count = call.mode & 0xffffu;
-    let q = call.mode >> 16u;
+    let count = call.mode % DIRECTION;
+    let q = call.mode / DIRECTION;
     let a = s.look.member * sight.nodes + node;
     let plane = sight.members * sight.nodes;
     let f = s.look.value;

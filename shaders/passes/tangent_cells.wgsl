@@ -48,7 +48,7 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let turned = pose.r * half;
     if p.live {
-        let at = (p.member * shape.cells + e) * 30u;
+        let at = (p.member * shape.cells + e) * TANGENT_VECTORS;
         for (var c = 0u; c < 3u; c++) {
             tangents[at + 6u + 3u * corner + c] = vec4(turned[c], 0.0);
         }

@@ -33,7 +33,7 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let by_way = force(fresh.pose, w.kd, c.sign);
     if c.live {
         for (var k = 0u; k < 3u; k++) {
-            tangents[(c.member * shape.cells + c.cell) * 30u + 6u + 3u * c.number + k] += vec4(turned[k], 0.0);
+            tangents[(c.member * shape.cells + c.cell) * TANGENT_VECTORS + 6u + 3u * c.number + k] += vec4(turned[k], 0.0);
         }
         law_modes[own + n] = vec4(by_way, 0.0);
         if c.number == 0u {

@@ -1,8 +1,8 @@
 //! What the planes do to every surface patch: the vector that corner forces take with the minus sign and their shape function,
-//! and the patch's stiffness. With call.extra > 0 the vector belongs to ∂r/∂p instead: 1 = Young's modulus, and for plane
-//! call.extra / 8: 2 = height, 3 = θ, 4 = φ; 5 = nothing.
+//! and the patch's stiffness; or, as call.extra asks (shared/asks), the vector of ∂r/∂p instead.
 // use shared/mix
 // use shared/contact
+// use shared/asks
 
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> cells: array<Cell>;
@@ -27,13 +27,13 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let area = site.point.w;
     let width = contact_width * shape.h;
-    let what = call.extra % 8u;
+    let what = call.extra % PLANE_ASKS;
     var vector = vec3(0.0);
     var energy = 0.0;
     var diagonal = vec3(0.0);
     var mixed = vec3(0.0);
     for (var k = 0u; k < shape.planes; k++) {
-        if what >= 2u && k != call.extra / 8u {
+        if what >= PLANE_HEIGHT && k != call.extra / PLANE_ASKS {
             continue;
         }
         let plane = planes[p.member * shape.planes + k];
@@ -42,11 +42,11 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let law = contact_law(gap, width);
         let s = area * plane.stiffness;
         switch what {
-            case 1u: { vector += (s * law.pressure * plane.scales / members[p.member].young) * n; }
-            case 2u: { vector -= (s * law.slope) * n; }
-            case 3u: { vector += s * (law.slope * dot(plane.by_theta.xyz, whole + rest) * n + law.pressure * plane.by_theta.xyz); }
-            case 4u: { vector += s * (law.slope * dot(plane.by_phi.xyz, whole + rest) * n + law.pressure * plane.by_phi.xyz); }
-            case 5u: {}
+            case TOUCH_YOUNG: { vector += (s * law.pressure * plane.scales / members[p.member].young) * n; }
+            case PLANE_HEIGHT: { vector -= (s * law.slope) * n; }
+            case PLANE_THETA: { vector += s * (law.slope * dot(plane.by_theta.xyz, whole + rest) * n + law.pressure * plane.by_theta.xyz); }
+            case PLANE_PHI: { vector += s * (law.slope * dot(plane.by_phi.xyz, whole + rest) * n + law.pressure * plane.by_phi.xyz); }
+            case NO_TOUCH: {}
             default: {
                 vector += (s * law.pressure) * n;
                 energy += s * law.energy;
@@ -57,7 +57,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let at = 3u * (p.member * shape.patches + p.item);
     touches[at] = vec4(vector, energy);
-    if what == 0u {
+    if what == TOUCH_FORCE {
         touches[at + 1u] = vec4(diagonal, 0.0);
         touches[at + 2u] = vec4(mixed, 0.0);
     }

@@ -1,7 +1,5 @@
 //! An effect in the tables of kernels, and the parameters of all effects.
 
-const NONE = 0xffffffffu;
-
 struct EffectSite { // mirrored
     // Number of the law, and where it acts.
     law: u32,

@@ -8,7 +8,7 @@ var<storage, read> agings: array<f32>;
 // Where a matrix of a clamp cell starts in `hold_elements`: [slot][K, dK/dν][clamp cell][24 · 24]; where effects act on clamps
 // every member has its own, and [rows][B][clamp cell] derivatives of K by their parameters follow.
 fn grip_at(m: Member, member: u32, which: u32, hold: u32) -> u32 {
-    let slot = select(m.slot, member, (shape.fields & 64u) != 0u);
+    let slot = select(m.slot, member, (shape.fields & FIELD_GRIPS) != 0u);
     return ((slot * 2u + which) * shape.holds + hold) * 576u;
 }
 
@@ -18,10 +18,10 @@ fn aging_at(member: u32, row: u32) -> f32 {
 
 fn young_at(m: Member, member: u32, cell: u32) -> f32 {
     var young = m.young;
-    if (shape.fields & 1u) != 0u {
+    if (shape.fields & FIELD_MODULUS) != 0u {
         young *= moduli[member * shape.cells + cell];
     }
-    if (shape.fields & 8u) != 0u {
+    if (shape.fields & FIELD_AGING) != 0u {
         young *= aging_at(member, 0u);
     }
     return young;

@@ -1,10 +1,11 @@
 //! What a look found: places of its points, and its scalar residuals, one a row.
 
-struct Found {
+struct Found { // mirrored
     xi: vec3<f32>,
     phi: f32,
     // World gradient of the deformed distance.
     gradient: vec3<f32>,
+    // Band cell, or NONE.
     cell: u32,
 }
 

@@ -33,7 +33,7 @@ fn rest_at(cell: u32, xi: vec3<f32>) -> Rest {
         return r;
     }
     let other = band_lookup[u32(ijk.x) + sight.lattice[0] * (u32(ijk.y) + sight.lattice[1] * u32(ijk.z))];
-    r.known = other != 0xffffffffu;
+    r.known = other != NONE;
     if r.known {
         r.d = distance_at(other, local);
     }

@@ -9,7 +9,7 @@ var<storage, read> densities: array<f32>;
 
 // Mass of the body's own node [kg]; the fourth component of a rest position is ∫ N.
 fn node_mass(m: Member, member: u32, node: u32) -> f32 {
-    if (shape.fields & 2u) != 0u {
+    if (shape.fields & FIELD_DENSITY) != 0u {
         return m.density * rest[node].w * densities[at_node(member, node)];
     }
     return m.density * rest[node].w;

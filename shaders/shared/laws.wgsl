@@ -47,7 +47,7 @@ struct Answer {
 
 // Scalars that the energies of this plan's laws depend on.
 fn scalars() -> u32 {
-    return (shape.fields >> 8u) & 15u;
+    return (shape.fields >> SCALARS_AT) & MOST_SCALARS;
 }
 
 // Asks the law of a number, with the input's values and `along` in place, for derivatives by the first `count` scalars.
@@ -77,7 +77,7 @@ fn ask(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, o
     let count = select(scalars(), 1u, which == LOSS_PART);
     step_rate = 1.0 / shape.dt;
     for (var k = 0u; k < MOST_LAWS; k++) {
-        if k >= (shape.fields >> 12u) {
+        if k >= (shape.fields >> LAWS_AT) {
             break;
         }
         let effect = cell_effects[k];

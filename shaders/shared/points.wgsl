@@ -5,12 +5,14 @@
 // use shared/contact
 // use shared/hyper
 // use shared/keys
+// use shared/asks
 // use shared/effect_site
 
-// Sites of an effect.
+// Sites of an effect; laws of cells have tables of their own.
 const AT_NODES = 0u;
 const AT_SURFACE = 1u;
 const AT_CONTACT = 2u;
+const AT_CELLS = 3u;
 
 // What is asked of a law: force and energy; its second derivative by x; the force's derivative along a change of the old state;
 // the transpose of that; the force's derivative by a parameter.
@@ -19,6 +21,27 @@ const STIFFNESS = 1u;
 const BY_OLD = 2u;
 const BACK = 3u;
 const COLUMN = 4u;
+
+// In call.extra: number of the effect; from this bit on the question; of a derivative by a parameter, from these on its kind and index.
+const QUESTION_AT = 8u;
+const KIND_AT = 12u;
+const INDEX_AT = 16u;
+
+fn asked_effect() -> u32 {
+    return extractBits(call.extra, 0u, QUESTION_AT);
+}
+
+fn asked_question() -> u32 {
+    return extractBits(call.extra, QUESTION_AT, KIND_AT - QUESTION_AT);
+}
+
+fn asked_kind() -> u32 {
+    return extractBits(call.extra, KIND_AT, INDEX_AT - KIND_AT);
+}
+
+fn asked_index() -> u32 {
+    return call.extra >> INDEX_AT;
+}
 
 var<storage, read> effects: array<EffectSite>;
 
@@ -183,7 +206,7 @@ fn place_point(origin: vec3<f32>, whole: vec3<f32>, rest: vec3<f32>, old_whole: 
     }
 }
 
-// Change of the input by a parameter of the balance; false where there is none. `index` counts axes, slots, or is 8 · plane + which.
+// Change of the input by a parameter of the balance; false where there is none. `index` counts axes, slots, or is PLANE_ASKS · plane + which.
 fn change_by(kind: u32, index: u32) {
     switch kind {
         case YOUNGS_MODULUS: { change[STIFFNESS_AT] = DEFAULT_STIFFNESS / shape.h; }

@@ -96,6 +96,26 @@ struct HoldSlope { // mirrored
     shift: vec4<f32>,
 }
 
+// Bits of `Shape.fields`: effects vary the stiffness over the body, the density; act on patches; vary the stiffness in time; change the
+// stress-free shape, and the body starts in it; act on clamps.
+const FIELD_MODULUS = 1u;
+const FIELD_DENSITY = 2u;
+const FIELD_PATCHES = 4u;
+const FIELD_AGING = 8u;
+const FIELD_REST = 16u;
+const FIELD_STARTS = 32u;
+const FIELD_GRIPS = 64u;
+// From this bit on the number of scalars that laws of cells depend on, and from that bit on how many such laws there are.
+const SCALARS_AT = 8u;
+const MOST_SCALARS = 15u;
+const LAWS_AT = 12u;
+
+// Vectors that tangent_cells keeps of a cell.
+const TANGENT_VECTORS = 30u;
+
+// In place of a number: there is none.
+const NONE = 0xffffffffu;
+
 const IDLE = 0u;
 const WANTS_MATRIX = 1u;
 const WANTS_SOLVE = 2u;

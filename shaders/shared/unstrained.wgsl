@@ -9,12 +9,12 @@ var<storage, read> rest_slopes: array<vec4<f32>>;
 var<storage, read> rest_shapes: array<vec4<f32>>;
 
 fn has_rest() -> bool {
-    return (shape.fields & 16u) != 0u;
+    return (shape.fields & FIELD_REST) != 0u;
 }
 
 // True when a body that starts at rest starts in the shape X + W.
 fn starts_unstrained() -> bool {
-    return (shape.fields & 32u) != 0u;
+    return (shape.fields & FIELD_STARTS) != 0u;
 }
 
 // A corner's deformation, measured from the stress-free shape; `at` is its place in what is kept per corner.

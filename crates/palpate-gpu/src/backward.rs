@@ -3,6 +3,7 @@
 use crate::effects;
 use crate::geometry::columns;
 use crate::pipelines::pass;
+use crate::pipelines::shared::asks;
 use crate::solve::{ALL, Per, Solve};
 use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
 use palpate_model::scene::InitialShape;
@@ -14,9 +15,9 @@ pub(crate) fn step_adjoint(world: &World, k: usize, now: &State, next: &State, a
         s.linearise();
         s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
         s.solve();
-        s.run(pass::HOLD_CELLS, ALL, Per::Hold, 5);
+        s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
         s.couple_patches(effects::BACK, &[]);
-        s.couple_cells(1, &[]);
+        s.couple_cells(asks::TRANSPOSED, &[]);
         s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
         s.press_nodes(ALL, effects::BACK, None, &adj_now.0.buffer, &[]);
         s.add_columns();
@@ -99,9 +100,9 @@ pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, o
                 s.column(column);
                 s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
                 s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
-                s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, 5, &[("probe", from)]);
+                s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &[("probe", from)]);
                 s.couple_patches(effects::BY_OLD, &[("probe", from)]);
-                s.couple_cells(0, &[("probe", from)]);
+                s.couple_cells(asks::ALONG, &[("probe", from)]);
                 s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
                 s.press_nodes(ALL, effects::BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
                 s.begin_column(q);

@@ -2,11 +2,20 @@
 
 use crate::effects;
 use crate::pipelines::pass;
-use crate::solve::{ALL, NO_TOUCH, Per, Solve};
+use crate::pipelines::shared::asks::{
+    HOLD_AGING, HOLD_GRIP, HOLD_MATRIX, HOLD_POISSON, HOLD_REST, HOLD_ROW, HOLD_SLOPE, HOLD_TIME, HOLD_YOUNG, NO_HOLD, NO_TOUCH,
+    OF_SHAPE, OF_VELOCITY, PLANE_ASKS, PLANE_HEIGHT, PLANE_PHI, PLANE_THETA, TOUCH_YOUNG,
+};
+use crate::pipelines::shared::keys::{
+    AGING_SLOPE, ANGULAR_VELOCITY, DENSITY, DENSITY_SLOPE, EFFECT, GRAVITY, KEYS, MASS_DAMPING, MODULUS_SLOPE, NOTHING, OF_CELLS,
+    PLANE, POINT_MASS, POISSON_RATIO, REST_SLOPE, SLOTS, START_SHAPE, START_SPIN, STIFFNESS_DAMPING, TIME_START, VELOCITY,
+    YOUNGS_MODULUS,
+};
+use crate::solve::{ALL, Per, Solve};
 use palpate_model::effects::Site;
 use palpate_model::params::ParamKey;
 
-/// How a parameter enters the balance: numbers of `shared/keys.wgsl`.
+/// How a parameter enters the balance: numbers of `shared/keys.wgsl` and `shared/asks.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Column {
     kind: u32,
@@ -17,60 +26,33 @@ pub(crate) struct Column {
     press: Option<(u32, Option<usize>)>,
 }
 
-/// Clamps that have no part in a column.
-const NO_HOLD: u32 = 6;
-/// A kind that no kernel knows: the column is zero.
-const NOTHING: u32 = 15;
-/// What cells and their laws depend on.
-const YOUNGS_MODULUS: u32 = 0;
-const POISSON_RATIO: u32 = 1;
-/// Kinds of parameters of effects.
-const EFFECT: u32 = 11;
-const MODULUS_SLOPE: u32 = 12;
-const DENSITY_SLOPE: u32 = 13;
-const AGING_SLOPE: u32 = 14;
-const REST_SLOPE: u32 = 16;
-const START_SHAPE: u32 = 17;
-const START_SPIN: u32 = 18;
-/// Kinds in an argument, beside the index.
-const KINDS: u32 = 32;
-/// What the clamps' pass is told for stiffness that varies over the body, in time, plus 256 times the row of its slopes.
-const HOLD_SLOPE: u32 = 7;
-const HOLD_AGING: u32 = 8;
-/// For the stress-free shape, and for how effects hold the clamps.
-const HOLD_REST: u32 = 9;
-const HOLD_GRIP: u32 = 10;
-/// Added to a node pass' argument: cells take part; added to the sum's argument: ∂v/∂p of the start.
-const FLAG: u32 = 1 << 16;
-/// Added to the sum's argument: ∂u/∂p of the start.
-const OF_SHAPE: u32 = 1 << 17;
-
 impl Solve<'_, '_> {
     /// How a parameter enters this balance, or `None`.
     pub(crate) fn column_of(&self, key: ParamKey) -> Option<Column> {
         let dynamic = self.step.is_some();
         let column = |kind, index: u32, cells| Some(Column { kind, index, cells, press: None });
         let plane = |what: u32, i: u16| {
-            let index = 8 * u32::from(i) + what;
-            Some(Column { kind: 9, index: 0, cells: Some([index, NO_HOLD]), press: Some((effects::column(9, index), None)) })
+            let index = PLANE_ASKS * u32::from(i) + what;
+            let press = Some((effects::column(PLANE, index), None));
+            Some(Column { kind: PLANE, index: 0, cells: Some([index, NO_HOLD]), press })
         };
         // Effects on points answer to these as well.
         let pressed = |kind, index, cells| Some(Column { kind, index, cells, press: Some((effects::column(kind, index), None)) });
         match key {
-            ParamKey::YoungsModulus => pressed(YOUNGS_MODULUS, 0, Some([1, 2])),
-            ParamKey::PoissonRatio => column(POISSON_RATIO, 0, Some([NO_TOUCH, 3])),
-            ParamKey::Density => column(2, 0, None),
-            ParamKey::MassDamping if dynamic => column(3, 0, None),
-            ParamKey::StiffnessDamping if dynamic => column(4, 0, Some([NO_TOUCH, NO_HOLD])),
-            ParamKey::Gravity(a) => pressed(5, a.into(), None),
+            ParamKey::YoungsModulus => pressed(YOUNGS_MODULUS, 0, Some([TOUCH_YOUNG, HOLD_YOUNG])),
+            ParamKey::PoissonRatio => column(POISSON_RATIO, 0, Some([NO_TOUCH, HOLD_POISSON])),
+            ParamKey::Density => column(DENSITY, 0, None),
+            ParamKey::MassDamping if dynamic => column(MASS_DAMPING, 0, None),
+            ParamKey::StiffnessDamping if dynamic => column(STIFFNESS_DAMPING, 0, Some([NO_TOUCH, NO_HOLD])),
+            ParamKey::Gravity(a) => pressed(GRAVITY, a.into(), None),
             ParamKey::TimeStart if self.world.plan.clamps.iter().any(|c| c.motion.is_some()) => {
-                pressed(8, 0, Some([NO_TOUCH, 4]))
+                pressed(TIME_START, 0, Some([NO_TOUCH, HOLD_TIME]))
             }
-            ParamKey::TimeStart if !self.world.geometry.effects.points.is_empty() => pressed(8, 0, None),
-            ParamKey::PlaneHeight(i) => plane(2, i),
-            ParamKey::PlaneTheta(i) => plane(3, i),
-            ParamKey::PlanePhi(i) => plane(4, i),
-            ParamKey::PointMass(i) => column(10, i.into(), None),
+            ParamKey::TimeStart if !self.world.geometry.effects.points.is_empty() => pressed(TIME_START, 0, None),
+            ParamKey::PlaneHeight(i) => plane(PLANE_HEIGHT, i),
+            ParamKey::PlaneTheta(i) => plane(PLANE_THETA, i),
+            ParamKey::PlanePhi(i) => plane(PLANE_PHI, i),
+            ParamKey::PointMass(i) => column(POINT_MASS, i.into(), None),
             ParamKey::Effect { effect, slot, law } => self.column_of_effect(effect.into(), slot.into(), law.into()),
             _ => None,
         }
@@ -81,27 +63,27 @@ impl Solve<'_, '_> {
         if let Some(row) = known.slope_row(effect, slot) {
             return Some(match palpate_model::effects::ALL[law].site {
                 Site::Modulus(_) => {
-                    let cells = Some([NO_TOUCH, HOLD_SLOPE + 256 * row]);
+                    let cells = Some([NO_TOUCH, HOLD_SLOPE + HOLD_ROW * row]);
                     Column { kind: MODULUS_SLOPE, index: row, cells, press: None }
                 }
                 Site::Aging(_) => {
-                    let cells = Some([NO_TOUCH, HOLD_AGING + 256 * row]);
+                    let cells = Some([NO_TOUCH, HOLD_AGING + HOLD_ROW * row]);
                     Column { kind: AGING_SLOPE, index: row, cells, press: None }
                 }
                 Site::Rest(_) => {
-                    let cells = Some([NO_TOUCH, HOLD_REST + 256 * row]);
+                    let cells = Some([NO_TOUCH, HOLD_REST + HOLD_ROW * row]);
                     Column { kind: REST_SLOPE, index: row, cells, press: None }
                 }
                 Site::Clamps(_) | Site::Edges(_) => {
-                    let matrix = known.matrix_row(row).map_or(0, |k| (k + 1) << 16);
-                    let cells = Some([NO_TOUCH, HOLD_GRIP + 256 * row + matrix]);
+                    let matrix = known.matrix_row(row).map_or(0, |k| (k + 1) * HOLD_MATRIX);
+                    let cells = Some([NO_TOUCH, HOLD_GRIP + HOLD_ROW * row + matrix]);
                     Column { kind: NOTHING, index: 0, cells, press: None }
                 }
                 _ => Column { kind: DENSITY_SLOPE, index: row, cells: None, press: None },
             });
         }
         if let Some(law) = known.cell_law(effect) {
-            return Some(Column { kind: EFFECT, index: 16 * law + slot, cells: Some([NO_TOUCH, NO_HOLD]), press: None });
+            return Some(Column { kind: EFFECT, index: SLOTS * law + slot, cells: Some([NO_TOUCH, NO_HOLD]), press: None });
         }
         if known.points.iter().all(|p| p.0 != effect) {
             return None;
@@ -119,13 +101,13 @@ impl Solve<'_, '_> {
                 self.press_patches(ALL, question, only, &[]);
             }
             self.run(pass::HOLD_CELLS, ALL, Per::Hold, hold);
-            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + KINDS * c.index);
+            self.run(pass::PRESS_COLUMN, ALL, Per::Cell, c.kind + KEYS * c.index);
             if [YOUNGS_MODULUS, POISSON_RATIO, EFFECT, MODULUS_SLOPE, AGING_SLOPE, REST_SLOPE].contains(&c.kind) {
-                self.laws(pass::COLUMN_LAWS, ALL, Per::Cell, c.kind + KINDS * c.index, &[]);
+                self.laws(pass::COLUMN_LAWS, ALL, Per::Cell, c.kind + KEYS * c.index, &[]);
             }
         }
-        let flag = if c.cells.is_some() { FLAG } else { 0 };
-        self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + KINDS * c.index + flag);
+        let flag = if c.cells.is_some() { OF_CELLS } else { 0 };
+        self.run(pass::GATHER_COLUMN, ALL, Per::Node, c.kind + KEYS * c.index + flag);
         if let Some((question, only)) = c.press {
             self.press_nodes(ALL, question, only, &self.world.buffers["column"], &[]);
         }
@@ -167,8 +149,8 @@ impl Solve<'_, '_> {
     /// Kind and index of ∂v/∂p of the start.
     fn velocity_kind(&self, key: ParamKey) -> Option<(u32, u32)> {
         match key {
-            ParamKey::Velocity(a) => Some((6, a.into())),
-            ParamKey::AngularVelocity(a) => Some((7, a.into())),
+            ParamKey::Velocity(a) => Some((VELOCITY, a.into())),
+            ParamKey::AngularVelocity(a) => Some((ANGULAR_VELOCITY, a.into())),
             _ => self.start_row(key).map(|row| (START_SPIN, row)),
         }
     }
@@ -183,7 +165,7 @@ impl Solve<'_, '_> {
         let keys = self.world.plan.layout.keys.clone();
         for (p, key) in keys.iter().enumerate() {
             if self.velocity_column(*key) {
-                self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + FLAG, &[("probe", adj)]);
+                self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + OF_VELOCITY, &[("probe", adj)]);
             }
             if self.shape_column(*key) {
                 self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + OF_SHAPE, &[("probe", adj)]);

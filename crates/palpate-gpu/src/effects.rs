@@ -10,8 +10,11 @@ use crate::layout::EffectSite;
 use crate::memory::Maker;
 use crate::pipelines::pass;
 use crate::pipelines::shared::laws;
-use crate::pipelines::shared::points::{AT_CONTACT, AT_NODES, AT_SURFACE, COLUMN};
+use crate::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE, COLUMN, INDEX_AT, KIND_AT, QUESTION_AT};
 pub(crate) use crate::pipelines::shared::points::{BACK, BY_OLD, FORCE, STIFFNESS};
+use crate::pipelines::shared::structs::{
+    FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, NONE, SCALARS_AT,
+};
 use crate::recorder::Named;
 use crate::solve::{Per, Solve};
 use palpate_model::changes::{self, Changes};
@@ -23,23 +26,11 @@ use std::collections::HashMap;
 
 /// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
 pub(crate) fn column(kind: u32, index: u32) -> u32 {
-    COLUMN + (kind << 4) + (index << 8)
+    COLUMN + (kind << (KIND_AT - QUESTION_AT)) + (index << (INDEX_AT - QUESTION_AT))
 }
-
-/// Where laws act, beside the places that points have.
-const CELLS: u32 = 3;
 
 /// Most laws of cells of a plan.
 const MOST_LAWS: usize = laws::MOST_LAWS as usize;
-
-/// Bits of `Shape::fields`.
-const MODULUS: u32 = 1;
-const DENSITY: u32 = 2;
-const PATCHES: u32 = 4;
-const AGING: u32 = 8;
-const REST: u32 = 16;
-const STARTS: u32 = 32;
-const GRIPS: u32 = 64;
 
 /// A plan's effects as the device sees them.
 #[derive(Debug, Default)]
@@ -82,25 +73,25 @@ impl Effects {
                 Site::Surface(_) => Some(AT_SURFACE),
                 Site::Contact(_) => Some(AT_CONTACT),
                 Site::Modulus(_) | Site::Density(_) => {
-                    e.bits |= if matches!(law.site, Site::Modulus(_)) { MODULUS } else { DENSITY };
+                    e.bits |= if matches!(law.site, Site::Modulus(_)) { FIELD_MODULUS } else { FIELD_DENSITY };
                     field = Some(e.slope_rows);
                     e.slope_rows += count;
                     None
                 }
                 Site::Aging(_) => {
-                    e.bits |= AGING;
+                    e.bits |= FIELD_AGING;
                     field = Some(e.aging_rows);
                     e.aging_rows += count;
                     None
                 }
                 Site::Rest(_) => {
-                    e.bits |= REST | if plan.initial == InitialShape::Rest { STARTS } else { 0 };
+                    e.bits |= FIELD_REST | if plan.initial == InitialShape::Rest { FIELD_STARTS } else { 0 };
                     field = Some(e.rest_rows);
                     e.rest_rows += count;
                     None
                 }
                 Site::Clamps(_) | Site::Edges(_) => {
-                    e.bits |= GRIPS;
+                    e.bits |= FIELD_GRIPS;
                     field = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
                     None
@@ -111,22 +102,22 @@ impl Effects {
                 Site::Cells(_) if e.cells.len() == MOST_LAWS => {
                     return Err(GpuError::Plan { what: format!("more than {MOST_LAWS} laws of cells") });
                 }
-                Site::Cells(_) => Some(CELLS),
+                Site::Cells(_) => Some(AT_CELLS),
                 // The observer's business.
                 Site::Clock | Site::Marker | Site::Readings(_) => None,
             };
             e.fields.push(field);
-            if let Some(site) = site.filter(|s| *s == CELLS) {
+            if let Some(site) = site.filter(|s| *s == AT_CELLS) {
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
                 e.cells.push((number, EffectSite { law, site, first: e.stride, count, ..EffectSite::default() }));
             } else if let Some(site) = site {
-                e.bits |= if site == AT_NODES { 0 } else { PATCHES };
-                let slopes = if shares(plan, law, &plan.theta[places]).is_some() { e.rows + 1 } else { u32::MAX };
+                e.bits |= if site == AT_NODES { 0 } else { FIELD_PATCHES };
+                let slopes = if shares(plan, law, &plan.theta[places]).is_some() { e.rows + 1 } else { NONE };
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
                 let point = EffectSite { law, site, first: e.stride, count, measures: e.rows, slopes, stride: 0, rows: 0 };
                 e.points.push((number, point));
                 if site == AT_NODES {
-                    e.rows += if slopes == u32::MAX { 1 } else { 1 + count };
+                    e.rows += if slopes == NONE { 1 } else { 1 + count };
                 }
             }
             e.stride += count;
@@ -135,7 +126,7 @@ impl Effects {
         for (_, p) in e.points.iter_mut().chain(&mut e.cells) {
             (p.stride, p.rows) = (e.stride, e.rows);
         }
-        e.bits |= scalars(plan) << 8 | (e.cells.len() as u32) << 12;
+        e.bits |= scalars(plan) << SCALARS_AT | (e.cells.len() as u32) << LAWS_AT;
         Ok(e)
     }
 
@@ -161,7 +152,7 @@ impl Effects {
 
     /// True when some effect acts on patches.
     pub(crate) fn on_patches(&self) -> bool {
-        self.bits & PATCHES != 0
+        self.bits & FIELD_PATCHES != 0
     }
 
     /// True when some effect acts on nodes.
@@ -171,7 +162,7 @@ impl Effects {
 
     /// True when the body starts in a stress-free shape of its own.
     pub(crate) fn starts_unstrained(&self) -> bool {
-        self.bits & STARTS != 0
+        self.bits & FIELD_STARTS != 0
     }
 
     /// Row of the slopes of number `slot` of an effect that is computed on the host.
@@ -186,11 +177,11 @@ impl Effects {
         let mut all = vec![
             ("effect_values", members * self.stride as usize),
             ("effect_measures", members * self.rows as usize * nodes),
-            ("moduli", of(MODULUS, cells)),
-            ("densities", of(DENSITY, nodes)),
-            ("modulus_slopes", of(MODULUS, slopes * cells)),
-            ("density_slopes", of(DENSITY, slopes * nodes)),
-            ("agings", of(AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
+            ("moduli", of(FIELD_MODULUS, cells)),
+            ("densities", of(FIELD_DENSITY, nodes)),
+            ("modulus_slopes", of(FIELD_MODULUS, slopes * cells)),
+            ("density_slopes", of(FIELD_DENSITY, slopes * nodes)),
+            ("agings", of(FIELD_AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
         ];
         all.extend(self.rest_sizes(members, nodes, cells));
         all.push(("hold_slopes", grips::FLOATS * self.grip_rows.len() * members * (self.steps + 1) * clamps));
@@ -217,7 +208,7 @@ impl Effects {
             for (number, site) in self.points.iter().filter(|p| p.1.site == AT_NODES) {
                 let law = plan.layout.effects().nth(*number).map(|e| e.0);
                 let shared = law.and_then(|law| shares(plan, law, &physics.effects[*number]));
-                match shared.filter(|_| site.slopes != u32::MAX) {
+                match shared.filter(|_| site.slopes != NONE) {
                     Some((values, slopes)) => {
                         put(&mut data[1], &values);
                         slopes.iter().for_each(|s| put(&mut data[1], s));
@@ -233,19 +224,19 @@ impl Effects {
                 for slot in 0..places.len() {
                     let stiff = changes.modulus_slope(plan, physics, effect, slot);
                     let heavy = changes.density_slope(plan, physics, effect, slot);
-                    if self.bits & MODULUS != 0 {
+                    if self.bits & FIELD_MODULUS != 0 {
                         put(&mut data[4], &stiff.unwrap_or_else(|| vec![0.0; body.cells.len()]));
                     }
-                    if self.bits & DENSITY != 0 {
+                    if self.bits & FIELD_DENSITY != 0 {
                         put(&mut data[5], &heavy.unwrap_or_else(|| vec![0.0; body.nodes.len()]));
                     }
                 }
             }
         }
-        if self.bits & AGING != 0 {
+        if self.bits & FIELD_AGING != 0 {
             data[6] = self.agings(plan, batch);
         }
-        if self.bits & REST != 0 {
+        if self.bits & FIELD_REST != 0 {
             self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[7 + k] = v);
         }
         data[10] = self.hold_slopes(plan, batch);
@@ -307,7 +298,7 @@ impl Solve<'_, '_> {
         let world = self.world;
         for (k, (number, site)) in world.geometry.effects.points.iter().enumerate() {
             if (site.site == AT_NODES) == matches!(per, Per::Node) && only.is_none_or(|o| o == *number) {
-                self.run_with(pass, section, per, k as u32 + (question << 8), more);
+                self.run_with(pass, section, per, k as u32 + (question << QUESTION_AT), more);
             }
         }
     }

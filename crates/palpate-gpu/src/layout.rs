@@ -3,7 +3,7 @@
 mod looks;
 
 use bytemuck::{Pod, Zeroable};
-pub use looks::{BandCell, Look, Mark, Shot, Sight, Site};
+pub use looks::{BandCell, Carried, Found, Look, Mark, Shot, Sight, Site};
 
 /// Arguments of one dispatch.
 #[repr(C)]
@@ -71,9 +71,7 @@ pub struct Shape {
     pub quantum: f32,
     /// 1 with a ghost penalty.
     pub ghosts: u32,
-    /// 1: effects vary the stiffness over the body, 2: the density, 4: effects act on patches, 8: the stiffness varies in time, 16: the stress-free
-    /// shape is another, 32: and the body starts in it, 64: effects act on clamps. Bits 8 to 11: number of scalars that
-    /// laws of cells depend on; from bit 12 on how many such laws there are.
+    /// What effects change, and numbers of the laws of cells: bits of `shared/structs.wgsl`.
     pub fields: u32,
     /// Rows of the slopes of such fields, per member.
     pub slope_rows: u32,
@@ -129,7 +127,7 @@ pub struct Plane {
 pub struct EffectSite {
     /// Place of the law in the table of effects.
     pub law: u32,
-    /// 0 = nodes, 1 = surface, 2 = surface and planes, 3 = cells.
+    /// A site of `shared/points.wgsl`.
     pub site: u32,
     /// First of its parameters among a member's.
     pub first: u32,
@@ -137,7 +135,7 @@ pub struct EffectSite {
     pub count: u32,
     /// Row of the nodes' measures.
     pub measures: u32,
-    /// First row of the measures' derivatives by the parameters, or `u32::MAX`.
+    /// First row of the measures' derivatives by the parameters, or `NONE`.
     pub slopes: u32,
     /// Parameters of all effects of a member.
     pub stride: u32,
@@ -223,7 +221,7 @@ pub struct HoldSlope {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Newton {
-    /// 0 idle, 1 wants a matrix, 2 wants conjugate gradients, 3 wants a trial.
+    /// A stage of `shared/structs.wgsl`.
     pub stage: u32,
     /// 1: use the convex part of the tangent.
     pub convex: u32,

@@ -24,9 +24,10 @@ mod tests;
 
 use crate::device::Gpu;
 use crate::error::GpuError;
-use crate::layout::{Look, Sight};
+use crate::layout::{Carried, Found, Look, Sight};
 use crate::memory::Maker;
 use crate::pipelines::pass;
+use crate::pipelines::shared::{directions::DIRECTION, reduce};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
 use looks::{Agenda, Round};
@@ -45,12 +46,12 @@ pub(crate) const MOST_LOOPS: u64 = 62_000;
 const POINTS_OF_STRIPE: usize = 12_500;
 /// Device memory for scratch [B]; fewer looks are worked on together when they need more.
 const SCRATCH: u64 = 256 << 20;
-/// Most workgroups that share a sum (`PARTS` in `shared/reduce.wgsl`).
-const PARTS: usize = 256;
-/// Bytes of a node's vector, and of the structs `Found` and `Carried` of the kernels.
+/// Most workgroups that share a sum.
+const PARTS: usize = reduce::PARTS as usize;
+/// Bytes of a node's vector, and of what is kept of a point and of a marker.
 const VECTOR: u64 = 16;
-const FOUND: u64 = 32;
-const CARRIED: u64 = 128;
+const FOUND: u64 = size_of::<Found>() as u64;
+const CARRIED: u64 = size_of::<Carried>() as u64;
 
 /// What is observed, on the device.
 #[derive(Debug)]
@@ -232,7 +233,7 @@ impl Observer {
         if q > 0 {
             for (i, [now, next]) in tangents.iter().enumerate() {
                 let own = self.named(&[&states[..], &[("tangent_now", *now), ("tangent_next", *next)]].concat(), tally);
-                run(r, pass::SEE_TANGENTS, &own, round, groups_of(self.sight.nodes as usize), q + (i << 16));
+                run(r, pass::SEE_TANGENTS, &own, round, groups_of(self.sight.nodes as usize), q + DIRECTION as usize * i);
             }
             if round.points > 0 && band > 0 {
                 run(r, pass::EXTEND_TANGENTS, &own, round, groups_of(q * band), q);

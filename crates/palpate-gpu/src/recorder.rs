@@ -3,14 +3,14 @@
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Call;
-use crate::pipelines::PASSES;
+use crate::pipelines::{PASSES, shared::roster};
 use std::collections::HashMap;
 
 /// Named buffers: what a pass finds under the names in its WGSL.
 pub type Named<'a> = [(&'static str, &'a wgpu::Buffer)];
 
 /// Most workgroups along one axis of a dispatch (the WebGPU limit; every device has at least this).
-pub const MOST_GROUPS: u64 = 65_535;
+pub const MOST_GROUPS: u64 = roster::WIDEST as u64;
 
 /// How many workgroups a dispatch has.
 #[derive(Clone, Copy, Debug)]

@@ -3,13 +3,11 @@
 
 use crate::effects;
 use crate::effort::{Effort, FULL};
-use crate::pipelines::{pass, shared::structs};
+use crate::pipelines::pass;
+use crate::pipelines::shared::{asks, roster, structs};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::tuning::Product;
 use crate::world::{KINDS, State, Tally, World};
-
-/// What `touch_patches` is told where planes have nothing to say.
-pub(crate) const NO_TOUCH: u32 = 5;
 
 /// Sections of the roster: all, or those at one stage.
 pub(crate) const ALL: u32 = structs::IDLE;
@@ -19,17 +17,18 @@ pub(crate) const TRIAL: u32 = structs::WANTS_TRIAL;
 
 /// What the items of a dispatch are: the kinds of `list_members`.
 #[derive(Clone, Copy, Debug)]
+#[repr(u32)]
 pub(crate) enum Per {
-    Member,
-    Node,
-    Cell,
-    Block,
-    Patch,
-    Hold,
+    Member = roster::PER_MEMBER,
+    Node = roster::PER_NODE,
+    Cell = roster::PER_CELL,
+    Block = roster::PER_BLOCK,
+    Patch = roster::PER_PATCH,
+    Hold = roster::PER_HOLD,
     /// Nodes, in workgroups of 256.
-    Wide,
+    Wide = roster::PER_WIDE,
     /// Nodes with eight lanes each, in workgroups of 256.
-    Row,
+    Row = roster::PER_ROW,
 }
 
 /// Rounds beyond the allowed Newton iterations, for convex retries and halved steps.
@@ -120,7 +119,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             return;
         }
         // The clamps' old force; its weight is zero where it does not act.
-        self.run(pass::HOLD_CELLS, ALL, Per::Hold, 1);
+        self.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_OLD);
         self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
         self.laws(pass::PRESS_LAWS, ALL, Per::Cell, 1, &[]);
         self.run(pass::GATHER_OLD, ALL, Per::Node, 0);
@@ -236,7 +235,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             Product::Free => {
                 self.run(pass::MULTIPLY_CELLS, SOLVE, Per::Cell, parity);
                 self.run(pass::GATHER_PRODUCT, SOLVE, Per::Wide, parity);
-                2
+                asks::WIDE_PARTS
             }
         }
     }
@@ -250,7 +249,7 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.assemble(ALL);
     }
 
-    /// Derivative of the cells' force by the old state, times a vector (`back` 0), or its transpose (1).
+    /// Derivative of the cells' force by the old state, times a vector (`back` is ALONG), or its transpose.
     pub(crate) fn couple_cells(&mut self, back: u32, more: &Named) {
         self.run_with(pass::COUPLE_OLD, ALL, Per::Cell, back, more);
         self.laws(pass::COUPLE_LAWS, ALL, Per::Cell, back, more);
@@ -259,7 +258,7 @@ impl<'a, 'r> Solve<'a, 'r> {
     /// What effects on patches have to say of the old state, for `couple_old`.
     pub(crate) fn couple_patches(&mut self, question: u32, more: &Named) {
         if self.world.geometry.effects.on_patches() {
-            self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, NO_TOUCH);
+            self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, asks::NO_TOUCH);
             self.press_patches(ALL, question, None, more);
         }
     }

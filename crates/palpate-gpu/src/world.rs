@@ -9,6 +9,7 @@ use crate::layout::{Health, Newton, Shape};
 use crate::members::Batch;
 use crate::memory::Maker as _;
 use crate::observe::Observer;
+use crate::pipelines::shared::{roster, structs};
 use crate::recorder::{Groups, PassTime, Recorder};
 use crate::tuning::{self, Product, Tuning};
 use palpate_engine::ParamBatch;
@@ -63,7 +64,7 @@ const WORK: [Work; 21] = [
     ("cg_image", |s| s.nodes, VECTOR),
     ("inverses", |s| 2 * s.nodes, VECTOR),
     ("values", |s| 9 * s.blocks, 4),
-    ("tangents", |s| 30 * s.cells, VECTOR),
+    ("tangents", |s| structs::TANGENT_VECTORS * s.cells, VECTOR),
     ("cell_force", |s| 8 * s.cells, VECTOR),
     ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
     ("cell_support", |s| 8 * s.cells, VECTOR),
@@ -76,7 +77,7 @@ const WORK: [Work; 21] = [
 /// The same per column of a member that is solved for at the same time as others.
 const OF_COLUMN: [Work; 4] = [
     ("cg_scalars", |_| 4, VECTOR),
-    ("cg_parts", |s| 2 * s.nodes.div_ceil(32), 4),
+    ("cg_parts", |s| 2 * s.nodes.div_ceil(roster::NARROW), 4),
     ("newton", |_| 1, size_of::<Newton>() as u64),
     ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
@@ -86,15 +87,15 @@ pub(crate) const COLUMN_VECTORS: [&str; 4] = ["direction", "cg_rest", "cg_along"
 
 /// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
 fn modes(fields: u32) -> u32 {
-    match (fields >> 8) & 15 {
+    match (fields >> structs::SCALARS_AT) & structs::MOST_SCALARS {
         0 => 0,
         n => 1 + 8 * (n + 1) + 2 * n,
     }
 }
 
 /// Sections of the roster, and kinds of items, of `list_members`.
-pub(crate) const SECTIONS: usize = 4;
-pub(crate) const KINDS: usize = 8;
+pub(crate) const SECTIONS: usize = roster::SECTIONS as usize;
+pub(crate) const KINDS: usize = roster::KINDS as usize;
 
 /// Work buffers of a batch, with their bytes.
 pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {

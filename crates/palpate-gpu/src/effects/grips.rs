@@ -1,8 +1,9 @@
 //! What effects make of clamps, computed on the host: poses over time, matrices, and the derivatives of both.
 
-use super::{Effects, GRIPS};
+use super::Effects;
 use crate::error::GpuError;
 use crate::layout::{ClampPose, HoldSlope};
+use crate::pipelines::shared::structs::FIELD_GRIPS;
 use glam::{DMat3, DVec3};
 use palpate_model::changes;
 use palpate_model::effects::field::Spot;
@@ -53,7 +54,7 @@ pub(super) fn matrix_rows(plan: &Plan, rows: &[[usize; 2]]) -> Vec<usize> {
 impl Effects {
     /// True when some effect acts on clamps: then every member has its own clamp matrices.
     pub(crate) fn on_clamps(&self) -> bool {
-        self.bits & GRIPS != 0
+        self.bits & FIELD_GRIPS != 0
     }
 
     /// Place among the matrices' slopes of a parameter of the clamps, by its row.

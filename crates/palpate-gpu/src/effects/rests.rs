@@ -1,7 +1,8 @@
 //! The stress-free shape that effects give a body: displacement and derivatives per node, deformation per cell, as kernels read them
 //! (`shared/unstrained.wgsl`).
 
-use super::{Effects, REST};
+use super::Effects;
+use crate::pipelines::shared::structs::FIELD_REST;
 use glam::DVec3;
 use palpate_model::changes::{self, Changes};
 use palpate_model::corotation::CellPose;
@@ -19,7 +20,7 @@ fn put_nodes(out: &mut Vec<f32>, v: &[DVec3]) {
 impl Effects {
     /// Numbers of every buffer of [`Effects::rests`].
     pub(super) fn rest_sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 3] {
-        let of = |n: usize| if self.bits & REST == 0 { 0 } else { 4 * members * n };
+        let of = |n: usize| if self.bits & FIELD_REST == 0 { 0 } else { 4 * members * n };
         [("rests", of(nodes)), ("rest_slopes", of(self.rest_rows as usize * nodes)), ("rest_shapes", of(8 * cells))]
     }
 

@@ -1,4 +1,4 @@
-//! Structs of the observation: twins of `shaders/shared/{look,hexahedron}.wgsl` and `shaders/costs/markers.wgsl`.
+//! Structs of the observation: twins of `shaders/shared/{look,found,hexahedron}.wgsl` and `shaders/costs/markers.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -68,6 +68,34 @@ pub struct Look {
     pub value: [f32; 4],
     /// Their derivatives by time [1/s].
     pub rate: [f32; 4],
+}
+
+/// A point of a frame, as a look found it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Found {
+    /// Place in its cell.
+    pub xi: [f32; 3],
+    /// Deformed distance [m].
+    pub phi: f32,
+    /// World gradient of the deformed distance.
+    pub gradient: [f32; 3],
+    /// Band cell, or `NONE`.
+    pub cell: u32,
+}
+
+/// A marker at one look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Carried {
+    /// Columns of its rotation.
+    pub turn: [[f32; 4]; 3],
+    /// Columns of G⁻¹ of the polar decomposition.
+    pub pair: [[f32; 4]; 3],
+    /// dJ/d(position).
+    pub pull: [f32; 4],
+    /// w of the gradient by F = R \[w\]×.
+    pub spin: [f32; 4],
 }
 
 /// One frame: where its parts lie, and the lattice of cubes that its points are sorted by.

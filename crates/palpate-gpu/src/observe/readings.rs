@@ -5,14 +5,12 @@
 use super::shots::{Shots, split};
 use crate::error::GpuError;
 use crate::memory::Maker;
+use crate::pipelines::shared::directions::READING;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::effects::{Site, Unstated};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
-
-/// First code of directions that move readings (`differentiate_rows`).
-const READING: u32 = 1 << 31;
 
 /// Places in θ of numbers that shift the simulation against the frames.
 pub(super) fn shifts(plan: &Plan) -> Vec<usize> {
@@ -28,7 +26,7 @@ pub(super) fn offset_places(plan: &Plan) -> Vec<[u32; 2]> {
     (0..plan.observation.markers.len() as u32).flat_map(of).collect()
 }
 
-/// What directions change of the measurement, as `differentiate_rows` wants it.
+/// What directions change of the measurement, as `shared/directions.wgsl` says.
 pub(super) fn codes(plan: &Plan, directions: &[usize]) -> Vec<u32> {
     let (offsets, readings) = (offset_places(plan), places(plan));
     let code = |d: &usize| {

@@ -3,8 +3,9 @@
 use super::readings::shifts;
 use super::{FOUND, Observer, VECTOR, look};
 use crate::error::GpuError;
-use crate::layout::Health;
+use crate::layout::{Found, Health};
 use crate::memory::Maker as _;
+use crate::pipelines::shared::structs::NONE;
 use crate::world::{Buffers, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, Source};
@@ -76,12 +77,12 @@ pub(crate) fn residuals(
         let (points, markers) = (shot.point_count as usize, shot.marker_count as usize);
         let sizes = [("found", FOUND as usize * points), ("rows", 8 * (points + 3 * markers))];
         let all_found = gpu.download_all(&sizes.map(|(name, bytes)| (&o.buffers[name], bytes)))?;
-        let found: Vec<[f32; FOUND as usize / 4]> = bytemuck::pod_collect_to_vec(&all_found[0]);
+        let found: Vec<Found> = bytemuck::pod_collect_to_vec(&all_found[0]);
         let rows: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&all_found[1]);
         let mut out = FrameResiduals { frame, points: vec![None; points], markers: vec![DVec3::ZERO; markers] };
         let order = &o.shots.point_order[shot.point_start as usize..][..points];
         for (f, &p) in found.iter().zip(order) {
-            out.points[p as usize] = (f[7].to_bits() != u32::MAX).then(|| f64::from(f[3]));
+            out.points[p as usize] = (f.cell != NONE).then(|| f64::from(f.phi));
         }
         for (r, &m) in rows[points..].chunks_exact(3).zip(&o.shots.mark_order[shot.marker_start as usize..]) {
             out.markers[m as usize] = DVec3::new(r[0][0].into(), r[1][0].into(), r[2][0].into());
@@ -122,7 +123,7 @@ pub(crate) fn rows(
             (&o.buffers["rows"], 8 * f.residuals()),
             (&tally["slopes"], 4 * q * most),
         ])?;
-        let found: Vec<[f32; FOUND as usize / 4]> = bytemuck::pod_collect_to_vec(&all_found[0]);
+        let found: Vec<Found> = bytemuck::pod_collect_to_vec(&all_found[0]);
         let values: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&all_found[1]);
         let slopes: Vec<f32> = bytemuck::pod_collect_to_vec(&all_found[2]);
         let mut add = |row: ResidualRow, place: usize| {
@@ -135,19 +136,19 @@ pub(crate) fn rows(
             place_of[p as usize] = place;
         }
         for (p, (&place, seen)) in place_of.iter().zip(&f.points).enumerate() {
-            let [x, y, z, phi, gx, gy, gz, cell] = found[place];
+            let Found { xi, phi, gradient, cell } = found[place];
             let source = Source::Point { point: p as u32, camera: seen.camera };
             let (noise, value) = (obs.depth_noise, f64::from(phi));
             let (rest, by_place) = (seen.position, DVec3::ZERO);
             let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest, along_sight: 0.0, by_place };
-            let row = body.band.cells.get(cell.to_bits() as usize).map_or(bare, |cell| {
+            let row = body.band.cells.get(cell as usize).map_or(bare, |cell| {
                 let truth = o.sensors[member].truth(&obs.cameras[seen.camera as usize], seen);
                 let sight = DVec3::from_array(truth.ray()).normalize_or_zero();
-                let gradient = DVec3::new(gx.into(), gy.into(), gz.into());
+                let gradient = DVec3::from_array(gradient.map(f64::from));
                 ResidualRow {
                     value: Some(value),
                     weight: kernel::weight(value, world.plan.band),
-                    rest: body.grid.position(cell.lattice) + body.grid.h * DVec3::new(x.into(), y.into(), z.into()),
+                    rest: body.grid.position(cell.lattice) + body.grid.h * DVec3::from_array(xi.map(f64::from)),
                     along_sight: gradient.dot(sight),
                     by_place: gradient,
                     ..bare

@@ -2,6 +2,7 @@
 
 use crate::layout::{BandCell, Site};
 use crate::observe::shots::split;
+use crate::pipelines::shared::structs::NONE;
 use glam::{DMat3, DVec3};
 use palpate_model::observation::MarkerSite;
 use palpate_model::plan::Plan;
@@ -38,7 +39,7 @@ impl<T: Copy> Rows<T> {
 pub(crate) struct BandTables {
     pub(crate) cells: Vec<BandCell>,
     pub(crate) sdf: Vec<f32>,
-    /// Band cells by lattice place; `u32::MAX` = none.
+    /// Band cells by lattice place; `NONE` = none.
     pub(crate) lookup: Vec<u32>,
     /// Extension: rows are band nodes, columns simulation nodes.
     pub(crate) extend: Rows<f32>,
@@ -52,7 +53,7 @@ impl BandTables {
     pub(crate) fn new(plan: &Plan) -> BandTables {
         let (body, band) = (&*plan.body, &plan.body.band);
         let n = body.nodes.len();
-        let mut lookup = vec![u32::MAX; body.grid.len()];
+        let mut lookup = vec![NONE; body.grid.len()];
         let mut cells = Vec::with_capacity(band.cells.len());
         let mut corners = Vec::with_capacity(8 * band.cells.len());
         for (c, cell) in band.cells.iter().enumerate() {

@@ -6,9 +6,10 @@ use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
+use crate::pipelines::shared::structs;
 use crate::pipelines::{PASSES, PassSource, Pipelines, compile, pass};
 use crate::recorder::{Args, Recorder, Size};
-use crate::solve::{Per, SOLVE, Solve};
+use crate::solve::{ALL, MATRIX, Per, SOLVE, Solve, TRIAL};
 use crate::tuning::Tuning;
 use crate::world::{KINDS, SECTIONS, World};
 use crate::{GpuBackend, device::Gpu};
@@ -89,11 +90,11 @@ fn memory_that_runs_out_and_a_lost_device_are_errors_with_a_way_out() {
     assert!(GpuBackend::on(gpu).build(&plan, 1).is_err());
 }
 
-/// Members that `list_members` counts as wanting a trial, of so many.
-fn listed(gpu: &Gpu, members: usize) -> u32 {
+/// What `list_members` makes of as many members of this shape that all want a trial: the roster, and the sizes of dispatches.
+fn listed(gpu: &Gpu, shape: Shape) -> [Vec<u32>; 2] {
     let fail = |e: GpuError| -> wgpu::Buffer { panic!("{e}") };
-    let shape = Shape { members: members as u32, nodes: 1, cells: 1, blocks: 1, ..Shape::default() };
-    let newton = vec![Newton { stage: 3, ..Newton::default() }; members];
+    let members = shape.members as usize;
+    let newton = vec![Newton { stage: structs::WANTS_TRIAL, ..Newton::default() }; members];
     let size = 4 * (SECTIONS * (members + 1)) as u64;
     let buffers = [
         ("shape", gpu.upload("shape", &[shape]).unwrap_or_else(fail)),
@@ -108,8 +109,8 @@ fn listed(gpu: &Gpu, members: usize) -> u32 {
     let mut r = Recorder::new(gpu, &world, &mut groups, false);
     r.run(pass::LIST_MEMBERS, &[], Size::All { members: 1, groups: 1 }, Args { extra: 1, ..Args::default() });
     r.submit(&mut times);
-    let roster: Vec<u32> = gpu.download(&world["roster"], SECTIONS * (members + 1)).unwrap_or_else(|e| panic!("{e}"));
-    roster[3 * (members + 1)]
+    [("roster", SECTIONS * (members + 1)), ("arguments", 3 * SECTIONS * KINDS)]
+        .map(|(name, count)| gpu.download(&world[name], count).unwrap_or_else(|e| panic!("{e}")))
 }
 
 #[test]
@@ -117,7 +118,35 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
     let Some(gpu) = device(None) else { return };
     // One invocation goes through all members: the most that a build accepts.
     let most = LOOPS - 64;
-    assert_eq!(u64::from(listed(&gpu, most as usize)), most);
+    let shape = Shape { members: most as u32, nodes: 1, cells: 1, blocks: 1, ..Shape::default() };
+    let [roster, _] = listed(&gpu, shape);
+    assert_eq!(u64::from(roster[TRIAL as usize * (most as usize + 1)]), most);
+}
+
+#[test]
+fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through() {
+    let Some(gpu) = device(None) else { return };
+    let shape = Shape { members: 3, nodes: 1000, cells: 333, blocks: 9001, patches: 777, holds: 55, ..Shape::default() };
+    let [_, sizes] = listed(&gpu, shape);
+    // A pass of each kind, how many of its lanes share an item, and the items.
+    let kinds = [
+        (Per::Member, pass::JUDGE_TRIAL, PASSES[pass::JUDGE_TRIAL].width, 1),
+        (Per::Node, pass::PLACE_NEXT, 1, shape.nodes),
+        (Per::Cell, pass::PRESS_CELLS, 8, shape.cells),
+        (Per::Block, pass::GATHER_MATRIX, 1, shape.blocks),
+        (Per::Patch, pass::TOUCH_PATCHES, 1, shape.patches),
+        (Per::Hold, pass::HOLD_CELLS, 8, shape.holds),
+        (Per::Wide, pass::TURN_CG, 1, shape.nodes),
+        (Per::Row, pass::MULTIPLY_ROWS, 8, shape.nodes),
+    ];
+    assert_eq!(kinds.len(), KINDS);
+    for (per, pass, lanes, items) in kinds {
+        let groups = items.div_ceil(PASSES[pass].width / lanes);
+        for (section, members) in [(ALL, shape.members), (MATRIX, 0), (SOLVE, 0), (TRIAL, shape.members)] {
+            let found = &sizes[3 * (section as usize * KINDS + per as usize)..][..3];
+            assert_eq!(found, [groups * members, groups.min(1) * u32::from(members > 0), 1], "{per:?} {}", PASSES[pass].name);
+        }
+    }
 }
 
 #[test]

@@ -4,6 +4,8 @@
 use crate::geometry::{LOOPS, Most, columns};
 use crate::observe::MOST_LOOPS;
 use crate::pipelines::PASSES;
+use crate::pipelines::shared::laws;
+use crate::world::KINDS;
 use std::collections::HashMap;
 
 /// Sizes of the observation's loops, as `observe::check_loops` accepts them at most.
@@ -38,12 +40,12 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("shape.members") => most.members,
         () if has("i < count; i += 256u") => most.nodes.div_ceil(32 * 256),
         () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),
-        () if has("< KINDS") => 10,
+        () if has("< KINDS") => KINDS as u64,
         () if has("< INPUTS") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
         () if has("< CELL_INPUTS") => (palpate_model::effects::cell::ENERGY + palpate_model::effects::cell::MOST) as u64,
         () if has("< SCALARS") => palpate_model::effects::cell::ENERGY as u64,
         // Laws of cells that the host lets into a plan.
-        () if has("< MOST_LAWS") => 16,
+        () if has("< MOST_LAWS") => laws::MOST_LAWS.into(),
         () if has("< MOST;") => palpate_model::effects::law::MOST as u64,
         () if has("shape.chunk") => most.chunk,
         () if has("i < shape.nodes; i += 256u") => most.share(),

@@ -1,0 +1,23 @@
+//! Sections of the roster and of the sizes of dispatches, and what the items of a dispatch are. There is a section for each stage of
+//! a member's solve; that of IDLE lists all that are well.
+
+const SECTIONS = 4u;
+
+// Kinds of items: the member itself, nodes, cells, blocks, patches, clamp cells, nodes in wide workgroups, and nodes with eight lanes
+// each. The host's `Per` has the same numbers.
+const PER_MEMBER = 0u;
+const PER_NODE = 1u;
+const PER_CELL = 2u;
+const PER_BLOCK = 3u;
+const PER_PATCH = 4u;
+const PER_HOLD = 5u;
+const PER_WIDE = 6u;
+const PER_ROW = 7u;
+const KINDS = 8u;
+
+// Nodes of a workgroup of the last two kinds.
+const WIDE = 256u;
+const NARROW = 32u;
+
+// Most workgroups along one axis of a dispatch (the WebGPU limit; every device has at least this).
+const WIDEST = 65535u;
