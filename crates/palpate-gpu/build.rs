@@ -6,7 +6,8 @@
 //! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, and
 //! `effects/cells` for every law of cells.
 
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+mod validate;
+
 use naga::{AddressSpace, Expression, Literal, StorageAccess, TypeInner};
 use palpate_model::contact::DEFAULT_STIFFNESS;
 use palpate_model::effects::{self, Law, Site, cell, law};
@@ -14,6 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
+use validate::validate;
 
 const VARIANTS: [&str; 2] = ["subgroup", "memory"];
 
@@ -97,6 +99,8 @@ fn constants_of(shaders: &Path, file: &str) -> Vec<String> {
 /// A pass with everything it uses.
 struct Linked {
     text: String,
+    /// It is the variant that needs subgroups.
+    subgroups: bool,
     /// Constants of the shared files in it that Rust uses as well.
     shared: Vec<(String, String)>,
 }
@@ -119,7 +123,7 @@ fn link(shaders: &Path, name: &str, variant: &str) -> Linked {
             }
         })
         .collect();
-    Linked { text: lines.join("\n"), shared }
+    Linked { text: lines.join("\n"), subgroups: variant == VARIANTS[0], shared }
 }
 
 fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
@@ -216,16 +220,8 @@ type Structs = BTreeMap<String, (u32, Vec<(String, u32)>)>;
 
 impl Facts {
     fn of(pass: &str, linked: &Linked, structs: &mut Structs, numbers: &mut Numbers) -> Facts {
-        let module = naga::front::wgsl::parse_str(&linked.text)
-            .unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {}", e.emit_to_string(&linked.text)));
-        let capabilities = Capabilities::SUBGROUP | Capabilities::IMMEDIATES;
-        let mut validator = Validator::new(ValidationFlags::all(), capabilities);
-        validator
-            .subgroup_stages(naga::valid::ShaderStages::COMPUTE)
-            .subgroup_operations(naga::valid::SubgroupOperationSet::all());
-        let info = validator
-            .validate(&module)
-            .unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {}", e.emit_to_string(&linked.text)));
+        let (module, info) =
+            validate(&linked.text, linked.subgroups).unwrap_or_else(|e| panic!("shaders/passes/{pass}.wgsl: {e}"));
         assert!(module.entry_points.len() == 1, "{pass} has one entry point");
         let entry = &module.entry_points[0];
         assert!(entry.name == pass, "the entry point of {pass}.wgsl is called {pass}, not {}", entry.name);

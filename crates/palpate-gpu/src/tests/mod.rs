@@ -18,3 +18,4 @@ mod passes;
 mod products;
 pub(crate) mod scenes;
 mod sizes;
+mod wgsl;
