@@ -1,6 +1,6 @@
 //! Many recordings in one command: one that fails harms no other, and what is done is not done again.
 
-use super::{BLOCK, observed};
+use super::{BLOCK, fitting::high, observed};
 use palpate::{Interrupt, cli::INTERRUPTED};
 use std::fs;
 use support::command::{Answer, arg, json, palpate, stopped};
@@ -69,6 +69,26 @@ fn one_bad_scene_harms_no_other_and_finished_ones_are_taken_over() {
     assert_eq!(run(&["--resume"]).code, 0);
     assert_ne!(written("a"), before[0]);
     assert_eq!(written("c"), before[1]);
+}
+
+#[test]
+fn a_scene_that_is_taken_over_keeps_its_warning() {
+    let folder = observed(BLOCK);
+    let (scene, out) = (folder.path().join("high.toml"), folder.path().join("out"));
+    let text = fs::read_to_string(folder.path().join("fit.toml")).unwrap().replace("starts = 3", "starts = 1");
+    fs::write(&scene, high(&text)).unwrap();
+    let message = |more: &[&str]| {
+        let a = palpate(&[&["batch", arg(&scene), "--out", arg(&out)], more].concat());
+        assert_eq!(a.code, 0, "{}", a.err);
+        json(out.join("summary.json"))["scenes"][0]["message"].as_str().unwrap().to_string()
+    };
+    let warning = message(&[]);
+    assert!(!warning.is_empty());
+    // However often.
+    for _ in 0..2 {
+        assert_eq!(message(&["--resume"]), format!("taken over: {warning}"));
+        assert!(fs::read_to_string(out.join("summary.csv")).unwrap().contains(&format!("taken over: {warning}")));
+    }
 }
 
 #[test]

@@ -111,16 +111,18 @@ fn a_bound_that_keeps_the_best_value_out_leaves_no_standard_error() {
     assert_eq!(json(out.join("result.json"))["parameters"][0]["at_bound"], "upper");
 }
 
+/// The scene of a block, held some centimetres above the recorded one: its top alone is in the images, if anything.
+pub(super) fn high(text: &str) -> String {
+    let pose = "[object]\npose = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.07], [0, 0, 0, 1]]";
+    let text = text.replace("[object]", pose).replace("min = [-0.01, -0.01, -0.01]", "min = [-0.01, -0.01, 0.06]");
+    text.replace("max = [0.05, 0.05, 0.001]", "max = [0.05, 0.05, 0.071]").replace("cost =", "band = 0.5\ncost =")
+}
+
 #[test]
 fn a_fit_to_points_that_mostly_meet_nothing_says_so() {
     let folder = observed(BLOCK);
     let file = |name: &str| folder.path().join(name);
-    // Held ten centimetres above the recorded block: its top alone is in the images, if anything.
-    let text = fs::read_to_string(file("fit.toml")).unwrap();
-    let pose = "[object]\npose = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.07], [0, 0, 0, 1]]";
-    let text = text.replace("[object]", pose).replace("min = [-0.01, -0.01, -0.01]", "min = [-0.01, -0.01, 0.06]");
-    let text = text.replace("max = [0.05, 0.05, 0.001]", "max = [0.05, 0.05, 0.071]").replace("cost =", "band = 0.5\ncost =");
-    fs::write(file("high.toml"), text).unwrap();
+    fs::write(file("high.toml"), high(&fs::read_to_string(file("fit.toml")).unwrap())).unwrap();
     let (scene, out) = (file("high.toml"), file("found"));
     let a = succeed(&["fit", arg(&scene), "--starts", "1", "--out", arg(&out)]);
     assert!(

@@ -95,8 +95,14 @@ fn list(names: &[String]) -> String {
 
 impl GpuError {
     /// What a user can do.
-    pub fn hint(&self) -> &'static str {
-        match self {
+    pub fn hint(&self) -> String {
+        let hint = match self {
+            GpuError::NoAdapter { found, .. } if !found.is_empty() => {
+                return format!(
+                    "set PALPATE_ADAPTER to part of a name found ({}), unset it, or use --backend cpu",
+                    found.join(", ")
+                );
+            }
             GpuError::NoAdapter { .. } => "install a Vulkan driver (Debian: mesa-vulkan-drivers), or use --backend cpu",
             GpuError::Unsupported { .. }
             | GpuError::TooSmall { .. }
@@ -109,12 +115,13 @@ impl GpuError {
             }
             // Drivers also drop a device whose memory is full.
             GpuError::Lost { .. } => "run again, with a smaller batch (--batch N) or --backend cpu; results so far are kept",
-        }
+        };
+        hint.into()
     }
 }
 
 impl From<GpuError> for BuildError {
     fn from(e: GpuError) -> BuildError {
-        BuildError { message: e.to_string(), hint: e.hint().into() }
+        BuildError { message: e.to_string(), hint: e.hint() }
     }
 }

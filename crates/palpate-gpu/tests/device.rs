@@ -5,8 +5,14 @@ use palpate_gpu::{Choice, Gpu, GpuError, Lanes, adapters};
 #[test]
 fn a_wrong_name_lists_what_there_is() {
     let error = Gpu::open(&Choice::Named("no such adapter".into())).unwrap_err();
-    assert!(matches!(&error, GpuError::NoAdapter { wanted: Some(w), .. } if w == "no such adapter"), "{error}");
-    assert!(error.hint().contains("--backend cpu"));
+    let GpuError::NoAdapter { wanted, found } = &error else { panic!("{error}") };
+    assert_eq!(wanted.as_deref(), Some("no such adapter"));
+    // A driver is missing where there is no adapter at all; elsewhere the names are what helps.
+    let hint = error.hint();
+    assert!(hint.contains("--backend cpu") && found.iter().all(|name| hint.contains(name)), "{hint}");
+    assert_eq!(hint.contains("install a Vulkan driver"), found.is_empty(), "{hint}");
+    let none = GpuError::NoAdapter { wanted: None, found: Vec::new() };
+    assert!(none.hint().contains("install a Vulkan driver"), "{}", none.hint());
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub struct Arguments {
 /// File in a scene's folder that says what its journal belongs to.
 const MARK: &str = "fit.fingerprint";
 
-/// What is said of a scene that an earlier run finished.
+/// What is said of a scene that an earlier run finished, before its warning if there was one.
 const TAKEN_OVER: &str = "taken over";
 
 /// What became of a scene.
@@ -133,13 +133,20 @@ fn earlier(out: &Path) -> Vec<Value> {
     summary["scenes"].as_array().cloned().unwrap_or_default()
 }
 
-/// A finished scene of an earlier run with the same fingerprint.
-fn finished(earlier: &[Value], out: &Path, name: &str, fingerprint: &str) -> Option<Value> {
+/// A finished scene of an earlier run with the same fingerprint: what is said of it, with the warning that it ended with, and its result.
+fn finished(earlier: &[Value], out: &Path, name: &str, fingerprint: &str) -> Option<(String, Value)> {
     let row = earlier.iter().find(|r| r["name"] == name && r["fingerprint"] == fingerprint)?;
     if row["status"] != Status::Complete.name() {
         return None;
     }
-    serde_json::from_str(&std::fs::read_to_string(out.join(name).join("result.json")).ok()?).ok()
+    let result = serde_json::from_str(&std::fs::read_to_string(out.join(name).join("result.json")).ok()?).ok()?;
+    let said = row["message"].as_str().unwrap_or_default();
+    let message = match said {
+        "" => TAKEN_OVER.into(),
+        again if again.starts_with(TAKEN_OVER) => again.into(),
+        warning => format!("{TAKEN_OVER}: {warning}"),
+    };
+    Some((message, result))
 }
 
 /// Fits one scene; whatever goes wrong ends up in the row.
@@ -157,13 +164,13 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
     let folder = a.out.join(name);
     let mut log = Vec::new();
     // A panic is a bug, but not a reason to lose the other scenes.
-    let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<Value>, Error> {
+    let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<(String, Value)>, Error> {
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
             format!("{} {:016x}", fingerprint(experiment.plan()), fnv1a(FNV_START, (asked + experiment.text()).as_bytes()));
-        if let Some(result) = finished(earlier, &a.out, name, &row.fingerprint) {
-            return Ok(Some(result));
+        if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint) {
+            return Ok(Some(done));
         }
         let (backend, note) = choose(&a.choices, &experiment)?;
         let mut track = console.progress(rounds(&a.choices, &experiment), label);
@@ -192,9 +199,9 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
     }));
     match done {
         Ok(Ok(None)) => {}
-        Ok(Ok(Some(result))) => {
+        Ok(Ok(Some((message, result)))) => {
             row.seconds = result["seconds"].as_f64().unwrap_or(0.0);
-            (row.status, row.message, row.result) = (Status::Complete, TAKEN_OVER.into(), result);
+            (row.status, row.message, row.result) = (Status::Complete, message, result);
             return row;
         }
         Ok(Err(e)) => {
@@ -290,7 +297,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let label = format!("{}/{} {name}", i + 1, scenes.len());
         let row = one(a, &earlier, scene, name, &label, console);
         console.note(&match row.status {
-            Status::Complete if row.message == TAKEN_OVER => format!("{label}: {TAKEN_OVER}"),
+            Status::Complete if row.message.starts_with(TAKEN_OVER) => format!("{label}: {TAKEN_OVER}"),
             Status::Complete => format!("{label}: complete in {:.1} s", row.seconds),
             other => format!("{label}: {} in {:.1} s: {}", other.name(), row.seconds, row.message),
         });
