@@ -1,7 +1,6 @@
 //! Decides, for each member with a fresh matrix, whether its Newton solve is done, and prepares conjugate gradients otherwise.
 //! The residual is measured with the inverse diagonal blocks, against the sizes of the forces that it is the sum of.
 // use shared/mix
-// use shared/inertia
 // use shared/totals
 // use shared/precondition
 // use shared/iteration
@@ -24,19 +23,12 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     let m = members[p.member];
-    let mix = mix_of(m);
     var forces = vec4(0.0);
     var state = vec4(0.0);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
         let r = residual[a].xyz;
-        var mass = node_mass(m, p.member, i);
-        for (var s = 0u; s < shape.masses; s++) {
-            let corner = mass_corner(s, i);
-            if corner < 8u {
-                mass += mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner];
-            }
-        }
+        let mass = sizes[part(1u) + a].w;
         let weight = mass * m.gravity.xyz;
         var momentum = vec3(0.0);
         if call.mode != 0u {

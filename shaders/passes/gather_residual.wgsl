@@ -16,7 +16,8 @@ var<storage, read> block_rows: array<u32>;
 var<storage, read> columns: array<u32>;
 var<storage, read> ghosts: array<f32>;
 var<storage, read_write> residual: array<vec4<f32>>;
-// [2][B][N]: elastic and support forces by themselves, for the size that a residual is compared with.
+// [2][B][N]: elastic and support forces by themselves, for the size that a residual is compared with; in their fourth components the shares
+// of the potential, and the node's mass with that of the points that it carries.
 var<storage, read_write> sizes: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -48,6 +49,7 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     } else {
         body = -mass * vec4(m.gravity.xyz, dot(m.gravity.xyz, w));
     }
+    var carried = mass;
     for (var s = 0u; s < shape.masses; s++) {
         let corner = mass_corner(s, p.item);
         if corner < 8u {
@@ -62,6 +64,7 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
                 twice = 1.0;
             }
             let f = mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner];
+            carried += f;
             body += f * vec4(pull, 0.5 * twice * dot(pull, w));
         }
     }
@@ -81,5 +84,5 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     }
     residual[a] = elastic + support + body;
     sizes[a] = vec4(elastic.xyz, abs(elastic.w) + abs(support.w) + abs(body.w));
-    sizes[part(1u) + a] = support;
+    sizes[part(1u) + a] = vec4(support.xyz, carried);
 }

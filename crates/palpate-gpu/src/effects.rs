@@ -155,6 +155,11 @@ impl Effects {
         self.bits & FIELD_PATCHES != 0
     }
 
+    /// True when some effect acts on contact.
+    pub(crate) fn on_contact(&self) -> bool {
+        self.points.iter().any(|p| p.1.site == AT_CONTACT)
+    }
+
     /// True when some effect acts on nodes.
     pub(crate) fn on_nodes(&self) -> bool {
         self.points.iter().any(|p| p.1.site == AT_NODES)

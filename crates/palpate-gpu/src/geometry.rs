@@ -44,6 +44,8 @@ pub(crate) struct Most {
     /// Patches and clamp cells of a cell.
     pub(crate) supports: u64,
     pub(crate) planes: u64,
+    /// Planes at which effects on contact are asked.
+    pub(crate) pressed: u64,
     pub(crate) masses: u64,
     /// Iterations of conjugate gradients in one dispatch.
     pub(crate) chunk: u64,
@@ -63,13 +65,16 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 5] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 7] {
         // 600: rotations by Jacobi's method, and sums over the corners of a cell.
         let cell = 600 + self.supports;
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
-            ("begin_solve", self.share() * (4 + 9 * self.masses) + 300),
+            ("begin_solve", 4 * self.share() + 300),
+            ("step_back", 2 * self.row + 20),
+            // An effect is asked up to six times for derivatives by all its inputs.
+            ("press_patches", 330 * self.pressed.max(1) + 100),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]
@@ -182,6 +187,7 @@ impl Geometry {
                 .unwrap_or(0)
                 .into(),
             planes: plan.planes.len() as u64,
+            pressed: if effects.on_contact() { plan.planes.len() as u64 } else { 0 },
             masses: masses.len() as u64,
             chunk: 1,
             many,

@@ -4,6 +4,7 @@
 //! tangents as `[2][B][N]`; results are added to buffers of the tally. Frames of a step are worked on in rounds ([`looks`]); matches
 //! are found again on the way back, which costs less memory than keeping them for every frame and member.
 
+mod bounds;
 #[cfg(test)]
 mod extension_tests;
 #[cfg(test)]
@@ -30,6 +31,7 @@ use crate::pipelines::pass;
 use crate::pipelines::shared::{directions::DIRECTION, reduce};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
+pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
@@ -43,7 +45,7 @@ use tables::{BandTables, SiteTables};
 /// not counted.
 pub(crate) const MOST_LOOPS: u64 = 62_000;
 /// Points that one group of eight lanes goes through at most for a cell; more are dealt out to more groups.
-const POINTS_OF_STRIPE: usize = 12_500;
+pub(crate) const POINTS_OF_STRIPE: usize = 12_500;
 /// Device memory for scratch [B]; fewer looks are worked on together when they need more.
 const SCRATCH: u64 = 256 << 20;
 /// Most workgroups that share a sum.
@@ -319,7 +321,7 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         displacement: per(obs.displacement_noise),
         ..Sight::default()
     };
-    check_loops(&sight, &shots, &band, &sites)?;
+    Seen::new(&sight, &shots, &band, &sites).check()?;
     let largest = gpu.largest();
     let each = scratch(&sight);
     let widest = each.iter().map(|s| s.1).max().unwrap_or(1).max(1);
@@ -378,43 +380,6 @@ fn scratch(s: &Sight) -> [(&'static str, u64); 9] {
         ("partials", VECTOR * PARTS as u64),
         ("corner_pulls", VECTOR * corners),
         ("pulls", VECTOR * extended),
-    ]
-}
-
-/// Refuses sizes at which an invocation of some kernel could loop longer than every adapter allows.
-fn check_loops(sight: &Sight, shots: &Shots, band: &BandTables, sites: &SiteTables) -> Result<(), GpuError> {
-    match longest_loops(sight, shots, band, sites).into_iter().find(|l| l.1 > MOST_LOOPS) {
-        None => Ok(()),
-        Some((what, needed)) => {
-            let limit = "loop iterations of one invocation";
-            Err(GpuError::Limit { limit, available: MOST_LOOPS, needed, what: format!("the kernel `{what}`") })
-        }
-    }
-}
-
-/// Upper bounds of the loop iterations of one invocation, for the kernels that have long loops.
-fn longest_loops(s: &Sight, shots: &Shots, band: &BandTables, sites: &SiteTables) -> [(&'static str, u64); 7] {
-    let across = |s: &crate::layout::Shot| (u64::from(s.cubes[1]), u64::from(s.cubes[2]));
-    let (y, z) = shots.shots.iter().map(across).fold((0, 0), |m, c| (m.0.max(c.0), m.1.max(c.1)));
-    let (rows, stripes, points) = (y * z, u64::from(s.stripes), u64::from(s.points));
-    // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and up to twelve of Newton's.
-    let matching = z + rows + (rows + points.div_ceil(8 * stripes)) * 13;
-    let pulling = z + rows + rows + points.div_ceil(stripes);
-    let marks = u64::from(s.markers);
-    let site = sites.nodes.longest() as u64;
-    [
-        ("match_points", matching),
-        ("pull_points", pulling),
-        ("extend_band", band.extend.longest() as u64),
-        ("gather_pulls", band.corners.longest() as u64 * (1 + stripes)),
-        // A node meets every marker of the frame at most once per entry of its sites.
-        ("fold_pulls", {
-            let nodes = u64::from(s.nodes).div_ceil(64 * (u64::from(s.nodes).div_ceil(64)).clamp(1, PARTS as u64));
-            nodes * (1 + band.fold.longest() as u64 + sites.of_node.longest() as u64 + marks)
-        }),
-        // 300: rotations of Jacobi's method.
-        ("carry_markers", site + 300),
-        ("weigh_rows", u64::from(s.rows).div_ceil(64) + 500),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! Observation kernels against the CPU's passes, on given motions: several cameras, empty frames, frames between steps, before the
 //! start and after the end, markers on stalks, points outside the band, observed nodes.
 
-use super::{MOST_LOOPS, Observer, Room, residuals};
+use super::{MOST_LOOPS, Observer, Room, Seen, residuals};
 use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use crate::world::{State, World};
@@ -443,8 +443,8 @@ fn loops_stay_bounded_and_strays_do_not_stretch_the_cubes() {
         ..Default::default()
     };
     // A million points in the stripes that they get, the largest lattice of cubes, a million nodes.
-    let longest = super::longest_loops(&sight(1_000_000, 50), &crowd, &band, &sites);
+    let longest = Seen::new(&sight(1_000_000, 50), &crowd, &band, &sites).loops();
     assert!(longest.iter().all(|l| l.1 <= MOST_LOOPS), "{longest:?}");
     // In one stripe they would be too many, and are refused.
-    assert!(super::check_loops(&sight(1_000_000, 1), &crowd, &band, &sites).is_err());
+    assert!(Seen::new(&sight(1_000_000, 1), &crowd, &band, &sites).check().is_err());
 }

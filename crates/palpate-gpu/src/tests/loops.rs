@@ -2,30 +2,30 @@
 //! that a build accepts. A loop whose header is not known here fails the test.
 
 use crate::geometry::{LOOPS, Most, columns};
-use crate::observe::MOST_LOOPS;
+use crate::observe::{MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::pipelines::PASSES;
 use crate::pipelines::shared::laws;
 use crate::world::KINDS;
 use std::collections::HashMap;
 
-/// Sizes of the observation's loops, as `observe::check_loops` accepts them at most.
-struct Seen {
-    rows_of_cubes: u64,
-    layers: u64,
-    points: u64,
-    stripes: u64,
-    extension: u64,
-    rows: u64,
-}
-
 /// Iterations of a loop by its header (variable names and indices left out), or `None` for a loop that nobody knows.
-fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
+fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
     let condition = header.split(';').nth(1).unwrap_or(header).trim();
     if let Some(number) = condition.split("< ").nth(1).and_then(|n| n.trim_end_matches(['u', ')', ' ']).parse().ok()) {
         return Some(number);
     }
     let has = |part: &str| header.contains(part);
-    Some(match () {
+    // What all rows of cubes hold together, or all sites of a node, by its mean: the loops around these sum to the whole.
+    let mean = |whole: u64, parts: u64| Some(whole as f64 / parts as f64);
+    match () {
+        () if has("c.low.y") => return mean(seen.rows_of_cubes, seen.layers),
+        () if has("row.x + 8u * stripe") => return mean(seen.points, 8 * seen.stripes * seen.rows_of_cubes).map(|n| n + 1.0),
+        () if has("row.x + stripe") => return mean(seen.points, seen.stripes * seen.rows_of_cubes).map(|n| n + 1.0),
+        // A marker belongs to one site.
+        () if has("mark_rows[") && !has("m += 64u") => return mean(seen.markers, seen.sites),
+        () => {}
+    }
+    let count = match () {
         () if has("> 0u; s /= 2u") || has("> 0u; step >>= 1u") => 8,
         () if has("block_rows[") => most.row,
         () if has("node_rows[") && !has("band_") => 8,
@@ -33,6 +33,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         // The new and the old state.
         () if has("instant < end") => 2,
         () if has("hold_start") || has("patch_start") => most.supports,
+        () if has("max(shape.planes, 1u)") => most.pressed.max(1),
         () if has("shape.planes") => most.planes,
         () if has("shape.masses") => most.masses,
         () if has("call.extra * shape.members") => columns(most.members) * most.members,
@@ -50,22 +51,23 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<u64> {
         () if has("shape.chunk") => most.chunk,
         () if has("i < shape.nodes; i += 256u") => most.share(),
         () if has("c.low.z") => seen.layers,
-        () if has("c.low.y") => seen.rows_of_cubes.div_ceil(seen.layers),
-        () if has("row.x + 8u * stripe") => 1 + seen.points.div_ceil(8 * seen.stripes * seen.rows_of_cubes),
-        () if has("row.x + stripe") => 1 + seen.points.div_ceil(seen.stripes * seen.rows_of_cubes),
         () if has("sight.stripes") => seen.stripes,
-        () if has("band_node_rows[") => 8,
-        () if has("band_rows[") || has("fold_rows[") => seen.extension,
-        () if has("site_rows[") || has("mark_rows[") => 30,
+        () if has("band_node_rows[") => seen.corners,
+        () if has("band_rows[") => seen.extension,
+        () if has("fold_rows[") => seen.fold,
+        () if has("node_site_rows[") => seen.sites,
+        () if has("site_rows[") => seen.site,
+        () if has("mark_rows[") => seen.markers.div_ceil(64),
         // Sums that up to 256 workgroups of 64 share.
         () if has("rows_of(shot); i += 64u * call.roster") => seen.rows.div_ceil(64 * 256),
-        () if has("sight.nodes; node += 64u * call.roster") => most.nodes.div_ceil(64 * 256),
+        () if has("sight.nodes; node += 64u * call.roster") => seen.share(),
         () if has("i < call.mode; i += 64u") => 4,
         () if has("shot.point_count; i += 64u") => seen.points.div_ceil(64),
         () if has("rows_of(shots[s.look.shot])") => seen.rows.div_ceil(64),
         () if has("while left > a") => 256,
         () => return None,
-    })
+    };
+    Some(count as f64)
 }
 
 /// Loops and calls of one function, each with the product of the loops around it.
@@ -119,47 +121,115 @@ fn functions(text: &str) -> HashMap<String, Function> {
     all
 }
 
-fn iterations(all: &HashMap<String, Function>, name: &str, of: &dyn Fn(&str) -> u64) -> u64 {
-    let Some(f) = all.get(name) else { return 0 };
-    let times = |nest: &[String]| nest.iter().map(|h| of(h)).product::<u64>();
-    let own: u64 = f.loops.iter().map(|nest| times(nest)).sum();
-    own + f.calls.iter().filter(|c| c.1 != name).map(|(nest, callee)| times(nest) * iterations(all, callee, of)).sum::<u64>()
+fn iterations(all: &HashMap<String, Function>, name: &str, of: &dyn Fn(&str) -> f64) -> f64 {
+    let Some(f) = all.get(name) else { return 0.0 };
+    let times = |nest: &[String]| nest.iter().map(|h| of(h)).product::<f64>();
+    let own: f64 = f.loops.iter().map(|nest| times(nest)).sum();
+    own + f.calls.iter().filter(|c| c.1 != name).map(|(nest, callee)| times(nest) * iterations(all, callee, of)).sum::<f64>()
 }
+
+/// The largest value of one size that a build accepts, the others being what `set` makes of `with`.
+fn largest<T: Copy>(with: T, set: impl Fn(&mut T, u64), fits: impl Fn(&T) -> bool) -> T {
+    let at = |value: u64| {
+        let mut own = with;
+        set(&mut own, value);
+        own
+    };
+    // Fits at the low end, not at the high one.
+    let (mut low, mut high) = (1u64, 1u64 << 32);
+    assert!(fits(&at(low)) && !fits(&at(high)));
+    while high - low > 1 {
+        let middle = u64::midpoint(low, high);
+        if fits(&at(middle)) { low = middle } else { high = middle }
+    }
+    at(low)
+}
+
+fn built(most: &Most) -> bool {
+    most.loops().iter().all(|l| l.1 <= LOOPS)
+}
+
+fn observed(seen: &Seen) -> bool {
+    seen.loops().iter().all(|l| l.1 <= MOST_LOOPS)
+}
+
+/// A large body with everything: 40 patches and clamp cells on a cell, ten planes, ten point masses.
+const BODY: Most =
+    Most { members: LOOPS - 16, nodes: 1000, row: 60, supports: 40, planes: 10, pressed: 10, masses: 10, chunk: 1, many: false };
+
+/// 40 × 40 rows of cubes, a million points in stripes of 12,500, some markers.
+const RECORDING: Seen = Seen {
+    nodes: 1_000_000,
+    layers: 40,
+    rows_of_cubes: 1600,
+    points: 1_000_000,
+    stripes: 80,
+    extension: 64,
+    fold: 64,
+    corners: 8,
+    rows: 1_000_000,
+    markers: 100,
+    site: 30,
+    sites: 30,
+};
 
 #[test]
 fn no_invocation_can_loop_longer_than_every_adapter_allows() {
-    // A large body with everything: 40 patches and clamp cells on a cell, ten planes, ten point masses; members, nodes and the
-    // length of a CG dispatch as large as a build accepts.
-    let base = Most { members: LOOPS - 16, nodes: 1000, row: 60, supports: 40, planes: 10, masses: 10, chunk: 1, many: false };
-    let fits = |m: &Most| m.loops().iter().all(|l| l.1 <= LOOPS);
-    let with = |nodes: u64, masses: u64| Most { nodes, masses, ..base };
-    let largest = |masses: u64| (1..20_000).map(|k| with(256 * k, masses)).take_while(fits).last().unwrap_or(base);
-    for most in [largest(10), largest(0)] {
-        assert!(most.nodes > 30_000 && !fits(&with(most.nodes + 256, most.masses)), "{most:?}");
-        let big = Most { nodes: 1_000_000, masses: 0, many: true, ..most };
-        assert!(fits(&big));
-        for most in [most, big, Most { nodes: 512, chunk: LOOPS / 600, masses: 0, ..most }] {
-            check(&most);
-        }
+    // One size after another as large as a build accepts.
+    let many = Most { many: true, ..BODY };
+    let bodies = [
+        largest(BODY, |m, n| m.nodes = n, built),
+        largest(Most { masses: 0, ..BODY }, |m, n| m.nodes = n, built),
+        largest(many, |m, n| m.nodes = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.supports = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.masses = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.planes = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| (m.planes, m.pressed) = (n, n), built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.row = n, built),
+        largest(Most { nodes: 512, masses: 0, ..BODY }, |m, n| m.chunk = n, built),
+    ];
+    assert!(bodies[0].nodes > 30_000 && bodies[2].nodes > 1_000_000 && bodies[3].supports > 1000, "{bodies:?}");
+    let recordings = [
+        largest(RECORDING, |s, n| (s.points, s.rows, s.stripes) = (n, n, n.div_ceil(POINTS_OF_STRIPE as u64)), observed),
+        largest(RECORDING, |s, n| s.rows = n, observed),
+        largest(RECORDING, |s, n| s.nodes = n, observed),
+        largest(RECORDING, |s, n| s.rows_of_cubes = n, observed),
+        largest(RECORDING, |s, n| (s.layers, s.rows_of_cubes) = (n, n), observed),
+        largest(RECORDING, |s, n| s.extension = n, observed),
+        largest(RECORDING, |s, n| s.fold = n, observed),
+        largest(RECORDING, |s, n| s.corners = n, observed),
+        largest(Seen { nodes: 1000, ..RECORDING }, |s, n| s.markers = n, observed),
+        largest(RECORDING, |s, n| s.site = n, observed),
+        largest(RECORDING, |s, n| s.sites = n, observed),
+    ];
+    assert!(recordings[0].points > 3_900_000, "{:?}", recordings[0]);
+    for most in bodies {
+        check(&most, &RECORDING);
+    }
+    for seen in recordings {
+        check(&Most { nodes: 1_000_000, ..many }, &seen);
     }
 }
 
-fn check(most: &Most) {
-    // 40 × 40 rows of cubes, a million points in stripes of 12,500.
-    let seen = Seen { rows_of_cubes: 1600, layers: 40, points: 1_000_000, stripes: 80, extension: 64, rows: 1_000_000 };
+fn check(most: &Most, seen: &Seen) {
     for pass in &PASSES {
         for source in pass.sources {
             let all = functions(source);
             let of = |header: &str| {
-                bound(header, most, &seen).unwrap_or_else(|| panic!("{}: how long is the loop `{header}`?", pass.name))
+                bound(header, most, seen).unwrap_or_else(|| panic!("{}: how long is the loop `{header}`?", pass.name))
             };
             if most.many && pass.name == "iterate_cg" {
                 continue;
             }
             let longest = iterations(&all, pass.name, &of);
-            assert!(longest <= MOST_LOOPS, "{}: {longest} iterations at {most:?}", pass.name);
-            if let Some((_, said)) = most.loops().iter().find(|l| l.0 == pass.name) {
-                assert!(longest <= *said, "{}: the host says {said}, the shader {longest} at {most:?}", pass.name);
+            assert!(longest <= MOST_LOOPS as f64, "{}: {longest} iterations at {most:?}, {seen:?}", pass.name);
+            if let Some((_, said)) = most.loops().iter().chain(&seen.loops()).find(|l| l.0 == pass.name) {
+                // Host and shader round differently.
+                assert!(
+                    longest <= *said as f64 + 1.0,
+                    "{}: the host says {said}, the shader {longest} at {most:?}, {seen:?}",
+                    pass.name
+                );
             }
         }
     }
@@ -171,10 +241,10 @@ fn a_nested_loop_is_counted_as_often_as_it_runs() {
     let number = |h: &str| {
         bound(
             h,
-            &Most { members: 0, nodes: 0, row: 0, supports: 0, planes: 0, masses: 0, chunk: 0, many: false },
-            &Seen { rows_of_cubes: 1, layers: 1, points: 0, stripes: 1, extension: 0, rows: 0 },
+            &Most { members: 0, nodes: 0, row: 0, supports: 0, planes: 0, pressed: 0, masses: 0, chunk: 0, many: false },
+            &RECORDING,
         )
-        .unwrap_or(0)
+        .unwrap_or(0.0)
     };
-    assert_eq!(iterations(&functions(text), "outer", &number), 5 + 5 * 7 + 5 * 3);
+    assert_eq!(iterations(&functions(text), "outer", &number), f64::from(5 + 5 * 7 + 5 * 3));
 }
