@@ -1,16 +1,15 @@
-//! Where single precision is strained: a body far from where it started, a stiff one, one that hardly changes its volume.
+//! Where single precision is strained: a body far from where it started, a stiff one, one that hardly changes its volume. Each
+//! comparison must see one percent of whatever acts.
 
-use super::forward::difference;
+use super::faults::{FLIGHT, Fault, busy, but, check_states};
 use super::scenes::{ball, device, plan};
 use glam::DVec3;
 use palpate_model::scene::Scene;
 
-/// Largest differences from the CPU, and what they may be: displacements [m], velocities [m/s].
-fn check(scene: &Scene, allowed: [f64; 2]) {
+/// Differences from the CPU: displacements [m], velocities [m/s].
+fn check(scene: &Scene, allowed: [f64; 2], faults: &[Fault]) {
     let Some(gpu) = device(None) else { return };
-    let d = difference(&gpu, scene, &[plan(scene).theta]);
-    println!("worst: {:.1e} m {:.1e} m/s", d[0], d[1]);
-    assert!(d[0] < allowed[0] && d[1] < allowed[1], "{:.1e} m {:.1e} m/s", d[0], d[1]);
+    check_states(&gpu, scene, &[plan(scene).theta], allowed, faults);
 }
 
 #[test]
@@ -22,7 +21,8 @@ fn twenty_metres_away_down_or_along_the_ground() {
     (fall.time.step, fall.time.steps) = (0.02, 103);
     fall.material.mass_damping = 0.0;
     fall.planes[0].point.z = -100.0;
-    check(&fall, [2e-4, 3e-4]);
+    // In free fall only what moves the body as a whole shows: forces of its slow spin strain it by 1e-3 at most.
+    check(&fall, [2e-4, 3e-4], &FLIGHT);
     // Sliding, it also bounces on the ground, which passes on what differs.
     let mut slide = ball(0.05);
     (slide.time.step, slide.time.steps) = (0.02, 100);
@@ -30,23 +30,29 @@ fn twenty_metres_away_down_or_along_the_ground() {
     slide.gravity = DVec3::new(0.0, 0.0, -9.0);
     slide.planes[0].normal = DVec3::Z;
     slide.initial.velocity = DVec3::new(10.0, 0.0, -0.2);
-    check(&slide, [5e-5, 1e-3]);
+    // The bounces: nothing is damped by its velocity, the ground has no stiffness of its own.
+    check(&slide, [5e-5, 1e-3], &[&FLIGHT[..], &but(&["mass damping", "contact stiffness"])].concat());
 }
 
 #[test]
 fn a_stiff_body() {
-    let mut scene = ball(0.03);
+    let mut scene = busy(ball(0.03));
     scene.material.youngs_modulus = 1e6;
+    // Not so damped, on ground not so soft, that the body behaves as if it were rigid.
+    scene.material.stiffness_damping = 0.002;
+    scene.planes[0].stiffness = Some(1e7);
+    scene.initial.velocity.z = -1.5;
     // Rounding of a displacement, 6e-8 of a cell of 3 cm, gives a corner a force of E h · 2e-9 m = 5e-5 N. Only inertia holds the
     // sum of these (some 100 corners, a random walk: 5e-4 N) on a body of 0.5 kg: 1e-5 m/s a step of 0.01 s in the mean, and
     // several times that where the ground answers. It stays a velocity: six steps make up to 5e-6 m of it.
-    check(&scene, [5e-6, 3e-4]);
+    check(&scene, [5e-6, 3e-4], &but(&[]));
 }
 
 #[test]
 fn a_body_that_hardly_changes_its_volume() {
-    let mut scene = ball(0.03);
+    let mut scene = busy(ball(0.03));
     scene.material.poisson_ratio = 0.49;
+    scene.initial.velocity.z = -1.5;
     // λ is 50 times μ: the same residual leaves up to ten times the error of ν = 0.4 in the soft, volume-preserving directions.
-    check(&scene, [1e-6, 1e-4]);
+    check(&scene, [1e-6, 1e-4], &but(&[]));
 }

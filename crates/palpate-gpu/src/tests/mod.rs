@@ -4,6 +4,7 @@ mod cell_laws;
 mod clocks;
 mod collapse;
 mod columns;
+mod derivative_passes;
 mod derivatives;
 mod effects;
 mod efforts;

@@ -27,20 +27,20 @@ use palpate_model::scene::Scene;
 pub(super) type Part = (&'static str, Vec<f64>, f64);
 
 /// Old displacement [m] and velocity [m/s], and the increment beyond free flight [m], at a node.
-type Given = fn(DVec3) -> [DVec3; 3];
+pub(super) type Given = fn(DVec3) -> [DVec3; 3];
 
 // Displacements have 24 bits of the increment and of the flight alone. Forces of cells are sums of products with strains of some
 // percent, each with an error of 6e-8 of the edge: 1e-6 of the force, times the bulk modulus over the shear modulus. Matrices and
 // products are sums of terms of both signs with 24 bits each. Solves end at 2e-7 in the preconditioner's norm, from where the
 // recursive residual of single precision drifts. Energies nearly cancel between two trials.
 const PLACED: f64 = 3e-7;
-const FORCES: f64 = 5e-6;
+pub(super) const FORCES: f64 = 5e-6;
 const MATRIX: f64 = 2e-6;
 const SOLVED: f64 = 3e-5;
 const ENERGY: f64 = 1e-4;
 
 /// Turned, stretched, waved.
-fn given(x: DVec3) -> [DVec3; 3] {
+pub(super) fn given(x: DVec3) -> [DVec3; 3] {
     let wave = |f: f64| DVec3::new((f * x.y).sin(), (f * x.z + 1.0).cos(), (f * (x.x + x.y)).sin());
     let turn = DMat3::from_rotation_y(0.2);
     let old = turn * (x * DVec3::new(1.04, 0.97, 1.0)) - x + 1e-3 * wave(40.0);
@@ -48,23 +48,23 @@ fn given(x: DVec3) -> [DVec3; 3] {
 }
 
 /// The right-hand side that is solved for [N], large and small alike in the preconditioner's norm.
-fn load(plan: &Plan) -> Vec<DVec3> {
+pub(super) fn load(plan: &Plan) -> Vec<DVec3> {
     plan.body.nodes.iter().zip(&plan.body.node_volume).map(|(x, v)| 1e4 * *v * given(*x)[1]).collect()
 }
 
-fn single(v: &DVec3) -> [f32; 4] {
+pub(super) fn single(v: &DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
-fn flat<'a>(v: impl IntoIterator<Item = &'a DVec3>) -> Vec<f64> {
+pub(super) fn flat<'a>(v: impl IntoIterator<Item = &'a DVec3>) -> Vec<f64> {
     v.into_iter().flat_map(|v| v.to_array()).collect()
 }
 
-fn three(v: &[[f32; 4]]) -> Vec<f64> {
+pub(super) fn three(v: &[[f32; 4]]) -> Vec<f64> {
     v.iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
 }
 
-fn vectors(v: &[[f32; 4]]) -> Vec<DVec3> {
+pub(super) fn vectors(v: &[[f32; 4]]) -> Vec<DVec3> {
     v.iter().map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into())).collect()
 }
 
@@ -165,38 +165,51 @@ pub(super) struct Exact {
     parts: Vec<(&'static str, Vec<f64>)>,
 }
 
+/// Runs `work` with the CPU's balance of a step, and its states, at given nodes.
+pub(super) fn with_balance<T>(plan: &Plan, given: Given, work: impl for<'a> FnOnce(&Balance<'a>, States<'a>) -> T) -> T {
+    let physics = Physics::new(&plan.layout, &plan.theta);
+    let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
+    let pattern = Pattern::new(&plan.body);
+    let places = Places::new(plan, &pattern);
+    let altered = Altered::new(plan, &physics, &elements);
+    let effects = acting(plan, &physics);
+    let planes = planes(plan, &physics);
+    let (dt, theta) = (plan.clock.step, plan.clock.theta);
+    let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt, rotation: plan.solver.rotation };
+    let inertia = Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt };
+    let balance = Balance {
+        plan,
+        pattern: &pattern,
+        places: &places,
+        elements: &elements,
+        physics: &physics,
+        planes: &planes,
+        effects: &effects,
+        altered: &altered,
+        inertia: Some(inertia),
+        mix,
+        time: physics.start + dt,
+    };
+    let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = plan.body.nodes.iter().map(|x| (given(*x)[0], given(*x)[1])).unzip();
+    let u1 = placed(&balance, given, 1.0);
+    work(&balance, States { u1: &u1, u0: &u0, v0: &v0 })
+}
+
+/// Free flight, and a part of the increment beyond it.
+fn placed(balance: &Balance, given: Given, length: f64) -> Vec<DVec3> {
+    let (plan, dt) = (balance.plan, balance.plan.clock.step);
+    let flight = |[u, v, w]: [DVec3; 3]| u + dt * v + plan.clock.theta * dt * dt * balance.physics.gravity + length * w;
+    plan.body.nodes.iter().map(|x| flight(given(*x))).collect()
+}
+
 impl Exact {
     pub(super) fn new(plan: &Plan, given: Given) -> Exact {
-        let physics = Physics::new(&plan.layout, &plan.theta);
-        let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
-        let pattern = Pattern::new(&plan.body);
-        let places = Places::new(plan, &pattern);
-        let altered = Altered::new(plan, &physics, &elements);
-        let effects = acting(plan, &physics);
-        let planes = planes(plan, &physics);
-        let (dt, theta) = (plan.clock.step, plan.clock.theta);
-        let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt, rotation: plan.solver.rotation };
-        let inertia = Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt };
-        let balance = Balance {
-            plan,
-            pattern: &pattern,
-            places: &places,
-            elements: &elements,
-            physics: &physics,
-            planes: &planes,
-            effects: &effects,
-            altered: &altered,
-            inertia: Some(inertia),
-            mix,
-            time: physics.start + dt,
-        };
-        let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| given(*x)).collect();
-        let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = all.iter().map(|a| (a[0], a[1])).unzip();
-        let at = |length: f64| -> Vec<DVec3> {
-            all.iter().map(|a| a[0] + dt * a[1] + theta * dt * dt * physics.gravity + length * a[2]).collect()
-        };
-        let (u1, u_half) = (at(1.0), at(0.5));
-        let s = States { u1: &u1, u0: &u0, v0: &v0 };
+        with_balance(plan, given, |balance, s| Exact::of(balance, s, given))
+    }
+
+    fn of<'a>(&balance: &Balance<'a>, s: States<'a>, given: Given) -> Exact {
+        let Balance { plan, elements, physics, altered, mix, .. } = balance;
+        let u_half = placed(&balance, given, 0.5);
         // Supports of the new state: what clamps, planes and effects add to a residual without the old state's forces.
         let bare = Plan { clamps: Vec::new(), ..plan.clone() };
         let fresh = Balance { mix: Mix { old: 0.0, ..mix }, ..balance };
@@ -205,7 +218,7 @@ impl Exact {
         let (body, h) = (&plan.body, plan.body.grid.h);
         let mut cells = Vec::new();
         for e in 0..body.cells.len() {
-            let mut poses = [&u1, &u0].map(|u| CellPose::new(&corners(body, e, u), h));
+            let mut poses = [s.u1, s.u0].map(|u| CellPose::new(&corners(body, e, u), h));
             if let Some(rest) = &altered.rest {
                 poses.iter_mut().for_each(|p| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w));
             }
@@ -220,17 +233,22 @@ impl Exact {
             cells.extend(force);
         }
         let residual = flat(&balance.residual(s));
-        let energy = balance.potential(s) - balance.potential(States { u1: &u_half, ..s });
+        let half = {
+            let (u1, u0, v0) = (&u_half[..], s.u0, s.v0);
+            balance.potential(States { u1, u0, v0 })
+        };
+        let energy = balance.potential(s) - half;
         let (mut light, mut matrix) = (Matrix::default(), Matrix::default());
         // On the device inertia is kept out of the matrix.
-        Balance { inertia: Some(Inertia { displacement: 0.0, ..inertia }), ..balance }.tangent(s, false, &mut light);
+        let weightless = balance.inertia.map(|t| Inertia { displacement: 0.0, ..t });
+        Balance { inertia: weightless, ..balance }.tangent(s, false, &mut light);
         balance.tangent(s, false, &mut matrix);
         // Rows of blocks, as the device keeps them.
         let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
-        let mut exact = Exact { given, pattern, matrix, parts: Vec::new() };
+        let mut exact = Exact { given, pattern: Pattern::new(&plan.body), matrix, parts: Vec::new() };
         let load = exact.scaled(&load(plan));
         exact.parts = vec![
-            ("place_next", flat(&u1)),
+            ("place_next", flat(s.u1)),
             ("press_cells", cells),
             ("touch_patches and hold_cells", supports),
             ("gather_residual", residual),
@@ -245,13 +263,13 @@ impl Exact {
     }
 
     /// A x.
-    fn product(&self, x: &[DVec3]) -> Vec<DVec3> {
+    pub(super) fn product(&self, x: &[DVec3]) -> Vec<DVec3> {
         let b = &self.pattern.blocks;
         (0..x.len()).map(|a| (b.rows[a]..b.rows[a + 1]).map(|k| self.matrix.values[k] * x[b.columns[k] as usize]).sum()).collect()
     }
 
     /// D⁻¹ r, D the diagonal blocks.
-    fn scaled(&self, r: &[DVec3]) -> Vec<DVec3> {
+    pub(super) fn scaled(&self, r: &[DVec3]) -> Vec<DVec3> {
         r.iter().zip(&self.pattern.blocks.diagonal).map(|(r, d)| self.matrix.values[*d].inverse() * *r).collect()
     }
 
@@ -280,7 +298,7 @@ pub(super) fn apart(found: &[Part], right: &Exact) -> Vec<&'static str> {
 }
 
 /// Everything acts: clamps that move, two planes, a point mass, ghosts, both dampings, effects on nodes, patches, cells and clamps.
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     let mut s = crowded();
     s.material.mass_damping = 5.0;
     s.material.stiffness_damping = 0.004;
