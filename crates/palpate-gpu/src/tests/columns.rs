@@ -3,7 +3,7 @@
 use super::products::crowded;
 use super::scenes::{device, own_device, plan, spread};
 use crate::geometry::columns;
-use crate::layout::{Health, Shape};
+use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
 use crate::pipelines::{pass, shared::structs};
 use crate::recorder::{Args, Recorder, Size};
@@ -87,19 +87,23 @@ fn the_first_column_that_fails_is_the_failure_of_its_member() {
     let well = Health::default();
     let (failed, other) = (ill(structs::UNSOLVED, 3), ill(structs::INDEFINITE, 3));
     let before = ill(structs::FELL_OUT, 2);
-    // Four members, three columns: none fails; the last; the two last; a member that had failed before.
-    let columns = [[well; 4], [well, well, failed, failed], [well, failed, other, other]].concat();
-    let shape = Shape { members: 4, ..Shape::default() };
+    // Five members, three columns: none fails; the last; the two last; a member that had failed before; one whose second column was cut off.
+    let columns = [[well; 5], [well, well, failed, failed, well], [well, failed, other, other, well]].concat();
+    let stage = |k: usize| if k == 9 { structs::WANTS_SOLVE } else { structs::IDLE };
+    let newton: Vec<Newton> = (0..15).map(|k| Newton { stage: stage(k), ..Newton::default() }).collect();
+    let shape = Shape { members: 5, ..Shape::default() };
     let upload = |name, values: &[Health]| gpu.upload(name, values).unwrap_or_else(|e| panic!("{e}"));
     let world: HashMap<&'static str, wgpu::Buffer> = HashMap::from([
         ("shape", gpu.upload("shape", &[shape]).unwrap_or_else(|e| panic!("{e}"))),
+        ("newton", gpu.upload("newton", &newton).unwrap_or_else(|e| panic!("{e}"))),
         ("column_health", upload("column_health", &columns)),
-        ("health", upload("health", &[well, well, well, before])),
+        ("health", upload("health", &[well, well, well, before, well])),
     ]);
     let (mut groups, mut times) = (HashMap::new(), HashMap::new());
     let mut r = Recorder::new(&gpu, &world, &mut groups, false);
     r.run(pass::END_EXACT, &[], Size::All { members: 1, groups: 1 }, Args { extra: 3, ..Args::default() });
     r.submit(&mut times);
-    let found: Vec<Health> = gpu.download(&world["health"], 4).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(found, [well, failed, failed, before]);
+    let found: Vec<Health> = gpu.download(&world["health"], 5).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(found[..4], [well, failed, failed, before]);
+    assert_eq!(found[4].code, structs::HURRIED);
 }
