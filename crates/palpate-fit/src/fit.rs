@@ -5,7 +5,7 @@ use crate::journal::{Journal, JournalError, JournalFile};
 use crate::multistart;
 use crate::optimise::{Sample, Status};
 use crate::problem::{Problem, Want};
-use crate::settings::Settings;
+use crate::settings::{ErrorModel, Settings};
 use crate::uncertainty::{self, Uncertainty};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -60,6 +60,8 @@ pub struct Hooks<'a> {
     pub interrupt: Option<&'a AtomicBool>,
     /// Journal of evaluations, for resuming.
     pub journal: Option<JournalFile>,
+    /// Told θ of every scene at the best point, says how many residuals count as one independent reading there; 1 without it.
+    pub design_effect: Option<&'a mut dyn FnMut(&[Vec<f64>]) -> f64>,
 }
 
 /// One start's search.
@@ -107,6 +109,8 @@ pub struct FitResult {
     pub correlation: Vec<Vec<f64>>,
     /// Mean square residual over the squared noise; 1 if the model is right and the noise as stated.
     pub reduced_chi_square: f64,
+    /// How many independent readings the data are worth; NaN where the curvature was not computed.
+    pub independent: f64,
     /// Number of the best start.
     pub best: usize,
     /// Cost of the first start; infinite if it could not be evaluated.
@@ -173,6 +177,10 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         Some(_) => Some("the fit broke off"),
         None => hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)).then_some("the fit was interrupted"),
     };
+    let theta: Vec<Vec<f64>> = (0..problem.scenes().len()).map(|s| problem.theta(s, &values)).collect();
+    // Data whose errors go together say less; never more.
+    let design_effect = hooks.design_effect.as_mut().map_or(1.0, |ask| ask(&theta)).max(1.0);
+    let settings = &Settings { errors: ErrorModel { design_effect, ..settings.errors.clone() }, ..settings.clone() };
     let (u, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, cut, &mut broken);
     let mut warnings = u.warnings.clone();
     warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
@@ -204,8 +212,9 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         parameters,
         correlation: u.correlation,
         reduced_chi_square: u.reduced_chi_square,
+        independent: u.independent,
         best,
-        theta: (0..problem.scenes().len()).map(|s| problem.theta(s, &values)).collect(),
+        theta,
         initial_cost: runs[0].start_cost,
         cost: runs[best].cost,
         evaluations: runs.iter().map(|r| r.evaluations).sum::<usize>() + extra,

@@ -88,10 +88,12 @@ pub struct ErrorModel {
     pub systematic: f64,
     /// Number of groups (frames, markers) whose systematic errors are independent; at least 1.
     pub groups: usize,
+    /// How many residuals count as one independent reading; at least 1.
+    pub design_effect: f64,
 }
 
 impl Default for ErrorModel {
     fn default() -> ErrorModel {
-        ErrorModel { systematic: 0.0, groups: 1 }
+        ErrorModel { systematic: 0.0, groups: 1, design_effect: 1.0 }
     }
 }

@@ -5,11 +5,12 @@
 //!
 //! - `s² = max(1, 2 n J/(n − q))`: the reduced χ², so that residuals larger than the stated noise widen the errors, while
 //!   residuals that happen to be smaller do not narrow them;
-//! - independent errors give the covariance `s² H⁻¹/n`;
+//! - independent errors give the covariance `s² H⁻¹/n`; where D residuals count as one, because their errors go together,
+//!   `s² D H⁻¹/n`;
 //! - an error of `systematic · σ` that all residuals of a group share does not average out within the group. As a bound, each
 //!   group counts like one residual with the average sensitivity: `systematic² H⁻¹/groups`.
 //!
-//! Altogether `cov = τ H⁻¹`, `τ = s²/n + systematic²/groups`. All of this is done in z (relative errors for logarithms);
+//! Altogether `cov = τ H⁻¹`, `τ = s² D/n + systematic²/groups`. All of this is done in z (relative errors for logarithms);
 //! standard errors in units of the parameter follow by the slope of its chart.
 
 use crate::chart::AtBound;
@@ -45,6 +46,8 @@ pub struct Uncertainty {
     pub correlation: Vec<Vec<f64>>,
     /// Mean square residual over the squared noise, `2 n J/(n − q)`; NaN when there are too few residuals.
     pub reduced_chi_square: f64,
+    /// How many independent readings the residuals are worth, n/D; NaN without any.
+    pub independent: f64,
     /// Plain sentences about what is not determined.
     pub warnings: Vec<String>,
     /// Standard errors in z `[q]`.
@@ -77,6 +80,7 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
         errors_z: vec![None; q],
         correlation: (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
         reduced_chi_square: f64::NAN,
+        independent: f64::NAN,
         ..Uncertainty::default()
     };
     let n = sample.residuals as f64;
@@ -86,7 +90,8 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
         u.warnings.push(format!("there are only {n} residuals for {q} free parameters"));
     }
     if n > 0.0 {
-        u.tau = u.reduced_chi_square.max(1.0) / n + errors.systematic.powi(2) / errors.groups.max(1) as f64;
+        u.independent = n / errors.design_effect.max(1.0);
+        u.tau = u.reduced_chi_square.max(1.0) / u.independent + errors.systematic.powi(2) / errors.groups.max(1) as f64;
     }
 
     // A parameter held by a bound is a known number for the others.

@@ -7,6 +7,7 @@ pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
+use crate::scatter::Excess;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_fit::{
     ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
@@ -180,15 +181,29 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
                 f(p);
             }
         };
-        let hooks = Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal };
+        let mut notes = Vec::new();
+        let mut after: Vec<ResidualSummary> = Vec::new();
+        let mut fault = None;
+        let mut worth = |theta: &[Vec<f64>]| {
+            let at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &mut notes);
+            match experiments.iter().zip(theta).map(at).collect() {
+                Ok(all) => after = all,
+                Err(e) => fault = Some(e),
+            }
+            let mut excess = Excess::default();
+            after.iter().for_each(|r| excess.add(r.excess));
+            excess.design_effect()
+        };
+        let hooks =
+            Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal, design_effect: Some(&mut worth) };
         let result = palpate_fit::fit(&mut problem, settings, hooks).map_err(failed)?;
+        if let Some(e) = fault {
+            return Err(e);
+        }
         let theta_before: Vec<Vec<f64>> = (0..experiments.len()).map(|s| problem.theta(s, &result.runs[0].start)).collect();
         // What the fit held on a device is free for what follows.
         drop(problem);
         let before = experiments.iter().zip(&theta_before).map(|(e, t)| e.residuals(backend, t).ok()).collect();
-        let mut notes = Vec::new();
-        let mut at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &mut notes);
-        let after = experiments.iter().zip(&result.theta).map(&mut at).collect::<Result<_, _>>()?;
         Ok((result, before, after, notes))
     })?;
     let (result, before, after, notes) = done?;
@@ -340,7 +355,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
 
 /// What the recordings say of errors that do not average out. Every camera, and every marker, has its own.
 pub(crate) fn errors(experiments: &[Experiment]) -> ErrorModel {
-    let mut model = ErrorModel { systematic: 0.0, groups: 0 };
+    let mut model = ErrorModel { groups: 0, ..ErrorModel::default() };
     for e in experiments {
         let o = &e.plan().observation;
         let points: usize = o.frames.iter().map(|f| f.points.len()).sum();

@@ -50,6 +50,7 @@ mod progress;
 pub mod render;
 pub mod report;
 mod residuals;
+mod scatter;
 pub mod synthetic;
 
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};

@@ -13,6 +13,7 @@ use crate::engine::{Backend, between};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::render::{DepthImage, Pinhole, rasterise};
+use crate::scatter::{Excess, Scatter};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Snapshot};
 use palpate_io::recording::RecordedCamera;
@@ -39,6 +40,8 @@ pub struct ResidualSummary {
     pub unmatched: usize,
     /// Cost J of the simulation.
     pub cost: f64,
+    /// How much more means of neighbouring residuals scatter than those of independent ones would.
+    pub(crate) excess: Excess,
     /// Frame by frame, ordered by time.
     pub frames: Vec<FrameResidual>,
 }
@@ -83,7 +86,9 @@ impl ResidualSummary {
         let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
         let mut frames = BTreeMap::new();
         let (mut cos2, mut seen) = (0.0, 0usize);
+        let mut scatter = Scatter::default();
         let cost = visit_frames(plan, backend, theta, |frame, displacement, r| {
+            scatter.add(plan, r);
             frames.insert(frame, FrameResidual::new(observation.frames[frame].time, r));
             if wanted.contains(&frame) {
                 let (sum, n) = incidence(experiment, frame, &surface.deform(&displacement()), &triangles);
@@ -107,6 +112,7 @@ impl ResidualSummary {
             points,
             unmatched,
             cost,
+            excess: scatter.excess(),
             frames,
         })
     }

@@ -41,7 +41,7 @@ fn fragile(calls: usize, from: usize) -> Problem<'static> {
     Problem::new(vec![scene], oscillator_problem().free().to_vec()).expect("the problem is valid")
 }
 
-fn with_journal(path: &Path, resume: bool) -> Hooks<'static> {
+fn with_journal<'a>(path: &Path, resume: bool) -> Hooks<'a> {
     Hooks { journal: Some(JournalFile { path: path.into(), resume }), ..Hooks::default() }
 }
 

@@ -68,9 +68,31 @@ fn smaller_residuals_do_not_narrow_standard_errors() {
 fn a_shared_error_is_covered() {
     // One error of 0.2 = 2 σ shared by all residuals: without it in the error model the offset's error is far too small.
     let blind = coverage(0.1, 0.2, ErrorModel::default())[0];
-    let told = coverage(0.1, 0.2, ErrorModel { systematic: 2.0, groups: 1 });
+    let told = coverage(0.1, 0.2, ErrorModel { systematic: 2.0, ..ErrorModel::default() });
     assert!(blind < 0.4, "{blind}");
     assert!(told.iter().all(|&ratio| ratio > 1.0 - THREE_SIGMA), "a bound: {told:?}");
+}
+
+#[test]
+fn errors_that_go_together_widen_by_what_they_are_worth() {
+    let plain = solve(&mut line(0.1, 1, 0.0), &settings(Optimizer::GaussNewton));
+    let mut asked = Vec::new();
+    let mut worth = |theta: &[Vec<f64>]| {
+        asked.push(theta.to_vec());
+        9.0
+    };
+    let hooks = Hooks { design_effect: Some(&mut worth), ..Hooks::default() };
+    let wide = fit(&mut line(0.1, 1, 0.0), &settings(Optimizer::GaussNewton), hooks).expect("the line can be fitted");
+    assert_eq!(asked, [plain.theta.clone()], "asked once, at the best point");
+    assert_eq!((plain.independent, wide.independent), (40.0, 40.0 / 9.0));
+    for (p, w) in plain.parameters.iter().zip(&wide.parameters) {
+        assert!((w.standard_error.unwrap() / p.standard_error.unwrap() - 3.0).abs() < 1e-12);
+    }
+    // A narrowing is not believed.
+    let mut less = |_: &[Vec<f64>]| 0.25;
+    let hooks = Hooks { design_effect: Some(&mut less), ..Hooks::default() };
+    let same = fit(&mut line(0.1, 1, 0.0), &settings(Optimizer::GaussNewton), hooks).expect("the line can be fitted");
+    assert_eq!(same.parameters, plain.parameters);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use palpate_model::scene::Optimizer;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-fn with_journal(path: &Path, resume: bool) -> Hooks<'static> {
+fn with_journal<'a>(path: &Path, resume: bool) -> Hooks<'a> {
     Hooks { journal: Some(JournalFile { path: path.into(), resume }), ..Hooks::default() }
 }
 

@@ -2,7 +2,7 @@
 
 use super::pictures::FramePicture;
 use super::plots::{Curve, curves};
-use super::result::number;
+use super::result::{number, worth};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
 use crate::residuals::ResidualSummary;
@@ -83,6 +83,9 @@ fn write_page(p: &mut String, input: &ReportInput) -> std::fmt::Result {
         rms * 1e3,
         noise * 1e3
     )?;
+    if let Some(worth) = worth(fitted) {
+        writeln!(p, "<p>{}.</p>", escape(&worth))?;
+    }
     parameters(p, fitted)?;
     writeln!(p, "<h2>Warnings</h2>")?;
     if fitted.warnings.is_empty() {

@@ -30,12 +30,19 @@ fn mostly_unmatched(fitted: &Fitted) -> Option<String> {
     })
 }
 
+/// How many independent readings the data are worth, where that is known.
+pub(super) fn worth(fitted: &Fitted) -> Option<String> {
+    let n = fitted.result.independent;
+    n.is_finite()
+        .then(|| format!("± counts the data as {n:.0} independent readings: neighbouring residuals that go together count once"))
+}
+
 fn unmatched(fitted: &Fitted) -> usize {
     fitted.after.iter().map(|r| r.unmatched).sum()
 }
 
-/// `result.json`. Beyond the format's keys it holds `status`, `error` (why the fit broke off), `warnings`, per-scene residuals, `residual_before` and the
-/// reduced χ²; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
+/// `result.json`. Beyond the format's keys it holds `status`, `error` (why the fit broke off), `warnings`, per-scene residuals, `residual_before`, the
+/// reduced χ² and how many independent readings the data are worth; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
 pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
     let r = &fitted.result;
     let named = |values: &[f64]| -> Value {
@@ -97,6 +104,7 @@ pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
         "correlation": r.correlation,
         "cost": { "initial": finite(r.initial_cost), "final": finite(r.cost) },
         "reduced_chi_square": finite(r.reduced_chi_square),
+        "independent_readings": finite(r.independent),
         "residual": { "rms": finite(rms), "noise": finite(noise), "points": points, "unmatched": unmatched(fitted),
                       "scenes": fitted.after.iter().map(residual).collect::<Vec<_>>() },
         "residual_before": before.map_or(Value::Null, |b| json!({ "rms": finite(total(&b, |r| r.rms)) })),
@@ -154,6 +162,7 @@ pub fn summary(fitted: &Fitted) -> String {
         rms * 1e3,
         noise * 1e3
     );
+    text += &worth(fitted).map_or(String::new(), |w| format!("\n  {w}"));
     if fitted.grid_shift.is_none() && fitted.result.parameters.iter().any(|p| p.standard_error.is_some()) {
         text += "\n  ± is what noise leaves open; what cells and time step add to it, --grid-check finds out";
     }
