@@ -54,6 +54,34 @@ fn who_stops_at_once_is_told_that_nothing_was_found() {
 }
 
 #[test]
+fn a_long_evaluation_ends_at_its_next_step() {
+    // Hours of steps: whoever waited for the evaluation would wait that long.
+    let folder = observed(BALL);
+    let (scene, out) = (folder.path().join("fit.toml"), folder.path().join("out"));
+    let text = fs::read_to_string(&scene).unwrap();
+    assert!(text.contains("steps = 16"));
+    fs::write(&scene, text.replace("steps = 16", "steps = 900000")).unwrap();
+    let interrupt = Interrupt::default();
+    let raise = interrupt.clone();
+    let clock = std::time::Instant::now();
+    let raised = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_secs(2));
+        raise.raise();
+    });
+    let a = stopped(&["fit", arg(&scene), "--out", arg(&out)], interrupt);
+    raised.join().unwrap();
+    assert_eq!((a.code, a.err.lines().last()), (INTERRUPTED, Some("error: interrupted: nothing was written")), "{}", a.err);
+    assert!(clock.elapsed().as_secs() < 60, "{:?}", clock.elapsed());
+}
+
+#[test]
+fn only_verbs_that_look_at_an_interrupt_listen_to_it() {
+    for (words, listens) in [("fit a.toml", true), ("diagnose a.toml", true), ("inspect a.toml", false), ("fit", false)] {
+        assert_eq!(palpate::cli::listens(std::iter::once("palpate").chain(words.split(' '))), listens, "{words}");
+    }
+}
+
+#[test]
 fn an_interrupted_fit_resumes_to_the_same_result() {
     let folder = observed(BALL);
     let file = |name: &str| folder.path().join(name);

@@ -33,6 +33,8 @@ pub enum FailureKind {
     Unsupported,
     /// The device that the backend runs on broke.
     Device,
+    /// Somebody asked to stop: nothing is wrong with the member.
+    Stopped,
 }
 
 impl Failure {
@@ -74,12 +76,16 @@ impl FailureKind {
             FailureKind::NotFinite => "use a smaller [time] step, or narrower bounds for the parameters named",
             FailureKind::NewtonStalled => "use a smaller [time] step, or set solver.rotation = \"lagged\"",
             FailureKind::LinearSolve => {
-                "set solver.linear = \"cholesky\", use a smaller [time] step, or poisson_ratio further below 0.5"
+                "set solver.linear = \"cholesky\" where conjugate gradients stopped; else use a smaller [time] step, or poisson_ratio \
+                 further below 0.5"
             }
             FailureKind::FellOut => "check gravity, planes and initial velocity, or shorten [time] duration",
-            FailureKind::NoEquilibrium => "add a [[clamp]], or start from initial.state = \"rest\"",
+            FailureKind::NoEquilibrium => {
+                "hold the body with a [[clamp]] (a larger one, or one more), make it stiffer, or start from initial.state = \"rest\""
+            }
             FailureKind::BadParameter => "set bounds for the parameter in [[fit.parameter]]",
             FailureKind::Unsupported => "use --backend cpu",
+            FailureKind::Stopped => "run again",
             FailureKind::Device => "run again, with a smaller batch, or with --backend cpu; results so far are kept",
         }
     }
@@ -95,6 +101,7 @@ impl fmt::Display for Failure {
             FailureKind::NoEquilibrium => "no static equilibrium was found",
             FailureKind::BadParameter => "a parameter is out of range",
             FailureKind::Unsupported => "the backend cannot do this",
+            FailureKind::Stopped => "stopped on request",
             FailureKind::Device => "the device failed",
         };
         if self.kind == FailureKind::Device {

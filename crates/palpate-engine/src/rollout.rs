@@ -7,6 +7,8 @@ use crate::rows::{Linearised, Rows};
 use glam::DVec3;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A plan on a backend, ready to be evaluated for batches of θ.
 pub struct Rollout<B: Backend> {
@@ -14,6 +16,8 @@ pub struct Rollout<B: Backend> {
     world: B::World,
     plan: Plan,
     members: usize,
+    /// Ends an evaluation at its next step when set.
+    stop: Arc<AtomicBool>,
 }
 
 /// One instant of one member, for reports.
@@ -31,7 +35,14 @@ impl<B: Backend> Rollout<B> {
     /// Prepares a plan for up to `members` simulations at once (more are evaluated in turns).
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
-        Ok(Rollout { backend, world, plan: plan.clone(), members: members.max(1) })
+        Ok(Rollout { backend, world, plan: plan.clone(), members: members.max(1), stop: Arc::default() })
+    }
+
+    /// The same rollout, whose evaluations end at their next step once `stop` is set; every member then fails as
+    /// [`FailureKind::Stopped`].
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Rollout { stop, ..self }
     }
 
     /// The plan.
@@ -46,14 +57,22 @@ impl<B: Backend> Rollout<B> {
 
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
         loop {
-            let all = self.attempt(theta, request);
+            let Some(all) = self.attempt(theta, request) else {
+                let failure = Failure { kind: FailureKind::Stopped, time: 0.0, detail: "the rollout was cut short".into() };
+                return vec![Evaluation::failed(failure); theta.members()];
+            };
             if !self.backend.again(&mut self.world) {
                 return all;
             }
         }
     }
 
-    fn attempt(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+    /// Evaluates a batch; `None` when it was asked to stop on the way.
+    fn attempt(&mut self, theta: &ParamBatch, request: &Request) -> Option<Vec<Evaluation>> {
+        let stop = || self.stop.load(Ordering::SeqCst);
+        if stop() {
+            return None;
+        }
         let b = &self.backend;
         let w = &mut self.world;
         b.watch(w, false);
@@ -77,6 +96,11 @@ impl<B: Backend> Rollout<B> {
         // The tape holds u and v of every step: 48 bytes a node and step in f64; everything else is rebuilt on the way back.
         let mut tape = Vec::new();
         for k in 0..steps {
+            if stop() {
+                // What was begun is waited for, so that the world is idle when it is used again.
+                b.read(w, &tally);
+                return None;
+            }
             if b.all_failed(&tally) {
                 break;
             }
@@ -104,6 +128,10 @@ impl<B: Backend> Rollout<B> {
                 b.start_adjoint(w, &next, &adj_now, &mut tally);
             }
             for k in (0..steps).rev() {
+                if stop() {
+                    b.read(w, &tally);
+                    return None;
+                }
                 let now = tape.pop().expect("one state per step is on the tape");
                 b.observe_adjoint(w, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
                 b.step_adjoint(w, k, &now, &next, &adj, &mut adj_now, &mut tally);
@@ -113,7 +141,7 @@ impl<B: Backend> Rollout<B> {
             }
             b.start_adjoint(w, &next, &adj, &mut tally);
         }
-        b.read(w, &tally)
+        Some(b.read(w, &tally))
     }
 
     /// Simulates one member and hands every state (the initial one first) to `visit` together with the residuals of the

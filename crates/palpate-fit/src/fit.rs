@@ -56,7 +56,8 @@ pub struct Progress {
 pub struct Hooks<'a> {
     /// Called for every iteration of every start, in the same order in every run.
     pub on_iteration: Option<&'a mut dyn FnMut(&Progress)>,
-    /// When set, every start stops before its next evaluation and keeps its best point.
+    /// When set, every start stops before its next evaluation and keeps its best point; an evaluation that the physics itself cut
+    /// short ([`palpate_engine::FailureKind::Stopped`]) ends its start alike.
     pub interrupt: Option<&'a AtomicBool>,
     /// Journal of evaluations, for resuming.
     pub journal: Option<JournalFile>,

@@ -209,7 +209,18 @@ fn read(path: &Path, text: &str, head: &Value, q: usize) -> Result<Entries, Jour
                     z.len() == q && cost.len() == 1 && [0, q].contains(&gradient.len()) && [0, q * q].contains(&curvature.len());
                 let residuals = e.residuals;
                 sizes.then(|| {
-                    (z, Sample { cost: cost[0], gradient, curvature, residuals, failure: e.failure.clone(), broken: false })
+                    (
+                        z,
+                        Sample {
+                            cost: cost[0],
+                            gradient,
+                            curvature,
+                            residuals,
+                            failure: e.failure.clone(),
+                            broken: false,
+                            stopped: false,
+                        },
+                    )
                 })
             })();
             let Some((z, sample)) = sample else {

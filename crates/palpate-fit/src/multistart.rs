@@ -211,8 +211,9 @@ fn broker(
             let z: Vec<Vec<f64>> = fresh.iter().filter_map(|&s| asked[s].clone()).collect();
             let samples = problem.evaluate(&z, want(settings.optimizer));
             broken = samples.iter().find(|s| s.broken).and_then(|s| s.failure.clone());
-            // A round that broke is computed again by a resumed fit, as a whole.
-            if let (Some(journal), None) = (&mut journal, &broken) {
+            // A round that broke or was stopped is computed again by a resumed fit, as a whole.
+            let stopped = samples.iter().any(|s| s.stopped);
+            if let (Some(journal), None, false) = (&mut journal, &broken, stopped) {
                 let round: Vec<_> =
                     fresh.iter().zip(&z).zip(&samples).map(|((&s, z), sample)| (s, served[s], z.as_slice(), sample)).collect();
                 journal.add(&round)?;
@@ -230,6 +231,7 @@ fn broker(
             served[s] += 1;
             let answer = match sample {
                 Sample { broken: true, failure, .. } => Err(Stop::Broken(failure.unwrap_or_default())),
+                Sample { stopped: true, .. } => Err(Stop::Interrupted),
                 sample => Ok(sample),
             };
             // A start that no longer listens has ended and said so.

@@ -182,8 +182,9 @@ impl<'a> Problem<'a> {
                 let sum = &mut sums[b];
                 if e.failure.is_some() || !e.cost.is_finite() {
                     let why = e.failure.as_ref().map_or("the cost is not finite".into(), |f| f.to_string());
-                    let broken = e.failure.as_ref().is_some_and(|f| f.kind == FailureKind::Device);
-                    *sum = Sample { broken, ..Sample::failed(format!("{}: {why}", self.scenes[s].name)) };
+                    let is = |kind| e.failure.as_ref().is_some_and(|f| f.kind == kind);
+                    let (broken, stopped) = (is(FailureKind::Device), is(FailureKind::Stopped));
+                    *sum = Sample { broken, stopped, ..Sample::failed(format!("{}: {why}", self.scenes[s].name)) };
                     continue;
                 }
                 // Physics that counts no residuals (an analytic cost) weighs as one.

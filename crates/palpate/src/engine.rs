@@ -8,6 +8,7 @@ use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBa
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -163,13 +164,21 @@ impl Backend {
     /// # Errors
     /// There is no usable adapter, or the backend refuses the plan.
     pub fn evaluator(self, plan: &Plan, members: usize) -> Result<Box<dyn Evaluate>, Error> {
+        self.evaluator_until(plan, members, Arc::default())
+    }
+
+    /// The same, whose evaluations end at their next time step once `stop` is set.
+    ///
+    /// # Errors
+    /// There is no usable adapter, or the backend refuses the plan.
+    pub fn evaluator_until(self, plan: &Plan, members: usize, stop: Arc<AtomicBool>) -> Result<Box<dyn Evaluate>, Error> {
         match self.resolve(plan, members).0 {
             Backend::Gpu => {
                 let device = gpu().map_err(|e| refused(&e))?;
                 let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                Ok(Box::new(InTurn(Rollout::new(device, plan, members)?)))
+                Ok(Box::new(InTurn(Rollout::new(device, plan, members)?.stopped_by(stop))))
             }
-            _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?)),
+            _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?.stopped_by(stop))),
         }
     }
 

@@ -15,6 +15,7 @@ use palpate_fit::{
 use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
+use std::sync::atomic::Ordering::SeqCst;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -159,7 +160,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let mut scenes = Vec::new();
     for (s, e) in experiments.iter().enumerate() {
         let demand = Demand { asked: options.batch, ..demand(&free, s, settings.optimizer, settings.starts) };
-        let inner = backend.evaluator(e.plan(), backend.members(e.plan(), &demand, threads)?)?;
+        let members = backend.members(e.plan(), &demand, threads)?;
+        let inner = backend.evaluator_until(e.plan(), members, options.interrupt.at_once())?;
         scenes.push(FitScene {
             name: e.scene().path.display().to_string(),
             fingerprint: fingerprint(e.plan()),
@@ -203,14 +205,18 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         let theta_before: Vec<Vec<f64>> = (0..experiments.len()).map(|s| problem.theta(s, &result.runs[0].start)).collect();
         // What the fit held on a device is free for what follows.
         drop(problem);
-        let before = experiments.iter().zip(&theta_before).map(|(e, t)| e.residuals(backend, t).ok()).collect();
+        // Whoever stops does not want to wait for what is only compared with.
+        let before =
+            |(e, t): (&Experiment, &Vec<f64>)| if interrupt.at_once().load(SeqCst) { None } else { e.residuals(backend, t).ok() };
+        let before = experiments.iter().zip(&theta_before).map(before).collect();
         Ok((result, before, after, notes))
     })?;
     let (result, before, after, notes) = done?;
+    let cut = interrupt.at_once().load(SeqCst);
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
     warnings.extend(result.warnings.iter().cloned().chain(notes));
-    let interrupted = result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
+    let interrupted = cut || result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
         free: numbers,

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// A request to stop that is looked at between evaluations; clones share it.
+/// A request to stop: a running evaluation ends at its next time step; a budget ends between evaluations. Clones share it.
 #[derive(Clone, Debug)]
 pub struct Interrupt {
     raised: Arc<AtomicBool>,
+    /// Set by [`Interrupt::raise`] alone: the last round of a budget is finished.
+    now: Arc<AtomicBool>,
     remaining: Arc<AtomicU64>,
 }
 
@@ -19,17 +21,24 @@ impl Default for Interrupt {
 impl Interrupt {
     /// An interrupt that raises itself after so many rounds of evaluations: a budget.
     pub fn after(rounds: u64) -> Interrupt {
-        Interrupt { raised: Arc::new(AtomicBool::new(rounds == 0)), remaining: Arc::new(AtomicU64::new(rounds)) }
+        let raised = Arc::new(AtomicBool::new(rounds == 0));
+        Interrupt { raised, now: Arc::default(), remaining: Arc::new(AtomicU64::new(rounds)) }
     }
 
     /// Asks to stop.
     pub fn raise(&self) {
+        self.now.store(true, Ordering::SeqCst);
         self.raised.store(true, Ordering::SeqCst);
     }
 
     /// True once it has been raised.
     pub fn is_raised(&self) -> bool {
         self.raised.load(Ordering::SeqCst)
+    }
+
+    /// The flag that running evaluations look at.
+    pub(crate) fn at_once(&self) -> Arc<AtomicBool> {
+        self.now.clone()
     }
 
     /// The flag itself.
@@ -42,7 +51,7 @@ impl Interrupt {
         let left = self.remaining.load(Ordering::SeqCst).saturating_sub(1);
         self.remaining.store(left, Ordering::SeqCst);
         if left == 0 {
-            self.raise();
+            self.raised.store(true, Ordering::SeqCst);
         }
     }
 }
@@ -57,7 +66,9 @@ mod tests {
         a.clone().count();
         assert!(!a.is_raised());
         a.count();
-        assert!(a.clone().is_raised());
+        assert!(a.clone().is_raised() && !a.at_once().load(Ordering::SeqCst), "its last round is finished");
+        a.raise();
+        assert!(a.clone().at_once().load(Ordering::SeqCst));
         assert!(!Interrupt::default().is_raised() && Interrupt::after(0).is_raised());
     }
 }

@@ -27,6 +27,8 @@ pub struct Sample {
     pub failure: Option<String>,
     /// True where there is none because what computes broke: the point is not to blame.
     pub broken: bool,
+    /// True where there is none because somebody asked to stop.
+    pub stopped: bool,
 }
 
 impl Sample {

@@ -11,6 +11,7 @@ struct Fragile {
     inner: Box<dyn Evaluate>,
     calls: usize,
     from: usize,
+    kind: FailureKind,
 }
 
 impl Evaluate for Fragile {
@@ -23,7 +24,7 @@ impl Evaluate for Fragile {
         self.calls = self.calls.saturating_sub(1);
         if self.calls == 0 {
             self.calls = usize::MAX;
-            let failure = Failure { kind: FailureKind::Device, time: 0.0, detail: "out of memory (hint: less)".into() };
+            let failure = Failure { kind: self.kind, time: 0.0, detail: "out of memory (hint: less)".into() };
             all.iter_mut().skip(self.from).for_each(|e| *e = Evaluation::failed(failure.clone()));
         }
         all
@@ -32,11 +33,15 @@ impl Evaluate for Fragile {
 
 /// The oscillator on a device that breaks so.
 fn fragile(calls: usize, from: usize) -> Problem<'static> {
+    failing(calls, from, FailureKind::Device)
+}
+
+fn failing(calls: usize, from: usize, kind: FailureKind) -> Problem<'static> {
     let truth = oscillator(4.0, 0.3, 60);
     let model = LeastSquares::new(2, move |t| {
         (t[0] < 400.0).then(|| oscillator(t[0], t[1], 60).iter().zip(&truth).map(|(a, b)| (a - b) / 0.01).collect())
     });
-    let evaluate = Box::new(Fragile { inner: Box::new(model), calls, from });
+    let evaluate = Box::new(Fragile { inner: Box::new(model), calls, from, kind });
     let scene = FitScene { name: "toy".into(), fingerprint: "toy".into(), base: vec![2.0, 0.1], evaluate };
     Problem::new(vec![scene], oscillator_problem().free().to_vec()).expect("the problem is valid")
 }
@@ -90,4 +95,24 @@ fn a_device_that_fails_at_once_or_at_the_end_says_so() {
     assert!(cut.broken.is_some_and(|why| why.contains("out of memory")));
     assert_eq!((cut.cost, cut.parameters[0].standard_error), (whole.cost, None));
     assert!(cut.warnings.iter().any(|w| w.contains("no standard errors: toy: the device failed")), "{:?}", cut.warnings);
+}
+
+#[test]
+fn an_evaluation_cut_short_is_an_interruption_and_no_failed_start() {
+    for optimizer in ALL {
+        let settings = Settings { starts: 4, iterations: 40, ..settings(optimizer) };
+        let timeless = |r: FitResult| FitResult { seconds: 0.0, ..r };
+        let whole = timeless(fit(&mut oscillator_problem(), &settings, Hooks::default()).expect("it can be evaluated"));
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("journal.jsonl");
+        let mut cut = failing(3, 0, FailureKind::Stopped);
+        let part = fit(&mut cut, &settings, with_journal(&path, false)).expect("two rounds were evaluated");
+        assert!(part.runs.iter().all(|r| r.status == Status::Interrupted), "{optimizer:?}: {:?}", part.runs);
+        assert!(part.broken.is_none() && part.cost.is_finite() && part.cost <= part.initial_cost);
+        assert_eq!(rounds(&path), 2, "{optimizer:?}: the round that was cut short is not kept");
+        let resumed = timeless(fit(&mut oscillator_problem(), &settings, with_journal(&path, true)).expect("it fits"));
+        assert_eq!(resumed, whole, "{optimizer:?}: to the last bit");
+        let first = fit(&mut failing(1, 0, FailureKind::Stopped), &settings, Hooks::default());
+        assert!(matches!(first, Err(FitError::Interrupted)), "{optimizer:?}");
+    }
 }

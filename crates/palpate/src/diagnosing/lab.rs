@@ -134,6 +134,7 @@ impl<'a> Lab<'a> {
 fn problem(
     base: &[Experiment],
     backend: Backend,
+    limits: Limits,
     (changes, start): (&[Change], &[f64]),
     newton: f64,
 ) -> Result<(Problem<'static>, Vec<Number>), LabError> {
@@ -154,7 +155,7 @@ fn problem(
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: e.plan.theta.clone(),
-            evaluate: backend.evaluator(&e.plan, 1).map_err(lab_error)?,
+            evaluate: backend.evaluator_until(&e.plan, 1, limits.interrupt.at_once()).map_err(lab_error)?,
         });
     }
     Ok((Problem::new(scenes, ready.free).map_err(LabError::Failed)?, numbers))
@@ -163,11 +164,12 @@ fn problem(
 /// Cost of one hypothesis at these values.
 fn cost(base: &[Experiment], backend: Backend, limits: Limits, (changes, values): &Try) -> Result<f64, LabError> {
     limits.check()?;
-    let (mut problem, _) = problem(base, backend, (changes, values), NEWTON * 1e-3)?;
+    let (mut problem, _) = problem(base, backend, limits, (changes, values), NEWTON * 1e-3)?;
     let values = problem.free().iter().map(|f| f.start.0).collect();
     let Some(sample) = problem.evaluate_values(&[values], Want::Cost).into_iter().next() else { return Ok(f64::INFINITY) };
     match sample {
         Sample { broken: true, failure, .. } => Err(limits.break_off(failure.unwrap_or_default())),
+        Sample { stopped: true, .. } => Err(LabError::Interrupted),
         s => Ok(s.cost),
     }
 }
@@ -181,7 +183,7 @@ fn fit(
     (iterations, tolerance): (usize, f64),
 ) -> Result<Fit, LabError> {
     limits.check()?;
-    let (mut problem, numbers) = problem(base, backend, (changes, values), NEWTON * tolerance)?;
+    let (mut problem, numbers) = problem(base, backend, limits, (changes, values), NEWTON * tolerance)?;
     let settings = Settings {
         iterations,
         first_step: *reach,
@@ -197,7 +199,10 @@ fn fit(
         stop.store(limits.check().is_err(), Ordering::SeqCst);
     };
     let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
-    let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| LabError::Failed(e.to_string()))?;
+    let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
+        palpate_fit::FitError::Interrupted => LabError::Interrupted,
+        e => LabError::Failed(e.to_string()),
+    })?;
     if let Some(why) = result.broken {
         return Err(limits.break_off(why));
     }
