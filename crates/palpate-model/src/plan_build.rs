@@ -216,6 +216,16 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Sha
             format!("{point} m lies {:.4} m from the body's surface; allowed are {allowed:.4} m", away.abs()),
         ));
     }
+    let (stalk, longest) = ((m.position - surface).length(), (max - min).length());
+    if stalk > longest {
+        return Err(error(
+            format!("markers.rest \"{}\".position", m.name),
+            format!(
+                "{} m lies {stalk:.4} m from where it is attached to the body; a stalk may be as long as the body's diagonal, {longest:.4} m",
+                m.position
+            ),
+        ));
+    }
     let w = affine_weights(body, lookup, surface, MARKER_RADIUS * h);
     Ok(MarkerSite {
         name: m.name.clone(),

@@ -182,6 +182,14 @@ fn markers_are_attached_in_the_order_given() {
     let far = [rest("far", tip, Some(DVec3::splat(9.0)))];
     let message = build_plan(&scene, Observation::default(), &far).unwrap_err().to_string();
     assert!(message.starts_with("markers.rest \"far\".surface: "), "{message}");
+    for surface in [None, Some(tip)] {
+        let far = [rest("far", DVec3::splat(9.0), surface)];
+        let message = build_plan(&scene, Observation::default(), &far).unwrap_err().to_string();
+        assert!(
+            message.starts_with("markers.rest \"far\".position: ") && message.contains("the body's diagonal, 0.21"),
+            "{message}"
+        );
+    }
 }
 
 /// Largest difference of two lists of clamp cells' moments, in units of a full cell's; cells that hold nothing may be missing.
