@@ -89,7 +89,11 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
         warnings.push(format!("touches itself along {} edges", report.non_manifold_edges));
     }
     if report.intersecting_pairs > 0 {
-        warnings.push(format!("passes through itself: {} pairs of triangles", report.intersecting_pairs));
+        warnings.push(format!(
+            "touches or passes through itself: {} pairs of triangles; the union of its parts is used, where the parts by themselves \
+             have {:.4e} m³ in all",
+            report.intersecting_pairs, report.signed_volume
+        ));
     }
     let warnings = warnings.into_iter().map(|w| InputError::file(path, w).to_string()).collect();
     Ok(Loaded { value: mesh, warnings })

@@ -10,6 +10,9 @@ const HOLE_EDGES: usize = 64;
 /// Holes with a rim longer than this share of the mesh's size are not closed.
 const HOLE_RIM: f64 = 0.25;
 
+/// Distance at which a segment touches a triangle, over their size: rounding of coordinates in f64.
+const TOUCHING: f64 = 1e-9;
+
 /// Facts about a mesh; a closed, consistently and outward oriented surface has zeros but for volume, components and size.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshReport {
@@ -21,7 +24,7 @@ pub struct MeshReport {
     pub inconsistent_edges: usize,
     /// Volume [m³] by the divergence theorem; negative = inside out.
     pub signed_volume: f64,
-    /// Pairs of triangles without common vertex that pierce each other.
+    /// Pairs of triangles without common vertex that touch or pierce each other.
     pub intersecting_pairs: usize,
     /// Parts not joined by common vertices.
     pub components: usize,
@@ -103,7 +106,7 @@ fn is_degenerate(mesh: &TriMesh, t: usize) -> bool {
     super::trimesh::triangle_area([a, b, c]) <= 0.5e-9 * longest * longest
 }
 
-/// Pairs of triangles of which an edge of one passes through the inside of the other.
+/// Pairs of triangles of which an edge of one meets the other.
 fn intersecting_pairs(mesh: &TriMesh) -> usize {
     let tree = MeshShape::unsigned(mesh.clone());
     let mut pairs = Vec::new();
@@ -111,7 +114,7 @@ fn intersecting_pairs(mesh: &TriMesh) -> usize {
         let [a, b, c] = mesh.corners(t);
         for [p, q] in [[a, b], [b, c], [c, a]] {
             tree.overlapping(p.min(q), p.max(q), &mut |s| {
-                if mesh.triangles[s].iter().all(|w| !v.contains(w)) && pierces(p, q, mesh.corners(s)) {
+                if mesh.triangles[s].iter().all(|w| !v.contains(w)) && meets(p, q, mesh.corners(s)) {
                     pairs.push((t.min(s), t.max(s)));
                 }
             });
@@ -122,14 +125,31 @@ fn intersecting_pairs(mesh: &TriMesh) -> usize {
     pairs.len()
 }
 
-/// True if the segment crosses the triangle strictly.
-fn pierces(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
-    let six = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
-    if six(a, b, c, p) * six(a, b, c, q) >= 0.0 {
+/// True if the segment meets the triangle, its edges and its plane included: bodies that overlap by whole faces, or by corners that
+/// lie on the diagonal of a face, pierce nothing strictly.
+fn meets(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    let normal = (b - a).cross(c - a);
+    let size = normal.length();
+    if size == 0.0 {
         return false;
     }
-    let (u, v, w) = (six(p, q, a, b), six(p, q, b, c), six(p, q, c, a));
-    (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)
+    let near = TOUCHING * (q - p).length().max((b - a).length()).max((c - a).length());
+    let (above, below) = (normal.dot(p - a) / size, normal.dot(q - a) / size);
+    let inside = |x: DVec3| {
+        [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(x - s).dot(normal) >= -near * size * (e - s).length())
+    };
+    if above.abs() > near || below.abs() > near {
+        // A segment that only ends in the plane meets it as well.
+        return above.min(below) <= near
+            && above.max(below) >= -near
+            && inside(p + (q - p) * (above / (above - below)).clamp(0.0, 1.0));
+    }
+    // In the plane of the triangle: an end inside, or an edge crossed.
+    let crosses = |&(s, e): &(DVec3, DVec3)| {
+        let side = |x: DVec3, from: DVec3, to: DVec3| (to - from).cross(x - from).dot(normal);
+        side(p, s, e) * side(q, s, e) < 0.0 && side(s, p, q) * side(e, p, q) < 0.0
+    };
+    inside(p) || inside(q) || [(a, b), (b, c), (c, a)].iter().any(crosses)
 }
 
 /// Closed loops of open edges, walked so that the triangle of each edge lies on its right (a filling has it on its left).

@@ -78,3 +78,27 @@ fn overlapping_parts_are_seen() {
     let report = diagnose(&joined(&ball(0.5, DVec3::ZERO), &ball(0.5, DVec3::X * 0.7)));
     assert!(report.is_closed() && report.components == 2 && report.intersecting_pairs > 20, "{report:?}");
 }
+
+#[test]
+fn parts_that_overlap_by_faces_edges_or_corners_are_seen() {
+    let cube = |at: DVec3| {
+        let corner = |k: usize| at + 0.1 * DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        TriMesh { vertices: (0..8).map(corner).collect(), triangles }
+    };
+    let one = cube(DVec3::ZERO);
+    assert!((one.volume() - 1e-3).abs() < 1e-15 && diagnose(&one).intersecting_pairs == 0);
+    for (by, seen) in [
+        (DVec3::splat(0.05), true),
+        (DVec3::new(0.05, 0.0, 0.0), true),
+        (DVec3::new(0.05, 0.05, 0.0), true),
+        (DVec3::new(0.03, 0.02, 0.01), true),
+        (DVec3::new(0.1, 0.05, 0.0), true),
+        (DVec3::new(0.11, 0.0, 0.0), false),
+        (DVec3::new(0.1 + 1e-6, 0.0, 0.0), false),
+    ] {
+        let pairs = diagnose(&joined(&one, &cube(by))).intersecting_pairs;
+        assert_eq!(pairs > 0, seen, "{by}: {pairs}");
+    }
+}
