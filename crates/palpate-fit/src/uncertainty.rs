@@ -157,6 +157,10 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
         }
         let top = vectors[k].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let members: Vec<usize> = (0..m).filter(|&a| vectors[k][a].abs() > NAMED * top).collect();
+        // Two directions of the same pair say the same of it.
+        if told.contains(&members) {
+            continue;
+        }
         let sentence = match members.as_slice() {
             [a] => names.undetermined(inner[*a], spread, values[inner[*a]], z[inner[*a]]),
             [a, b] => names.alike(inner[*a], inner[*b], covariance(*a, *a), covariance(*b, *b), covariance(*a, *b)),

@@ -6,17 +6,25 @@ use crate::error::Error;
 use crate::fitting::{self, FitOptions, Fitted};
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
-use palpate_engine::Snapshot;
+use palpate_engine::{Snapshot, number};
 use palpate_io::recording::{ObservationError, Recording};
 use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_error};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan_build::{PlanError, build_plan};
-use palpate_model::scene::{ObservationSpec, Scene};
+use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
 use std::sync::Arc;
+
+/// A time [s]: four decimals, or few digits where it is none that anything moves in.
+pub(crate) fn short(t: f64) -> String {
+    if t.abs() < 1e6 { format!("{t:.4}") } else { number(t) }
+}
+
+/// Depth, in cells, from which on a plane that reaches into the body at rest deserves a word.
+const CUT: f64 = 0.25;
 
 /// One scene, its recording where it names one, and the plan made of both.
 #[derive(Clone, Debug)]
@@ -104,6 +112,7 @@ impl Experiment {
         let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, warnings };
         experiment.check_times()?;
+        experiment.check_planes();
         Ok(experiment)
     }
 
@@ -126,10 +135,12 @@ impl Experiment {
         }
         let count = if outside == frames.len() { "all".to_string() } else { format!("{outside} of") };
         let text = format!(
-            "{count} {} frames ({:.4} s to {:.4} s) lie outside the simulated time ({from:.4} s to {to:.4} s)",
+            "{count} {} frames ({} s to {} s) lie outside the simulated time ({} s to {} s)",
             frames.len(),
-            first.time,
-            last.time
+            short(first.time),
+            short(last.time),
+            short(from),
+            short(to)
         );
         if outside == frames.len() {
             return Err(
@@ -140,6 +151,25 @@ impl Experiment {
         self.warnings
             .push(format!("{name}: {text} and are compared with its first or last state; adapt [observation] frames or [time]"));
         Ok(())
+    }
+
+    /// A plane that cuts through the body at rest throws it out in the first step, or squeezes it against what holds it.
+    fn check_planes(&mut self) {
+        if self.scene.initial.state != InitialShape::Rest {
+            return;
+        }
+        let body = &self.plan.body;
+        for (i, plane) in self.scene.planes.iter().enumerate() {
+            let depth = body.patches.iter().map(|p| plane.normal.dot(plane.point - p.point)).fold(0.0, f64::max);
+            if depth > CUT * body.grid.h {
+                self.warnings.push(format!(
+                    "{}: plane.{i} cuts {} m deep into the body at rest: contact pushes it out from the first step on; move the plane or the \
+                     body, or start from initial.state = \"static-equilibrium\"",
+                    self.scene.path.display(),
+                    number(depth)
+                ));
+            }
+        }
     }
 
     /// An error about a key of the scene, with its line.

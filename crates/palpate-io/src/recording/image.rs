@@ -2,7 +2,7 @@
 
 use super::{RecordedCamera, RecordedFrame};
 use crate::document::Table;
-use crate::error::InputError;
+use crate::error::{InputError, number};
 use image::{DynamicImage, ImageFormat};
 use std::path::Path;
 
@@ -84,6 +84,17 @@ pub(super) fn check_depth_unit(root: &Table, cameras: &[RecordedCamera], frames:
                 "the median depth of camera \"{}\" is {depth:.6} m ({median} counts), expected {NEAREST} to {FARTHEST} m{hint}",
                 camera.name
             );
+            // Counts that are right by themselves are spoiled by what is added.
+            let plain = depth - camera.depth_offset;
+            if (NEAREST..=FARTHEST).contains(&plain) {
+                let text = format!(
+                    "adds {} m to the readings of camera \"{}\", whose median depth is then {depth:.6} m instead of {plain:.6} m; expected \
+                     {NEAREST} to {FARTHEST} m",
+                    number(camera.depth_offset),
+                    camera.name
+                );
+                return Err(table.error("depth_offset", text));
+            }
             return Err(table.error("depth_scale", text));
         }
     }

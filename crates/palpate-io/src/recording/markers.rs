@@ -1,6 +1,6 @@
 //! Tracked points: `markers.csv`.
 
-use crate::error::InputError;
+use crate::error::{InputError, number as short};
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
 use std::collections::BTreeMap;
@@ -72,11 +72,11 @@ pub(super) fn read_csv(path: &Path, bytes: &[u8]) -> Result<(Vec<String>, Vec<Ma
             names.len() - 1
         });
         if let Some(before) = samples.last().filter(|s| s.time > time) {
-            let text = format!("time: {time} comes after {} in the file; rows are ordered by time", before.time);
+            let text = format!("time: {} comes after {} in the file; rows are ordered by time", short(time), short(before.time));
             return Err(InputError::line(path, line, text));
         }
         if samples.iter().rev().take_while(|s| s.time == time).any(|s| s.marker == marker) {
-            return Err(InputError::line(path, line, format!("name: \"{name}\" occurs twice at time {time}")));
+            return Err(InputError::line(path, line, format!("name: \"{name}\" occurs twice at time {}", short(time))));
         }
         samples.push(MarkerSample { time, marker, position: DVec3::new(number(2)?, number(3)?, number(4)?) });
     }

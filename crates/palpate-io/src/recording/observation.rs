@@ -1,7 +1,7 @@
 //! A recording as an [`Observation`]: pixels to world points, markers to frames.
 
-use super::{RecordedMarkers, Recording};
-use crate::error::InputError;
+use super::{RecordedFrame, RecordedMarkers, Recording};
+use crate::error::{InputError, number};
 use palpate_model::observation::Observation;
 use palpate_model::observation::{Camera, Frame, MarkerRest, ObservedMarker, ObservedPoint};
 use palpate_model::scene::{CostKind, ObservationSpec};
@@ -89,7 +89,10 @@ impl Recording {
             (false, true) => format!("up to {} s", spec.to),
             (false, false) => format!("on every {}-th row and column", spec.pixel_stride),
         };
-        asked("observation.frames", format!("no {what} is left {chosen}; {path} has them from {first} s to {last} s"))
+        asked(
+            "observation.frames",
+            format!("no {what} is left {chosen}; {path} has them from {} s to {} s", number(first), number(last)),
+        )
     }
 
     fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), ObservationError> {
@@ -130,6 +133,7 @@ impl Recording {
             let seen = self.frames.iter().filter(|f| f.readings().next().is_some()).map(|f| f.time);
             return Err(self.no_data(spec, "depth reading of the object", seen));
         }
+        self.warn_of_images(o, warnings);
         // One noise serves all cameras: the root mean square of those in use.
         let cameras = || self.cameras.iter().zip(&used).filter(|(_, u)| **u).map(|(c, _)| c);
         let n = cameras().count() as f64;
@@ -143,6 +147,32 @@ impl Recording {
         o.depth_noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
         o.depth_systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
         Ok(())
+    }
+
+    /// Images that say nothing among others that do: without a reading of the object, or with readings at the end of the camera's range.
+    fn warn_of_images(&self, o: &Observation, warnings: &mut Vec<String>) {
+        let mut say = |times: Vec<f64>, of: usize, what: &str| {
+            if let Some(first) = times.first() {
+                let n = times.len();
+                let path = self.path.display();
+                warnings.push(format!("{path}: {n} of {of} depth images {what} (the first at {} s)", number(*first)));
+            }
+        };
+        let seen = |t: f64| o.frames.iter().any(|f| (f.time - t).abs() < SAME_TIME);
+        let images: Vec<_> = self.frames.iter().filter(|f| f.depth.is_some() && seen(f.time)).collect();
+        let times = |f: fn(usize, usize) -> bool| -> Vec<f64> {
+            let counts = |i: &&&RecordedFrame| {
+                let (full, all) = i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == u16::MAX), all + 1));
+                f(full, all)
+            };
+            images.iter().filter(counts).map(|i| i.time).collect()
+        };
+        say(times(|_, all| all == 0), images.len(), "hold no reading of the object");
+        say(
+            times(|full, all| all > 0 && 2 * full > all),
+            images.len(),
+            "hold mostly readings at the largest count, 65535: saturated?",
+        );
     }
 
     fn add_markers(

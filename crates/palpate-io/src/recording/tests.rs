@@ -194,6 +194,7 @@ fn faults_of_the_text_are_named() {
             "depth_scale = 1.0",
             "expected 0.02 to 20 m; depth_scale = 0.001 would make it",
         ),
+        ("recording.toml", "depth_offset = -0.01", "depth_offset = 100", "depth_offset: adds 100 m to the readings of camera"),
         ("recording.toml", "depth_scale = 0.001\n", "", "depth_scale: missing; expected metres per PNG count"),
         ("recording.toml", "width = 8", "width = 9", "is 8 × 6 pixels, its camera has 9 × 6"),
         ("recording.toml", "[0, 0, 0, 1]", "[0, 0, 1, 1]", "not rigid: the last row"),

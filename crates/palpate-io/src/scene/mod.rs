@@ -204,7 +204,7 @@ fn initial(root: &Table) -> Result<Initial, InputError> {
 
 fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     let t = root.optional_table("time")?.ok_or_else(|| root.missing("time", "a table [time] with step and duration"))?;
-    let step = t.f64_where("step", |x| x > 0.0, "is not allowed: must be > 0 (s)")?;
+    let step = t.f64_where("step", |x| x >= SHORTEST_STEP, "is not allowed: must be > 0, and at least 1e-9 (s)")?;
     let duration = t.f64_where("duration", |x| x >= 0.0, "is not allowed: must be ≥ 0 (s)")?;
     let steps = t.optional_count("steps", 0..=MOST_STEPS as u64)?;
     let (key, count) = match (duration, steps) {
@@ -234,6 +234,9 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
     Ok(Time { step, steps: count as usize, start: t.optional_f64("start")?.unwrap_or(0.0), theta: theta.unwrap_or(0.6) })
 }
+
+/// Shortest time step [s]: the fastest waves need a thousand times as long to cross the smallest cells, and forces overflow long before zero.
+const SHORTEST_STEP: f64 = 1e-9;
 
 fn solver(root: &Table) -> Result<Solver, InputError> {
     let mut s = Solver::default();

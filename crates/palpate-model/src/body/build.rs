@@ -15,6 +15,15 @@ pub const SUBDIVISIONS: usize = 4;
 /// Most cells of a lattice.
 pub const MAX_CELLS: f64 = 5e6;
 
+/// Most cells of a body.
+pub const MAX_BODY_CELLS: f64 = 1e6;
+
+/// Memory that a cell of a body takes while its plan is made [B], measured on blocks.
+const CELL_MEMORY: f64 = 2.1e3;
+
+/// Places along the longest side at which a shape is asked how much of its bounding box it fills.
+const ASKED: f64 = 24.0;
+
 /// Cells with less of the body than this fraction are merged into a neighbour: below it the cut of a surface that grazes a lattice
 /// plane leaves nothing but rounding to compute with. Volume and surface are kept, as continuations of the neighbour.
 const SLIVER: f64 = 1e-6;
@@ -46,6 +55,20 @@ pub enum BodyError {
         h: f64,
         /// Size of the object's bounding box [m].
         size: DVec3,
+    },
+    /// The body would have too many cells.
+    #[error(
+        "cell size {h} m gives about {cells:.1e} cells, which take {:.1} GB before anything is computed; at most {MAX_BODY_CELLS:.0e} are \
+         allowed, use cells of {suggestion:.2e} m or more",
+        cells * CELL_MEMORY * 1e-9
+    )]
+    TooLarge {
+        /// Edge of a cell [m].
+        h: f64,
+        /// Number of cells, as estimated.
+        cells: f64,
+        /// A cell size that fits [m].
+        suggestion: f64,
     },
     /// The lattice would be huge.
     #[error(
@@ -228,8 +251,23 @@ fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<(Grid, usiz
         }
         return Err(BodyError::TooManyCells { h, cells: count, size, suggestion });
     }
+    if count > MAX_BODY_CELLS {
+        let cells = filled(shape, min, size) * (size / h).element_product();
+        if cells > MAX_BODY_CELLS {
+            return Err(BodyError::TooLarge { h, cells, suggestion: 1.02 * h * (cells / MAX_BODY_CELLS).cbrt() });
+        }
+    }
     let border = border as i32;
     Ok((Grid::covering(min, max, h, border), border as usize - 1))
+}
+
+/// Share of its bounding box that a shape fills, by asking at a few places.
+fn filled(shape: &dyn Shape, min: DVec3, size: DVec3) -> f64 {
+    let n = (size / size.max_element() * ASKED).ceil().max(DVec3::ONE);
+    let [nx, ny, nz] = n.to_array().map(|n| n as usize);
+    let at = |k: usize| min + size * (DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64) + 0.5) / n;
+    let all = nx * ny * nz;
+    (0..all).into_par_iter().filter(|&k| shape.signed_distance(at(k)) < 0.0).count() as f64 / all as f64
 }
 
 /// Takes slivers out of `found` and adds their volume and surface to the neighbouring cell nearest to what they hold.

@@ -4,7 +4,7 @@ use crate::catalogue;
 use crate::cli::Console;
 use crate::commands::devices;
 use crate::error::Error;
-use crate::experiment::Experiment;
+use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, room};
 use clap::Args;
@@ -248,11 +248,11 @@ fn observed(e: &Experiment) -> Vec<Line> {
                     "points_per_frame": [low, high], "marker_readings": markers, "markers": o.markers.len(),
                     "depth_noise": o.depth_noise, "marker_noise": o.marker_noise, "overlap": true }),
             format!(
-                "{} frames from {:.4} s to {:.4} s, {} cameras, {low} to {high} depth points a frame, {} markers ({markers} readings); \
+                "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({markers} readings); \
                  noise {noise}; lies around the object",
                 o.frames.len(),
-                first.time,
-                last.time,
+                short(first.time),
+                short(last.time),
                 o.cameras.len(),
                 o.markers.len(),
             ),
@@ -308,9 +308,11 @@ fn recording(r: &Recording) -> Vec<Line> {
             json!({ "names": m.names, "readings": m.samples.len(), "from": from, "to": to, "noise": m.noise_sigma,
                     "rest_places": m.rest.len() }),
             format!(
-                "{} markers, {} readings from {from:.4} s to {to:.4} s, noise {noise}, {} with a rest place",
+                "{} markers, {} readings from {} s to {} s, noise {noise}, {} with a rest place",
                 m.names.len(),
                 m.samples.len(),
+                short(from),
+                short(to),
                 m.rest.len()
             ),
         ));
