@@ -3,6 +3,7 @@
 use glam::{DVec3, DVec4};
 use palpate_model::plan::Plan;
 use palpate_model::scene::*;
+use std::f64::consts::TAU;
 use support::{modes, run, scenes};
 
 /// Ten times the thickness: a fully held end also stops Poisson's contraction, which beam theory does not know; what that adds
@@ -172,6 +173,30 @@ fn first_frequency_meets_timoshenko() {
         println!("ν = {nu}: without the error of lumped masses {stiffness:.4?}");
         assert_converging(&stiffness);
     }
+}
+
+/// A beam at rest on which a small gravity begins to act swings in its first mode about where it will hang, measured over four swings.
+#[test]
+fn a_beam_that_is_let_go_swings_as_timoshenko_says() {
+    const PER_SWING: f64 = 60.0;
+    let mut s = beam(4, 0.3);
+    s.gravity = DVec3::new(0.0, 0.0, -0.0981);
+    let theory = timoshenko(0.3);
+    s.time = Time { step: TAU / theory / PER_SWING, steps: (4.7 * PER_SWING) as usize, start: 0.0, theta: 0.5 };
+    let plan = scenes::plan(&s);
+    let mode = modes::first(&plan, DVec3::Z);
+    let swing: Vec<f64> = run::states(&plan).iter().map(|s| mode.of(&s.displacement)).collect();
+    let (low, high) = swing.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let middle = 0.5 * (low + high);
+    // Times, in steps, at which it comes through the middle on its way down.
+    let at = |k: &usize| *k as f64 + (swing[*k] - middle) / (swing[*k] - swing[k + 1]);
+    let down: Vec<f64> = (0..swing.len() - 1).filter(|&k| swing[k] > middle && swing[k + 1] <= middle).map(|k| at(&k)).collect();
+    let swings = down.len() - 1;
+    let omega = TAU * swings as f64 / ((down[swings] - down[0]) * s.time.step);
+    println!("{swings} swings: frequency over theory {:.4}, over the mode's {:.4}", omega / theory, omega / mode.omega);
+    assert!(swings >= 3 && (omega / theory - 1.0).abs() < 0.02, "{omega} and {theory}");
+    // θ = ½ lengthens a period by (ωΔt)²/12 = 0.09 %; places between steps are known to (ωΔt)²/8 of a step.
+    assert!((omega / mode.omega - 1.0).abs() < 0.002, "{omega} and {}", mode.omega);
 }
 
 /// Mean upward displacement over the face at the beam's end [m]: no node of its own dent.

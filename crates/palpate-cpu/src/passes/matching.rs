@@ -215,3 +215,51 @@ pub fn match_points(
     };
     best.into_par_iter().with_min_len(1024).filter_map(side).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::body::SUBDIVISIONS;
+    use palpate_model::scene::Analytic;
+    use palpate_model::shape::Placed;
+
+    /// Cells of the band, and how many points they are handed and how many lie in their boxes, over the number of points.
+    fn asked(h: f64, band: f64) -> (usize, f64, f64) {
+        let shape = Placed::new(Analytic::Ball { radius: 0.1, center: DVec3::new(1e-3, 2e-3, 3e-3) }, glam::DAffine3::IDENTITY);
+        let body = Body::build(&shape, h, band * h, SUBDIVISIONS).unwrap();
+        // Two thousand places spread evenly over the ball (golden angle).
+        let place = |k: usize| {
+            let (z, turn) = (1.0 - (k as f64 + 0.5) / 1000.0, 2.399_963 * k as f64);
+            DVec3::new(1e-3, 2e-3, 3e-3)
+                + 0.1 * DVec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z)
+        };
+        let points: Vec<ObservedPoint> = (0..2000).map(|k| ObservedPoint { position: place(k), camera: 0 }).collect();
+        let hash = PointHash::new(&points, h);
+        let n = body.nodes.len();
+        let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
+        let (mut handed, mut held) = (0usize, 0usize);
+        for cell in &body.band.cells {
+            let x = cell.nodes.map(rest);
+            let (min, max) = (x.into_iter().fold(x[0], DVec3::min), x.into_iter().fold(x[0], DVec3::max));
+            hash.visit(min, max, |p| {
+                handed += 1;
+                let at = points[p as usize].position;
+                held += usize::from(at.cmpge(min).all() && at.cmple(max).all());
+            });
+        }
+        (body.band.cells.len(), handed as f64 / 2000.0, held as f64 / 2000.0)
+    }
+
+    #[test]
+    fn a_point_is_asked_for_by_as_many_cells_however_many_there_are() {
+        let sizes: Vec<_> = [0.03, 0.015, 0.0075].iter().map(|&h| asked(h, 4.0)).collect();
+        println!("cells of the band, points handed and held per point: {sizes:?}");
+        assert!(sizes[2].0 > 6 * sizes[0].0, "many more cells: {sizes:?}");
+        for (cells, handed, held) in &sizes {
+            // What is inverted by Newton's method: the one cell of the rest shape that holds a point, two on a face between them.
+            assert!((held - 1.0).abs() < 0.01, "{sizes:?}");
+            // What is only compared with a box: the cubes that a cell looks into, empty or not, share slots with others.
+            assert!(handed * 2000.0 < 12.0 * (2000 + cells) as f64, "points + cells, not points × cells: {sizes:?}");
+        }
+    }
+}
