@@ -30,8 +30,8 @@ enum Verb {
     },
     /// Time and memory of a step, forward and back
     Bench {
-        /// Also a body of 100 000 nodes
-        #[arg(long)]
+        /// With --gpu: also a body of 100 000 nodes, which the CPU's bench always has
+        #[arg(long, requires = "gpu")]
         large: bool,
         /// Only bodies whose name begins so, e.g. dragon or "ball 30k"; nothing is written
         #[arg(long, value_name = "NAME")]
@@ -39,8 +39,8 @@ enum Verb {
         /// The GPU backend beside the CPU's, in batches, with times per pass
         #[arg(long)]
         gpu: bool,
-        /// With --gpu: the small bodies alone, for software adapters
-        #[arg(long, requires = "gpu")]
+        /// Without the bodies of 100 000 nodes; with --gpu: the small bodies alone, for software adapters
+        #[arg(long)]
         quick: bool,
         /// With --gpu: instead of steps, a whole fit of the size of the paper's teddy; with --quick a tiny one
         #[arg(long, requires = "gpu")]
@@ -118,9 +118,9 @@ fn run(verb: Verb) -> Result<(), String> {
                 println!("\nwritten to {}", table::save(&name, &report)?.display());
             }
         }
-        Verb::Bench { large, only: Some(name), .. } => bench::all(large, &name)?.print(),
-        Verb::Bench { large, only: None, .. } => {
-            let report = bench::all(large, "")?;
+        Verb::Bench { quick, only: Some(name), .. } => bench::all(quick, &name)?.print(),
+        Verb::Bench { quick, only: None, .. } => {
+            let report = bench::all(quick, "")?;
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }

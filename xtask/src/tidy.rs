@@ -25,6 +25,7 @@ pub fn check(root: &Path) -> Vec<String> {
     let mut found = Vec::new();
     rooms(root, &mut found);
     tables(root, &mut found);
+    effects(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
         let size = fs::metadata(&file).map_or(0, |m| m.len());
@@ -82,6 +83,15 @@ fn tables(root: &Path, found: &mut Vec<String>) {
         if table(page).is_none() || table(page) != table("README.md") {
             found.push(format!("README.md: the table between two lines {mark} is not that of {page}"));
         }
+    }
+}
+
+/// README says how many effects there are.
+fn effects(root: &Path, found: &mut Vec<String>) {
+    let text = fs::read_to_string(root.join("README.md")).unwrap_or_default();
+    let stated = format!("{} [effects](docs/effects.md)", palpate_model::effects::ALL.len());
+    if !text.contains(&stated) {
+        found.push(format!("README.md: does not say \"{stated}\""));
     }
 }
 
@@ -158,6 +168,7 @@ mod tests {
             "assets may have",
             "README.md",
             "is not that of",
+            "[effects](docs/effects.md)",
         ] {
             assert!(found.contains(part), "{part} in\n{found}");
         }

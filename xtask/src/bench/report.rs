@@ -155,6 +155,37 @@ impl Report {
                 println!("  {}: {f}", l.name);
             }
         }
+        self.print_sizes();
+    }
+
+    /// How time, iterations and memory of balls and blocks grow with their nodes.
+    fn print_sizes(&self) {
+        let mut sizes: Vec<&Line> = self
+            .lines
+            .iter()
+            .filter(|l| l.gpu.is_none() && (l.name.starts_with("ball ") || l.name.starts_with("block ")))
+            .collect();
+        if sizes.len() < 2 {
+            return;
+        }
+        sizes.sort_by_key(|l| l.nodes);
+        let head = ["body", "nodes", "step ms", "µs a node", "newton", "cg", "peak"];
+        let mut rows = vec![head.map(String::from).to_vec()];
+        rows.extend(sizes.iter().map(|l| {
+            vec![
+                l.name.clone(),
+                l.nodes.to_string(),
+                format!("{:.1}", 1e3 * l.forward.median),
+                format!("{:.1}", 1e6 * l.forward.median / l.nodes as f64),
+                format!("{:.1}", l.newton),
+                format!("{:.0}", l.linear),
+                format!("{:.0} MB", l.peak as f64 / 1e6),
+            ]
+        }));
+        table::print(
+            "sizes: a step forward, its iterations, and the most memory from cutting the body to the last adjoint",
+            &rows,
+        );
     }
 }
 
