@@ -51,6 +51,9 @@ pub struct Progress {
     pub values: Vec<f64>,
 }
 
+/// From θ of every scene to how many residuals count as one independent reading.
+pub type Worth<'a> = dyn FnMut(&[Vec<f64>]) -> f64 + 'a;
+
 /// What the caller hears and controls while a fit runs.
 #[derive(Default)]
 pub struct Hooks<'a> {
@@ -62,7 +65,7 @@ pub struct Hooks<'a> {
     /// Journal of evaluations, for resuming.
     pub journal: Option<JournalFile>,
     /// Told θ of every scene at the best point, says how many residuals count as one independent reading there; 1 without it.
-    pub design_effect: Option<&'a mut dyn FnMut(&[Vec<f64>]) -> f64>,
+    pub design_effect: Option<&'a mut Worth<'a>>,
 }
 
 /// One start's search.

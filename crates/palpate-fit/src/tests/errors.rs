@@ -83,7 +83,7 @@ fn errors_that_go_together_widen_by_what_they_are_worth() {
     };
     let hooks = Hooks { design_effect: Some(&mut worth), ..Hooks::default() };
     let wide = fit(&mut line(0.1, 1, 0.0), &settings(Optimizer::GaussNewton), hooks).expect("the line can be fitted");
-    assert_eq!(asked, [plain.theta.clone()], "asked once, at the best point");
+    assert_eq!(asked, std::slice::from_ref(&plain.theta), "asked once, at the best point");
     assert_eq!((plain.independent, wide.independent), (40.0, 40.0 / 9.0));
     for (p, w) in plain.parameters.iter().zip(&wide.parameters) {
         assert!((w.standard_error.unwrap() / p.standard_error.unwrap() - 3.0).abs() < 1e-12);
