@@ -104,29 +104,33 @@ impl Tuning {
     /// The same, asked.
     pub(crate) fn measured(gpu: &Arc<Gpu>, plan: &Plan, choices: &Choices) -> Result<Tuning, GpuError> {
         static KNOWN: Known = Mutex::new(None);
-        let alone = |many_from, product| World::new(gpu.clone(), plan, 1, Tuning { many_from, product });
-        let (mut one, mut many) = (alone(usize::MAX, Some(Product::Matrix))?, alone(0, None)?);
-        let key = format!("{}, {} parameters", key(&one), plan.layout.len());
-        let product = many.product;
+        let ways = [usize::MAX, 0].map(|many_from| Tuning { many_from, product: None });
+        let (nodes, cells, parameters) = (plan.body.nodes.len(), plan.body.cells.len(), plan.layout.len());
+        let key = format!("{}: {nodes} nodes, {cells} cells, {parameters} parameters", device(gpu));
         let chosen = once(&key, WORKGROUPS, choices, &KNOWN, || {
-            let iteration = |world: &mut World| {
+            let iteration = |way| {
+                let mut world = World::new(gpu.clone(), plan, 1, way)?;
                 world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
                 world.cg_speed().map(|speed| speed.iteration.seconds)
             };
-            Ok([iteration(&mut one)?, iteration(&mut many)?])
+            Ok([iteration(ways[0])?, iteration(ways[1])?])
         })?;
-        Ok(Tuning { many_from: if chosen == 0 { usize::MAX } else { 0 }, product: Some(product) })
+        Ok(ways[chosen])
     }
 }
 
 /// Choices of this process.
 type Known = Mutex<Option<HashMap<String, usize>>>;
 
-/// What a choice holds for: adapter and driver, nodes, cells, kinds of cells.
+/// Adapter and driver that a choice holds for.
+fn device(gpu: &Gpu) -> String {
+    format!("{} {}", gpu.name, gpu.driver).replace(char::is_control, " ")
+}
+
+/// What the choice of a product holds for: the device, nodes, cells, kinds of cells.
 fn key(world: &World) -> String {
     let s = &world.geometry.shape;
-    let device = format!("{} {}", world.gpu.name, world.gpu.driver).replace(char::is_control, " ");
-    format!("{device}: {} nodes, {} cells of {} kinds", s.nodes, s.cells, s.classes)
+    format!("{}: {} nodes, {} cells of {} kinds", device(&world.gpu), s.nodes, s.cells, s.classes)
 }
 
 /// Which of two ways is faster: measured once [s], so that a user gets the same bits twice.

@@ -15,7 +15,6 @@ use palpate_fit::{
 use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering::SeqCst;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -206,13 +205,12 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         // What the fit held on a device is free for what follows.
         drop(problem);
         // Whoever stops does not want to wait for what is only compared with.
-        let before =
-            |(e, t): (&Experiment, &Vec<f64>)| if interrupt.at_once().load(SeqCst) { None } else { e.residuals(backend, t).ok() };
+        let before = |(e, t): (&Experiment, &Vec<f64>)| if interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
         let before = experiments.iter().zip(&theta_before).map(before).collect();
         Ok((result, before, after, notes))
     })?;
     let (result, before, after, notes) = done?;
-    let cut = interrupt.at_once().load(SeqCst);
+    let cut = interrupt.is_urgent();
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
     warnings.extend(result.warnings.iter().cloned().chain(notes));

@@ -41,6 +41,11 @@ impl Interrupt {
         self.now.clone()
     }
 
+    /// True from the moment that somebody asked to stop: what only adds to the answer is left out then.
+    pub(crate) fn is_urgent(&self) -> bool {
+        self.now.load(Ordering::SeqCst)
+    }
+
     /// The flag itself.
     pub(crate) fn flag(&self) -> &AtomicBool {
         &self.raised

@@ -159,13 +159,13 @@ impl Recording {
             }
         };
         let seen = |t: f64| o.frames.iter().any(|f| (f.time - t).abs() < SAME_TIME);
-        let images: Vec<_> = self.frames.iter().filter(|f| f.depth.is_some() && seen(f.time)).collect();
-        let times = |f: fn(usize, usize) -> bool| -> Vec<f64> {
-            let counts = |i: &&&RecordedFrame| {
-                let (full, all) = i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == u16::MAX), all + 1));
-                f(full, all)
-            };
-            images.iter().filter(counts).map(|i| i.time).collect()
+        // Readings at the largest count, and all.
+        let count =
+            |i: &RecordedFrame| i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == u16::MAX), all + 1));
+        let images: Vec<(f64, (usize, usize))> =
+            self.frames.iter().filter(|f| f.depth.is_some() && seen(f.time)).map(|f| (f.time, count(f))).collect();
+        let times = |is: fn(usize, usize) -> bool| -> Vec<f64> {
+            images.iter().filter(|(_, (full, all))| is(*full, *all)).map(|(time, _)| *time).collect()
         };
         say(times(|_, all| all == 0), images.len(), "hold no reading of the object");
         say(
