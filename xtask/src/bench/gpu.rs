@@ -17,10 +17,10 @@ use std::time::Instant;
 
 /// Simulations that run together.
 const BATCHES: [usize; 3] = [1, 8, 64];
-/// Steps that are timed.
+/// Most steps that are timed.
 const STEPS: usize = 4;
-/// Longest time for one body and batch [s].
-const PATIENCE: f64 = 600.0;
+/// How the time of a step grows with nodes: iterations of conjugate gradients grow as bodies do.
+const GROWTH: f64 = 4.0 / 3.0;
 /// Derivatives by parameters that are timed together.
 const COLUMNS: usize = 8;
 /// Passes that are printed.
@@ -99,7 +99,7 @@ struct Subject {
     paper: Option<[f64; 3]>,
 }
 
-fn subjects(large: bool, quick: bool) -> Result<Vec<Subject>, String> {
+fn subjects(quick: bool) -> Result<Vec<Subject>, String> {
     let center = DVec3::new(0.001, 0.002, 0.103);
     let torus = Analytic::Torus { major: 0.08, minor: 0.03, center, axis: DVec3::Z };
     let ball = Analytic::Ball { radius: 0.1, center };
@@ -110,26 +110,22 @@ fn subjects(large: bool, quick: bool) -> Result<Vec<Subject>, String> {
     }
     // Cells across that give about as many nodes as the paper's bodies have: 1138 and 770.
     let mut all = vec![like(PAPER_TORUS, of("torus", torus, 13.0)), like(PAPER_BALL, of("ball", ball.clone(), 8.6))];
-    {
-        if let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
-            let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
-            all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, paper: Some(PAPER_DRAGON) });
-        } else {
-            println!("no dragon: set PALPATE_DATA to the folder of recordings");
-        }
-        all.extend([of("ball 1k", ball.clone(), 10.0), of("ball 10k", ball.clone(), 24.0)]);
-        if large {
-            all.extend([of("ball 30k", ball.clone(), 36.0), of("ball 100k", ball, 55.0)]);
-        }
+    if let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
+        let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
+        all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, paper: Some(PAPER_DRAGON) });
+    } else {
+        println!("no dragon: set PALPATE_DATA to the folder of recordings");
     }
+    let balls = [("ball 1k", 10.0), ("ball 10k", 24.0), ("ball 30k", 36.0), ("ball 100k", 55.0)];
+    all.extend(balls.map(|(name, across)| of(name, ball.clone(), across)));
     Ok(all)
 }
 
-/// Every body whose name begins with `only`, on the CPU and in batches on the device.
+/// Every body whose name begins with `only`, on the CPU and in batches on the device; none that would take more than `patience` seconds.
 ///
 /// # Errors
 /// There is no device, or a body cannot be built.
-pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
+pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
     let gpu = Gpu::open(&Choice::from_env()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
     let copy = gpu.copy_bandwidth().map_err(|e| e.to_string())?;
     println!("{}: copies {:.1} GB/s", gpu.name, copy / 1e9);
@@ -141,7 +137,8 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
         fit: None,
         lines: Vec::new(),
     };
-    for s in subjects(large, quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
+    let mut longest: Option<Longest> = None;
+    for s in subjects(quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
         let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, &[])?;
         cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
@@ -149,19 +146,17 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
         let mut plan = plan(body, RotationUpdate::Converged, &[]);
         plan.clock.steps = plan.clock.steps.min(STEPS);
         report.lines.push(cpu.clone());
-        let mut took = 0.0;
         for batch in BATCHES.into_iter().filter(|b| !quick || *b < 64) {
             // Software adapters take as many times longer as there are members.
-            if 8.0 * took > PATIENCE {
-                println!("  {} × {batch}: left out, it would take some {:.0} minutes", s.name, 8.0 * took / 60.0);
+            let expected = longest.map_or(0.0, |l| l.expects(cpu.nodes, batch));
+            if expected > patience {
+                println!("  {} × {batch}: left out, a step would take some {expected:.0} s; --patience allows more", s.name);
                 break;
             }
-            let clock = Instant::now();
-            let answer = on_device(&gpu, copy, &plan, batch, &cpu);
-            took = clock.elapsed().as_secs_f64();
-            match answer {
-                Ok(line) => {
+            match on_device(&gpu, copy, &plan, batch, &cpu, patience) {
+                Ok((line, seconds)) => {
                     println!("  {}: forward {:.2} ms a member", line.name, 1e3 * line.forward.median);
+                    longest = longest.filter(|l| l.seconds > seconds).or(Some(Longest { nodes: cpu.nodes, batch, seconds }));
                     report.lines.push(line);
                 }
                 // Too large for the device is an answer as well.
@@ -172,15 +167,29 @@ pub fn all(large: bool, quick: bool, only: &str) -> Result<Report, String> {
     Ok(report)
 }
 
+/// The longest step there and back so far: what larger ones will take.
+#[derive(Clone, Copy, Debug)]
+struct Longest {
+    nodes: usize,
+    batch: usize,
+    seconds: f64,
+}
+
+impl Longest {
+    fn expects(&self, nodes: usize, batch: usize) -> f64 {
+        self.seconds * batch as f64 / self.batch as f64 * (nodes as f64 / self.nodes as f64).powf(GROWTH)
+    }
+}
+
 /// Seconds of forward, cost and adjoint of every step, and bytes of the device.
 struct Run {
     seconds: [Vec<f64>; 3],
-    /// Of one derivative and of as many as are timed together, every step.
-    columns: [Vec<f64>; 2],
+    /// The same of derivatives, for every number of them that were computed together.
+    columns: Vec<Vec<f64>>,
     failure: Option<String>,
 }
 
-fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, String> {
+fn run(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]) -> Result<Run, String> {
     let wait = || backend.gpu().wait().map_err(|e| e.to_string());
     let mut seconds = [Vec::new(), Vec::new(), Vec::new()];
     let mut tally = backend.new_tally(world, &[]);
@@ -199,8 +208,8 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, Str
         seconds[1].push(clock.elapsed().as_secs_f64());
         tape.push(next);
     }
-    let mut columns = [Vec::new(), Vec::new()];
-    for (count, seconds) in [1, COLUMNS].into_iter().zip(&mut columns) {
+    let mut columns = vec![Vec::new(); together.len()];
+    for (&count, seconds) in together.iter().zip(&mut columns) {
         let directions: Vec<usize> = (0..count).collect();
         let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(world, &directions));
         backend.start_tangent(world, &tape[0], &mut old, &mut tally);
@@ -229,17 +238,18 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, Str
 }
 
 /// The run that has what its members need.
-fn settled(backend: &GpuBackend, world: &mut World, steps: usize) -> Result<Run, String> {
+fn settled(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]) -> Result<Run, String> {
     backend.watch(world, false);
     loop {
-        let run = run(backend, world, steps)?;
+        let run = run(backend, world, steps, together)?;
         if !backend.again(world) {
             return Ok(run);
         }
     }
 }
 
-fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -> Result<Line, String> {
+/// One line of the report, and the seconds of a step there and back.
+fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, patience: f64) -> Result<(Line, f64), String> {
     let backend = GpuBackend::on(gpu.clone());
     let before = gpu.made();
     let clock = Instant::now();
@@ -255,19 +265,33 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -
         })
         .collect();
     backend.set_params(&mut world, &ParamBatch::from_rows(&rows));
-    // Once with the clock of the passes, which also compiles them; then as fits run.
-    world.time_passes(true);
-    let steps = plan.clock.steps;
-    settled(&backend, &mut world, 1)?;
-    let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
-    world.time_passes(false);
-    let run = settled(&backend, &mut world, steps)?;
+    // With the clock of the passes, a second time where the first one compiled some of them; then as fits run, as often as there is time.
+    let clock = Instant::now();
+    let once = |world: &mut World| -> Result<(Run, f64, Vec<(String, u64, f64)>), String> {
+        world.time_passes(true);
+        let run = settled(&backend, world, 1, &[])?;
+        let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
+        world.time_passes(false);
+        let step = run.seconds.iter().flatten().sum();
+        Ok((run, step, passes))
+    };
+    let (mut run, mut step, mut passes) = once(&mut world)?;
+    if 4.0 * clock.elapsed().as_secs_f64() < patience {
+        (run, step, passes) = once(&mut world)?;
+    }
+    let times = ((patience - clock.elapsed().as_secs_f64()) / step) as usize;
+    // A derivative takes about as long as an adjoint.
+    let both: &[usize] = if times > 2 * COLUMNS { &[1, COLUMNS] } else { &[] };
+    if times > 0 {
+        let steps = (times / if both.is_empty() { 1 } else { 2 + COLUMNS }).clamp(1, plan.clock.steps);
+        run = settled(&backend, &mut world, steps, both)?;
+    }
     let speed = world.cg_speed().map_err(|e| e.to_string())?;
     let of_member = |s: Vec<f64>| Times::of(s.into_iter().map(|x| x / batch as f64).collect());
     let [forward, cost, adjoint] = run.seconds.map(of_member);
-    let columns = run.columns.map(|s| of_member(s).median);
+    let columns: Vec<f64> = run.columns.into_iter().map(|s| of_member(s).median).collect();
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
-    Ok(Line {
+    let line = Line {
         name: format!("gpu {} × {batch}", cpu.name),
         build,
         forward,
@@ -282,12 +306,13 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line) -
         gpu: Some(Device {
             batch,
             over_cpu: [ratio(&cpu.forward, &forward), ratio(&cpu.cost, &cost), ratio(&cpu.adjoint, &adjoint)],
-            columns: Some(columns),
+            columns: columns.try_into().ok(),
             product: format!("{}, {}", speed.product.name(), if speed.many { "many workgroups" } else { "one workgroup" }),
             iteration: Some(Traffic::new(speed.iteration, copy)),
             products: speed.products.iter().map(|(p, t)| (p.name().to_string(), Traffic::new(*t, copy))).collect(),
             passes,
         }),
         ..cpu.clone()
-    })
+    };
+    Ok((line, step))
 }

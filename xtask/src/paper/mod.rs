@@ -4,5 +4,6 @@
 pub mod finer;
 pub mod gradient;
 pub mod scenes;
+pub mod several;
 pub mod study;
 pub mod tables;
