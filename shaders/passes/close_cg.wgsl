@@ -1,4 +1,6 @@
-//! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next.
+//! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next. call.extra:
+//! FOR_DIRECTION or FOR_DERIVATIVE.
+// use shared/asks
 // use shared/grid
 // use shared/totals
 // use shared/iteration
@@ -19,5 +21,5 @@ fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     let ended = !negative && (s.z == 1.0 || !(sqrt(max(rz, 0.0)) > n.goal) || s.y >= f32(shape.most));
     n.rz = rz;
     n.cg = u32(s.y);
-    leave_cg(local, p.member, n, negative, ended, (call.extra & 4u) != 0u);
+    leave_cg(local, p.member, n, negative, ended, call.extra == FOR_DERIVATIVE);
 }

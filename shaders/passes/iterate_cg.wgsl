@@ -1,6 +1,7 @@
 //! A bounded number of conjugate-gradient iterations, one workgroup per member and column; every scalar stays on the device. Ends in the
-//! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: 0 = a Newton direction
-//! (a negative curvature cuts it short), 1 = a derivative (it is an error).
+//! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: FOR_DIRECTION or
+//! FOR_DERIVATIVE.
+// use shared/asks
 // use shared/mix
 // use shared/inertia
 // use shared/totals
@@ -85,5 +86,5 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             cg_along[a] = vec4(scaled(at_node(p.home, i), cg_rest[a].xyz), 0.0) + beta * cg_along[a];
         }
     }
-    leave_cg(local, p.member, n, negative, ended, call.extra == 1u);
+    leave_cg(local, p.member, n, negative, ended, call.extra == FOR_DERIVATIVE);
 }

@@ -37,6 +37,11 @@ const TRANSPOSED = 1u;
 const ODD = 1u;
 const WIDE_PARTS = 2u;
 
+// What a solve by conjugate gradients is for: a direction of Newton's method, which a negative curvature cuts short, or a derivative, of which it
+// is an error.
+const FOR_DIRECTION = 0u;
+const FOR_DERIVATIVE = 1u;
+
 // Of dot_column, on top of the parameter: −z · ∂r/∂p, unless it is ∂v/∂p or ∂u/∂p of the start.
 const OF_VELOCITY = 65536u;
 const OF_SHAPE = 131072u;

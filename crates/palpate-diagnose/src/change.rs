@@ -66,6 +66,16 @@ impl Change {
         }
     }
 
+    /// Which of [`Change::free_slots`] are coordinates of a place on the body.
+    pub fn on_body(&self) -> Vec<bool> {
+        match self {
+            Change::Effect(e) => {
+                self.free_slots().into_iter().map(|s| matches!(e.law().params[s].default, Unstated::OnBody)).collect()
+            }
+            Change::Freed { paths, .. } => vec![false; paths.len()],
+        }
+    }
+
     /// What each free number is a component of: those of one vector are of one kind and size.
     pub fn groups(&self) -> Vec<String> {
         match self {

@@ -4,6 +4,7 @@ use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::layout::Newton;
 use crate::memory::Maker as _;
+use crate::pipelines::shared::asks;
 use crate::recorder::PassTime;
 use crate::solve::Solve;
 use crate::tuning::{self, Product};
@@ -112,7 +113,7 @@ impl World {
             let clock = Instant::now();
             self.work(&rest, |s| {
                 s.list();
-                (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(1) });
+                (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) });
             });
             self.gpu.download::<f32>(&self.buffers["cg_parts"], 1).map(|_| clock.elapsed().as_secs_f64())
         };

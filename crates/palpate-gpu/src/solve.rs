@@ -182,17 +182,17 @@ impl<'a, 'r> Solve<'a, 'r> {
             let budget = if round < EARLY { ROUND } else { LATE_ROUND };
             // One workgroup alone has all it is allowed in every round.
             let budget = if self.world.many { budget } else { self.world.geometry.shape.most };
-            self.conjugate_gradients(0, effort.iterations.min(budget));
+            self.conjugate_gradients(asks::FOR_DIRECTION, effort.iterations.min(budget));
         }
         self.run(pass::FINISH_STEP, ALL, Per::Node, 0);
         self.run(pass::CHECK_STATE, ALL, Per::Member, u32::from(effort != FULL));
     }
 
     /// At least so many iterations of the solves of all members that want one: the rest comes in the next round.
-    fn conjugate_gradients(&mut self, exact: u32, budget: u32) {
+    fn conjugate_gradients(&mut self, purpose: u32, budget: u32) {
         if !self.world.many {
             for _ in 0..budget.div_ceil(self.world.geometry.shape.chunk) {
-                self.iterate_chunk(exact);
+                self.iterate_chunk(purpose);
                 self.relist();
             }
             return;
@@ -201,7 +201,7 @@ impl<'a, 'r> Solve<'a, 'r> {
             for i in 0..BLOCK {
                 self.iterate(i % 2);
             }
-            self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, 4 * exact, &self.failures(exact));
+            self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
             if block % GATED == 0 { self.list() } else { self.relist() }
         }
     }
@@ -215,14 +215,14 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, parity + width);
     }
 
-    /// A chunk of iterations by one workgroup a member; `exact` as `iterate_cg` has it.
-    pub(crate) fn iterate_chunk(&mut self, exact: u32) {
-        self.run_with(pass::ITERATE_CG, SOLVE, Per::Member, exact, &self.failures(exact));
+    /// A chunk of iterations by one workgroup a member, for this purpose.
+    pub(crate) fn iterate_chunk(&mut self, purpose: u32) {
+        self.run_with(pass::ITERATE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
     }
 
     /// Where a solve says that it failed: columns of a derivative have a place of their own each.
-    fn failures(&self, exact: u32) -> Vec<(&'static str, &'a wgpu::Buffer)> {
-        (exact == 1).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
+    fn failures(&self, purpose: u32) -> Vec<(&'static str, &'a wgpu::Buffer)> {
+        (purpose == asks::FOR_DERIVATIVE).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
     }
 
     /// A times `cg_along` → `cg_image`; returns how the parts of pᵀ A p lie, for `advance_cg`.
@@ -271,7 +271,7 @@ impl<'a, 'r> Solve<'a, 'r> {
 
     /// Makes `rhs` column q of the next [`Solve::solve_columns`].
     pub(crate) fn begin_column(&mut self, q: usize) {
-        self.run_with(pass::BEGIN_EXACT, ALL, Per::Member, q as u32, &self.failures(1));
+        self.run_with(pass::BEGIN_EXACT, ALL, Per::Member, q as u32, &self.failures(asks::FOR_DERIVATIVE));
     }
 
     /// Solves for as many columns as were begun, all at the same time, into as many vectors `direction`.
@@ -279,7 +279,7 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.columns = count as u32;
         self.list();
         let most = self.world.geometry.shape.most;
-        self.conjugate_gradients(1, self.effort().derivative.min(most));
+        self.conjugate_gradients(asks::FOR_DERIVATIVE, self.effort().derivative.min(most));
         self.columns = 1;
         let groups = self.world.members().div_ceil(64);
         let args = Args { extra: count as u32, ..Args::default() };

@@ -55,12 +55,18 @@ const QUICK: [&str; 13] = [
 ];
 
 /// Two things at once: names, scene.
-const PAIRS: [([&str; 2], &str); 5] = [
+const PAIRS: [([&str; 2], &str); 10] = [
     (["coulomb-friction", "air-drag"], "ball"),
     (["coulomb-friction", "initial-spin"], "torus"),
     (["two-part-stiffness", "marker-offset"], "beam"),
     (["two-part-stiffness", "depth-along-ray"], "plate"),
     (["two-part-stiffness", "camera-pose"], "plate"),
+    // One more of each scene.
+    (["air-drag", "camera-pose"], "blob"),
+    (["uniform-force", "structural-damping"], "beam"),
+    (["coulomb-friction", "depth-scale"], "torus"),
+    (["stiffness-damping", "depth-bias"], "ball"),
+    (["rest-shape", "time-offset"], "plate"),
 ];
 
 /// A case of the tests on the small ball: what is hidden (a line of the table in any scene), nothing, or a magnet.

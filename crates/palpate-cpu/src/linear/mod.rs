@@ -122,11 +122,16 @@ impl Task<'_> {
     fn is_easy(&self, entries: usize) -> bool {
         let Purpose::Step(columns) = self.purpose else { return false };
         let factor = FACTOR * entries as f64 / self.pattern.blocks.columns.len() as f64;
-        let root = self.inertia.sqrt();
+        let iterations = self.iterations(self.digits);
         match self.digits {
-            Digits::Few => DIRECTIONS * ITERATIONS[0] < factor * root,
-            Digits::All => columns as f64 * ITERATIONS[1] < factor * (1.0 + SUBSTITUTION * columns as f64) * root,
+            Digits::Few => DIRECTIONS * iterations < factor,
+            Digits::All => columns as f64 * iterations < factor * (1.0 + SUBSTITUTION * columns as f64),
         }
+    }
+
+    /// Iterations of CG with block-Jacobi alone, about: as many as one over the root of inertia's share.
+    fn iterations(&self, digits: Digits) -> f64 {
+        ITERATIONS[usize::from(digits == Digits::All)] / self.inertia.sqrt()
     }
 }
 
@@ -150,7 +155,7 @@ impl Solvers {
             Digits::Few => Box::new(Packed::new(rows, task.matrix, |v| v as f32)),
             Digits::All => Box::new(Packed::new(rows, task.matrix, |v| v)),
         };
-        if rows.len() < COARSE_FROM || ITERATIONS[0] < PLAIN * task.inertia.sqrt() {
+        if rows.len() < COARSE_FROM || task.iterations(Digits::Few) < PLAIN {
             return Ok(Prepared::Iterative(operator, Box::new(task.diagonal)));
         }
         let coarsening = self.coarsening.get_or_init(|| Coarsening::new(task.body, task.pattern, GROUP));

@@ -6,7 +6,7 @@ use crate::linear::least_squares;
 use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
-use palpate_model::effects::{Effect, find};
+use palpate_model::effects::{Effect, Unstated, find};
 use palpate_model::params::Transform;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -37,6 +37,8 @@ pub struct Bench {
     pub marsh: f64,
     /// Size of what a finer computation would change [m].
     pub grid: f64,
+    /// Half of the box that places on the body lie in [m].
+    pub body: f64,
 }
 
 /// A smooth pattern over place and time that a name stands for; a magnet pulls at one spot only.
@@ -125,6 +127,7 @@ impl Bench {
             iterations: usize::MAX,
             marsh: f64::INFINITY,
             grid: 2e-4,
+            body: 0.05,
         }
     }
 
@@ -197,7 +200,9 @@ impl Laboratory for Bench {
                 out.push(match c {
                     Change::Effect(e) => {
                         let p = &e.law().params[s];
-                        number(p.key.into(), e.values[s].unwrap_or(0.0), (p.lower, p.upper))
+                        let on_body = matches!(p.default, Unstated::OnBody);
+                        let bounds = if on_body { (-self.body, self.body) } else { (p.lower, p.upper) };
+                        number(p.key.into(), e.values[s].unwrap_or(0.0), bounds)
                     }
                     Change::Freed { paths, .. } => number(paths[s].clone(), 0.3, free),
                 });

@@ -118,7 +118,11 @@ pub(super) mod tests {
 
     /// Kinds that a step leaves of two that were accepted, and the stated number of the last.
     pub(in crate::workflow) fn left(step: Step, accepted: [&str; 2], hidden: &[(&str, f64)]) -> (Vec<String>, f64) {
-        let mut bench = Bench::new(11, hidden, false);
+        left_of(Bench::new(11, hidden, false), step, accepted)
+    }
+
+    /// The same of any laboratory.
+    pub(in crate::workflow) fn left_of(mut bench: Bench, step: Step, accepted: [&str; 2]) -> (Vec<String>, f64) {
         let effect = |kind: &str| Change::Effect(Effect::absent(find(kind).unwrap()));
         let changes = accepted.map(effect).to_vec();
         let values = bench.numbers(&changes).unwrap().iter().map(|n| n.start).collect();

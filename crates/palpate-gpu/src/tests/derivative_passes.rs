@@ -2,7 +2,7 @@
 //! against the same quantities of the CPU; each comparison must see one percent.
 
 use super::faults::{BALANCE, Fault};
-use super::passes::{Exact, FORCES, flat, given, load, scene, single, three, vectors, with_balance};
+use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, three, vectors, with_balance};
 use super::scenes::{device, plan};
 use crate::effects::{BACK, BY_OLD};
 use crate::pipelines::pass;
@@ -12,7 +12,7 @@ use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::passes::balance::{Balance, Inertia, States};
 use palpate_cpu::passes::cells::Mix;
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::Backend;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::{Physics, Plan};
 
@@ -36,10 +36,7 @@ fn name_of(key: ParamKey) -> String {
 
 /// The device's numbers; derivatives of the whole in these `sizes`.
 fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
-    let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
-    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    world.set_iterations(1);
-    let (world, n) = (&world, plan.body.nodes.len());
+    let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
     let tally = backend.new_tally(world, &[]);
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));

@@ -73,12 +73,17 @@ fn without_effects(plan: &Plan) -> bool {
     plan.layout.effects().next().is_none()
 }
 
-/// The device's numbers, with A of the CPU to check solutions by.
-pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
+/// A world at the plan's own values that takes one iteration of Newton's method at a time.
+pub(super) fn stepwise(backend: &GpuBackend, plan: &Plan) -> World {
     let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     world.set_iterations(1);
-    let (world, n) = (&world, plan.body.nodes.len());
+    world
+}
+
+/// The device's numbers, with A of the CPU to check solutions by.
+pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
+    let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
     let tally = backend.new_tally(world, &[]);
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let quantum = f64::from(world.geometry.shape.quantum);
