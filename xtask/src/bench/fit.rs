@@ -72,6 +72,7 @@ pub fn run(tiny: bool) -> Result<Report, String> {
         copy: None,
         fit: Some(fit),
         lines: Vec::new(),
+        left_out: Vec::new(),
     })
 }
 

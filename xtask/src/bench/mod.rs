@@ -53,6 +53,7 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         copy: None,
         fit: None,
         lines: Vec::new(),
+        left_out: Vec::new(),
     };
     let mut add = |line: Line| {
         println!("{}: {} nodes, forward {:.1} ms", line.name, line.nodes, 1e3 * line.forward.median);

@@ -83,6 +83,9 @@ pub struct Report {
     pub fit: Option<super::fit::Fit>,
     /// Bodies.
     pub lines: Vec<Line>,
+    /// What was asked for and is not among them, with the reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
 fn milliseconds(t: &Times) -> String {
@@ -156,6 +159,7 @@ impl Report {
             }
         }
         self.print_sizes();
+        self.left_out.iter().for_each(|l| println!("  left out: {l}"));
     }
 
     /// How time, iterations and memory of balls and blocks grow with their nodes.
@@ -284,7 +288,15 @@ mod tests {
     }
 
     fn report(lines: Vec<Line>) -> Report {
-        Report { date: "2026-01-01".into(), threads: 2, adapter: Some("a device".into()), copy: Some(1e10), fit: None, lines }
+        Report {
+            date: "2026-01-01".into(),
+            threads: 2,
+            adapter: Some("a device".into()),
+            copy: Some(1e10),
+            fit: None,
+            lines,
+            left_out: Vec::new(),
+        }
     }
 
     #[test]

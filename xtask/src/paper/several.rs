@@ -1,4 +1,5 @@
-//! A bouncing ball whose gravity, stiffness and damping are all unknown: what a recording tells apart, and what it is said not to.
+//! A bouncing ball whose gravity, stiffness and damping are all unknown: what a recording tells apart, and what it is said not to. (Weiss et al. find
+//! gravity in all 60 of their starts, and many pairs of the other two that do as well.)
 
 use super::scenes;
 use super::study::{self, Search, Watch};

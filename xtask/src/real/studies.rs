@@ -1,5 +1,6 @@
 //! The tables: each recording's own fit, both beams with one modulus, what one beam says of the other, and how the load of 52 g may hang.
 
+use super::tracks::{rms, track};
 use super::{fit, found, open, scene_path, swings};
 use crate::table;
 use palpate::{Error, Experiment, FitOptions, Fitted};
@@ -16,21 +17,40 @@ struct Recorded {
     name: &'static str,
     scene: &'static str,
     marker: Option<(&'static str, f64)>,
+    /// Texts of the scene that end it before the recording does, and what they are where it does not.
+    whole: &'static [(&'static str, &'static str)],
 }
 
 const BEAMS: [Recorded; 2] = [
-    Recorded { name: "Dragon Skin beam, own weight", scene: "beam-gravity", marker: Some(("tip1", 7.5)) },
-    Recorded { name: "the same beam with 52 g", scene: "beam-load52", marker: Some(("tip1", 4.3)) },
+    Recorded {
+        name: "Dragon Skin beam, own weight",
+        scene: "beam-gravity",
+        marker: Some(("tip1", 7.5)),
+        whole: &[("duration = 1.0", "duration = 4.2"), ("to = 1.06", "to = 9.0")],
+    },
+    Recorded {
+        name: "the same beam with 52 g",
+        scene: "beam-load52",
+        marker: Some(("tip1", 4.3)),
+        whole: &[("duration = 1.6", "duration = 5.4"), ("to = 1.7", "to = 9.0")],
+    },
 ];
 
-const CANTILEVERS: [Recorded; 3] = [
+const fn still(name: &'static str, scene: &'static str) -> Recorded {
+    Recorded { name, scene, marker: None, whole: &[] }
+}
+
+const CANTILEVERS: [Recorded; 5] = [
     Recorded {
         name: "MoldStar cantilever, swinging",
         scene: "cantilever-moldstar-oscillating",
         marker: Some(("head_outer_top", 2.6)),
+        whole: &[],
     },
-    Recorded { name: "Ecoflex cantilever, hanging", scene: "cantilever-ecoflex-hanging", marker: None },
-    Recorded { name: "two materials as one, hanging", scene: "cantilever-two-materials-hanging", marker: None },
+    still("Ecoflex cantilever, hanging", "cantilever-ecoflex-hanging"),
+    still("the same with the camera's bias", "cantilever-ecoflex-hanging-raw"),
+    still("two materials as one, hanging", "cantilever-two-materials-hanging"),
+    still("the same with the camera's biases", "cantilever-two-materials-hanging-raw"),
 ];
 
 /// Something measured, and the same simulated.
@@ -55,6 +75,9 @@ struct Row {
     /// Residual, and what noise alone would leave, root mean square [m].
     rms: f64,
     noise: f64,
+    /// The marker's distance from its measured places, root mean square, in the frames that were fitted and in all from the first of them to the
+    /// end of the recording [m].
+    marker_rms: Option<[f64; 2]>,
 }
 
 /// Every table, as it is printed.
@@ -81,6 +104,7 @@ fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted
         sag: None,
         rms: left.rms,
         noise: left.noise,
+        marker_rms: None,
     };
     if let Some((marker, guess)) = recorded.marker {
         let (seen, simulated) = swings(experiment, theta, marker, guess)?;
@@ -100,7 +124,13 @@ fn recordings(data: &Path) -> Result<(Vec<Row>, [Fitted; 2]), Error> {
     let mut own = |r: &Recorded| {
         let experiment = open(data, r.scene, &[])?;
         let fitted = fit(&experiment)?;
-        rows.push(told(row(r.name, r, &experiment, &fitted, 0)?));
+        let mut row = row(r.name, r, &experiment, &fitted, 0)?;
+        if let (Some((marker, _)), false) = (r.marker, r.whole.is_empty()) {
+            let whole = open(data, r.scene, r.whole)?;
+            let left = |e: &Experiment| Ok::<_, Error>(rms(&track(e, &fitted.result.theta[0], marker)?));
+            row.marker_rms = Some([left(&experiment)?, left(&whole)?]);
+        }
+        rows.push(told(row));
         Ok::<_, Error>((experiment, fitted))
     };
     let ((unloaded, first), (loaded, second)) = (own(&BEAMS[0])?, own(&BEAMS[1])?);
@@ -235,9 +265,11 @@ fn print(title: &str, rows: &[Row]) {
             both(r.frequency, 1.0, 2, true),
             both(r.sag, 1e3, 2, true),
             format!("{:.2} ({:.2})", 1e3 * r.rms, 1e3 * r.noise),
+            r.marker_rms.map_or("–".into(), |[fitted, whole]| format!("{:.2} / {:.2}", 1e3 * fitted, 1e3 * whole)),
         ]
     };
-    let head = ["", "E [kPa]", "damping ratio", "frequency [Hz]", "sag [mm]", "rms (noise) [mm]"];
+    let head =
+        ["", "E [kPa]", "damping ratio", "frequency [Hz]", "sag [mm]", "rms (noise) [mm]", "tip, fitted / to the end [mm]"];
     let rows: Vec<Vec<String>> = std::iter::once(head.map(String::from).to_vec()).chain(rows.iter().map(line)).collect();
     table::print(title, &rows);
 }
