@@ -75,6 +75,10 @@ enum Verb {
         /// Say what is being computed
         #[arg(long)]
         verbose: bool,
+        /// Instead: recordings by a simulator that shares nothing with palpate (quadratic tetrahedra, neo-Hookean); --only takes a case, its
+        /// first word, its scene or what is hidden
+        #[arg(long, conflicts_with_all = ["scene", "quick", "strengths"])]
+        independent: bool,
     },
     /// Fit every measured recording and print what docs/real-data.md says of them
     Real,
@@ -124,8 +128,8 @@ fn run(verb: Verb) -> Result<(), String> {
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }
-        Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose } => {
-            blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose })?;
+        Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent } => {
+            blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent })?;
         }
         Verb::Real => println!("\nwritten to {}", real::run()?.display()),
         Verb::Test { more } => test::run(&table::root(), &more)?,

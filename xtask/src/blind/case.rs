@@ -151,28 +151,8 @@ impl Case {
 
     /// Runs the case in an empty folder; `budget` bounds the diagnosis. Failures are outcomes too.
     pub fn run(&self, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Outcome {
-        let mut out = Outcome {
-            name: self.name.clone(),
-            scene: self.scene.into(),
-            group: self.group.into(),
-            hidden: self.hidden.iter().map(|h| TABLE[h.0].name.to_string()).collect(),
-            amplitudes: Vec::new(),
-            strength: 0.0,
-            verdict: "failed".into(),
-            named: Vec::new(),
-            indistinguishable: Vec::new(),
-            close: Vec::new(),
-            p_value: None,
-            p_value_after: None,
-            structure: (0.0, 0.0),
-            localisation: None,
-            parameter_error: None,
-            gap_closed: 0.0,
-            held_out: None,
-            slack_points: None,
-            seconds: 0.0,
-            sentence: String::new(),
-        };
+        let hidden = self.hidden.iter().map(|h| TABLE[h.0].name.to_string()).collect();
+        let mut out = Outcome::new(&self.name, self.scene, self.group, hidden);
         if let Err(e) = self.fill(&mut out, folder, budget, say) {
             out.sentence = e.to_string();
         }
@@ -239,7 +219,34 @@ const WEAKER: usize = 3;
 const MAGNET: f64 = 1e3;
 
 impl Outcome {
-    fn compare(&mut self, found: &Diagnosed, moved: &[Moved], numbers: &[(String, Number)]) {
+    /// Nothing said yet.
+    pub(super) fn new(name: &str, scene: &str, group: &str, hidden: Vec<String>) -> Outcome {
+        Outcome {
+            name: name.into(),
+            scene: scene.into(),
+            group: group.into(),
+            hidden,
+            amplitudes: Vec::new(),
+            strength: 0.0,
+            verdict: "failed".into(),
+            named: Vec::new(),
+            indistinguishable: Vec::new(),
+            close: Vec::new(),
+            p_value: None,
+            p_value_after: None,
+            structure: (0.0, 0.0),
+            localisation: None,
+            parameter_error: None,
+            gap_closed: 0.0,
+            held_out: None,
+            slack_points: None,
+            seconds: 0.0,
+            sentence: String::new(),
+        }
+    }
+
+    /// What the diagnosis says, without comparing it with the truth.
+    pub(super) fn answer(&mut self, found: &Diagnosed) {
         let d = &found.diagnosis;
         self.verdict = d.verdict.name().into();
         self.sentence = d.sentence();
@@ -252,6 +259,12 @@ impl Outcome {
         self.named = accepted.iter().map(|e| e.kind.clone()).collect();
         self.indistinguishable = accepted.first().map(|e| e.indistinguishable_from.clone()).unwrap_or_default();
         self.close = d.effects.iter().filter(|e| !e.accepted).map(|e| (e.kind.clone(), e.held_out_gain)).collect();
+    }
+
+    fn compare(&mut self, found: &Diagnosed, moved: &[Moved], numbers: &[(String, Number)]) {
+        self.answer(found);
+        let d = &found.diagnosis;
+        let accepted: Vec<_> = d.effects.iter().filter(|e| e.accepted).collect();
         // Of everything that belongs to what was named; a number that the answer does not state is as wrong as it can be.
         let mut off = (0.0, 0.0);
         let stated = |kind: &str, path: &str| {

@@ -3,6 +3,7 @@
 
 pub mod case;
 pub mod hidden;
+pub mod independent;
 pub mod magnet;
 pub mod record;
 pub mod report;
@@ -35,6 +36,8 @@ pub struct Options {
     pub strengths: bool,
     /// Say what is being computed.
     pub verbose: bool,
+    /// The cases that another simulator records ([`independent`]) instead.
+    pub independent: bool,
 }
 
 /// Cases of the quick subset, beside two nulls.
@@ -146,6 +149,9 @@ impl Options {
 /// # Errors
 /// Nothing fits the options, or a file cannot be read or written.
 pub fn run(options: &Options) -> Result<(), String> {
+    if options.independent {
+        return independent::run(options);
+    }
     let name = if options.quick { "blind-quick" } else { "blind" };
     let path = table::root().join("bench").join(format!("{name}.json"));
     let mut all = cases(options.nulls);
@@ -197,7 +203,7 @@ pub fn run(options: &Options) -> Result<(), String> {
 }
 
 /// Whole or not at all: a run may be stopped at any time.
-fn save(path: &std::path::Path, known: &[Outcome]) -> Result<(), String> {
+fn save(path: &std::path::Path, known: &[impl serde::Serialize]) -> Result<(), String> {
     let fail = |e: std::io::Error| format!("{}: {e}", path.display());
     let text = serde_json::to_string_pretty(known).map_err(|e| e.to_string())?;
     let new = path.with_extension("new");

@@ -215,9 +215,9 @@ impl Setup {
 
     /// The scene file of the diagnosis, which compares with a recording in `folder`.
     pub fn text(&self, folder: &Path) -> String {
-        let markers = if self.markers.is_empty() { "" } else { ", \"markers\"" };
-        let seen =
-            format!("[observation]\nrecording = {:?}\ncost = [\"sparse-surface\"{markers}]\n", folder.display().to_string());
+        let costs = [(self.cameras.is_empty(), "sparse-surface"), (self.markers.is_empty(), "markers")];
+        let costs: Vec<&str> = costs.iter().filter(|c| !c.0).map(|c| c.1).collect();
+        let seen = format!("[observation]\nrecording = {:?}\ncost = {costs:?}\n", folder.display().to_string());
         format!("{}{seen}{}", self.body, self.fit)
     }
 
