@@ -90,7 +90,7 @@ const MARKED: Independent = Independent {
         other_start: [[0.0; 3], [0.0, -1.5, 2.0]],
     },
     depth_noise: 0.0,
-    substeps: 4,
+    substeps: 8,
     spare: 0.04,
 };
 
@@ -117,7 +117,7 @@ const SEEN_BALL: Independent = Independent {
         other_start: [[0.1, 0.05, -0.3], [0.0; 3]],
     },
     depth_noise: 4.5e-4,
-    substeps: 2,
+    substeps: 4,
     spare: 0.0,
 };
 
@@ -127,7 +127,8 @@ pub fn scene(name: &str) -> Option<&'static Independent> {
 }
 
 /// Coordinates of the planes that cut the beam: finer where the clamp ends and strains change most.
-const ALONG: [f64; 13] = [0.0, 0.02, 0.024, 0.03, 0.04, 0.055, 0.075, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2];
+const ALONG: [f64; 18] =
+    [0.0, 0.02, 0.0225, 0.0265, 0.0325, 0.04, 0.05, 0.0625, 0.075, 0.0875, 0.1, 0.1125, 0.125, 0.14, 0.155, 0.17, 0.185, 0.2];
 
 impl Independent {
     /// The mesh of the body as the scene states it.
