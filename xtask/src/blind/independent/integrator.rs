@@ -93,6 +93,7 @@ impl<'a> Integrator<'a> {
     ///
     /// # Errors
     /// Newton's method does not converge.
+    #[cfg(test)]
     pub fn settle(&mut self) -> Result<(), String> {
         let zero = vec![DVec3::ZERO; self.now.u.len()];
         let m = Motion {

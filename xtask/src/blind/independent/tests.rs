@@ -134,3 +134,17 @@ fn a_cantilever_bends_as_a_beam() {
         assert!((found / exact - 1.0).abs() < within, "{found} instead of {exact}");
     }
 }
+
+/// A body that feels nothing but drag k v² slows down as v₀/(1 + k v₀ t).
+#[test]
+fn drag_brakes_as_the_drag_equation_says() {
+    let mut body = block([1, 1, 1]);
+    body.loads.drag = 7.2;
+    let area = 2.0 * (0.1 * 0.03 + 0.1 * 0.04 + 0.03 * 0.04);
+    let k = 7.2 * area / body.total_mass();
+    let mut motion = Integrator::new(&body, vec![DVec3::X * 5.0; body.mesh.nodes.len()], 0.0025).unwrap();
+    (0..80).for_each(|_| motion.advance().unwrap());
+    let mean = motion.state().v.iter().map(|v| v.x).sum::<f64>() / body.mesh.nodes.len() as f64;
+    let exact = 5.0 / (1.0 + k * 5.0 * 0.2);
+    assert!((mean / exact - 1.0).abs() < 1e-3, "{mean} instead of {exact}");
+}
