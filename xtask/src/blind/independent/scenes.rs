@@ -30,6 +30,8 @@ pub struct Independent {
     pub spare: f64,
 }
 
+/// A beam that hangs at 30° from the vertical and swings in two planes. Let go where it is level, it strains by a fifth at its root: the best
+/// fit then leaves 0.4 mm even where nothing is hidden, half of which a shorter step does not take away.
 const BEAM: &str = r#"
 format = "scene/1"
 [object]
@@ -40,9 +42,12 @@ density = 1000.0
 youngs_modulus = 2.4e5
 poisson_ratio = 0.4
 stiffness_damping = 0.003
+[world]
+gravity = [8.496, 0.0, -4.905]
 [[clamp]]
 box = { min = [-0.01, -0.03, 0.08], max = [0.02, 0.03, 0.15] }
 [initial]
+angular_velocity = [0.0, 0.0, 3.0]
 pivot = [0.02, 0.0, 0.115]
 [time]
 step = 0.01
@@ -87,7 +92,7 @@ const MARKED: Independent = Independent {
             ("root", [0.06, -0.015, 0.12]),
         ],
         spacing: 0.02,
-        other_start: [[0.0; 3], [0.0, -1.5, 2.0]],
+        other_start: [[0.0; 3], [0.0, -1.5, -5.0]],
     },
     depth_noise: 0.0,
     substeps: 8,
