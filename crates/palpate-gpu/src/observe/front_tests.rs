@@ -1,9 +1,11 @@
 //! Points that belong to the front of a thin plate, against the CPU: the plate has swung less far than the one that was recorded, so that
 //! points of the side which it swung away from lie behind its middle.
 
+use super::fault_tests::FAULTS;
 use super::rollout_tests::{assert_agreement, differences, seen_within, watched};
 use super::rows_tests::{apart, effect};
 use crate::GpuBackend;
+use crate::tests::faults::{BALANCE, faulty};
 use crate::tests::scenes::{device, held};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
@@ -52,9 +54,18 @@ fn check(plan: &Plan, keys: &[usize]) {
         .to_vec();
     let batch = ParamBatch::from_rows(&rows);
     let mut cpu = Rollout::new(CpuBackend, plan, 2).unwrap_or_else(|e| panic!("{e}"));
-    let mut rollout = Rollout::new(GpuBackend::on(gpu), plan, 2).unwrap_or_else(|e| panic!("{e}"));
-    let found = rollout.evaluate(&batch, &request);
-    for ((a, b), row) in found.iter().zip(&cpu.evaluate(&batch, &request)).zip(&rows) {
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let (found, exact) = (rollout.evaluate(&batch, &request), cpu.evaluate(&batch, &request));
+    for fault in [&FAULTS[..2], &BALANCE[2..3]].concat() {
+        let (wrong, rows) = faulty(plan, &rows, &fault);
+        let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &wrong, 2).unwrap_or_else(|e| panic!("{e}"));
+        for (a, b) in rollout.evaluate(&ParamBatch::from_rows(&rows), &request).iter().zip(&exact) {
+            let seen = differences(a, b, &directions);
+            println!("1 % of {}: {seen:?}", fault.0);
+            assert!(!seen.is_empty(), "1 % of {} was not seen", fault.0);
+        }
+    }
+    for ((a, b), row) in found.iter().zip(&exact).zip(&rows) {
         assert!(b.failure.is_none() && b.matched > 100, "{b:?}");
         assert_agreement(a, b, &directions);
         let right = cpu.linearise(row, &directions).unwrap_or_else(|e| panic!("{e}"));

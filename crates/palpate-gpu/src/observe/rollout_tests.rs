@@ -1,8 +1,10 @@
 //! Whole evaluations with observations against the CPU backend: cost, gradient and Gauss–Newton matrix through all steps, moving and
 //! static; a member that fails leaves the others alone.
 
+use super::fault_tests::FAULTS;
 use super::tests::{Noise, scene};
 use crate::GpuBackend;
+use crate::tests::faults::{BALANCE, Fault, faulty};
 use crate::tests::scenes::{device, held};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
@@ -119,7 +121,8 @@ pub(crate) fn assert_agreement(a: &Evaluation, b: &Evaluation, directions: &[usi
     assert!(gradients > 0, "no gradient is large enough to tell 1 %");
 }
 
-fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]]) {
+/// Evaluations of members with these changes of some parameters are the CPU's; with each of these faults of the device they are not.
+fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]], faults: &[Fault]) {
     let Some(gpu) = device(None) else { return };
     let directions: Vec<usize> = keys.iter().map(|k| plan.layout.index(*k)).collect();
     let mut rows = vec![plan.theta.clone(); changes.len()];
@@ -129,6 +132,15 @@ fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]]) {
     let request = Request { gradient: true, sensitivities: directions.clone() };
     let mut cpu = Rollout::new(CpuBackend, plan, rows.len()).unwrap_or_else(|e| panic!("{e}"));
     let right = cpu.evaluate(&ParamBatch::from_rows(&rows), &request);
+    for fault in faults {
+        let (wrong, rows) = faulty(plan, &rows, fault);
+        let mut backend = Rollout::new(GpuBackend::on(gpu.clone()), &wrong, rows.len()).unwrap_or_else(|e| panic!("{e}"));
+        for (a, b) in backend.evaluate(&ParamBatch::from_rows(&rows), &request).iter().zip(&right) {
+            let seen = differences(a, b, &directions);
+            println!("1 % of {}: {seen:?}", fault.0);
+            assert!(seen.iter().any(|s| s.starts_with("gradient")), "1 % of {} was not seen: {seen:?}", fault.0);
+        }
+    }
     // One more member, whose Young's modulus is none.
     let mut broken = plan.theta.clone();
     broken[plan.layout.index(ParamKey::YoungsModulus)] = f64::NAN;
@@ -148,7 +160,9 @@ fn evaluations_of_a_falling_ball_agree() {
     let center = DVec3::new(0.003, 0.001, 0.051);
     let plan = seen(&scene(Analytic::Ball { radius: 0.05, center }, 0.03));
     let keys = [ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density, ParamKey::TimeStart, ParamKey::Gravity(2)];
-    compare(&plan, &keys, &[&[1.3, 0.95, 1.1, 1.03, 1.0], &[0.8, 1.05, 1.0, 0.96, 1.02]]);
+    // It does not touch the ground, and is hardly damped.
+    let faults = [&BALANCE[..3], &FAULTS[1..2]].concat();
+    compare(&plan, &keys, &[&[1.3, 0.95, 1.1, 1.03, 1.0], &[0.8, 1.05, 1.0, 0.96, 1.02]], &faults);
 }
 
 #[test]
@@ -156,5 +170,6 @@ fn evaluations_of_a_static_problem_agree() {
     let mut s = held(0.03);
     s.time.steps = 0;
     s.observation = watched();
-    compare(&seen(&s), &[ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density], &[&[1.2, 0.97, 1.0]]);
+    let keys = [ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density];
+    compare(&seen(&s), &keys, &[&[1.2, 0.97, 1.0]], &[&BALANCE[..3], &FAULTS[1..2]].concat());
 }

@@ -13,7 +13,7 @@ use palpate_model::scene::Scene;
 use std::sync::Arc;
 
 /// Where the fault is, and what makes it.
-pub(super) type Fault = (&'static str, fn(&mut Plan));
+pub(crate) type Fault = (&'static str, fn(&mut Plan));
 
 fn scale(plan: &mut Plan, key: ParamKey) {
     let place = plan.layout.index(key);
@@ -21,7 +21,7 @@ fn scale(plan: &mut Plan, key: ParamKey) {
 }
 
 /// Faults of the balance.
-pub(super) const BALANCE: [Fault; 8] = [
+pub(crate) const BALANCE: [Fault; 8] = [
     ("Young's modulus", |p| scale(p, ParamKey::YoungsModulus)),
     ("Poisson's ratio", |p| scale(p, ParamKey::PoissonRatio)),
     ("density", |p| scale(p, ParamKey::Density)),
@@ -34,6 +34,16 @@ pub(super) const BALANCE: [Fault; 8] = [
 
 /// A fault of the comparison with what was measured; `observe/fault_tests.rs` has more.
 const OBSERVATION: [Fault; 1] = [("noise of depth", |p| Arc::make_mut(&mut p.observation).depth_noise *= 1.01)];
+
+/// A plan that is wrong in one place, and parameters of its members that are wrong in the same.
+pub(crate) fn faulty(right: &Plan, theta: &[Vec<f64>], (_, fault): &Fault) -> (Plan, Vec<Vec<f64>>) {
+    let of = |row: &[f64]| {
+        let mut own = Plan { theta: row.to_vec(), ..right.clone() };
+        fault(&mut own);
+        own
+    };
+    (of(&right.theta), theta.iter().map(|row| of(row).theta).collect())
+}
 
 /// A ball that every term pushes about: it lands hard, slips off its ghosts, and is damped in both ways.
 pub(super) fn busy(mut scene: Scene) -> Scene {
@@ -72,17 +82,11 @@ pub(super) fn check_states(gpu: &Arc<Gpu>, scene: &Scene, theta: &[Vec<f64>], al
     println!("{} nodes: {:.1e} m {:.1e} m/s", right.body.nodes.len(), d[0], d[1]);
     assert!(d[0] < allowed[0] && d[1] < allowed[1], "{:.1e} m {:.1e} m/s", d[0], d[1]);
     let mut missed: Vec<&str> = Vec::new();
-    for (name, fault) in faults {
-        let mut wrong = right.clone();
-        fault(&mut wrong);
-        let of_member = |row: &Vec<f64>| {
-            let mut own = Plan { theta: row.clone(), ..right.clone() };
-            fault(&mut own);
-            own.theta
-        };
-        let d = apart(&wrong, &theta.iter().map(of_member).collect::<Vec<_>>());
+    for fault in faults {
+        let (wrong, rows) = faulty(&right, theta, fault);
+        let (d, name) = (apart(&wrong, &rows), fault.0);
         println!("{name}: {:.1e} m {:.1e} m/s", d[0], d[1]);
-        missed.extend((d[0] <= allowed[0] && d[1] <= allowed[1]).then_some(*name));
+        missed.extend((d[0] <= allowed[0] && d[1] <= allowed[1]).then_some(name));
     }
     assert!(missed.is_empty(), "1 % of {missed:?} was not seen");
 }

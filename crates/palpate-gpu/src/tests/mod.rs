@@ -9,7 +9,7 @@ mod derivatives;
 mod effects;
 mod efforts;
 mod extremes;
-mod faults;
+pub(crate) mod faults;
 mod forward;
 mod lanes;
 mod limits;

@@ -1,6 +1,6 @@
 //! Conjugate gradients by many workgroups, with a matrix and without, against one workgroup's and against the CPU.
 
-use super::faults::BALANCE;
+use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, spread};
 use crate::choices::Choices;
@@ -11,6 +11,7 @@ use crate::world::World;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use palpate_model::plan::Plan;
 use palpate_model::scene::{Plane, Scene};
 
 const BOTH: [Product; 2] = [Product::Matrix, Product::Free];
@@ -76,15 +77,9 @@ fn products_with_and_without_a_matrix_agree_and_one_percent_shows() {
     let d = apart(&free, &right);
     println!("products differ by {d:.1e}");
     assert!(d < 1e-5, "{d:.1e}");
-    for (name, fault) in BALANCE {
-        let mut wrong = plan.clone();
-        fault(&mut wrong);
-        let of_member = |row: &Vec<f64>| {
-            let mut own = palpate_model::plan::Plan { theta: row.clone(), ..plan.clone() };
-            fault(&mut own);
-            own.theta
-        };
-        let theta: Vec<Vec<f64>> = theta.iter().map(of_member).collect();
+    for fault in BALANCE {
+        let name = fault.0;
+        let (wrong, theta) = faulty(&plan, &theta, &fault);
         let mut world = backend.build(&wrong, 2).unwrap_or_else(|e| panic!("{e}"));
         let d = apart(&product(&backend, &mut world, &theta, Product::Free), &right);
         println!("1 % of {name} makes {d:.1e}");
@@ -99,25 +94,31 @@ fn steps_by_many_workgroups_are_as_close_to_the_cpu_as_those_by_one() {
         let plan = plan(&scene);
         let theta = spread(&plan, 2);
         let exact = states(&CpuBackend, &plan, &theta).0;
-        let worst = |tuning: Tuning| {
+        let worst = |tuning: Tuning, fault: Option<&Fault>| {
             let backend = GpuBackend::on(gpu.clone()).tuned(tuning);
+            let (plan, theta) = fault.map_or_else(|| (plan.clone(), theta.clone()), |f| faulty(&plan, &theta, f));
             let (found, evaluations) = states(&backend, &plan, &theta);
             assert!(evaluations.iter().all(|e| e.failure.is_none()), "{tuning:?}: {:?}", evaluations[0].failure);
-            assert!(found == states(&backend, &plan, &theta).0, "{tuning:?}: two runs differ");
+            assert!(fault.is_some() || found == states(&backend, &plan, &theta).0, "{tuning:?}: two runs differ");
             found
                 .iter()
                 .flatten()
                 .zip(exact.iter().flatten())
                 .fold([0.0f64; 2], |w, (a, b)| [w[0].max(off(&a.0, &b.0)), w[1].max(off(&a.1, &b.1))])
         };
-        let one = worst(Tuning { many_from: usize::MAX, product: None });
+        let one = worst(Tuning { many_from: usize::MAX, product: None }, None);
         for product in BOTH {
-            let d = worst(many(product));
+            let d = worst(many(product), None);
             println!("{product:?}: {d:?}, one workgroup {one:?}");
             // Both end at Newton's accuracy; where in it is chance.
             assert!(d[0] < CLOSE[0].max(3.0 * one[0]) && d[1] < CLOSE[1].max(3.0 * one[1]), "{product:?}: {d:?}, one: {one:?}");
             // In no case more than a thirtieth of what a percent of stiffness makes (3e-4 m, 9e-3 m/s in `faults`).
             assert!(d[0] < 2e-6 && d[1] < 3e-4, "{product:?}: {d:?}");
+            for fault in &BALANCE[..3] {
+                let d = worst(many(product), Some(fault));
+                println!("{product:?}: 1 % of {}: {d:?}", fault.0);
+                assert!(d[0] > 2e-6 || d[1] > 3e-4, "{product:?}: 1 % of {} was not seen: {d:?}", fault.0);
+            }
         }
     }
 }
@@ -130,15 +131,23 @@ fn gradients_by_many_workgroups_agree_with_the_cpu() {
     scene.observation = watched();
     let plan = seen(&scene);
     let request = Request { gradient: true, sensitivities: vec![0, 1, 2] };
-    let rows = ParamBatch::from_rows(&spread(&plan, 2)[1..]);
+    let theta = &spread(&plan, 2)[1..];
     let mut cpu = Rollout::new(CpuBackend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
-    let right = cpu.evaluate(&rows, &request).remove(0);
+    let right = cpu.evaluate(&ParamBatch::from_rows(theta), &request).remove(0);
     for product in BOTH {
-        let backend = GpuBackend::on(gpu.clone()).tuned(many(product));
-        let mut rollout = Rollout::new(backend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
-        let found = rollout.evaluate(&rows, &request).remove(0);
-        let off = differences(&found, &right, &request.sensitivities);
-        assert!(off.is_empty(), "{product:?}: {off:?}");
+        let off = |plan: &Plan, theta: &[Vec<f64>]| {
+            let backend = GpuBackend::on(gpu.clone()).tuned(many(product));
+            let mut rollout = Rollout::new(backend, plan, 1).unwrap_or_else(|e| panic!("{e}"));
+            let found = rollout.evaluate(&ParamBatch::from_rows(theta), &request).remove(0);
+            differences(&found, &right, &request.sensitivities)
+        };
+        assert!(off(&plan, theta).is_empty(), "{product:?}: {:?}", off(&plan, theta));
+        for fault in &BALANCE[..3] {
+            let (wrong, theta) = faulty(&plan, theta, fault);
+            let seen = off(&wrong, &theta);
+            println!("{product:?}: 1 % of {}: {seen:?}", fault.0);
+            assert!(seen.iter().any(|s| s.starts_with("gradient")), "{product:?}: 1 % of {} was not seen", fault.0);
+        }
     }
 }
 

@@ -42,7 +42,7 @@ fn nodes_around_a_workgroup_agree_and_one_percent_shows() {
 }
 
 #[test]
-fn members_around_a_workgroup_agree_with_the_cpu_and_with_themselves_alone() {
+fn members_around_a_workgroup_agree_with_the_cpu_and_with_themselves_alone_and_one_percent_of_the_last_shows() {
     let Some(gpu) = device(None) else { return };
     let mut scene = block([1, 1, 1]);
     scene.observation = watched();
@@ -65,6 +65,16 @@ fn members_around_a_workgroup_agree_with_the_cpu_and_with_themselves_alone() {
         let last = alone.evaluate(&ParamBatch::from_rows(&rows[members - 1..members]), &request);
         assert_eq!(last[0], found[members - 1], "the last of {members}");
         assert_eq!(rollout.evaluate(&ParamBatch::from_rows(&rows[..members]), &request), found, "{members} again");
+        // One percent of the last member alone.
+        for key in [ParamKey::Density, ParamKey::Gravity(2)] {
+            let mut wrong = rows[..members].to_vec();
+            wrong[members - 1][plan.layout.index(key)] *= 1.01;
+            let wrong = rollout.evaluate(&ParamBatch::from_rows(&wrong), &request);
+            let off = |m: usize| differences(&wrong[m], &right[m], &request.sensitivities);
+            assert!((0..members - 1).all(|m| off(m).is_empty()), "{key:?} of another member");
+            println!("{members} members, 1 % of {key:?} of the last: {:?}", off(members - 1));
+            assert!(!off(members - 1).is_empty(), "1 % of {key:?} of the last of {members} was not seen");
+        }
     }
 }
 
