@@ -3,6 +3,7 @@
 use super::effects::with;
 use super::products::crowded;
 use super::scenes::{ball, device, own_device, plan, spread};
+use crate::effort::FULL;
 use crate::memory::Maker as _;
 use crate::observe::rollout_tests::{seen, watched};
 use crate::pipelines::{PASSES, pass};
@@ -75,6 +76,8 @@ fn conjugate_gradients_are_timed_by_whole_iterations_of_the_kernels_that_run() {
     }
 }
 
+/// Everything is recorded at once here. A graphics processor is given little work first and waits once for each level of effort that
+/// an evaluation needs (`effort.rs`, `tests/efforts.rs`).
 #[test]
 fn an_evaluation_waits_once() {
     let Some(gpu) = own_device() else { return };
@@ -82,7 +85,8 @@ fn an_evaluation_waits_once() {
     scene.time.steps = 2;
     scene.observation = watched();
     let plan = seen(&scene);
-    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), &plan, 2).unwrap_or_else(|e| panic!("{e}"));
+    let backend = GpuBackend::on(gpu.clone()).levels(&[FULL]);
+    let mut rollout = Rollout::new(backend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
     let request = Request { gradient: true, sensitivities: vec![0, 1] };
     let before = gpu.waits.load(Ordering::Relaxed);
     let all = rollout.evaluate(&ParamBatch::from_rows(&spread(&plan, 2)), &request);
