@@ -1,6 +1,6 @@
 //! Contact law of a plane. Twin of palpate-model/src/contact.rs; all per unit stiffness.
 
-override contact_width: f32 = 0.05;
+override contact_width: f32;
 
 struct Law {
     pressure: f32,

@@ -5,11 +5,12 @@
 // Numbers of the band cells by lattice place.
 var<storage, read> band_lookup: array<u32>;
 
-// Steps of the march per cell, and most of them.
-const PER_CELL = 4.0;
-const MOST = 64;
+// Steps of the march per cell, most of them, and most of the root's.
+override front_per_cell: f32;
+override front_most: u32;
+override front_root: u32;
 // A cell continued so far (in its own size) means nothing any more.
-const FAR = 8.0;
+override front_far: f32;
 // Newton's steps of a place (in cells) and of the root (in h) that are the last: both converge quadratically, so that what is left is below
 // rounding, some 5e-7 of a cell.
 const PLACED = 1e-4;
@@ -50,7 +51,7 @@ fn continue_to(e: Hexahedron, y: vec3<f32>, nearby: vec3<f32>) -> Continued {
     var c: Continued;
     c.xi = nearby;
     let flat = 1e-6 * e.size * e.size * e.size;
-    for (var i = 0; i < 12; i++) {
+    for (var i = 0u; i < place_iterations; i++) {
         let j = jacobian_in(e, c.xi);
         let det = determinant(j);
         if !(det > flat) {
@@ -60,7 +61,7 @@ fn continue_to(e: Hexahedron, y: vec3<f32>, nearby: vec3<f32>) -> Continued {
         let step = inverse_of(j, det) * (position_in(e, c.xi) - y);
         c.xi -= step;
         let away = abs(c.xi - 0.5);
-        if !(max(max(away.x, away.y), away.z) < FAR) {
+        if !(max(max(away.x, away.y), away.z) < front_far) {
             c.lost = true;
             break;
         }
@@ -82,24 +83,24 @@ fn side_of(e: Hexahedron, cell: u32, y: vec3<f32>, p: Pulled, line: vec3<f32>) -
     var inside = t;
     var beyond = 0.0;
     var marches = true;
-    // One look whether this is the front, 64 steps of the march, 40 of the root.
-    for (var i = 0; i < 105; i++) {
+    // One look whether this is the front, the march, the root.
+    for (var i = 0u; i < 1u + front_most + front_root; i++) {
         let c = continue_to(e, y - t * line, xi);
         let r = rest_at(cell, c.xi);
         let known = r.known && !c.lost;
-        if i == 0 && !(known && r.d.w < 0.0) {
+        if i == 0u && !(known && r.d.w < 0.0) {
             return p;
         }
-        if !known || (marches && i > MOST) {
+        if !known || (marches && i > front_most) {
             break;
         }
         xi = c.xi;
         if marches && r.d.w < 0.0 {
-            if i > 0 && t >= sight.band {
+            if i > 0u && t >= sight.band {
                 break;
             }
             inside = t;
-            t += sight.h / PER_CELL;
+            t += sight.h / front_per_cell;
             continue;
         }
         if marches {

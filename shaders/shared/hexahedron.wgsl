@@ -14,7 +14,9 @@ var<storage, read> band_cells: array<BandCell>;
 var<storage, read> band_sdf: array<f32>;
 
 // Quadratic pieces per axis of a cell's distances, and samples: every piece has three, neighbours share one.
-override sdf_pieces: u32 = 2u;
+override sdf_pieces: u32;
+// Most steps of Newton's method for a place.
+override place_iterations: u32;
 
 // Relative rounding of a position is 6e-8 of the cell; so much slack in ξ leaves no gap between neighbours, and a point that two
 // of them hold has the same distance in both up to that slack.
@@ -104,7 +106,7 @@ fn pull_back(e: Hexahedron, cell: u32, y: vec3<f32>, slack: f32) -> Pulled {
     // Rounding of a determinant is some 1e-7 of the cell's cube.
     let flat = 1e-6 * e.size * e.size * e.size;
     var lost = false;
-    for (var i = 0; i < 12; i++) {
+    for (var i = 0u; i < place_iterations; i++) {
         let j = jacobian_in(e, xi);
         let det = determinant(j);
         if !(abs(det) > flat) {

@@ -1,8 +1,8 @@
 //! Rotation of a deformation gradient F = I + H in single precision, as a unit quaternion: (R − I) is then free of cancellation
 //! for small rotations. Twin of palpate-model/src/rotation.rs.
 
-override newton_determinant: f32 = 1e-3;
-override smallest_pair: f32 = 1e-3;
+override newton_determinant: f32;
+override smallest_pair: f32;
 
 fn identity3() -> mat3x3<f32> {
     return mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));

@@ -10,12 +10,8 @@ use glam::DVec3;
 use palpate_engine::{FailureKind, number};
 use palpate_model::changes;
 use palpate_model::params::ParamKey;
+use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
-
-/// A body that has moved this many times its own size has left the world.
-const WORLD_SIZE: f64 = 1000.0;
-/// A static problem starts far from its solution, so it gets more Newton iterations than a step.
-const STATIC_ITERATIONS: usize = 200;
 
 /// The balance of step k, or of the static problem (`None`).
 pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Balance<'a> {

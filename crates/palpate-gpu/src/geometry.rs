@@ -7,12 +7,10 @@ use crate::memory::Maker;
 use palpate_model::elements::Classes;
 use palpate_model::grips::within_reach;
 use palpate_model::pattern::{Pattern, Places};
-use palpate_model::plan::Plan;
+use palpate_model::plan::{Plan, WORLD_SIZE};
 use palpate_model::scene::RotationUpdate;
 use std::collections::HashMap;
 
-/// A body that has moved this many times its own size has left the world (as on the CPU).
-const WORLD_SIZE: f64 = 1000.0;
 /// Best relative accuracy of a Newton solve in single precision: 30 roundings. Newton's method is quadratic there, so the
 /// solution is better than its last but one residual.
 const FINEST: f64 = 2e-6;

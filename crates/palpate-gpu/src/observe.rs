@@ -31,6 +31,8 @@ use crate::pipelines::pass;
 use crate::pipelines::shared::{directions::DIRECTION, reduce};
 use crate::recorder::{Args, Named, Recorder, Size};
 use crate::world::Buffers;
+#[cfg(test)]
+pub(crate) use bounds::MOST_DIRECTIONS;
 pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
 use palpate_model::effects::sensors::Sensors;
@@ -136,6 +138,9 @@ impl Observer {
 
     /// Adds to a tally's buffers what observations write. What the device refuses is kept as its error.
     pub(crate) fn extend_tally(&self, gpu: &Gpu, directions: &[usize], tally: &mut Buffers) {
+        if let Err(e) = bounds::check_directions(directions.len()) {
+            gpu.keep(e);
+        }
         let together = tangent_slots(&self.sight, self.room, self.largest, directions.len());
         for (name, bytes) in tally_sizes(&self.sight, directions.len() as u64, together as u64) {
             let made = gpu.buffer(name, bytes).unwrap_or_else(|e| {

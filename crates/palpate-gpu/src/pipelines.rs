@@ -52,6 +52,11 @@ pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
 pub(crate) fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_width" => palpate_model::contact::WIDTH,
+        "front_far" => palpate_model::front::FAR,
+        "front_most" => palpate_model::front::MOST as f64,
+        "front_per_cell" => palpate_model::front::PER_CELL,
+        "front_root" => palpate_model::front::ROOT as f64,
+        "place_iterations" => palpate_model::pullback::ITERATIONS as f64,
         "sdf_pieces" => palpate_model::distances::PIECES as f64,
         "smallest_pair" => palpate_model::rotation::SMALLEST_PAIR,
         "newton_determinant" => palpate_model::rotation::NEWTON_DETERMINANT,

@@ -8,17 +8,17 @@
 //! derivatives of a [`Pullback`] with gradient −G / (G·s).
 
 use crate::grid::shape_functions;
-use crate::pullback::{Pullback, TURNED_AWAY, jacobian};
+use crate::pullback::{ITERATIONS, Pullback, TURNED_AWAY, jacobian};
 use glam::DVec3;
 
 /// Steps of the search per cell.
-const PER_CELL: f64 = 4.0;
+pub const PER_CELL: f64 = 4.0;
 /// Most steps: bands are a few cells wide.
-const MOST: usize = 64;
+pub const MOST: usize = 64;
 /// Iterations of the root: intervals halve where Newton's step leaves them.
-const ROOT: usize = 40;
+pub const ROOT: usize = 40;
 /// A cell continued so far (in its own size) means nothing any more.
-const FAR: f64 = 8.0;
+pub const FAR: f64 = 8.0;
 
 /// A line of sight through a deformed cell with corners `x` [m].
 pub struct Sight<'a> {
@@ -34,7 +34,7 @@ impl Sight<'_> {
     /// Place ξ on the line `t` [m] before the point, from a place nearby; `None` where the continued cell folds.
     fn at(&self, t: f64, mut xi: DVec3) -> Option<DVec3> {
         let goal = self.point - t * self.direction;
-        for _ in 0..12 {
+        for _ in 0..ITERATIONS {
             let n = shape_functions(xi);
             let r = (0..8).fold(-goal, |r, i| r + n[i] * self.x[i]);
             let j = jacobian(self.x, xi);

@@ -11,6 +11,11 @@ use crate::scene::{InitialShape, Solver};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
+/// A body that has moved this many times its own size has left the world.
+pub const WORLD_SIZE: f64 = 1000.0;
+/// Newton iterations that a static problem has at least: it starts far from its solution.
+pub const STATIC_ITERATIONS: usize = 200;
+
 /// A batch's common part: geometry, clock, observations. Members differ only in θ.
 #[derive(Clone, Debug)]
 pub struct Plan {

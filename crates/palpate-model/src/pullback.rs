@@ -14,13 +14,16 @@ pub const TURNED_AWAY: f64 = 0.3;
 /// ([`crate::front`]).
 pub const NOISE_REACH: f64 = 4.0;
 
+/// Most steps of Newton's method for a place: five reach rounding for corners displaced by up to 0.4 h, and convergence is quadratic;
+/// twelve cover strong shear.
+pub const ITERATIONS: usize = 12;
+
 /// Local coordinates ξ of world point `p` in the trilinear cell with corners `x`, by Newton's method; `None` when `p` is not in
 /// the cell (beyond a slack of 1e-9 of its size, so that no gap opens between neighbours) or the cell is folded.
 pub fn invert_trilinear(x: &[DVec3; 8], p: DVec3) -> Option<DVec3> {
     let size = (x[7] - x[0]).abs().max_element().max((x[6] - x[1]).abs().max_element());
     let mut xi = DVec3::splat(0.5);
-    // Quadratic convergence: five steps reach rounding for corners displaced by up to 0.4 h; twelve cover strong shear.
-    for _ in 0..12 {
+    for _ in 0..ITERATIONS {
         let n = shape_functions(xi);
         let mut r = -p;
         for i in 0..8 {

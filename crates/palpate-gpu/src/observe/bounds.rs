@@ -5,6 +5,18 @@ use super::tables::{BandTables, SiteTables};
 use super::{MOST_LOOPS, PARTS};
 use crate::error::GpuError;
 use crate::layout::Sight;
+use palpate_model::pullback::ITERATIONS;
+
+/// Most derivatives of an evaluation: a workgroup of `weigh_rows` goes through as many rows of the Gauss–Newton matrix.
+pub(crate) const MOST_DIRECTIONS: u64 = 256;
+
+/// Refuses more derivatives than that.
+pub(super) fn check_directions(count: usize) -> Result<(), GpuError> {
+    if count as u64 <= MOST_DIRECTIONS {
+        return Ok(());
+    }
+    Err(GpuError::Plan { what: format!("{count} derivatives at once: {MOST_DIRECTIONS} at most") })
+}
 
 /// What the loops of the kernels of an observation run over, at most.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +69,8 @@ impl Seen {
     /// Bounds by kernel, for those that have long loops; `tests/loops.rs` compares them with the shaders.
     pub(crate) fn loops(&self) -> [(&'static str, u64); 7] {
         let (rows, stripes) = (self.rows_of_cubes, self.stripes);
-        // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and up to twelve of Newton's.
-        let matching = self.layers + rows + (rows + self.points.div_ceil(8 * stripes)) * 13;
+        // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and those of Newton's method.
+        let matching = self.layers + rows + (rows + self.points.div_ceil(8 * stripes)) * (1 + ITERATIONS as u64);
         let pulling = self.layers + rows + rows + self.points.div_ceil(stripes);
         [
             ("match_points", matching),
@@ -69,7 +81,8 @@ impl Seen {
             ("fold_pulls", self.share() * (1 + self.fold + self.sites + self.markers) + 8),
             // 700: rotations of Jacobi's method.
             ("carry_markers", self.site + 700),
-            ("weigh_rows", self.rows.div_ceil(64) + 500),
+            // The entry of the matrix that a workgroup adds is found row by row. 8: the sum over the workgroup.
+            ("weigh_rows", self.rows.div_ceil(64) + MOST_DIRECTIONS + 8),
         ]
     }
 

@@ -2,10 +2,11 @@
 //! that a build accepts. A loop whose header is not known here fails the test.
 
 use crate::geometry::{LOOPS, Most, columns};
-use crate::observe::{MOST_LOOPS, POINTS_OF_STRIPE, Seen};
+use crate::observe::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::pipelines::PASSES;
 use crate::pipelines::shared::laws;
 use crate::world::KINDS;
+use palpate_model::{front, pullback};
 use std::collections::HashMap;
 
 /// Iterations of a loop by its header (variable names and indices left out), or `None` for a loop that nobody knows.
@@ -64,7 +65,9 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("i < call.mode; i += 64u") => 4,
         () if has("shot.point_count; i += 64u") => seen.points.div_ceil(64),
         () if has("rows_of(shots[s.look.shot])") => seen.rows.div_ceil(64),
-        () if has("while left > a") => 256,
+        () if has("while left > a") => MOST_DIRECTIONS,
+        () if has("< place_iterations") => pullback::ITERATIONS as u64,
+        () if has("front_most + front_root") => (1 + front::MOST + front::ROOT) as u64,
         () => return None,
     };
     Some(count as f64)
