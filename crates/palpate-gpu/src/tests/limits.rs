@@ -6,8 +6,9 @@ use crate::error::GpuError;
 use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
 use crate::memory::Maker as _;
+use crate::observe::MOST_DIRECTIONS;
 use crate::pipelines::shared::structs;
-use crate::pipelines::{PASSES, PassSource, Pipelines, compile, pass};
+use crate::pipelines::{PASSES, PassSource, Pipelines, compile, constant, pass};
 use crate::recorder::{Args, Recorder, Size};
 use crate::solve::{ALL, MATRIX, Per, SOLVE, Solve, TRIAL};
 use crate::tuning::Tuning;
@@ -222,6 +223,46 @@ fn a_kernel_that_does_not_compile_is_named() {
         // The device is none the worse.
         assert_eq!(gpu.take_trouble(), None);
     }
+}
+
+#[test]
+fn an_evaluation_that_needs_a_kernel_that_does_not_compile_names_it_and_the_way_out() {
+    let Some(mut gpu) = own_device() else { return };
+    // Nobody says where the barrier begins.
+    let missing = "guard_start";
+    let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
+    own.pipelines.constant = |name| constant(name).filter(|_| name != "guard_start");
+    let mut scene = ball(0.05);
+    scene.time.steps = 1;
+    let plan = plan(&scene);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    // It does not compile the second time either.
+    for _ in 0..2 {
+        let found = evaluate(&mut rollout, &plan.theta);
+        let failure = found.failure.unwrap_or_else(|| panic!("no kernel is missed, and the cost is {}", found.cost));
+        assert!(failure.kind == FailureKind::Device && found.cost.is_infinite(), "{failure}");
+        let needs = |p: &&PassSource| p.overrides.contains(&missing);
+        let named = |p: &PassSource| failure.detail.contains(&format!("the kernel {} does not compile", p.name));
+        assert!(PASSES.iter().filter(needs).any(named) && failure.detail.contains("--backend cpu"), "{failure}");
+    }
+}
+
+#[test]
+fn more_derivatives_than_an_invocation_may_look_through_are_refused() {
+    let Some(gpu) = own_device() else { return };
+    let mut scene = ball(0.05);
+    scene.time.steps = 1;
+    let plan = plan(&scene);
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let mut with = |count: u64| {
+        let request = Request { gradient: false, sensitivities: vec![0; count as usize] };
+        rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0).failure
+    };
+    let failure = with(MOST_DIRECTIONS + 1).unwrap_or_else(|| panic!("{} derivatives", MOST_DIRECTIONS + 1));
+    for words in ["257 derivatives", "256 at most", "--backend cpu"] {
+        assert!(failure.detail.contains(words), "{failure}");
+    }
+    assert_eq!(with(2), None);
 }
 
 #[test]
