@@ -2,16 +2,15 @@
 
 use super::scenes::{ball, held, own_device, plan};
 use crate::observe::rollout_tests::{seen, watched};
-use crate::{Gpu, GpuBackend, Load, memory};
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use crate::{Gpu, GpuBackend, Load, Product, Tuning, memory, tuning};
+use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
 use palpate_model::effects::{self, Effect};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::sync::Arc;
 
-fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
-    let before = (gpu.made(), gpu.allocated());
-    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, members).unwrap_or_else(|e| panic!("{e}"));
+/// Members with different Poisson's ratios.
+fn ratios(plan: &Plan, members: usize) -> ParamBatch {
     let nu = plan.layout.index(ParamKey::PoissonRatio);
     let rows: Vec<Vec<f64>> = (0..members)
         .map(|m| {
@@ -20,8 +19,36 @@ fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
             row
         })
         .collect();
-    let all = rollout.evaluate(&ParamBatch::from_rows(&rows), request);
+    ParamBatch::from_rows(&rows)
+}
+
+fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
+    let before = (gpu.made(), gpu.allocated());
+    let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, members).unwrap_or_else(|e| panic!("{e}"));
+    let all = rollout.evaluate(&ratios(plan, members), request);
     assert!(all.iter().all(|e| e.failure.is_none()), "{:?}", all[0].failure);
+    compare(gpu, before, plan, members, request);
+}
+
+/// The same of what an evaluation holds, made without computing anything.
+fn check_unused(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
+    let before = (gpu.made(), gpu.allocated());
+    // No measurement, whose buffers would be counted as well.
+    let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { product: Some(Product::Matrix), ..Tuning::default() });
+    let mut world = backend.build(plan, members).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ratios(plan, members));
+    let directions = &request.sensitivities;
+    let _tally = backend.new_tally(&world, directions);
+    let kept = if request.gradient { plan.clock.steps + 1 } else { 2 };
+    let _states: Vec<_> = (0..kept).map(|_| backend.new_state(&world)).collect();
+    let _adjoints: Vec<_> = (0..if request.gradient { 2 } else { 0 }).map(|_| backend.new_adjoint(&world)).collect();
+    let _tangents: Vec<_> = [0; 2].iter().map(|_| backend.new_tangent(&world, directions)).collect();
+    assert_eq!(gpu.take_trouble(), None);
+    compare(gpu, before, plan, members, request);
+}
+
+/// What was predicted, and what was made and allocated since.
+fn compare(gpu: &Arc<Gpu>, before: (u64, Option<u64>), plan: &Plan, members: usize, request: &Request) {
     let made = gpu.made() - before.0;
     // By the driver's own account, where it gives one.
     let held = gpu.allocated().zip(before.1).map(|(now, before)| now - before);
@@ -70,6 +97,23 @@ fn two_sizes_alone_and_in_batches_of_eight() {
         for members in [1, 8] {
             check(&gpu, &plan(&scene), members, &Request { gradient: h > 0.025, sensitivities: Vec::new() });
         }
+    }
+}
+
+#[test]
+fn large_bodies_and_batches_are_foreseen() {
+    let Some(gpu) = own_device() else { return };
+    let mut scene = ball(0.005);
+    scene.time.steps = 2;
+    let large = plan(&scene);
+    assert!(large.body.nodes.len() >= tuning::MANY, "{}", large.body.nodes.len());
+    check_unused(&gpu, &large, 1, &Request { gradient: true, sensitivities: vec![0] });
+    let mut scene = ball(0.02);
+    scene.time.steps = 4;
+    scene.observation = watched();
+    let small = seen(&scene);
+    for request in [Request { gradient: true, ..Request::default() }, Request { gradient: false, sensitivities: vec![0] }] {
+        check_unused(&gpu, &small, 64, &request);
     }
 }
 
