@@ -126,6 +126,44 @@ fn a_fit_whose_device_is_lost_keeps_its_best_and_resumes_to_the_same_bits() {
 }
 
 #[test]
+fn a_batch_whose_device_is_lost_goes_on_with_another() {
+    let Some((_alone, device)) = shared() else { return };
+    let folder = recorded();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    // Two scenes more after the one that is disturbed.
+    for name in ["second.toml", "third.toml"] {
+        let text = std::fs::read_to_string(path("fit.toml")).expect("a scene");
+        std::fs::write(path(name), text.replace("iterations = 12", "iterations = 2")).expect("writable");
+    }
+    let whole = folder.path().join("whole");
+    let alone = command(&["fit", &path("second.toml"), "--backend", "gpu", "--pictures", "0", "--out", &path("whole")]);
+    assert_eq!(alone.0, 0, "{}", alone.1);
+    let arguments = ["fit.toml", "second.toml", "third.toml"].map(path);
+    let arguments = [&["batch".to_string()], &arguments[..], &["--backend", "gpu", "--pictures", "0", "--out"].map(String::from)];
+    let arguments = [&arguments.concat()[..], &[path("all")]].concat();
+    let journal = folder.path().join("all/fit/journal.jsonl");
+    let rounds = || std::fs::read_to_string(&journal).map_or(0, |t| t.lines().count().saturating_sub(1));
+    let (code, err) = std::thread::scope(|scope| {
+        let batch = scope.spawn(|| command(&arguments.iter().map(String::as_str).collect::<Vec<_>>()));
+        while rounds() < 3 && !batch.is_finished() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        device.gpu().destroy();
+        batch.join().expect("a batch does not panic")
+    });
+    assert_eq!(code, 1, "{err}");
+    let text = std::fs::read_to_string(path("all/summary.json")).expect("a summary is written");
+    let summary: Value = serde_json::from_str(&text).expect("it is JSON");
+    let row = |k: usize, key: &str| summary["scenes"][k][key].clone();
+    let states = [0, 1, 2].map(|k| row(k, "status"));
+    assert_eq!(states, ["failed", "complete", "complete"].map(Value::from), "{err}");
+    assert!(row(0, "message").as_str().is_some_and(|m| m.contains("lost") && m.contains("--backend cpu")), "{summary}");
+    assert!((1..3).all(|k| row(k, "backend") == "gpu"), "{summary}");
+    // What came after is what it is alone.
+    assert_eq!(result(&folder.path().join("all/second")), result(&whole));
+}
+
+#[test]
 fn a_diagnosis_whose_device_is_lost_says_so_and_blames_no_candidate() {
     let Some((_alone, _)) = shared() else { return };
     let folder = recorded();
