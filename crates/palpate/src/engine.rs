@@ -6,6 +6,8 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBatch, Request, Rollout, Snapshot};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
+use palpate_model::observation::Frame;
+use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
@@ -52,6 +54,8 @@ pub enum Backend {
 
 /// Steps that `auto` times on both backends.
 const TRIAL_STEPS: usize = 2;
+/// Most members that it times: more change nothing in what is faster.
+const TRIAL_MEMBERS: usize = 16;
 
 /// The device of this process: kernels are compiled once. A device that was lost is opened anew, for whoever comes next.
 fn gpu() -> Result<GpuBackend, GpuError> {
@@ -92,15 +96,31 @@ fn refused(e: &GpuError) -> Error {
     Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
 }
 
-/// Seconds of a forward step of `members` simulations, so many at once; the first round warms up.
-fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, members: usize, at_once: usize) -> Option<f64> {
-    let mut plan = Plan { observation: Arc::new(plan.observation.without_frames()), ..plan.clone() };
-    plan.clock.steps = plan.clock.steps.min(TRIAL_STEPS);
+/// The first steps of a plan, with as many frames a step as the whole has where they are compared; the first ones, in which the body is
+/// where it starts.
+fn trial(plan: &Plan, compared: bool) -> Plan {
+    let (start, dt, steps) = (plan.theta[plan.layout.index(ParamKey::TimeStart)], plan.clock.step, plan.clock.steps);
+    let mut short = plan.clone();
+    short.clock.steps = steps.min(TRIAL_STEPS);
+    let mut seen = plan.observation.without_frames();
+    if compared {
+        let all = &plan.observation.frames;
+        let count = (all.len() * short.clock.steps).div_ceil(steps.max(1));
+        let count = if steps == 0 { all.len() } else { count };
+        let time = |k: usize| start + (k as f64 + 0.5) / count as f64 * short.clock.steps as f64 * dt;
+        seen.frames = all.iter().take(count).enumerate().map(|(k, f)| Frame { time: time(k), ..f.clone() }).collect();
+    }
+    Plan { observation: Arc::new(seen), ..short }
+}
+
+/// Seconds of a step of such a trial with what is asked of it, for `members` simulations, so many at once; the first round warms up.
+fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Request, members: [usize; 2]) -> Option<f64> {
+    let [members, at_once] = members;
     let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
-    let mut rollout = Rollout::new(backend, &plan, at_once).ok()?;
-    rollout.evaluate(&rows, &Request::default());
+    let mut rollout = Rollout::new(backend, plan, at_once).ok()?;
+    rollout.evaluate(&rows, request);
     let clock = Instant::now();
-    let done = rollout.evaluate(&rows, &Request::default());
+    let done = rollout.evaluate(&rows, request);
     let seconds = clock.elapsed().as_secs_f64() / plan.clock.steps.max(1) as f64;
     done.iter().all(|e| e.failure.is_none()).then_some(seconds)
 }
@@ -119,6 +139,11 @@ impl Backend {
     /// takes less time on it than on the CPU, both measured here. Software adapters are never faster and not tried, unless
     /// `PALPATE_ADAPTER` names one.
     pub fn resolve(self, plan: &Plan, members: usize) -> (Backend, String) {
+        self.resolve_for(plan, &Demand::forward(members))
+    }
+
+    /// The same for a fit, whose steps are timed with what its optimiser asks of them: the cost, its gradient or derivatives.
+    pub(crate) fn resolve_for(self, plan: &Plan, demand: &Demand) -> (Backend, String) {
         if self != Backend::Auto {
             return (self, "asked for".into());
         }
@@ -131,16 +156,19 @@ impl Backend {
             Err(e) => return (Backend::Cpu, e.to_string()),
         };
         let name = device.name();
-        let cpu = time_step(CpuBackend, plan, members, members);
-        let at_once = Demand::forward(members).on_device(plan, device.gpu().largest_buffer()).map_or(1, |d| d.0);
+        let (short, request, members) = (&trial(plan, demand.compared), demand.request(), demand.starts.min(TRIAL_MEMBERS));
+        let demand = Demand { starts: members, ..demand.clone() };
+        let cpu = time_step(CpuBackend, short, &request, [members, demand.on_cpu(plan, 0).0]);
+        let at_once = demand.on_device(plan, device.gpu().largest_buffer()).map_or(1, |d| d.0);
         let gpu = {
             let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-            time_step(device, plan, members, at_once)
+            time_step(device, short, &request, [members, at_once])
         };
+        let what = demand.step();
         let ms = |s: f64| format!("{:.2} ms", s * 1e3);
         match (cpu, gpu) {
-            (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("a step takes {} on {name}, {} on the CPU", ms(g), ms(c))),
-            (Some(c), Some(g)) => (Backend::Cpu, format!("a step takes {}, {} on {name}", ms(c), ms(g))),
+            (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("{what} takes {} on {name}, {} on the CPU", ms(g), ms(c))),
+            (Some(c), Some(g)) => (Backend::Cpu, format!("{what} takes {}, {} on {name}", ms(c), ms(g))),
             _ => (Backend::Cpu, format!("{name} cannot compute this body")),
         }
     }

@@ -153,8 +153,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         tolerance: Tolerance { cost: options.tolerance.unwrap_or(usual.cost), ..usual },
         ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
     };
-    let backend = options.backend.resolve(first.plan(), settings.starts.min(16)).0;
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
+    let backend = options.backend.resolve_for(first.plan(), &demand(&free, 0, settings.optimizer, settings.starts)).0;
     let threads = options.threads.unwrap_or(spec.threads);
     let mut scenes = Vec::new();
     for (s, e) in experiments.iter().enumerate() {
@@ -384,7 +384,7 @@ pub(crate) fn demand(free: &[FreeParameter], scene: usize, optimizer: Optimizer,
     let mut places: Vec<usize> = slots.map(|s| s.place).collect();
     places.sort_unstable();
     let fixed = free.iter().all(|f| f.start.0 == f.start.1);
-    Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places }
+    Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places, compared: true }
 }
 
 /// Counts evaluations against an interrupt's budget.

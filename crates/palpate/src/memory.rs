@@ -22,20 +22,33 @@ pub(crate) struct Demand {
     pub optimizer: Optimizer,
     /// Places in θ of the free parameters.
     pub places: Vec<usize>,
+    /// Whether states are compared with what was measured.
+    pub compared: bool,
 }
 
 impl Demand {
     /// So many simulations without derivatives.
     pub fn forward(members: usize) -> Demand {
-        Demand { starts: members, asked: None, optimizer: Optimizer::NelderMead, places: Vec::new() }
+        Demand { starts: members, asked: None, optimizer: Optimizer::NelderMead, places: Vec::new(), compared: false }
     }
 
     /// What is asked of every evaluation.
-    fn request(&self) -> Request {
+    pub fn request(&self) -> Request {
         match want(self.optimizer) {
             Want::Cost => Request::default(),
             Want::Gradient => Request { gradient: true, sensitivities: Vec::new() },
             Want::Curvature => Request { gradient: false, sensitivities: self.places.clone() },
+        }
+    }
+
+    /// A step with that, in words.
+    pub fn step(&self) -> String {
+        match want(self.optimizer) {
+            _ if !self.compared => "a step".into(),
+            Want::Cost => "a step with the cost".into(),
+            Want::Gradient => "a step with the cost and its gradient".into(),
+            Want::Curvature if self.places.len() == 1 => "a step with the cost and one derivative".into(),
+            Want::Curvature => format!("a step with the cost and {} derivatives", self.places.len()),
         }
     }
 
@@ -142,7 +155,7 @@ mod tests {
         let experiment = Experiment::from_toml(scene, "ball.toml").unwrap_or_else(|e| panic!("{e}"));
         let plan = experiment.plan();
         for optimizer in [Optimizer::GaussNewton, Optimizer::Rprop, Optimizer::NelderMead] {
-            let demand = |starts, asked| Demand { starts, asked, optimizer, places: vec![0, 1] };
+            let demand = |starts, asked| Demand { starts, asked, optimizer, places: vec![0, 1], compared: true };
             let on = |starts, asked, room| demand(starts, asked).on_device(plan, room).unwrap_or_else(|e| panic!("{e}"));
             let (all, memory) = on(20, None, u64::MAX);
             assert_eq!(all, 20);

@@ -2,6 +2,7 @@
 
 use crate::engine::Backend;
 use crate::error::Error;
+use crate::memory::Demand;
 use clap::{Args, ValueEnum};
 use palpate_model::plan::Plan;
 use std::path::{Path, PathBuf};
@@ -32,9 +33,17 @@ impl BackendName {
     /// # Errors
     /// The GPU was asked for and there is no usable adapter.
     pub fn choose(self, plan: &Plan, members: usize) -> Result<(Backend, Option<String>), Error> {
+        self.choose_for(plan, &Demand::forward(members))
+    }
+
+    /// The same for a fit.
+    ///
+    /// # Errors
+    /// As [`BackendName::choose`].
+    pub(crate) fn choose_for(self, plan: &Plan, demand: &Demand) -> Result<(Backend, Option<String>), Error> {
         let asked = self.backend();
         asked.check()?;
-        let (backend, reason) = asked.resolve(plan, members);
+        let (backend, reason) = asked.resolve_for(plan, demand);
         Ok((backend, (asked == Backend::Auto).then(|| format!("backend: {} (auto: {reason})", backend.name()))))
     }
 }

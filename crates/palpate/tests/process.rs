@@ -61,22 +61,70 @@ fn an_adapter_that_does_not_exist_is_one_line_with_a_way_out() {
     }
 }
 
+/// A machine without drivers: one clear error where the device was asked for, the CPU where it was not.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_any_adapter_there_is_one_error_with_a_way_out_and_auto_takes_the_cpu() {
+    let (folder, scene) = scene();
+    let simulate = |backend: &str| {
+        let mut command = program();
+        command.arg("simulate").arg(&scene).args(["--backend", backend, "--every", "8", "--out"]).arg(folder.path().join("out"));
+        command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent");
+        command
+    };
+    let (code, out, err) = run(&mut simulate("gpu"));
+    assert_eq!((code, out.as_str()), (1, ""), "{err}");
+    assert_eq!(err.lines().count(), 1, "{err}");
+    for word in ["error: --backend gpu: no graphics adapter", "found: none", "hint: install a Vulkan driver", "--backend cpu"] {
+        assert!(err.contains(word), "\"{word}\" is not in: {err}");
+    }
+    // Whether or not an adapter is named, which has it look for one.
+    for named in ["", "llvmpipe"] {
+        let (code, _, err) = run(simulate("auto").env("PALPATE_ADAPTER", named));
+        assert_eq!(code, 0, "{err}");
+        let told = err.lines().find(|l| l.starts_with("backend: ")).unwrap_or_else(|| panic!("no choice is told: {err}"));
+        assert!(told.starts_with("backend: cpu (auto: ") && told.contains("no graphics "), "{told}");
+    }
+}
+
+/// What `--backend auto` says it measured: the time of what it picked comes first.
+fn check_choice(err: &str, step: &str, name: &str) {
+    let told = err.lines().find(|l| l.starts_with("backend: ")).unwrap_or_else(|| panic!("no choice is told: {err}"));
+    let (picked, reason) = told.split_once(&format!(" (auto: {step} takes ")).unwrap_or_else(|| panic!("{told}"));
+    let times: Vec<f64> = reason.split(" ms").filter_map(|w| w.rsplit(' ').next()?.parse().ok()).collect();
+    assert!(reason.contains(name) && times.len() == 2 && times[0] <= times[1], "{told}");
+    let device_first = reason.find(name) < reason.find(" ms, ");
+    assert_eq!(picked, if device_first { "backend: gpu" } else { "backend: cpu" }, "{told}");
+}
+
 #[test]
 fn auto_takes_what_it_measured_to_be_faster_and_says_so() {
     let Some(adapter) = adapter("") else { return };
     let name = adapter.name.split(" (").next().unwrap_or_default().to_string();
     let (folder, scene) = scene();
+    let path = |name: &str| folder.path().join(name);
     let mut command = program();
     command.arg("simulate").arg(&scene).args(["--backend", "auto", "--format", "obj", "--every", "6", "--out"]);
-    let (code, _, err) = run(command.arg(folder.path().join("out")).env("PALPATE_ADAPTER", &name));
+    let (code, _, err) = run(command.arg(path("out")).env("PALPATE_ADAPTER", &name));
     assert_eq!(code, 0, "{err}");
-    let told = err.lines().find(|l| l.starts_with("backend: ")).unwrap_or_else(|| panic!("no choice is told: {err}"));
-    let (picked, reason) = told.split_once(" (auto: a step takes ").unwrap_or_else(|| panic!("{told}"));
-    let times: Vec<f64> = reason.split(" ms").filter_map(|w| w.rsplit(' ').next()?.parse().ok()).collect();
-    assert!(reason.contains(&name) && times.len() == 2 && times[0] <= times[1], "{told}");
-    // The time of what was picked comes first.
-    let device_first = reason.find(&name) < reason.find(" ms, ");
-    assert_eq!(picked, if device_first { "backend: gpu" } else { "backend: cpu" }, "{told}");
+    check_choice(&err, "a step", &name);
+    // A fit is timed by what its optimiser asks of a step.
+    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
+    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"rprop\"\nstarts = 2\n\
+               iterations = 1\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
+    fs::write(path("fit.toml"), BLOCK.to_string() + fit).expect("writable");
+    for (optimizer, step) in [
+        ("rprop", "a step with the cost and its gradient"),
+        ("gauss-newton", "a step with the cost and one derivative"),
+        ("nelder-mead", "a step with the cost"),
+    ] {
+        let mut command = program();
+        command.arg("fit").arg(path("fit.toml")).args(["--optimizer", optimizer, "--pictures", "0", "--out"]);
+        let (code, _, err) = run(command.arg(path(optimizer)).env("PALPATE_ADAPTER", &name));
+        assert_eq!(code, 0, "{err}");
+        check_choice(&err, step, &name);
+    }
 }
 
 #[test]

@@ -172,7 +172,7 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint) {
             return Ok(Some(done));
         }
-        let (backend, note) = choose(&a.choices, &experiment)?;
+        let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment))?;
         let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);

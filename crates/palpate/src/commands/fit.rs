@@ -4,7 +4,7 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::{FitOptions, Fitted, fit};
+use crate::fitting::{FitOptions, Fitted, demand, fit, free_parameters};
 use crate::grid::grid_shift;
 use crate::options::{BackendName, out_folder};
 use crate::progress::Track;
@@ -208,7 +208,7 @@ fn warn_of_twins(paths: &[PathBuf], experiments: &mut [Experiment]) {
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     warn_of_twins(&a.scenes, &mut experiments);
-    let (backend, note) = choose(&a.choices, &experiments[0])?;
+    let (backend, note) = choose(&a.choices, &experiments)?;
     note.iter().for_each(|n| console.note(n));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
     let mut track = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
@@ -226,11 +226,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
 }
 
-/// The backend for a fit of this experiment, which runs all starts at once.
-pub fn choose(a: &Choices, experiment: &Experiment) -> Result<(Backend, Option<String>), Error> {
-    let starts = a.starts.unwrap_or(experiment.scene().fit.as_ref().map_or(1, |f| f.starts as u64));
-    // More members than this change nothing in what is faster.
-    a.backend.choose(experiment.plan(), starts.min(16) as usize)
+/// The backend for a fit of these experiments, which runs all starts at once: what is faster for the first.
+pub fn choose(a: &Choices, experiments: &[Experiment]) -> Result<(Backend, Option<String>), Error> {
+    let (first, spec) = (&experiments[0], experiments[0].scene().fit.as_ref());
+    let starts = a.starts.map_or(spec.map_or(1, |f| f.starts), |n| n as usize);
+    let optimizer = a.optimizer.map(Optimizer::from).or(spec.map(|f| f.optimizer)).unwrap_or(Optimizer::GaussNewton);
+    let (_, free, _) = free_parameters(experiments)?;
+    a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts))
 }
 
 impl Choices {
