@@ -30,8 +30,15 @@ fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
     compare(gpu, before, plan, members, request);
 }
 
+/// Waits until uploads have arrived, whose copies on the way are memory as well.
+fn settle(gpu: &Gpu) {
+    gpu.queue.submit([]);
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap_or_else(|e| panic!("{e}"));
+}
+
 /// The same of what an evaluation holds, made without computing anything.
 fn check_unused(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
+    settle(gpu);
     let before = (gpu.made(), gpu.allocated());
     // No measurement, whose buffers would be counted as well.
     let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { product: Some(Product::Matrix), ..Tuning::default() });
@@ -43,6 +50,7 @@ fn check_unused(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) 
     let _states: Vec<_> = (0..kept).map(|_| backend.new_state(&world)).collect();
     let _adjoints: Vec<_> = (0..if request.gradient { 2 } else { 0 }).map(|_| backend.new_adjoint(&world)).collect();
     let _tangents: Vec<_> = [0; 2].iter().map(|_| backend.new_tangent(&world, directions)).collect();
+    settle(gpu);
     assert_eq!(gpu.take_trouble(), None);
     compare(gpu, before, plan, members, request);
 }
