@@ -58,7 +58,7 @@ impl Console<'_> {
         Console {
             out,
             err,
-            talk: Talk { json: false, quiet: false },
+            talk: Talk { json: false, quiet: false, progress: None },
             alive: Liveliness::Silent,
             interrupt: self.interrupt.clone(),
         }
@@ -90,7 +90,8 @@ impl Console<'_> {
 
     /// Progress of `what` over `length` units (0: unknown) on stderr.
     pub fn progress(&self, length: u64, what: &str) -> Track {
-        Track::new(if self.talk.quiet { Liveliness::Silent } else { self.alive }, length, what)
+        let how = if self.talk.quiet { Liveliness::Silent } else { self.talk.progress.unwrap_or(self.alive) };
+        Track::new(how, length, what)
     }
 }
 
@@ -100,7 +101,7 @@ pub fn listens<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>
 }
 
 /// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown
-/// on the process's stderr as `alive` says; all else goes to `out` and `err`.
+/// on the process's stderr, as `alive` says where no option does; all else goes to `out` and `err`.
 pub fn run<A: Into<OsString> + Clone>(
     arguments: impl IntoIterator<Item = A>,
     out: &mut dyn Write,

@@ -3,6 +3,7 @@
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::memory::Demand;
+use crate::progress::Liveliness;
 use clap::{Args, ValueEnum};
 use palpate_model::plan::Plan;
 use std::path::{Path, PathBuf};
@@ -57,6 +58,9 @@ pub struct Talk {
     /// No progress and no notes on stderr; warnings and errors remain
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Progress on stderr [default: bar on a terminal, none otherwise]
+    #[arg(long, global = true, value_enum, value_name = "HOW")]
+    pub progress: Option<Liveliness>,
 }
 
 /// Name of a scene without folder and ending.

@@ -1,5 +1,6 @@
-//! Signs of life of a long command on stderr: a bar on a terminal, a plain line now and then in logs.
+//! Signs of life of a long command on stderr: a bar on a terminal; where a log asks for it, a plain line now and then.
 
+use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -7,13 +8,15 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// How a command shows that it is alive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Liveliness {
-    /// Not at all.
+    /// Not at all
+    #[value(name = "none")]
     Silent,
-    /// A bar, for terminals.
+    /// A bar, for terminals
+    #[value(name = "bar")]
     Bars,
-    /// Lines, for logs.
+    /// A line every few seconds, for logs
     Lines,
 }
 

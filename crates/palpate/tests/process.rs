@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A soft block on a clamp, pushed sideways.
 const BLOCK: &str = include_str!("block.toml");
@@ -240,4 +240,63 @@ fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
     copy("firm.toml", false);
     let (code, _, err) = job(&scenes, &out);
     assert_eq!((code, written()), (0, before), "{err}");
+}
+
+/// Ends the process, whatever happens to the test.
+#[cfg(unix)]
+struct Running(std::process::Child);
+
+#[cfg(unix)]
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It has usually ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
+    let (folder, scene) = scene();
+    let path = |name: &str| folder.path().join(name);
+    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
+    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
+    // Short evaluations, but minutes of them.
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"rprop\"\nstarts = 2000\niterations = 50\n\
+               [[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
+    fs::write(path("fit.toml"), BLOCK.to_string() + fit).expect("writable");
+    let journal = || fs::read_to_string(path("out/journal.jsonl")).unwrap_or_default();
+    let log = || fs::read_to_string(path("log")).unwrap_or_default();
+    let stopped_when = |options: &[&str], ready: &dyn Fn(Duration) -> bool| {
+        let mut fit = program();
+        fit.arg("fit").arg(path("fit.toml")).args(["--backend", "cpu", "--batch", "2", "--out"]).arg(path("out")).args(options);
+        let errors = fs::File::create(path("log")).expect("writable");
+        let mut fit = Running(fit.stdout(Stdio::null()).stderr(errors).spawn().expect("the program starts"));
+        let begun = Instant::now();
+        while !ready(begun.elapsed()) {
+            assert!(fit.0.try_wait().expect("it can be waited for").is_none(), "it has ended: {}", log());
+            assert!(begun.elapsed() < Duration::from_secs(120), "nothing happens: {}", log());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        // What Ctrl-C sends.
+        assert!(Command::new("kill").args(["-INT", &fit.0.id().to_string()]).status().expect("kill is there").success());
+        let code = fit.0.wait().expect("it ends").code();
+        assert_eq!(code, Some(130), "{}", log());
+        assert!(log().contains("interrupted: stopping at the next time step"), "{}", log());
+        let text = fs::read_to_string(path("out/result.json")).expect("the best so far is written");
+        let result: Value = serde_json::from_str(&text).expect("it is JSON");
+        assert_eq!(result["status"], "interrupted");
+        assert!(result["parameters"][0]["value"].as_f64().is_some_and(|e| e > 0.0), "{result}");
+        result
+    };
+    // Lines come after two seconds, where they come: in a file as in a pipe none do.
+    let first = stopped_when(&[], &|t| t > Duration::from_secs(4) && journal().lines().count() > 3);
+    assert!(!log().contains("fitting, "), "{}", log());
+    let kept = journal();
+    let second =
+        stopped_when(&["--resume", "--progress", "lines"], &|_| log().contains("fitting, ") && journal().len() > kept.len());
+    assert!(journal().starts_with(&kept), "it has begun anew");
+    assert!(second["cost"]["final"].as_f64() <= first["cost"]["final"].as_f64(), "{first} {second}");
+    assert!(path("out/previous-1/result.json").exists(), "the first result is kept");
 }
