@@ -35,6 +35,7 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         (&["simulate", s, "--backend", "tpu"], &["tpu", "--backend", "gpu"]),
         (&["simulate", s, "--format", "stl"], &["stl", "obj"]),
         (&["simulate", s, "--every", "0"], &["--every"]),
+        (&["simulate", s, "--progress", "dots"], &["dots", "--progress", "none", "bar", "lines"]),
         (&["observe", s, "--out", o], &["--camera", "--markers"]),
         (&["observe", s, "--out", o, "--camera", "eye=1,0,0"], &["eye=1,0,0", "target"]),
         (&["observe", s, "--out", o, "--camera", "eye=1,0,0 target=2,0,0"], &["never sees"]),
@@ -116,6 +117,10 @@ fn inspect_tells_sizes_and_problems_of_scenes_and_recordings() {
     assert!(v["memory"].as_f64().is_some_and(|m| m > 3.0 * 72.0 * 8.0 * 45.0), "{}", v["memory"]);
     let v: serde_json::Value = serde_json::from_str(&succeed(&["inspect", arg(&seen), "--json"]).out).unwrap();
     assert_eq!((&v["kind"], v["frames"]["count"].as_u64()), (&"recording".into(), Some(17)));
+    // One camera: what an image shows is what a frame has.
+    let [low, high] = [0, 1].map(|k| v["frames"]["readings_per_image"][k].as_u64().unwrap());
+    assert!(0 < low && low < high, "{}", v["frames"]);
+    assert!(text.contains(&format!("1 cameras, {low} to {high} depth points a frame, ")), "{text}");
 
     // The same recording around a body a metre away.
     let far = (BLOCK.to_string() + STIFFNESS).replace("[object]", "[object]\npose = [[1,0,0,1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
@@ -127,6 +132,44 @@ fn inspect_tells_sizes_and_problems_of_scenes_and_recordings() {
     let a = palpate(&["inspect", arg(&file("far.toml"))]);
     assert_eq!(a.code, 2, "{}", a.out);
     assert!(a.err.contains("far.toml") && a.err.contains("nowhere near"), "{}", a.err);
+}
+
+#[test]
+fn inspect_counts_the_edges_that_were_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    // Six faces of a box at (x, y), in OBJ's numbering behind `first` vertices.
+    let solid = |x: f64, y: f64, first: usize| {
+        let corner = |k: usize| [x + 0.04 * (k & 1) as f64, y + 0.04 * (k >> 1 & 1) as f64, 0.08 * (k >> 2) as f64];
+        let mut text: String = (0..8).map(corner).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+        for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            let [a, b, c, d] = face.map(|k| k + first + 1);
+            text += &format!("f {a} {b} {c} {d}\n");
+        }
+        text
+    };
+    // Two boxes that share an edge, where four triangles meet; and a ball without one of its triangles.
+    fs::write(file("pair.obj"), solid(0.0, 0.0, 0) + &solid(0.04, 0.04, 8)).unwrap();
+    let ball = palpate_model::scene::Analytic::Ball { radius: 0.04, center: glam::DVec3::new(0.02, 0.02, 0.04) };
+    let placed = palpate_model::shape::Placed::new(ball, glam::DAffine3::IDENTITY);
+    let mut holed = palpate_model::shape::Shape::surface(&placed, 0.01);
+    holed.triangles.remove(40);
+    palpate_io::write_obj(file("holed.obj"), &holed).unwrap();
+    let shape = "shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }";
+    assert!(BLOCK.contains(shape));
+    for (name, open, said, warning) in [
+        ("pair", 0, "0 (closed)", "touches itself along 1 edges"),
+        ("holed", 3, "3 in the file (closed by the repair)", "repaired: closed small holes: 1"),
+    ] {
+        let scene = file(&format!("{name}.toml"));
+        fs::write(&scene, BLOCK.replace(shape, &format!("mesh = \"{name}.obj\""))).unwrap();
+        let text = succeed(&["inspect", arg(&scene)]).out;
+        let line = text.lines().find(|l| l.trim_start().starts_with("open edges ")).unwrap_or_else(|| panic!("{text}"));
+        assert_eq!(line.trim_start().trim_start_matches("open edges").trim(), said, "{text}");
+        assert!(text.contains(warning), "{text}");
+        let v: serde_json::Value = serde_json::from_str(&succeed(&["inspect", arg(&scene), "--json"]).out).unwrap();
+        assert_eq!(v["open_edges"], open, "{name}");
+    }
 }
 
 #[test]

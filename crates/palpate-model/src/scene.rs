@@ -70,6 +70,8 @@ pub enum BodySource {
         path: PathBuf,
         /// The surface, before `pose`.
         mesh: TriMesh,
+        /// Edges with one triangle in the file, which the repair has closed.
+        open_edges: usize,
     },
     /// A closed form, before `pose`.
     Analytic(Analytic),

@@ -8,7 +8,7 @@ mod trimesh;
 
 pub use analytic::Placed;
 pub use mesh::MeshShape;
-pub use repair::{MeshReport, diagnose, repair};
+pub use repair::{MeshReport, Repaired, diagnose, repair};
 pub use trimesh::TriMesh;
 
 use crate::scene::{BodySource, Object};

@@ -6,7 +6,7 @@ mod tests;
 
 use crate::error::{InputError, Loaded, number};
 use glam::DVec3;
-use palpate_model::shape::{MeshReport, TriMesh, diagnose, repair};
+use palpate_model::shape::{MeshReport, Repaired, TriMesh, diagnose, repair};
 use std::path::Path;
 
 /// Longest side of an object [m]; anything larger was written in another unit.
@@ -21,7 +21,12 @@ const SMALLEST_SIDE: f64 = 1e-4;
 /// A file that cannot be parsed, holds no triangle, is in the wrong unit, is open, one-sided, or encloses no volume. Small holes
 /// are closed and inward faces turned, with a warning.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Loaded<TriMesh>, InputError> {
-    let path = path.as_ref();
+    let Loaded { value, warnings } = read_repaired(path.as_ref())?;
+    Ok(Loaded { value: value.mesh, warnings })
+}
+
+/// As [`read_mesh`], with what the file was like.
+pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Repaired>, InputError> {
     let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.as_str() {
@@ -59,7 +64,7 @@ fn merge(mesh: TriMesh) -> TriMesh {
     out
 }
 
-fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
+fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<Repaired>, InputError> {
     let refuse = |message: String| Err(InputError::file(path, message));
     if mesh.triangles.is_empty() {
         return refuse("holds no triangle with area".to_string());
@@ -79,9 +84,9 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
     if (max - min).min_element() < 1e-6 * side {
         return refuse("encloses no volume: it is flat; a closed surface of a solid is needed".to_string());
     }
-    let (mesh, repairs) = repair(&mesh);
-    let mut warnings: Vec<String> = repairs.into_iter().map(|r| format!("repaired: {r}")).collect();
-    let report = diagnose(&mesh);
+    let repaired = repair(&mesh);
+    let mut warnings: Vec<String> = repaired.done.iter().map(|r| format!("repaired: {r}")).collect();
+    let report = diagnose(&repaired.mesh);
     if let Some(fault) = fault(&report, side) {
         return refuse(fault);
     }
@@ -96,7 +101,7 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<TriMesh>, InputError> {
         ));
     }
     let warnings = warnings.into_iter().map(|w| InputError::file(path, w).to_string()).collect();
-    Ok(Loaded { value: mesh, warnings })
+    Ok(Loaded { value: repaired, warnings })
 }
 
 /// What keeps a repaired mesh from enclosing a solid.

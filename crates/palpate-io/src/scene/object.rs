@@ -3,10 +3,11 @@
 use super::corners;
 use crate::document::Table;
 use crate::error::{InputError, number};
-use crate::mesh::{LARGEST_SIDE, read_mesh};
+use crate::mesh::{LARGEST_SIDE, read_repaired};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
+use palpate_model::shape::Repaired;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
@@ -16,10 +17,11 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
     let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
         (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
         (Some(path), _) => {
-            let loaded = read_mesh(&path)?;
+            let loaded = read_repaired(&path)?;
             warnings.extend(loaded.warnings);
-            let (min, max) = crate::mesh::bounds(&loaded.value.vertices);
-            (BodySource::Mesh { path, mesh: loaded.value }, max - min)
+            let Repaired { mesh, open_edges, .. } = loaded.value;
+            let (min, max) = crate::mesh::bounds(&mesh.vertices);
+            (BodySource::Mesh { path, mesh, open_edges }, max - min)
         }
         (None, Some(shape)) => {
             let analytic = analytic(&shape)?;

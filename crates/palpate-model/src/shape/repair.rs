@@ -184,9 +184,20 @@ fn rim_length(mesh: &TriMesh, rim: &[u32]) -> f64 {
     (0..rim.len()).map(|i| at(i).distance(at(i + 1))).sum()
 }
 
+/// What [`repair`] made of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repaired {
+    /// The mesh.
+    pub mesh: TriMesh,
+    /// What was done, in words and numbers.
+    pub done: Vec<String>,
+    /// Edges with one triangle before holes were closed.
+    pub open_edges: usize,
+}
+
 /// Puts right what needs no guessing: joins equal vertices, drops collapsed and doubled triangles, turns triangles to agree with their
-/// neighbours and outward, closes small holes. Says what was done, in words and numbers; larger holes are left to the caller to refuse.
-pub fn repair(mesh: &TriMesh) -> (TriMesh, Vec<String>) {
+/// neighbours and outward, closes small holes. Larger holes are left to the caller to refuse.
+pub fn repair(mesh: &TriMesh) -> Repaired {
     let mut done = Vec::new();
     let mut say = |n: usize, what: &str| {
         if n > 0 {
@@ -208,9 +219,10 @@ pub fn repair(mesh: &TriMesh) -> (TriMesh, Vec<String>) {
     say(before - mesh.triangles.len(), "dropped triangles that occur twice");
     say(orient(&mut mesh), "turned triangles to agree with their neighbours");
     say(turn_outward(&mut mesh), "turned inside-out parts outward, triangles");
+    let open_edges = edge_uses(&mesh).values().filter(|u| u.len() == 1).count();
     let holes = close_holes(&mut mesh);
     say(holes, "closed small holes");
-    (drop_unused(mesh), done)
+    Repaired { mesh: drop_unused(mesh), done, open_edges }
 }
 
 /// Joins vertices closer than f32 can tell apart.

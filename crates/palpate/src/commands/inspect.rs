@@ -10,7 +10,7 @@ use crate::memory::{Demand, room};
 use clap::Args;
 use palpate_io::recording::{Recording, read_recording};
 use palpate_model::plan::Physics;
-use palpate_model::scene::{BodySource, Optimizer, Scene};
+use palpate_model::scene::{BodySource, Optimizer};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -95,15 +95,6 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     Ok(0)
 }
 
-/// Edges of a mesh that belong to one triangle only, or to more than two.
-fn open_edges(scene: &Scene) -> Option<usize> {
-    let BodySource::Mesh { mesh, .. } = &scene.object.source else { return None };
-    let mut edges: Vec<[u32; 2]> =
-        mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| [a.min(b), a.max(b)]).collect();
-    edges.sort_unstable();
-    Some(edges.chunk_by(|a, b| a == b).filter(|c| c.len() != 2).count())
-}
-
 fn megabytes(bytes: f64) -> String {
     if bytes < 1e6 { format!("{:.0} kB", bytes / 1e3) } else { format!("{:.1} MB", bytes / 1e6) }
 }
@@ -171,8 +162,9 @@ fn scene(e: &Experiment) -> Vec<Line> {
         line("area", "surface", json!(body.area), format!("{:.6e} m²", body.area)),
         line("mass", "mass", json!(mass), format!("{mass:.6} kg ({:.1} kg/m³)", physics.density)),
     ];
-    if let Some(open) = open_edges(scene) {
-        let text = if open == 0 { "0 (closed)".to_string() } else { format!("{open} (not closed)") };
+    if let BodySource::Mesh { open_edges: open, .. } = scene.object.source {
+        // A mesh that stays open is refused before it comes here.
+        let text = if open == 0 { "0 (closed)".to_string() } else { format!("{open} in the file (closed by the repair)") };
         lines.push(line("open_edges", "open edges", json!(open), text));
     }
     lines.extend([
