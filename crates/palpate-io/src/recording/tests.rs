@@ -115,6 +115,26 @@ fn pixels_become_world_points_that_project_back() {
 }
 
 #[test]
+fn distortion_is_opencvs() {
+    let mut c = camera("c");
+    c.world_from_camera = DAffine3::IDENTITY;
+    (c.focal, c.center) = ([100.0, 200.0], [50.0, 30.0]);
+    // k1, k2, p1, p2, k3.
+    c.distortion = [0.4, -0.8, 0.02, 0.05, 1.6];
+    // (0.6, 0.8, 2) has x = 0.3, y = 0.4, r² = 0.25, r⁴ = 0.0625, r⁶ = 0.015625.
+    // Radial: 1 + 0.4·0.25 − 0.8·0.0625 + 1.6·0.015625 = 1 + 0.1 − 0.05 + 0.025 = 1.075.
+    // Tangential: 2·0.02·0.12 + 0.05·(0.25 + 2·0.09) = 0.0048 + 0.0215 = 0.0263 in x,
+    //             0.02·(0.25 + 2·0.16) + 2·0.05·0.12 = 0.0114 + 0.012 = 0.0234 in y.
+    // x_d = 0.3·1.075 + 0.0263 = 0.3488 and y_d = 0.4·1.075 + 0.0234 = 0.4534, so
+    // u = 100·0.3488 + 50 = 84.88 and v = 200·0.4534 + 30 = 120.68.
+    let ([u, v], depth) = c.project(DVec3::new(0.6, 0.8, 2.0)).unwrap();
+    assert!((u - 84.88).abs() < 1e-12 && (v - 120.68).abs() < 1e-12 && depth == 2.0, "{u} {v} {depth}");
+    // Files hold the coefficients in the same order.
+    let text = fs::read_to_string(written().path().join("recording.toml")).unwrap();
+    assert!(text.contains("distortion = [0.1, -0.02, 0.001, -0.002, 0.003]"), "{text}");
+}
+
+#[test]
 fn frames_group_instants_and_choices_thin_them() {
     let folder = written();
     let r = read_recording(folder.path()).unwrap();
