@@ -63,8 +63,12 @@ pub(crate) struct Ran {
 
 /// Simulates to the end, or to the first failure.
 pub(crate) fn run(plan: &Plan) -> Ran {
+    run_in(World::new(plan), plan)
+}
+
+/// The same in a world of the plan.
+pub(crate) fn run_in(mut world: World, plan: &Plan) -> Ran {
     let backend = CpuBackend;
-    let mut world = backend.build(plan, 1).unwrap();
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     let mut tally = backend.new_tally(&world, &[]);
     let (mut now, mut next) = (backend.new_state(&world), backend.new_state(&world));

@@ -47,6 +47,8 @@ const GROUP: i64 = 4;
 #[derive(Debug)]
 pub struct Solvers {
     choice: LinearSolver,
+    /// Most iterations of CG; tests set it lower.
+    pub(crate) most: usize,
     analysis: OnceLock<Result<Analysis, String>>,
     coarsening: OnceLock<Result<Coarsening, String>>,
 }
@@ -94,8 +96,8 @@ pub struct Task<'a> {
 pub enum Prepared<'a> {
     /// Factorised.
     Direct(Factor),
-    /// With a preconditioner.
-    Iterative(Box<dyn Operator + 'a>, Box<dyn Precondition + 'a>),
+    /// With a preconditioner, and the most iterations.
+    Iterative(Box<dyn Operator + 'a>, Box<dyn Precondition + 'a>, usize),
 }
 
 /// A solve that failed.
@@ -138,7 +140,7 @@ impl Task<'_> {
 impl Solvers {
     /// Solvers for a choice made in the scene.
     pub fn new(choice: LinearSolver) -> Solvers {
-        Solvers { choice, analysis: OnceLock::new(), coarsening: OnceLock::new() }
+        Solvers { choice, most: MOST_ITERATIONS, analysis: OnceLock::new(), coarsening: OnceLock::new() }
     }
 
     /// Factorises or preconditions a matrix. A second level that is there already is used as it is; else it is made.
@@ -156,7 +158,7 @@ impl Solvers {
             Digits::All => Box::new(Packed::new(rows, task.matrix, |v| v)),
         };
         if rows.len() < COARSE_FROM || task.iterations(Digits::Few) < PLAIN {
-            return Ok(Prepared::Iterative(operator, Box::new(task.diagonal)));
+            return Ok(Prepared::Iterative(operator, Box::new(task.diagonal), self.most));
         }
         let coarsening = self.coarsening.get_or_init(|| Coarsening::new(task.body, task.pattern, GROUP));
         let coarsening = coarsening.as_ref().map_err(|e| Trouble::Indefinite(e.clone()))?;
@@ -164,7 +166,7 @@ impl Solvers {
             *level = Some(coarsening.level(task.body, rows, task.matrix, task.u).map_err(Trouble::Indefinite)?);
         }
         let level = level.as_ref().expect("made above");
-        Ok(Prepared::Iterative(operator, Box::new(TwoLevel { coarsening, jacobi: task.diagonal, level })))
+        Ok(Prepared::Iterative(operator, Box::new(TwoLevel { coarsening, jacobi: task.diagonal, level }), self.most))
     }
 }
 
@@ -176,10 +178,10 @@ impl Prepared<'_> {
                 factor.solve(&mut [b]);
                 Ok(0)
             }
-            Prepared::Iterative(matrix, precondition) => {
+            Prepared::Iterative(matrix, precondition, most) => {
                 let mut x = vec![DVec3::ZERO; b.len()];
                 let (matrix, precondition) = (matrix.as_ref(), precondition.as_ref());
-                match conjugate_gradient::solve(matrix, precondition, b, &mut x, relative, absolute, MOST_ITERATIONS) {
+                match conjugate_gradient::solve(matrix, precondition, b, &mut x, relative, absolute, *most) {
                     CgEnd::Converged(iterations) => {
                         *b = x;
                         Ok(iterations)

@@ -41,3 +41,35 @@ impl Carried {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collapse_tests::scene;
+    use palpate_model::observation::{MarkerRest, Observation};
+    use palpate_model::plan_build::build_plan;
+    use palpate_model::scene::{Analytic, BodySource};
+
+    #[test]
+    fn a_stalk_is_turned_but_neither_stretched_nor_sheared() {
+        let mut scene = scene(5e4);
+        let (min, max) = (DVec3::new(0.0, 0.0, 0.1), DVec3::new(0.1, 0.06, 0.16));
+        scene.object.source = BodySource::Analytic(Analytic::Box { min, max });
+        let (surface, stalk) = (DVec3::new(0.05, 0.03, 0.16), DVec3::new(0.003, -0.004, 0.012));
+        let rest = MarkerRest { name: "m".into(), position: surface + stalk, surface: Some(surface) };
+        let plan = build_plan(&scene, Observation::default(), &[rest]).unwrap();
+        let site = &plan.observation.markers[0];
+        // A stretch along skew axes, thirty per cent and more, and then a turn: the polar decomposition takes F = R S apart again.
+        let stretch = DMat3::from_cols(DVec3::new(1.3, 0.2, -0.1), DVec3::new(0.2, 0.8, 0.15), DVec3::new(-0.1, 0.15, 1.4));
+        let turn = DMat3::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 1.1);
+        for r in [DMat3::IDENTITY, turn] {
+            let f = r * stretch;
+            let u: Vec<DVec3> = plan.body.nodes.iter().map(|x| f * *x - *x).collect();
+            let carried = Carried::new(&plan.body, site, &u).position - f * surface;
+            assert!((carried.length() - stalk.length()).abs() < 1e-13, "{} m of {} m", carried.length(), stalk.length());
+            assert!((carried - r * stalk).length() < 1e-13, "{carried} instead of {}", r * stalk);
+            // Carried by F it would be a fifth longer.
+            assert!((f * stalk).length() > 1.2 * stalk.length());
+        }
+    }
+}
