@@ -23,11 +23,12 @@ Examples:
   palpate fit beam.toml --out found --resume   go on with an interrupted fit
 
 What is free, and where starts are drawn from, is said by [[fit.parameter]] in the scene. The folder gets result.json
-(format fit/1), model.toml (the scene with the values found), history.csv, report.html and journal.jsonl. Results that are
-already there are moved to previous-1, previous-2, … in the same folder. Ctrl-C stops at the next time step, writes the
-best so far (\"status\": \"interrupted\") and exits with 130. A graphics device that fails (out of memory, lost) ends the fit as well:
-the best so far is written (\"status\": \"broken-off\"), the exit code is 1, and --resume goes on where it failed, also with another
---batch: how many simulations run at once changes no number. `palpate inspect` says how much memory they will take.";
+(format fit/1), model.toml (the scene with the values found; of several scenes model-1.toml, model-2.toml, … in their
+order), history.csv, report.html and journal.jsonl. Results that are already there are moved to previous-1, previous-2, …
+in the same folder. Ctrl-C stops at the next time step, writes the best so far (\"status\": \"interrupted\") and exits with
+130. A graphics device that fails (out of memory, lost) ends the fit as well: the best so far is written (\"status\":
+\"broken-off\"), the exit code is 1, and --resume goes on where it failed, also with another --batch: how many simulations
+run at once changes no number. `palpate inspect` says how much memory they will take.";
 
 /// Find the parameters that explain a recording
 #[derive(Clone, Debug, Args)]
