@@ -87,3 +87,35 @@ fn a_body_held_at_its_ends_is_turned_as_it_is() {
         assert!(off < 1.2e-10, "{off} m");
     }
 }
+
+#[test]
+fn what_a_clamp_holds_does_not_depend_on_the_stiffness() {
+    // With loads that grow like E and time that passes like 1/√E the equations are the same up to a factor, if Nitsche's penalty grows
+    // like E as well: a fixed one is too soft for 1e7 Pa, where the body gives way at the clamp, and needless at 1e3 Pa.
+    let moved = |e: f64, state: InitialShape| {
+        let mut s = body(1000.0, 12);
+        let times = e / 5000.0;
+        s.material.youngs_modulus = e;
+        s.material.mass_damping = 2.0 * times.sqrt();
+        s.time.step = 0.005 / times.sqrt();
+        s.gravity = DVec3::new(0.3, -0.5, -2.0) * times;
+        s.initial.velocity = DVec3::new(0.02, 0.05, 0.1) * times.sqrt();
+        s.initial.state = state;
+        // Its edge is in the middle of cells.
+        s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(-0.0165, 1.0, 1.0))];
+        let states = run::states(&scenes::plan(&s));
+        states.into_iter().map(|s| s.displacement).collect::<Vec<_>>()
+    };
+    for state in [InitialShape::Rest, InitialShape::StaticEquilibrium] {
+        let reference = moved(1e3, state);
+        let largest = reference.iter().flatten().map(|u| u.length()).fold(0.0, f64::max);
+        for e in [1e4, 1e5, 1e6, 1e7] {
+            let scaled = moved(e, state);
+            let nodes = reference.iter().flatten().zip(scaled.iter().flatten());
+            let apart = nodes.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            println!("{state:?}, {e:.0e} Pa: {apart:.1e} m apart of {largest:.1e} m");
+            // Every step is solved to 1e-13 of the forces, times a condition number of a few hundred (see above).
+            assert!(largest > 1e-3 && apart < 1e-9 * largest, "{e} Pa: {apart} m of {largest} m");
+        }
+    }
+}
