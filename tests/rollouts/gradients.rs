@@ -4,7 +4,8 @@
 
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Source};
+use palpate_model::body::SUBDIVISIONS;
 use palpate_model::motion::RigidMotion;
 use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
 use palpate_model::params::ParamKey;
@@ -46,6 +47,9 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
         })
         .unwrap();
     let body = &plain.body;
+    // One on each side: every point is seen by the camera nearest to it.
+    let sides = DVec3::AXES.into_iter().flat_map(|a| [a, -a]);
+    let cameras: Vec<Camera> = sides.map(|a| Camera { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a }).collect();
     let frames = times
         .iter()
         .map(|&time| {
@@ -59,7 +63,10 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
                     let moved: DVec3 = (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum();
                     // A little off the surface, in and out.
                     let off = 0.002 * (1.0 + 40.0 * p.point.x).sin();
-                    ObservedPoint { position: p.point + moved + off * p.normal, camera: 0 }
+                    let position = p.point + moved + off * p.normal;
+                    let away = |c: &u32| cameras[*c as usize].center.distance(position);
+                    let camera = (0..6).min_by(|a, b| away(a).total_cmp(&away(b))).expect("there are six");
+                    ObservedPoint { position, camera }
                 })
                 .collect();
             Frame {
@@ -71,8 +78,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
         })
         .collect();
     let observation = Observation {
-        // The camera sits inside the body: it sees every side, so no point is dropped by visibility.
-        cameras: vec![Camera { center: DVec3::new(0.0, 0.0, 0.05), axis: DVec3::Z }],
+        cameras,
         frames,
         markers: Vec::new(),
         depth_noise: 1e-3,
@@ -81,7 +87,31 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
         depth_systematic: 0.0,
         marker_systematic: 0.0,
     };
-    build_plan(scene, observation, &[marker]).unwrap()
+    let plan = build_plan(scene, observation, &[marker]).unwrap();
+    away_from_kinks(plan)
+}
+
+/// Without the points that differences may take across a face of the distance's samples, where its slope jumps: differences over a kink are
+/// no derivatives.
+fn away_from_kinks(plan: Plan) -> Plan {
+    let body = &plan.body;
+    let rows = Rollout::new(CpuBackend, &plan, 1).unwrap().linearise(&plan.theta, &[0]).unwrap().rows.residuals;
+    let far = |rest: DVec3| {
+        let place = (rest - body.grid.position([0; 3])) * (SUBDIVISIONS as f64 / body.grid.h);
+        (place - place.round()).abs().min_element() > 0.02
+    };
+    let mut observation = (*plan.observation).clone();
+    for (k, f) in observation.frames.iter_mut().enumerate() {
+        let kept = |r: &&ResidualRow| r.frame == k && r.value.is_some() && far(r.rest);
+        let numbers = rows.iter().filter(kept).filter_map(|r| match r.source {
+            Source::Point { point, .. } => Some(point as usize),
+            _ => None,
+        });
+        let points: Vec<ObservedPoint> = numbers.map(|n| f.points[n]).collect();
+        assert!(2 * points.len() > f.points.len(), "{} of {} points are left", points.len(), f.points.len());
+        f.points = points;
+    }
+    Plan { observation: observation.into(), ..plan }
 }
 
 fn evaluate(rollout: &mut Rollout<CpuBackend>, theta: &[f64], request: &Request) -> Evaluation {

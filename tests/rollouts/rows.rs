@@ -5,6 +5,7 @@ use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Source};
 use palpate_model::observation::ObservedPoint;
 use palpate_model::params::ParamKey::*;
+use palpate_model::plan::Plan;
 
 #[test]
 fn rows_add_up_to_cost_gradient_and_curvature() {
@@ -26,6 +27,8 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
     let missing: Vec<_> = rows.iter().filter(|r| r.value.is_none()).collect();
     assert!(missing.iter().any(|r| r.frame == 1 && r.source == Source::Point { point: 1, camera: 0 }), "{missing:?}");
     assert_eq!(rows.iter().filter(|r| r.value.is_some()).count(), e.matched);
+    let points = rows.iter().filter(|r| matches!(r.source, Source::Point { .. }) && r.value.is_some()).count();
+    assert!(points > 800, "{points} points meet something");
     let (mut gradient, mut matrix) = (vec![0.0; q], vec![0.0; q * q]);
     for (r, d) in rows.iter().zip(lin.rows.sensitivity.chunks(q)) {
         let w = r.weight / (r.noise * r.noise) / e.residuals as f64;
@@ -63,4 +66,59 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
         // Truncation and rounding of central differences, and points in cells whose slope jumps at a face.
         assert!(worst < 1e-3 * scale, "{:?}: {worst} of {scale}", plan.layout.keys[p]);
     }
+}
+
+/// Cost and gradient by the vertical velocity at the start, with Gauss-Newton's curvature: sums over the residuals, not their mean.
+fn sums(plan: &Plan) -> [f64; 3] {
+    let at = plan.layout.index(Velocity(2));
+    let mut rollout = Rollout::new(CpuBackend, plan, 1).unwrap();
+    let request = Request { gradient: false, sensitivities: vec![at] };
+    let e = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
+    assert_eq!(e.matched, e.residuals, "{:?}", e.failure);
+    let c = e.curvature.unwrap();
+    [e.cost, c.gradient[0], c.matrix[0]].map(|x| x * e.residuals as f64)
+}
+
+#[test]
+fn a_frame_counts_by_its_points() {
+    // What is promised (docs/method.md, "Cost"): every point counts 1/σ², whatever the frame that it is in. A frame of few pixels neither
+    // has its points counted for more than others', as a mean over frames would, nor for less.
+    let plan = observed(&ball(), &[0.025, 0.0437]);
+    let with = |sizes: [usize; 2], shift: [f64; 2]| {
+        let mut o = (*plan.observation).clone();
+        for ((f, n), dz) in o.frames.iter_mut().zip(sizes).zip(shift) {
+            // Spread over the ball, and as often as it takes.
+            let all = std::mem::take(&mut f.points);
+            let pick = |k: usize| all[(k * all.len() / n.min(all.len())) % all.len()];
+            f.points = (0..n).map(pick).collect();
+            f.points.iter_mut().for_each(|p| p.position.z += dz);
+            f.markers.clear();
+            f.displacements.clear();
+        }
+        Plan { observation: o.into(), ..plan.clone() }
+    };
+    let still = [0.0; 2];
+    let (both, many, few) = (sums(&with([500, 5], still)), sums(&with([500, 0], still)), sums(&with([0, 5], still)));
+    let often = sums(&with([0, 10], still));
+    for k in 0..3 {
+        // The same terms in another order.
+        assert!((both[k] - many[k] - few[k]).abs() < 1e-9 * both[k].abs().max(many[k].abs()), "{both:?} {many:?} {few:?}");
+    }
+    // Curvature is a sum of squares that hardly depend on where the points are: a hundredth of the points has about a hundredth of it (more
+    // here, because the later frame has had longer to move), and twice as many points have about twice as much.
+    println!("curvature: {:.3e} of 500 points, {:.3e} of 5, {:.3e} of 10", many[2], few[2], often[2]);
+    assert!(few[2] > 0.3 * 0.01 * many[2] && few[2] < 10.0 * 0.01 * many[2], "{few:?} {many:?}");
+    assert!(often[2] > 1.5 * few[2] && often[2] < 2.7 * few[2], "{often:?} {few:?}");
+    // A millimetre of error in one of the frames moves the answer by as much as its share of the curvature lets it.
+    let answer = |shift: [f64; 2]| {
+        let [_, gradient, curvature] = sums(&with([500, 5], shift));
+        -gradient / curvature
+    };
+    let (right, few_off, many_off) = (answer(still), answer([0.0, 1e-3]) - answer(still), answer([1e-3, 0.0]) - answer(still));
+    println!(
+        "step {right:.4} m/s; 1 mm in the frame of 5 points moves it by {few_off:.4} m/s, in the frame of 500 by {many_off:.4} m/s"
+    );
+    // With equal weights for frames instead of points both would move it alike.
+    assert!(few_off.abs() < 0.1 * many_off.abs(), "{few_off} {many_off}");
+    assert!(few_off.abs() > 0.001 * many_off.abs(), "{few_off} {many_off}");
 }
