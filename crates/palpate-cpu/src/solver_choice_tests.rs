@@ -42,7 +42,7 @@ fn a_solve_that_does_not_converge_stops_the_run_and_says_where() {
     scene.solver.linear = LinearSolver::ConjugateGradient;
     let plan = build_plan(&scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"));
     let mut world = World::new(&plan);
-    // In free fall nothing is left to solve for or one iteration does; on the ground it takes more.
+    // Too few for the first step.
     world.shared.solvers.most = 3;
     let Ran { solved, failure, .. } = run_in(world, &plan);
     let failure = failure.expect("three iterations are too few");
