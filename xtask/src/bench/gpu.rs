@@ -286,13 +286,13 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
     backend.set_params(&mut world, &ParamBatch::from_rows(&rows));
     // With the clock of the passes, a second time where the first one compiled some of them; then as fits run, as often as there is time.
     let clock = Instant::now();
-    let once = |world: &mut World| -> Result<(Run, f64, Vec<(String, u64, f64)>), String> {
+    let once = |world: &mut World| {
         world.time_passes(true);
         let run = settled(&backend, world, 1, &[])?;
         let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
         world.time_passes(false);
         let step = run.seconds.iter().flatten().sum();
-        Ok((run, step, passes))
+        Ok::<_, String>((run, step, passes))
     };
     let (mut run, mut step, mut passes) = once(&mut world)?;
     if 4.0 * clock.elapsed().as_secs_f64() < patience {
