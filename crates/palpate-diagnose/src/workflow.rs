@@ -345,10 +345,11 @@ impl Session<'_> {
         test(&self.cells, &state.frame, &self.noise, self.options.bins, self.options.seed)
     }
 
-    /// True when residuals have structure that is neither chance nor too small to count.
+    /// True when residuals have structure that is no chance and counts: because it is large, or because more than twice what noise and
+    /// discretisation explain is left. What swings within a block does not show in its mean.
     fn is_missing(&self, found: &Adequacy, state: &State) -> bool {
         let least = self.options.least_structure * self.reading_noise(&state.readings);
-        found.p_value <= self.options.significance && found.structure >= least
+        found.p_value <= self.options.significance && (found.structure >= least || !self.level(state).is_close())
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -153,7 +153,10 @@ fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&
 
 #[cfg(test)]
 mod tests {
+    use super::super::prune::tests::left;
     use super::*;
+    use crate::diagnosis::Found;
+    use crate::tests::bench::NOISE;
 
     #[test]
     fn an_effect_that_leaves_much_of_the_second_recording_must_close_more_of_the_gap() {
@@ -162,5 +165,22 @@ mod tests {
         assert_eq!(options.enough_of_one(None), options.enough);
         assert_eq!(options.enough_of_one(left(2e-3)), options.enough);
         assert_eq!(options.enough_of_one(left(3e-3)), options.enough_of_several);
+    }
+
+    /// Asks whether something is missing where the means of blocks show nothing.
+    fn asks<const MISSING: bool>(s: &mut Session, state: State, _: &mut Vec<Found>) -> State {
+        let swings = |p_value| Adequacy { p_value, structure: 0.0, blocks: Vec::new() };
+        assert_eq!(s.is_missing(&swings(0.005), &state), MISSING);
+        // Never by chance, and always where structure is large.
+        assert!(!s.is_missing(&swings(0.02), &state));
+        assert!(s.is_missing(&Adequacy { structure: NOISE, ..swings(0.005) }, &state));
+        state
+    }
+
+    #[test]
+    fn what_swings_within_blocks_is_missing_where_it_leaves_more_than_twice_what_is_explained() {
+        let both = ["depth-bias", "air-drag"];
+        left(asks::<false>, both, &[]);
+        left(asks::<true>, both, &[("magnet", 3.0 * NOISE)]);
     }
 }
