@@ -21,6 +21,15 @@ pub enum Change {
     },
 }
 
+/// What an effect at an unknown place, or along an unknown direction, is aimed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aim {
+    /// A coordinate of a place on the body.
+    Place,
+    /// A component of a direction, whose length means nothing.
+    Direction,
+}
+
 impl Change {
     /// Name: the effect's kind, or what is freed.
     pub fn kind(&self) -> &'static str {
@@ -66,13 +75,18 @@ impl Change {
         }
     }
 
-    /// Which of [`Change::free_slots`] are coordinates of a place on the body.
-    pub fn on_body(&self) -> Vec<bool> {
+    /// Which of [`Change::free_slots`] are coordinates of a place on the body or components of a direction.
+    pub fn aims(&self) -> Vec<Option<Aim>> {
         match self {
             Change::Effect(e) => {
-                self.free_slots().into_iter().map(|s| matches!(e.law().params[s].default, Unstated::OnBody)).collect()
+                let aim = |p: &EffectParam| match p.default {
+                    Unstated::OnBody => Some(Aim::Place),
+                    _ if p.is_direction() => Some(Aim::Direction),
+                    _ => None,
+                };
+                self.free_slots().into_iter().map(|s| aim(&e.law().params[s])).collect()
             }
-            Change::Freed { paths, .. } => vec![false; paths.len()],
+            Change::Freed { paths, .. } => vec![None; paths.len()],
         }
     }
 

@@ -4,7 +4,7 @@
 
 use super::choose::price;
 use super::{Session, State, Variant, met};
-use crate::change::Change;
+use crate::change::{Aim, Change};
 use crate::laboratory::Number;
 use crate::linear::dot;
 use crate::null::absorbed_by;
@@ -15,8 +15,8 @@ type Moved = BTreeMap<usize, f64>;
 
 impl Session<'_> {
     /// Numbers of a fitted candidate, but for those that leave no more than their price when they are not fitted, around the optimum: the
-    /// vectors and amplitudes that go back to "absent" one after the other, and coordinates of a place that may be anywhere on the body; of
-    /// every change one of either stays. To have picked some vectors out of more counts as one number: an effect that has no others is plainer.
+    /// vectors and amplitudes that go back to "absent" one after the other, coordinates of a place that may be anywhere on the body, and
+    /// components of a direction that may point anywhere; of every change one of each stays. To have picked some vectors out of more counts as one number: an effect that has no others is plainer.
     pub(super) fn needed(&self, old: &State, new: &State, v: &Variant) -> usize {
         let mut count = v.columns.len();
         let first = new.model.values.len() - count;
@@ -27,7 +27,8 @@ impl Session<'_> {
             let left = rise(new, first, &moved);
             let vectors =
                 removable(v, &moved).into_iter().map(|g| (g.into_iter().map(|k| (k, absent(new, first, v, k))).collect(), true));
-            let coordinates = vague(v, &moved).into_iter().map(|(k, by)| (Moved::from([(k, by)]), false));
+            let coordinates =
+                vague(v, &new.model.values[first..], &moved).into_iter().map(|(k, by)| (Moved::from([(k, by)]), false));
             let cost = |more: &Moved| {
                 let with = moved.iter().chain(more).map(|(k, by)| (*k, *by)).collect();
                 (rise(new, first, &with) - left) / more.len() as f64
@@ -69,21 +70,28 @@ fn removable(v: &Variant, moved: &Moved) -> Vec<Vec<usize>> {
     out
 }
 
-/// Coordinates of places on the body, with how far a place that may be anywhere on it is from the middle, root mean square. One of every
-/// change stays: it has been chosen.
-fn vague(v: &Variant, moved: &Moved) -> Vec<(usize, f64)> {
+/// Coordinates of places on the body and components of directions, with how far one that may be anywhere, or point anywhere, is from its
+/// mean, root mean square. One of every place and direction stays: it has been chosen. `values` are those of the candidate's numbers.
+fn vague(v: &Variant, values: &[f64], moved: &Moved) -> Vec<(usize, f64)> {
     let mut next = 0;
     let mut out = Vec::new();
-    for on_body in v.changes.iter().map(Change::on_body) {
-        let own = next..next + on_body.len();
+    for aims in v.changes.iter().map(Change::aims) {
+        let own = next..next + aims.len();
         next = own.end;
-        let open: Vec<usize> = own.zip(on_body).filter(|(k, on)| *on && !moved.contains_key(k)).map(|(k, _)| k).collect();
-        if open.len() > 1 {
-            out.extend(open);
+        for aim in [Aim::Place, Aim::Direction] {
+            let all: Vec<usize> = own.clone().zip(&aims).filter(|(_, a)| **a == Some(aim)).map(|(k, _)| k).collect();
+            let length = all.iter().map(|k| values[*k].powi(2)).sum::<f64>().sqrt();
+            let spread = |n: &Number| match aim {
+                Aim::Place => (n.bounds.1 - n.bounds.0) / 12f64.sqrt(),
+                Aim::Direction => length / 3f64.sqrt(),
+            };
+            let open: Vec<usize> = all.into_iter().filter(|k| !moved.contains_key(k)).collect();
+            if open.len() > 1 {
+                out.extend(open.into_iter().map(|k| (k, spread(&v.numbers[k]))));
+            }
         }
     }
-    let spread = |n: &Number| (n.bounds.1 - n.bounds.0) / 12f64.sqrt();
-    out.into_iter().map(|k| (k, spread(&v.numbers[k]))).collect()
+    out
 }
 
 /// Sum of squares that remains when some of a candidate's numbers are moved and all others are fitted again; `first` is the place of its
