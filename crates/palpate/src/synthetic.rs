@@ -191,7 +191,8 @@ fn marker_samples(observers: &Observers, number: usize, time: f64, positions: &[
     samples
 }
 
-fn recorded_camera(c: &Pinhole, sensor: &Sensor) -> RecordedCamera {
+/// A camera as a recording of this sensor states it.
+pub fn recorded_camera(c: &Pinhole, sensor: &Sensor) -> RecordedCamera {
     RecordedCamera {
         name: c.name.clone(),
         width: c.width,

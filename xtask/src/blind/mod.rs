@@ -14,7 +14,9 @@ use crate::table;
 use case::{Case, Outcome};
 use glam::DVec3;
 use hidden::{STRONG, TABLE, WEAK};
-use std::path::PathBuf;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Which cases run, and how long each may take.
@@ -166,44 +168,86 @@ pub fn run(options: &Options) -> Result<(), String> {
     if wanted.is_empty() {
         return Err("no case fits these options".into());
     }
-    let mut known: Vec<Outcome> = match std::fs::read_to_string(&path) {
+    if options.strengths {
+        for (i, c) in wanted.iter().enumerate() {
+            println!("{}/{} {}", i + 1, wanted.len(), c.name);
+            println!("  {}", c.strength(&Folder::new(&c.name)?.0).map_err(|e| e.to_string())?);
+        }
+        return Ok(());
+    }
+    let known = outcomes(&path, &wanted, options)?;
+    report::print(&known.iter().collect::<Vec<_>>());
+    println!("\nwritten to {}", path.display());
+    Ok(())
+}
+
+/// A case that a suite runs.
+trait Run {
+    /// What is kept of it.
+    type Kept: Serialize + DeserializeOwned;
+    /// Its name, unique in the suite.
+    fn name(&self) -> &str;
+    /// Name of the case that something was kept of.
+    fn name_of(kept: &Self::Kept) -> &str;
+    /// What was kept, in one line.
+    fn line(kept: &Self::Kept) -> String;
+    /// Runs it in an empty folder, with so much time for the search.
+    fn run(&self, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Self::Kept;
+}
+
+impl Run for Case {
+    type Kept = Outcome;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn name_of(kept: &Outcome) -> &str {
+        &kept.name
+    }
+
+    fn line(kept: &Outcome) -> String {
+        report::line(kept)
+    }
+
+    fn run(&self, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Outcome {
+        Case::run(self, folder, budget, say)
+    }
+}
+
+/// Outcomes of these cases: those that a file holds and of those that it does not, which run; it is saved after every one.
+fn outcomes<C: Run>(path: &Path, wanted: &[C], options: &Options) -> Result<Vec<C::Kept>, String> {
+    let mut known: Vec<C::Kept> = match std::fs::read_to_string(path) {
         Ok(text) => serde_json::from_str(&text).map_err(|e| format!("{}: {e}; remove it to start again", path.display()))?,
         Err(_) => Vec::new(),
     };
+    let is_wanted = |kept: &C::Kept| wanted.iter().any(|c| c.name() == C::name_of(kept));
     if options.fresh {
-        known.retain(|o| !wanted.iter().any(|c| c.name == o.name));
+        known.retain(|kept| !is_wanted(kept));
     }
     for (i, c) in wanted.iter().enumerate() {
-        if !options.strengths && known.iter().any(|o| o.name == c.name) {
+        if known.iter().any(|kept| C::name_of(kept) == c.name()) {
             continue;
         }
-        println!("{}/{} {}", i + 1, wanted.len(), c.name);
-        let folder = Folder::new(&c.name)?;
-        if options.strengths {
-            println!("  {}", c.strength(&folder.0).map_err(|e| e.to_string())?);
-            continue;
-        }
+        println!("{}/{} {}", i + 1, wanted.len(), c.name());
+        let folder = Folder::new(c.name())?;
         let clock = Instant::now();
         let mut say = |what: &str| {
             if options.verbose {
                 println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
             }
         };
-        let outcome = c.run(&folder.0, Duration::from_secs_f64(options.budget), &mut say);
-        println!("  {}", report::line(&outcome));
-        known.push(outcome);
-        save(&path, &known)?;
+        let kept = c.run(&folder.0, Duration::from_secs_f64(options.budget), &mut say);
+        println!("  {}", C::line(&kept));
+        known.push(kept);
+        save(path, &known)?;
     }
-    if !options.strengths {
-        let chosen: Vec<&Outcome> = known.iter().filter(|o| wanted.iter().any(|c| c.name == o.name)).collect();
-        report::print(&chosen);
-        println!("\nwritten to {}", path.display());
-    }
-    Ok(())
+    known.retain(is_wanted);
+    Ok(known)
 }
 
 /// Whole or not at all: a run may be stopped at any time.
-fn save(path: &std::path::Path, known: &[impl serde::Serialize]) -> Result<(), String> {
+fn save(path: &Path, known: &[impl Serialize]) -> Result<(), String> {
     let fail = |e: std::io::Error| format!("{}: {e}", path.display());
     let text = serde_json::to_string_pretty(known).map_err(|e| e.to_string())?;
     let new = path.with_extension("new");

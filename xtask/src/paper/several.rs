@@ -2,7 +2,7 @@
 //! gravity in all 60 of their starts, and many pairs of the other two that do as well.)
 
 use super::scenes;
-use super::study::{self, Search, Watch};
+use super::study::{self, Recovery, Search, Watch};
 use crate::table;
 use glam::DVec3;
 use palpate::Error;
@@ -66,12 +66,13 @@ pub fn several(cell: f64, every: usize, starts: usize) -> Result<Several, Error>
     let gravity = DVec3::from([0, 1, 2].map(|axis| value(ParamKey::Gravity(axis))));
     let off = |end: &[f64]| (DVec3::from_slice(end) - gravity).length() / gravity.length();
     let good: Vec<f64> = result.runs.iter().filter(|r| r.cost < (1.0 + AS_GOOD) * result.cost).map(|r| off(&r.end)).collect();
-    let other = |place: usize, truth: f64| {
-        let p = &result.parameters[place];
-        [p.value / truth - 1.0, p.standard_error.unwrap_or(f64::INFINITY) / truth].map(|x| 100.0 * x)
+    let recovered = |place: usize, truth: f64| {
+        let error = result.parameters[place].standard_error.unwrap_or(f64::INFINITY) / truth;
+        let r = Recovery::of(&result, place, truth);
+        ([r.best_error, error].map(|x| 100.0 * x), r.evaluations)
     };
-    let mut evaluations: Vec<usize> = result.runs.iter().map(|r| r.evaluations).collect();
-    evaluations.sort_unstable();
+    let (modulus, evaluations) = recovered(3, truth.material.youngs_modulus);
+    let (damping, _) = recovered(4, truth.material.stiffness_damping);
     let line = Several {
         every,
         nodes: plan.body.nodes.len(),
@@ -79,10 +80,10 @@ pub fn several(cell: f64, every: usize, starts: usize) -> Result<Several, Error>
         gravity_found: good.iter().filter(|e| **e < FOUND).count(),
         starts: result.runs.len(),
         gravity_error_percent: 100.0 * good.iter().copied().fold(0.0, f64::max),
-        others_percent: [other(3, truth.material.youngs_modulus), other(4, truth.material.stiffness_damping)],
+        others_percent: [modulus, damping],
         correlation: result.correlation[3][4],
         warned: warns_of_ambiguity(&result),
-        evaluations: evaluations[evaluations.len() / 2],
+        evaluations,
         seconds: clock.elapsed().as_secs_f64(),
     };
     println!(

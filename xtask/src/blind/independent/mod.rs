@@ -19,7 +19,6 @@ mod scenes;
 mod tests;
 
 use super::case::Outcome;
-use super::{Folder, save};
 use crate::table;
 use cases::Case;
 use palpate::{Backend, DiagnoseOptions, Diagnosed, Error, diagnose};
@@ -78,34 +77,30 @@ pub fn run(options: &super::Options) -> Result<(), String> {
         let names: Vec<&str> = cases::all().iter().map(|c| c.name).collect();
         return Err(format!("no case fits; there are: {}", names.join(", ")));
     }
-    let mut known: Vec<Independent> = match std::fs::read_to_string(&path) {
-        Ok(text) => serde_json::from_str(&text).map_err(|e| format!("{}: {e}; remove it to start again", path.display()))?,
-        Err(_) => Vec::new(),
-    };
-    if options.fresh {
-        known.retain(|o| !wanted.iter().any(|c| c.name == o.outcome.name));
-    }
-    for (i, c) in wanted.iter().enumerate() {
-        if known.iter().any(|o| o.outcome.name == c.name) {
-            continue;
-        }
-        println!("{}/{} {}", i + 1, wanted.len(), c.name);
-        let folder = Folder::new(c.name)?;
-        let clock = Instant::now();
-        let mut say = |what: &str| {
-            if options.verbose {
-                println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
-            }
-        };
-        let outcome = c.run(&folder.0, Duration::from_secs_f64(options.budget), &mut say);
-        println!("  {}", report::line(&outcome));
-        known.push(outcome);
-        save(&path, &known)?;
-    }
-    let chosen: Vec<&Independent> = known.iter().filter(|o| wanted.iter().any(|c| c.name == o.outcome.name)).collect();
-    report::print(&chosen);
+    let known = super::outcomes(&path, &wanted, options)?;
+    report::print(&known.iter().collect::<Vec<_>>());
     println!("\nwritten to {}", path.display());
     Ok(())
+}
+
+impl super::Run for Case {
+    type Kept = Independent;
+
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn name_of(kept: &Independent) -> &str {
+        &kept.outcome.name
+    }
+
+    fn line(kept: &Independent) -> String {
+        report::line(kept)
+    }
+
+    fn run(&self, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Independent {
+        Case::run(self, folder, budget, say)
+    }
 }
 
 impl Case {

@@ -7,6 +7,7 @@ use super::mesh::Mesh;
 use super::scenes::{Independent, MARKER_NOISE};
 use glam::{DAffine3, DQuat, DVec3};
 use palpate::render::{Pinhole, Sensor, rasterise};
+use palpate::synthetic::recorded_camera;
 use palpate::{Error, Experiment};
 use palpate_io::recording::{DepthImage, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
 use palpate_io::write_recording;
@@ -59,7 +60,7 @@ pub fn observed(scene: &Independent, truth: &Truth, seed: u64, folder: &Path, ot
         path: PathBuf::from("recording.toml"),
         title: format!("Synthetic: {}", setup.name),
         source: "Quadratic tetrahedra".into(),
-        cameras: cameras.iter().map(|c| stated(c, truth, scene.depth_noise)).collect(),
+        cameras: cameras.iter().map(|c| stated(c, truth, &sensor)).collect(),
         frames,
         markers: (!setup.markers.is_empty()).then(|| tracked(scene, truth, &mesh, &instants, &mut rng)),
         warnings: Vec::new(),
@@ -146,23 +147,13 @@ fn reading(truth: &Truth, camera: &Pinhole, pixel: [usize; 2], z: f64) -> f64 {
 }
 
 /// The camera as the recording states it.
-fn stated(c: &Pinhole, truth: &Truth, noise: f64) -> RecordedCamera {
+fn stated(c: &Pinhole, truth: &Truth, sensor: &Sensor) -> RecordedCamera {
     let [moved, turned] = truth.camera;
     let turn = glam::DMat3::from_quat(DQuat::from_scaled_axis(turned));
     let pose = c.world_from_camera;
     RecordedCamera {
-        name: c.name.clone(),
-        width: c.width,
-        height: c.height,
-        focal: [c.fx, c.fy],
-        center: [c.cx, c.cy],
-        distortion: [0.0; 5],
         world_from_camera: DAffine3::from_mat3_translation(turn * pose.matrix3, pose.translation + moved),
-        depth_scale: Some(DEPTH_SCALE),
-        depth_offset: 0.0,
-        // Rounding to counts adds the variance of a uniform error.
-        noise_sigma: Some((noise * noise + DEPTH_SCALE * DEPTH_SCALE / 12.0).sqrt()),
-        noise_systematic: 0.0,
+        ..recorded_camera(c, sensor)
     }
 }
 
