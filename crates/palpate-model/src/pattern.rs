@@ -87,8 +87,8 @@ impl Pattern {
             cell_list.extend(list);
             cell_rows.push(cell_list.len());
         }
-        // About 600 rows are worth a task of their own; each part repeats the cells it shares with its neighbours.
-        let count = (n / 600).clamp(1, 16);
+        // About 300 rows are worth a task of their own; the blocks of cells that two parts share are set aside and added afterwards.
+        let count = (n / 300).clamp(1, 16);
         let parts = (0..count).map(|p| p * n / count..(p + 1) * n / count).collect();
         Pattern { blocks, cell_rows, cell_list, parts }
     }

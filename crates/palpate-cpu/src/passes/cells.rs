@@ -17,7 +17,7 @@ use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 
 /// Cells that one task treats in a row.
-pub(super) const CHUNK: usize = 128;
+pub(super) const CHUNK: usize = 64;
 
 /// Eight vectors, one per corner.
 pub type Corners = [DVec3; 8];
