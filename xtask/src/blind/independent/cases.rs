@@ -84,8 +84,9 @@ pub fn all() -> Vec<Case> {
         case(marked, "drag markers", Truth { drag: 50.0, ..none }).named(&["air-drag"], &[("coefficient", 50.0)]),
         Case { mirrored: true, ..case(marked, "two parts markers", soft).named(&["two-part-stiffness"], TWO_PARTS) },
         case(marked, "bent markers", Truth { bend: 0.6, ..none }).named(&["rest-shape"], &[("bend_x_to_z", 0.6)]),
+        // The scene states 3.
         case(marked, "spin markers", Truth { spin: DVec3::new(0.0, 0.0, 1.0), ..none })
-            .named(&["initial-spin"], &[("initial.angular_velocity.z", 1.0)]),
+            .named(&["initial-spin"], &[("initial.angular_velocity.z", 4.0)]),
         case(seen, "depth bias camera", Truth { depth_bias: 0.01, ..none }).named(&["depth-bias"], &[("bias", 0.01)]),
         Case { mirrored: true, ..case(seen, "two parts camera", soft).named(&["two-part-stiffness"], TWO_PARTS) },
         case(seen, "heavy tip mass camera", heavy).named(&["point-mass"], HEAVY),
@@ -101,7 +102,7 @@ pub fn all() -> Vec<Case> {
         case(ball, "drag ball", Truth { drag: 12.0, ..none }).named(&["air-drag"], &[("coefficient", 12.0)]),
         Case {
             verdict: "unexplained",
-            ..case(ball, "magnet ball", Truth { magnet: Some((DVec3::new(0.12, 0.07, 0.09), 4e3)), ..none })
+            ..case(ball, "magnet ball", Truth { magnet: Some((DVec3::new(0.15, 0.2, 0.1), 6e3)), ..none })
         },
     ]
 }
