@@ -346,10 +346,12 @@ impl Session<'_> {
     }
 
     /// True when residuals have structure that is no chance and counts: because it is large, or because more than twice what noise and
-    /// discretisation explain is left. What swings within a block does not show in its mean.
+    /// discretisation explain is left. What swings within a block does not show in its mean, and what errors of the discretisation could
+    /// just make up for, taken twice each, not in the test at all: more than four times as much is missing something in any case.
     fn is_missing(&self, found: &Adequacy, state: &State) -> bool {
         let least = self.options.least_structure * self.reading_noise(&state.readings);
-        found.p_value <= self.options.significance && (found.structure >= least || !self.level(state).is_close())
+        let level = self.level(state);
+        level.is_far() || found.p_value <= self.options.significance && (found.structure >= least || !level.is_close())
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -45,6 +45,23 @@ fn two_hidden_effects_are_both_named() {
 }
 
 #[test]
+fn a_plain_effect_and_a_freer_one_are_found_together_where_neither_passes_alone() {
+    let drag = Bench::first_pattern("air-drag");
+    let mut bench = Bench::new(8, &[(&drag, -1.5 * NOISE), ("camera-pose 1 []", 1.5 * NOISE)], false);
+    let baseline = bench.baseline();
+    // The camera alone closes 85 % of the gap.
+    let d = diagnose(&mut bench, baseline, &Options { least_gain: 0.9, ..Options::default() }).unwrap();
+    let mut kinds: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.kind.as_str()).collect();
+    kinds.sort_unstable();
+    assert_eq!(kinds, ["air-drag", "camera-pose"], "{}", d.sentence());
+    assert!(
+        d.tried.iter().any(|t| t.round == 1 && t.kind == "camera-pose + air-drag" && t.held_out_gain.is_some()),
+        "{:?}",
+        d.tried
+    );
+}
+
+#[test]
 fn what_no_effect_explains_is_called_unexplained() {
     let mut bench = Bench::new(6, &[("magnet", 2.0 * NOISE)], false);
     let baseline = bench.baseline();

@@ -183,4 +183,13 @@ mod tests {
         left(asks::<false>, both, &[]);
         left(asks::<true>, both, &[("magnet", 3.0 * NOISE)]);
     }
+
+    #[test]
+    fn what_leaves_far_more_than_is_explained_is_missing_whatever_its_structure() {
+        let asks = |s: &mut Session, state: State, _: &mut Vec<Found>| {
+            assert!(s.is_missing(&Adequacy { p_value: 1.0, structure: 0.0, blocks: Vec::new() }, &state));
+            state
+        };
+        left(asks, ["depth-bias", "air-drag"], &[("magnet", 6.0 * NOISE)]);
+    }
 }

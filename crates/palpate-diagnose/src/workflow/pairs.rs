@@ -7,12 +7,16 @@ use crate::laboratory::{LabError, Model, Number};
 use crate::score::Score;
 use std::rc::Rc;
 
-/// Most numbers of an effect of a pair.
+/// Most numbers of an effect of a pair, and of the freer one of a pair that is tried because nothing plainer explains anything.
 const PLAIN: usize = 3;
+const FREE: usize = 9;
 /// Pairs of so many numbers in all are ranked on their own: those with more always promise more.
 const CLASSES: [std::ops::RangeInclusive<usize>; 3] = [2..=2, 3..=3, 4..=2 * PLAIN];
-/// Pairs of a class, and partners of a fitted effect, that are fitted.
+/// The same of pairs with a freer effect.
+const FREE_CLASSES: [std::ops::RangeInclusive<usize>; 2] = [5..=9, 10..=FREE + PLAIN];
+/// Pairs of a class, and partners of a fitted effect, that are fitted; and pairs with a freer effect.
 const EACH: usize = 2;
+const FREE_EACH: usize = 8;
 /// Fitted effects that partners are looked for.
 const HALVES: usize = 3;
 /// Share of the sum of squares that a pair must promise to take away, and how much of it beyond what its better half does alone.
@@ -33,23 +37,36 @@ impl Session<'_> {
         if fewer_than <= 2 {
             return Ok(Vec::new());
         }
-        let plain = plain(variants);
+        let plain = with_at_most(PLAIN, variants);
         let mut out = self.partners(state, fitted, &plain, fewer_than)?;
         let baseline = Rc::new(state.clone());
-        out.extend(self.promising(state, &plain, fewer_than).into_iter().map(|v| (baseline.clone(), v)));
+        let fits = |a: usize, b: usize| a + b < fewer_than;
+        out.extend(self.promising(state, &plain, (&CLASSES, EACH), fits).into_iter().map(|v| (baseline.clone(), v)));
         keep_first(&mut out, |(_, v)| v.candidate);
         Ok(out)
     }
 
-    /// Those that promise most together where both are absent.
-    fn promising(&self, state: &State, plain: &[&Variant], fewer_than: usize) -> Vec<Variant> {
+    /// Pairs of a plain effect and a freer one that are worth a fit where nothing plainer passes: what two causes do together may look like
+    /// neither of them, and like no single cause.
+    pub(super) fn freer_pairs(&self, state: &State, variants: &[Variant]) -> Vec<Variant> {
+        self.promising(state, &with_at_most(FREE, variants), (&FREE_CLASSES, FREE_EACH), |a, b| (a > PLAIN) != (b > PLAIN))
+    }
+
+    /// Those that promise most together where both are absent, of those whose numbers of numbers fit.
+    fn promising(
+        &self,
+        state: &State,
+        effects: &[&Variant],
+        (classes, each): (&[std::ops::RangeInclusive<usize>], usize),
+        fits: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Variant> {
         let mut out: Vec<Variant> = Vec::new();
-        for class in CLASSES {
+        for class in classes {
             let mut these: Vec<Variant> = Vec::new();
-            for (i, a) in plain.iter().enumerate() {
-                for b in &plain[i + 1..] {
-                    let numbers = a.columns.len() + b.columns.len();
-                    if class.contains(&numbers) && numbers < fewer_than {
+            for (i, a) in effects.iter().enumerate() {
+                for b in &effects[i + 1..] {
+                    let (first, second) = (a.columns.len(), b.columns.len());
+                    if class.contains(&(first + second)) && fits(first, second) {
                         let mut both = joined(a, b);
                         both.score = self.score(state, &both);
                         let share = both.score.share;
@@ -58,7 +75,7 @@ impl Session<'_> {
                 }
             }
             these.sort_by(most_promising);
-            these.truncate(EACH);
+            these.truncate(each);
             out.extend(these);
         }
         out
@@ -123,10 +140,10 @@ fn joined(a: &Variant, b: &Variant) -> Variant {
     }
 }
 
-/// The best variants of plain effects, of variants sorted by what they promise.
-fn plain(variants: &[Variant]) -> Vec<&Variant> {
-    let mut plain: Vec<&Variant> =
-        variants.iter().filter(|v| v.is_certain() && v.blunt.is_none() && v.columns.len() <= PLAIN).collect();
-    keep_first(&mut plain, |v| v.candidate);
-    plain
+/// The best variants of effects with at most so many numbers, of variants sorted by what they promise.
+fn with_at_most(most: usize, variants: &[Variant]) -> Vec<&Variant> {
+    let mut all: Vec<&Variant> =
+        variants.iter().filter(|v| v.is_certain() && v.blunt.is_none() && v.columns.len() <= most).collect();
+    keep_first(&mut all, |v| v.candidate);
+    all
 }

@@ -109,6 +109,14 @@ impl Session<'_> {
             if !tries.is_empty() {
                 fitted = ranked(self.fitted(state, &tries, &STARTS, looks, fitted)?);
             }
+            if self.choose(state, &fitted, count).is_none() && !self.lab.out_of_time() {
+                let pairs = self.freer_pairs(state, &variants);
+                pairs.iter().for_each(|p| self.note(round, p));
+                let tries: Vec<(&State, &Variant)> = pairs.iter().map(|v| (state, v)).collect();
+                if !tries.is_empty() {
+                    fitted = ranked(self.fitted(state, &tries, &STARTS, looks, fitted)?);
+                }
+            }
         }
         for f in &fitted {
             let kind = f.kind();
