@@ -39,27 +39,25 @@ impl Session<'_> {
         }
         let plain = with_at_most(PLAIN, variants);
         let mut out = self.partners(state, fitted, &plain, fewer_than)?;
-        let baseline = Rc::new(state.clone());
-        let fits = |a: usize, b: usize| a + b < fewer_than;
-        out.extend(self.promising(state, &plain, (&CLASSES, EACH), fits).into_iter().map(|v| (baseline.clone(), v)));
+        out.extend(self.promising(state, &plain, (&CLASSES, EACH), |a, b| a + b < fewer_than));
         keep_first(&mut out, |(_, v)| v.candidate);
         Ok(out)
     }
 
     /// Pairs of a plain effect and a freer one that are worth a fit where nothing plainer passes: what two causes do together may look like
     /// neither of them, and like no single cause.
-    pub(super) fn freer_pairs(&self, state: &State, variants: &[Variant]) -> Vec<Variant> {
+    pub(super) fn freer_pairs(&self, state: &State, variants: &[Variant]) -> Vec<(Rc<State>, Variant)> {
         self.promising(state, &with_at_most(FREE, variants), (&FREE_CLASSES, FREE_EACH), |a, b| (a > PLAIN) != (b > PLAIN))
     }
 
-    /// Those that promise most together where both are absent, of those whose numbers of numbers fit.
+    /// Those that promise most together where both are absent, of those whose numbers of numbers fit, with the state where they are.
     fn promising(
         &self,
         state: &State,
         effects: &[&Variant],
         (classes, each): (&[std::ops::RangeInclusive<usize>], usize),
         fits: impl Fn(usize, usize) -> bool,
-    ) -> Vec<Variant> {
+    ) -> Vec<(Rc<State>, Variant)> {
         let mut out: Vec<Variant> = Vec::new();
         for class in classes {
             let mut these: Vec<Variant> = Vec::new();
@@ -78,7 +76,8 @@ impl Session<'_> {
             these.truncate(each);
             out.extend(these);
         }
-        out
+        let from = Rc::new(state.clone());
+        out.into_iter().map(|v| (from.clone(), v)).collect()
     }
 
     /// Partners of the plain effects that were fitted, the best of those first: an effect that is there already shows better what lacks

@@ -8,6 +8,7 @@ use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number};
 use crate::score::f_tail;
 use crate::separation::Separated;
+use std::rc::Rc;
 
 /// Change of a fitted number, relative to its size, from which on it may lie in another valley, and where it was before is another place to
 /// start from.
@@ -104,18 +105,10 @@ impl Session<'_> {
             let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].needed);
             let fewer_than = if explained { named } else { usize::MAX };
             let pairs = self.pairs(state, &fitted, &variants, fewer_than)?;
-            pairs.iter().for_each(|(_, p)| self.note(round, p));
-            let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
-            if !tries.is_empty() {
-                fitted = ranked(self.fitted(state, &tries, &STARTS, looks, fitted)?);
-            }
+            fitted = self.with_pairs((state, round), &pairs, looks, fitted)?;
             if self.choose(state, &fitted, count).is_none() && !self.lab.out_of_time() {
                 let pairs = self.freer_pairs(state, &variants);
-                pairs.iter().for_each(|p| self.note(round, p));
-                let tries: Vec<(&State, &Variant)> = pairs.iter().map(|v| (state, v)).collect();
-                if !tries.is_empty() {
-                    fitted = ranked(self.fitted(state, &tries, &STARTS, looks, fitted)?);
-                }
+                fitted = self.with_pairs((state, round), &pairs, looks, fitted)?;
             }
         }
         for f in &fitted {
@@ -124,6 +117,22 @@ impl Session<'_> {
             mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
         }
         self.decide(state, fitted, count)
+    }
+
+    /// Notes pairs in a round, fits them and ranks them among what was fitted before.
+    fn with_pairs(
+        &mut self,
+        (state, round): (&State, usize),
+        pairs: &[(Rc<State>, Variant)],
+        looks: usize,
+        before: Vec<Fitted>,
+    ) -> Result<Vec<Fitted>, LabError> {
+        pairs.iter().for_each(|(_, p)| self.note(round, p));
+        if pairs.is_empty() {
+            return Ok(before);
+        }
+        let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
+        Ok(ranked(self.fitted(state, &tries, &STARTS, looks, before)?))
     }
 
     /// Candidates that there is time to fit: a few that arrive say more than many that do not.
