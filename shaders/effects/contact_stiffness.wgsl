@@ -1,5 +1,10 @@
 //! Twin of palpate-model/src/effects/contact_stiffness.rs.
 
 fn contact_stiffness() -> Dual {
-    return mul(mul(param(0u), energy_of(gap(), z[PLANE_AT + 4u])), measure);
+    var energy = number(0.0);
+    for (var k = 0u; k < INSTANTS; k++) {
+        let at = along_way(k, old_gap(), gap());
+        energy += at.weight * energy_of(at.gap, z[PLANE_AT + 4u]);
+    }
+    return mul(mul(param(0u), energy), measure);
 }

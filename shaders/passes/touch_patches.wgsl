@@ -1,10 +1,12 @@
-//! What the planes do to every surface patch: the vector that corner forces take with the minus sign and their shape function,
+//! What the planes do to every surface patch along its way in a step: the vector that corner forces take with the minus sign and their shape function,
 //! and the patch's stiffness; or, as call.extra asks (shared/asks), the vector of ∂r/∂p instead.
 // use shared/mix
 // use shared/contact
 // use shared/asks
 
+var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
+var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> cells: array<Cell>;
 var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
@@ -18,40 +20,60 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         return;
     }
     let site = patches[p.item];
+    let what = call.extra % PLANE_ASKS;
+    let theta = select(1.0, shape.theta, call.mode != 0u);
     var whole = site.point.xyz;
     var rest = vec3(0.0);
+    var old_whole = site.point.xyz;
+    var old_rest = vec3(0.0);
+    var mean = vec3(0.0);
     for (var i = 0u; i < 8u; i++) {
         let a = at_node(p.member, cells[site.cell].nodes[i]);
-        whole += site.weights[i] * next[a].xyz;
-        rest += site.weights[i] * next[part(1u) + a].xyz;
+        let w = site.weights[i];
+        whole += w * next[a].xyz;
+        rest += w * next[part(1u) + a].xyz;
+        old_whole += w * now[a].xyz;
+        old_rest += w * now[part(1u) + a].xyz;
+        if what == TOUCH_OLD {
+            mean += w * probe[a].xyz;
+        }
     }
     let area = site.point.w;
     let width = contact_width * shape.h;
-    let what = call.extra % PLANE_ASKS;
     var vector = vec3(0.0);
     var energy = 0.0;
     var diagonal = vec3(0.0);
     var mixed = vec3(0.0);
     for (var k = 0u; k < shape.planes; k++) {
-        if what >= PLANE_HEIGHT && k != call.extra / PLANE_ASKS {
+        if what == NO_TOUCH || (what >= PLANE_HEIGHT && what <= PLANE_PHI && k != call.extra / PLANE_ASKS) {
             continue;
         }
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
         let gap = (dot(n, whole) - plane.normal.w) + dot(n, rest);
-        let law = contact_law(gap, width);
+        let old_gap = (dot(n, old_whole) - plane.normal.w) + dot(n, old_rest);
+        if min(gap, old_gap) >= width {
+            continue;
+        }
         let s = area * plane.stiffness;
-        switch what {
-            case TOUCH_YOUNG: { vector += (s * law.pressure * plane.scales / members[p.member].young) * n; }
-            case PLANE_HEIGHT: { vector -= (s * law.slope) * n; }
-            case PLANE_THETA: { vector += s * (law.slope * dot(plane.by_theta.xyz, whole + rest) * n + law.pressure * plane.by_theta.xyz); }
-            case PLANE_PHI: { vector += s * (law.slope * dot(plane.by_phi.xyz, whole + rest) * n + law.pressure * plane.by_phi.xyz); }
-            case NO_TOUCH: {}
-            default: {
-                vector += (s * law.pressure) * n;
-                energy += s * law.energy;
-                diagonal -= (s * law.slope) * (n * n);
-                mixed -= (s * law.slope) * (n.xxy * n.yzz);
+        for (var i = 0u; i < INSTANTS; i++) {
+            let at = instant(i, theta);
+            let law = contact_law(gap + (1.0 - at.y) * (old_gap - gap), width);
+            let pressure = s * at.x * law.pressure;
+            let slope = s * at.x * law.slope;
+            let place = (whole + rest) + (1.0 - at.y) * ((old_whole - whole) + (old_rest - rest));
+            switch what {
+                case TOUCH_YOUNG: { vector += (pressure * plane.scales / members[p.member].young) * n; }
+                case PLANE_HEIGHT: { vector -= slope * n; }
+                case PLANE_THETA: { vector += slope * dot(plane.by_theta.xyz, place) * n + pressure * plane.by_theta.xyz; }
+                case PLANE_PHI: { vector += slope * dot(plane.by_phi.xyz, place) * n + pressure * plane.by_phi.xyz; }
+                case TOUCH_OLD: { vector += ((1.0 - at.y) * slope * dot(n, mean)) * n; }
+                default: {
+                    vector += pressure * n;
+                    energy += s * at.x / at.y * law.energy;
+                    diagonal -= (at.y * slope) * (n * n);
+                    mixed -= (at.y * slope) * (n.xxy * n.yzz);
+                }
             }
         }
     }

@@ -1,13 +1,14 @@
 //! What call.extra asks of passes.
 
 // Of touch_patches: force, energy and stiffness; derivatives by Young's modulus and, plus PLANE_ASKS times the plane, by its height
-// and angles; nothing.
+// and angles; nothing; by the old state along `probe`.
 const TOUCH_FORCE = 0u;
 const TOUCH_YOUNG = 1u;
 const PLANE_HEIGHT = 2u;
 const PLANE_THETA = 3u;
 const PLANE_PHI = 4u;
 const NO_TOUCH = 5u;
+const TOUCH_OLD = 6u;
 const PLANE_ASKS = 8u;
 
 // Of hold_cells: force of the new state, weighted with θ, and of the old one, weighted with 1 − θ; derivative of both by Young's

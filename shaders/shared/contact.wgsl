@@ -1,6 +1,21 @@
 //! Contact law of a plane. Twin of palpate-model/src/contact.rs; all per unit stiffness.
 
 override contact_width: f32;
+// Distance of the outer points of the quadrature over a step from its middle, and their weight (`contact::instants`).
+override instant_offset: f32;
+override instant_weight: f32;
+// Weight of the new state from which on contact acts there alone.
+override contact_damped: f32;
+
+const INSTANTS = 3u;
+
+// Weight of an evaluation of the law, and its place in the step.
+fn instant(k: u32, theta: f32) -> vec2<f32> {
+    let away = f32(k) - 1.0;
+    let start = min((theta - 0.5) / (contact_damped - 0.5), 1.0);
+    let at = start + (1.0 - start) * (0.5 + away * instant_offset);
+    return vec2(select(instant_weight, 1.0 - 2.0 * instant_weight, k == 1u), at);
+}
 
 struct Law {
     pressure: f32,

@@ -120,6 +120,12 @@ fn x_from(place: Three) -> Three {
     return with_value(sub3(three_of(0u), place), ((spot.origin - p) + spot.whole) + spot.rest);
 }
 
+// Old position − place.
+fn old_from(place: Three) -> Three {
+    let p = vec3(place[0].x, place[1].x, place[2].x);
+    return with_value(sub3(three_of(OLD_AT), place), ((spot.origin - p) + spot.old_whole) + spot.old_rest);
+}
+
 // Distance above the plane, now and before.
 fn gap() -> Dual {
     let n = vec3(z[PLANE_AT].x, z[PLANE_AT + 1u].x, z[PLANE_AT + 2u].x);
@@ -149,8 +155,19 @@ fn energy_of(g: Dual, stiffness: Dual) -> Dual {
     return mul(stiffness, chain(l.energy, -l.pressure, -l.slope, g));
 }
 
+struct Instant {
+    weight: f32,
+    gap: Dual,
+}
+
 fn old_pressure() -> Dual {
     return pressure_of(old_gap(), z[PLANE_AT + 4u]);
+}
+
+// Weight of term k of the potential of what acts along the way from the old gap to the new one as contact does, and the gap there.
+fn along_way(k: u32, old: Dual, new_gap: Dual) -> Instant {
+    let at = instant(k, select(1.0, spot.rate / spot.momentum, spot.rate > 0.0));
+    return Instant(at.x / at.y, new_gap + (1.0 - at.y) * (old - new_gap));
 }
 
 // Shares of nodes in one load do not change in time: the host computes them.

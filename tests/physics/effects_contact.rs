@@ -60,6 +60,28 @@ fn friction_stops_a_sliding_block_where_it_should() {
 }
 
 #[test]
+fn a_ball_rolls_as_a_rigid_one_does_whatever_the_step() {
+    // With friction to spare, down a slope of 14 degrees on cells of a third of its radius, lowered onto the contact's layer.
+    let (radius, slope, time) = (0.05, DVec3::new(0.25, 0.0, 1.0).normalize(), 0.4);
+    for steps in [80, 160] {
+        let mut s = scenes::body(Analytic::Ball { radius, center: slope * radius }, radius / 3.0);
+        s.material.youngs_modulus = 1e5;
+        s.gravity = DVec3::new(0.0, 0.0, -9.81);
+        s.planes = vec![scenes::plane(DVec3::ZERO, slope)];
+        s.effects = vec![effect("coulomb-friction", &[("coefficient", 0, 0.4)])];
+        s.time = Time { step: time / f64::from(steps), steps: steps as usize, start: 0.0, theta: 0.5 };
+        let plan = scenes::plan(&s);
+        let way = mean(&plan, run::states(&plan).last().unwrap()).0;
+        let along = (way - slope * way.dot(slope)).length();
+        let expected = 0.5 * 5.0 / 7.0 * 9.81 * slope.x * time * time;
+        println!("rolled {:.2} mm in {steps} steps, expected {:.2} mm", along * 1e3, expected * 1e3);
+        // It creeps by up to 5 mm/s, two millimetres, and its mass, where it is flattened, is nearer to the ground than a rigid ball's.
+        // Contact with the new state alone, and lumped mass as it comes, leave 4 % and 8 % too little.
+        assert!((along / expected - 1.0).abs() < 0.01, "{along} m, not {expected}");
+    }
+}
+
+#[test]
 fn adhesion_holds_less_than_its_pull_off_pressure() {
     // A block of weight 196 Pa under a ceiling, at rest within the contact's layer.
     for (factor, holds) in [(1.3, true), (0.8, false)] {
@@ -142,6 +164,6 @@ fn dissipation_takes_the_energy_of_hunt_and_crossley() {
         if excess(middle) * excess(low) > 0.0 { low = middle } else { high = middle }
     }
     println!("restitution {e:.4} of {free:.4}, expected {low:.4} of 1");
-    // Contact at the new state, of first order in time, takes a few per cent by itself, and the block vibrates a little.
-    assert!(free > 0.95 && (e / free - low).abs() < 0.01);
+    // Contact along the way of each step keeps the energy (with the new state alone 5 % of the speed are lost); the block vibrates a little.
+    assert!((free - 1.0).abs() < 1e-3 && (e - low).abs() < 2e-3);
 }

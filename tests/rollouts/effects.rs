@@ -22,6 +22,10 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         }
     }
     scene.effects = vec![effect];
+    if ALL[law].family == Family::Contact {
+        // Contact acts along the way of a step.
+        scene.time.theta = 0.55;
+    }
     if matches!(ALL[law].site, effects::Site::Clamps(_) | effects::Site::Edges(_)) {
         // They need a clamp, a start that it does not jerk, and a body that does not hang by half its size from the clamp's edge: where the
         // extension folds, the cost is rough.

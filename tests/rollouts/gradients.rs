@@ -197,6 +197,13 @@ fn bouncing_ball_with_lagged_rotation() {
 }
 
 #[test]
+fn bouncing_ball_that_touches_along_the_way_of_each_step() {
+    let mut s = ball();
+    s.time.theta = 0.55;
+    check(&observed(&s, &[0.025, 0.0437, 0.06]), "along the way");
+}
+
+#[test]
 fn static_equilibrium_then_motion() {
     let mut s = ball();
     s.initial.state = InitialShape::StaticEquilibrium;

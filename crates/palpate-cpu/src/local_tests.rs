@@ -73,7 +73,7 @@ fn plan(rotation: RotationUpdate, effects: Vec<Effect>) -> Plan {
             pivot: None,
             state: InitialShape::StaticEquilibrium,
         },
-        time: Time { step: 0.01, steps: 3, start: 0.05, theta: 0.6 },
+        time: Time { step: 0.01, steps: 3, start: 0.05, theta: 0.55 },
         solver: Solver { rotation, ..Solver::default() },
         observation: None,
         fit: None,

@@ -63,7 +63,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 7] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 8] {
         // 600: rotations by Jacobi's method, and sums over the corners of a cell.
         let cell = 600 + self.supports;
         [
@@ -71,8 +71,9 @@ impl Most {
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
             ("begin_solve", 4 * self.share() + 300),
             ("step_back", 2 * self.row + 20),
-            // An effect is asked up to six times for derivatives by all its inputs.
-            ("press_patches", 330 * self.pressed.max(1) + 100),
+            // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
+            ("press_patches", 380 * self.pressed.max(1) + 100),
+            ("touch_patches", (1 + palpate_model::contact::INSTANTS as u64) * self.planes + 20),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]

@@ -52,6 +52,9 @@ pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
 pub(crate) fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_width" => palpate_model::contact::WIDTH,
+        "contact_damped" => palpate_model::contact::DAMPED,
+        "instant_offset" => palpate_model::contact::INSTANT_OFFSET,
+        "instant_weight" => palpate_model::contact::INSTANT_WEIGHT,
         "front_far" => palpate_model::front::FAR,
         "front_most" => palpate_model::front::MOST as f64,
         "front_per_cell" => palpate_model::front::PER_CELL,

@@ -255,10 +255,10 @@ impl<'a, 'r> Solve<'a, 'r> {
         self.laws(pass::COUPLE_LAWS, ALL, Per::Cell, back, more);
     }
 
-    /// What effects on patches have to say of the old state, for `couple_old`.
+    /// What planes and effects on patches have to say of the old state, for `couple_old`.
     pub(crate) fn couple_patches(&mut self, question: u32, more: &Named) {
-        if self.world.geometry.effects.on_patches() {
-            self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, asks::NO_TOUCH);
+        if self.world.geometry.effects.on_patches() || !self.world.plan.planes.is_empty() {
+            self.run_with(pass::TOUCH_PATCHES, ALL, Per::Patch, asks::TOUCH_OLD, more);
             self.press_patches(ALL, question, None, more);
         }
     }

@@ -1,6 +1,7 @@
 //! The body on its grid: active cells, nodes, weights, surface patches, ghost penalty, the band around it.
 
 mod build;
+mod moments;
 
 pub use build::{BodyError, MAX_CELLS, SUBDIVISIONS};
 pub(crate) use build::{Parts, build_parts, world_cell};
@@ -16,7 +17,8 @@ pub struct Body {
     pub grid: Grid,
     /// Rest positions of the simulation nodes [m], shape `[N]`.
     pub nodes: Vec<DVec3>,
-    /// ∫ N_i over the body [m³], shape `[N]`; sums to `volume`.
+    /// Lumped volumes [m³], shape `[N]`: ∫ N_i over the body, after [`Body::mend_moments`] times a factor near 1; their sum is `volume`,
+    /// their centre `center`.
     pub node_volume: Vec<f64>,
     /// Cells that hold some of the body.
     pub cells: Vec<Cell>,

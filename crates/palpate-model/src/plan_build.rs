@@ -2,6 +2,7 @@
 
 use crate::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
 use crate::clamp_edge::Edge;
+use crate::contact;
 use crate::cut::{ClipBox, HeldMoments, Lattice, held_moments};
 use crate::effects::check_choices;
 use crate::extension::{NodeLookup, active_cell, affine_weights};
@@ -60,7 +61,11 @@ fn band_cells(scene: &Scene) -> f64 {
 /// Everything a backend needs for a scene. `observation` comes with frames, cameras and noise; its markers are filled here, one per
 /// entry of `marker_rest` in the same order.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
-    let (parts, shape) = build_parts(scene)?;
+    let (mut parts, shape) = build_parts(scene)?;
+    // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
+    if scene.clamps.is_empty() && scene.time.theta < contact::DAMPED {
+        parts.body.mend_moments();
+    }
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);

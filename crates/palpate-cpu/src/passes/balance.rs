@@ -2,8 +2,8 @@
 //!
 //! Dynamic (a step of the θ-scheme) and static problems are the same sum with and without inertia:
 //! `r(u₁) = M[(1/(θΔt²))(u₁−u₀) − v₀/(θΔt)] + αM(u₁−u₀)/Δt + cells(u₁,u₀) + ghost + clamps(u₁) + contact(u₁) − weight`.
-//! Contact acts at the new state only: its work is never less than its energy's change, so it limits no time step. Clamps are
-//! weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
+//! Contact acts along the way between the states (`palpate_model::contact`): its work is never less than its energy's change, so it
+//! limits no time step. Clamps are weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, dot};
@@ -14,7 +14,6 @@ use crate::passes::points::Acting;
 use crate::passes::posed::{Before, Curvature, Posed};
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
-use palpate_model::contact;
 use palpate_model::elements::Elements;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
@@ -142,7 +141,7 @@ impl<'a> Balance<'a> {
     }
 
     /// The cells' poses at a state, for [`Balance::tangent_from`].
-    fn posed(&self, s: States) -> Vec<Posed> {
+    fn posed(&self, s: States<'a>) -> Vec<Posed> {
         let (mut posed, mut unused) = (Vec::new(), zeros(s.u1.len()));
         self.elasticity().force_from(&self.mix, &self.before(s.u0), s.u1, &mut posed, &mut unused);
         posed
@@ -184,11 +183,16 @@ impl<'a> Balance<'a> {
         }
     }
 
+    /// What happens between the body and a plane.
+    pub(super) fn contact(&self, plane: &'a PlaneNow, s: States<'a>) -> supports::Contact<'a> {
+        supports::Contact { body: &self.plan.body, plane, theta: self.mix.new, u: [s.u1, s.u0] }
+    }
+
     /// Adds clamps and contact.
     fn supports(&self, s: States<'a>, out: &mut [DVec3]) {
         self.clamps(Matrices::Stiffness, self.young(), 0.0, s, out);
         for plane in self.planes {
-            for t in supports::touches(&self.plan.body, plane, s.u1) {
+            for (_, t) in self.contact(plane, s).touches() {
                 for i in 0..8 {
                     out[t.nodes[i] as usize] -= t.area * t.pressure * t.weights[i] * plane.normal[0];
                 }
@@ -246,11 +250,8 @@ impl<'a> Balance<'a> {
             Balance { mix: Mix { new: 0.0, ..self.mix }, ..*self }.clamps(Matrices::Stiffness, self.young(), 0.0, s, &mut old);
             w += dot(s.u1, &old);
         }
-        let width = contact::WIDTH * self.plan.body.grid.h;
         for plane in self.planes {
-            w += supports::touches(&self.plan.body, plane, s.u1)
-                .map(|t| t.area * contact::energy(t.gap, plane.stiffness, width))
-                .sum::<f64>();
+            w += self.contact(plane, s).touches().map(|(_, t)| t.area * t.energy).sum::<f64>();
         }
         // Inertia and weight are quadratic and linear: ½ (r(u₁) + r(0))·u₁.
         let mut at_new = zeros(s.u1.len());
@@ -261,22 +262,22 @@ impl<'a> Balance<'a> {
     }
 
     /// ∂r/∂u₁, symmetric.
-    pub fn tangent(&self, s: States, convex: bool, matrix: &mut Matrix) {
+    pub fn tangent(&self, s: States<'a>, convex: bool, matrix: &mut Matrix) {
         let curvature = if convex { Curvature::Convex } else { Curvature::Exact };
         self.tangent_from(s, &self.posed(s), curvature, matrix);
     }
 
     /// The same within a solve. `posed` is what the residual at
     /// the same displacement left.
-    pub fn tangent_from(&self, s: States, posed: &[Posed], curvature: Curvature, matrix: &mut Matrix) {
+    pub fn tangent_from(&self, s: States<'a>, posed: &[Posed], curvature: Curvature, matrix: &mut Matrix) {
         let (elasticity, materials) = (self.elasticity(), self.materials());
         assembly::cells(&elasticity, materials.as_ref(), self.pattern, self.places, &self.mix, s, posed, curvature, matrix);
-        self.add_sparse(s.u1, curvature == Curvature::Convex, matrix);
+        self.add_sparse(s, curvature == Curvature::Convex, matrix);
         self.add_effects_tangent(s, curvature != Curvature::Exact, matrix);
     }
 
     /// Adds everything but the cells to the matrix.
-    fn add_sparse(&self, u: &[DVec3], convex: bool, matrix: &mut Matrix) {
+    fn add_sparse(&self, s: States<'a>, convex: bool, matrix: &mut Matrix) {
         let (plan, pattern, physics) = (self.plan, self.pattern, self.physics);
         let values = &mut matrix.values;
         let ghost = self.ghost_scale(physics.youngs_modulus * self.elements.shear[0]) * (self.mix.new + self.mix.rate);
@@ -310,18 +311,19 @@ impl<'a> Balance<'a> {
         for plane in self.planes {
             let n = plane.normal[0];
             let nn = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
-            for (patch, t) in supports::patch_touches(&plan.body, plane, u) {
+            for (patch, t) in self.contact(plane, s).touches() {
                 let places = &self.places.cells[patch.cell as usize];
                 for b in 0..64 {
-                    values[places[b] as usize] += nn * (-t.area * t.slope * t.weights[b / 8] * t.weights[b % 8]);
+                    values[places[b] as usize] += nn * (-t.area * t.slopes[0] * t.weights[b / 8] * t.weights[b % 8]);
                 }
             }
         }
     }
 
     /// (∂r/∂u₀) du₀ + (∂r/∂v₀) dv₀.
-    pub fn by_old(&self, s: States, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
+    pub fn by_old(&self, s: States<'a>, du0: &[DVec3], dv0: &[DVec3]) -> Nodes {
         let mut out = self.by_old_linear(du0, dv0);
+        self.contact_by_old(s, du0, &mut out);
         self.elasticity().by_old(&self.mix, s.u1, s.u0, du0, &mut out);
         if let Some(m) = self.materials() {
             m.by_old(s.u1, s.u0, du0, &mut out);
@@ -331,9 +333,10 @@ impl<'a> Balance<'a> {
     }
 
     /// Transposes of both: ((∂r/∂u₀)ᵀ z, (∂r/∂v₀)ᵀ z).
-    pub fn by_old_transposed(&self, s: States, z: &[DVec3]) -> (Nodes, Nodes) {
+    pub fn by_old_transposed(&self, s: States<'a>, z: &[DVec3]) -> (Nodes, Nodes) {
         let zero = zeros(z.len());
         let mut to_u = self.by_old_linear(z, &zero);
+        self.contact_by_old(s, z, &mut to_u);
         self.elasticity().by_old_transposed(&self.mix, s.u1, s.u0, z, &mut to_u);
         if let Some(m) = self.materials() {
             m.by_old_transposed(s.u1, s.u0, z, &mut to_u);
@@ -341,6 +344,19 @@ impl<'a> Balance<'a> {
         let mut to_v = self.by_old_linear(&zero, z);
         self.add_effects_transposed(s, z, &mut to_u, &mut to_v);
         (to_u, to_v)
+    }
+
+    /// Adds the derivative of contact by the old state, times `d`; symmetric.
+    fn contact_by_old(&self, s: States<'a>, d: &[DVec3], out: &mut [DVec3]) {
+        for plane in self.planes {
+            let n = plane.normal[0];
+            for (_, t) in self.contact(plane, s).touches() {
+                let approach: f64 = (0..8).map(|i| t.weights[i] * n.dot(d[t.nodes[i] as usize])).sum();
+                for i in 0..8 {
+                    out[t.nodes[i] as usize] -= t.area * t.slopes[1] * approach * t.weights[i] * n;
+                }
+            }
+        }
     }
 
     /// The symmetric parts (inertia, ghost, clamps) of the derivative by the old state.

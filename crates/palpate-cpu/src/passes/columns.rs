@@ -30,7 +30,7 @@ impl<'a> Balance<'a> {
                 self.clamps(which, factor, 0.0, s, &mut out);
                 if which == Matrices::Stiffness {
                     for plane in self.planes.iter().filter(|p| p.scales) {
-                        self.contact_column(plane, s.u1, |t| (t.pressure / young) * plane.normal[0], &mut out);
+                        self.contact_column(plane, s, |t| (t.pressure / young) * plane.normal[0], &mut out);
                     }
                 }
             }
@@ -71,12 +71,12 @@ impl<'a> Balance<'a> {
             }
             ParamKey::PlaneHeight(k) => {
                 let plane = &self.planes[k as usize];
-                self.contact_column(plane, s.u1, |t| -t.slope * plane.normal[0], &mut out);
+                self.contact_column(plane, s, |t| -(t.slopes[0] + t.slopes[1]) * plane.normal[0], &mut out);
             }
             ParamKey::PlaneTheta(k) | ParamKey::PlanePhi(k) => {
                 let plane = &self.planes[k as usize];
                 let dn = plane.normal[if matches!(key, ParamKey::PlaneTheta(_)) { 1 } else { 2 }];
-                self.contact_column(plane, s.u1, |t| t.slope * dn.dot(t.point) * plane.normal[0] + t.pressure * dn, &mut out);
+                self.contact_column(plane, s, |t| dn.dot(t.lever) * plane.normal[0] + t.pressure * dn, &mut out);
             }
             ParamKey::TimeStart => {
                 let moving = self.plan.clamps.iter().any(|c| c.motion.is_some());
@@ -99,8 +99,8 @@ impl<'a> Balance<'a> {
     }
 
     /// Adds −area · weight · f(touch) over the patches that touch a plane.
-    fn contact_column(&self, plane: &PlaneNow, u: &[DVec3], f: impl Fn(&supports::Touch) -> DVec3, out: &mut [DVec3]) {
-        for t in supports::touches(&self.plan.body, plane, u) {
+    fn contact_column(&self, plane: &'a PlaneNow, s: States<'a>, f: impl Fn(&supports::Touch) -> DVec3, out: &mut [DVec3]) {
+        for (_, t) in self.contact(plane, s).touches() {
             let v = t.area * f(&t);
             for i in 0..8 {
                 out[t.nodes[i] as usize] -= t.weights[i] * v;

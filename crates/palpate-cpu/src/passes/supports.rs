@@ -16,7 +16,7 @@ pub fn ghost_product(body: &Body, scale: f64, u: &[DVec3], out: &mut [DVec3]) {
     }
 }
 
-/// A surface patch that touches a plane.
+/// A surface patch that touches a plane within a step: sums over the instants of [`contact::instants`].
 pub struct Touch<'a> {
     /// Nodes of the patch's cell.
     pub nodes: &'a [u32; 8],
@@ -24,34 +24,66 @@ pub struct Touch<'a> {
     pub weights: &'a [f64; 8],
     /// Area [m²].
     pub area: f64,
-    /// Where the patch's mean point is now [m].
-    pub point: DVec3,
     /// Pressure [Pa].
     pub pressure: f64,
-    /// Derivative of the pressure by the gap [Pa/m], negative.
-    pub slope: f64,
-    /// Gap: distance above the plane [m].
-    pub gap: f64,
+    /// Its derivatives by the new and by the old gap [Pa/m], negative.
+    pub slopes: [f64; 2],
+    /// Slope of the law times the place of the patch's mean point [Pa]: derivative of the pressure by the plane's normal.
+    pub lever: DVec3,
+    /// Potential per area whose derivative by the new gap is minus the pressure [J/m²].
+    pub energy: f64,
 }
 
-/// Patches that feel a plane at displacement u.
-pub fn touches<'a>(body: &'a Body, plane: &'a PlaneNow, u: &'a [DVec3]) -> impl Iterator<Item = Touch<'a>> {
-    patch_touches(body, plane, u).map(|(_, t)| t)
+/// What happens between a body and a plane in one balance.
+#[derive(Clone, Copy)]
+pub struct Contact<'a> {
+    /// The body.
+    pub body: &'a Body,
+    /// The plane.
+    pub plane: &'a PlaneNow,
+    /// Weight θ of the new state.
+    pub theta: f64,
+    /// New and old displacement.
+    pub u: [&'a [DVec3]; 2],
 }
 
-/// The same with the patch.
-pub fn patch_touches<'a>(body: &'a Body, plane: &'a PlaneNow, u: &'a [DVec3]) -> impl Iterator<Item = (&'a Patch, Touch<'a>)> {
-    let width = contact::WIDTH * body.grid.h;
-    body.patches.iter().filter_map(move |patch| {
-        let nodes = &body.cells[patch.cell as usize].nodes;
-        let mut point = patch.point;
-        for i in 0..8 {
-            point += patch.weights[i] * u[nodes[i] as usize];
-        }
-        let gap = plane.normal[0].dot(point) - plane.height;
-        (gap < width).then(|| {
-            let (pressure, slope) = contact::pressure(gap, plane.stiffness, width);
-            (patch, Touch { nodes, weights: &patch.weights, area: patch.area, point, pressure, slope, gap })
+impl<'a> Contact<'a> {
+    /// Patches that feel the plane.
+    pub fn touches(self) -> impl Iterator<Item = (&'a Patch, Touch<'a>)> {
+        let Contact { body, plane, theta, u: [u1, u0] } = self;
+        let width = contact::WIDTH * body.grid.h;
+        let instants = contact::instants(theta);
+        body.patches.iter().filter_map(move |patch| {
+            let nodes = &body.cells[patch.cell as usize].nodes;
+            let (mut new, mut old) = (patch.point, patch.point);
+            for i in 0..8 {
+                new += patch.weights[i] * u1[nodes[i] as usize];
+                old += patch.weights[i] * u0[nodes[i] as usize];
+            }
+            let n = plane.normal[0];
+            if n.dot(new).min(n.dot(old)) - plane.height >= width {
+                return None;
+            }
+            let gaps = [new, old].map(|x| n.dot(x) - plane.height);
+            let mut t = Touch {
+                nodes,
+                weights: &patch.weights,
+                area: patch.area,
+                pressure: 0.0,
+                slopes: [0.0; 2],
+                lever: DVec3::ZERO,
+                energy: 0.0,
+            };
+            for (weight, at) in instants {
+                let gap = gaps[0] + (1.0 - at) * (gaps[1] - gaps[0]);
+                let (pressure, slope) = contact::pressure(gap, plane.stiffness, width);
+                t.pressure += weight * pressure;
+                t.slopes[0] += weight * at * slope;
+                t.slopes[1] += weight * (1.0 - at) * slope;
+                t.lever += weight * slope * (new + (1.0 - at) * (old - new));
+                t.energy += weight / at * contact::energy(gap, plane.stiffness, width);
+            }
+            (t.energy > 0.0).then_some((patch, t))
         })
-    })
+    }
 }

@@ -79,7 +79,7 @@ fn probe(law: &Law, noise: &mut Noise) -> Probe {
         width,
         rate: 100.0,
         inertia: single(1e4 / 0.6),
-        momentum: single(1e2 / 0.6),
+        momentum: single(1e2 / 0.55),
     };
     Probe { place, z, change, weight: DVec3::from_array(noise.vector(1.0).to_array().map(single)) }
 }
@@ -271,6 +271,7 @@ fn evaluations_with_contact_and_varying_stiffness_agree() {
     s.object.pose.translation.z = -0.008;
     s.initial.velocity = DVec3::new(0.4, 0.1, -0.6);
     s.time.steps = 3;
+    s.time.theta = 0.55;
     s.observation = watched();
     with(&mut s, "coulomb-friction", &[("coefficient", &[0.5])]);
     with(&mut s, "adhesion", &[("pressure", &[600.0]), ("range", &[4e-3])]);

@@ -25,8 +25,10 @@ pub(super) fn crowded() -> Scene {
     let mut scene = held(0.03);
     scene.solver.ghost = 0.5;
     scene.planes[0].point.z = 0.004;
-    scene.planes.push(Plane { point: glam::DVec3::new(-0.04, 0.0, 0.0), normal: glam::DVec3::X, stiffness: Some(1e6) });
+    scene.planes.push(Plane { point: glam::DVec3::new(-0.038, 0.0, 0.0), normal: glam::DVec3::X, stiffness: Some(1e6) });
     scene.time.steps = 2;
+    // Contact acts along the way of a step.
+    scene.time.theta = 0.55;
     scene
 }
 

@@ -6,7 +6,7 @@
 //! `coulomb-friction`. Valid while r is small against the body; peeling is resolved where r is not small against a cell times
 //! σ over Young's modulus.
 
-use super::law::{Input, Number, Place, PointLaw, dot};
+use super::law::{Input, Number, Place, PointLaw, along_way};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
 
 pub(super) const LAW: Law = Law {
@@ -28,22 +28,24 @@ struct Adhesion;
 impl PointLaw for Adhesion {
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
         let (pressure, range) = (at.p(0), at.p(1));
-        let beyond = dot(at.normal(), at.x()) - at.height() - place.width;
-        if beyond.re() >= range.re() {
-            return D::from(0.0);
-        }
-        let depth = if beyond.re() <= 0.0 {
-            -beyond + range * 0.5
-        } else {
-            // ∫ of the quintic step 10 s³ − 15 s⁴ + 6 s⁵ with s falling from 1 at the layer to 0 at the range.
-            let s = (range - beyond) / range;
-            range * s.powi(4) * (s * s - s * 3.0 + 2.5)
+        let depth = |gap: D| {
+            let beyond = gap - place.width;
+            if beyond.re() >= range.re() {
+                D::from(0.0)
+            } else if beyond.re() <= 0.0 {
+                -beyond + range * 0.5
+            } else {
+                // ∫ of the quintic step 10 s³ − 15 s⁴ + 6 s⁵ with s falling from 1 at the layer to 0 at the range.
+                let s = (range - beyond) / range;
+                range * s.powi(4) * (s * s - s * 3.0 + 2.5)
+            }
         };
-        -pressure * depth * place.measure
+        -pressure * along_way(place, at.gaps(), depth) * place.measure
     }
 
     fn idle(&self, place: &Place, z: &[f64]) -> bool {
         let at = Input::new(z);
-        dot(at.normal(), at.x()) - at.height() - place.width >= at.p(1)
+        let [old, new] = at.gaps();
+        old.min(new) - place.width >= at.p(1)
     }
 }

@@ -1,10 +1,10 @@
 //! Contact that is stiffer or softer than the plane's stated stiffness: a padded floor, a skin that gives before the body does.
 //!
-//! Adds c times the contact energy of `palpate_model::contact` at the new state, so that every pressure is (1 + c) times the stated one.
+//! Adds c times the contact energy of `palpate_model::contact`, so that every pressure is (1 + c) times the stated one.
 //! Relative to the stiffness in use, whether the scene states it or it follows Young's modulus. Valid for all c above −1; the
 //! layer keeps its width, so a soft floor lets the body sink in by its pressure over the stiffness.
 
-use super::law::{Input, Number, Place, PointLaw, dot};
+use super::law::{Input, Number, Place, PointLaw, along_way};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
 use crate::contact;
 use crate::params::Transform;
@@ -28,12 +28,12 @@ struct ContactStiffness;
 
 impl PointLaw for ContactStiffness {
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
-        let gap = dot(at.normal(), at.x()) - at.height();
-        at.p(0) * contact::energy_of(gap, at.plane_stiffness(), place.width) * place.measure
+        let energy = |gap| contact::energy_of(gap, at.plane_stiffness(), place.width);
+        at.p(0) * along_way(place, at.gaps(), energy) * place.measure
     }
 
     fn idle(&self, place: &Place, z: &[f64]) -> bool {
-        let at = Input::new(z);
-        dot(at.normal(), at.x()) - at.height() >= place.width
+        let [old, new] = Input::new(z).gaps();
+        old.min(new) >= place.width
     }
 }

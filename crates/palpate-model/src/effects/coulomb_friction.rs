@@ -27,8 +27,7 @@ struct Friction;
 
 /// Pressure at the old state by value and derivative.
 pub(super) fn old_pressure<D: Number>(place: &Place, at: &Input<D>) -> D {
-    let gap = dot(at.normal(), at.old()) - at.height();
-    contact::pressure_of(gap, at.plane_stiffness(), place.width)
+    contact::pressure_of(at.gaps()[0], at.plane_stiffness(), place.width)
 }
 
 impl PointLaw for Friction {

@@ -6,6 +6,7 @@
 //! derivatives are therefore symmetric, Newton's line search has something to descend, and the adjoint needs no transposed
 //! matrix. Derivatives come from hyper-dual numbers (Fike & Alonso, AIAA 2011-886), exact to rounding.
 
+use crate::contact;
 use glam::DVec3;
 use num_dual::{DualNum, HyperDual64};
 
@@ -120,6 +121,11 @@ impl<'a, D: Number> Input<'a, D> {
         self.z[PLANE + 4]
     }
 
+    /// Old and new distance above the plane [m].
+    pub fn gaps(&self) -> [D; 2] {
+        [self.old(), self.x()].map(|x| dot(self.normal(), x) - self.height())
+    }
+
     /// Time of the new state on the recording's clock [s].
     pub fn time(&self) -> D {
         self.z[TIME]
@@ -134,6 +140,13 @@ impl<'a, D: Number> Input<'a, D> {
     pub fn vector(&self, i: usize) -> [D; 3] {
         self.three(COMMON + i)
     }
+}
+
+/// Potential of what acts along the way from the old `gap` [m] to the new one as contact does (`crate::contact`), from its `energy` at
+/// a gap: the derivative by the new gap is the mean of the energy's.
+pub fn along_way<D: Number>(place: &Place, [old, new]: [D; 2], energy: impl Fn(D) -> D) -> D {
+    let parts = contact::instants(place.theta()).map(|(weight, at)| energy(new + (old - new) * (1.0 - at)) * (weight / at));
+    parts.into_iter().fold(D::from(0.0), |sum, part| sum + part)
 }
 
 /// a − b.

@@ -1,12 +1,12 @@
 //! A plane that the scene does not know: a wall, a table's edge, a tilted floor. Place and tilt are parameters.
 //!
-//! The contact law of `palpate_model::contact` at the new state, as for the scene's own planes, with `stiffness` times their default
+//! The contact law of `palpate_model::contact`, as for the scene's own planes, with `stiffness` times their default
 //! penalty. The body stays on the side that the normal points to; of that only the direction counts (two angles would leave a fit stuck
 //! where the normal is their pole). The plane lies at `distance` from `point` against it, so that turning it leaves it near the body.
 //! Without friction.
 
 use super::field::along;
-use super::law::{Input, Number, Place, PointLaw, sub};
+use super::law::{Input, Number, Place, PointLaw, along_way, sub};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, direction, number};
 use crate::contact;
 
@@ -42,17 +42,19 @@ const PARAMS: [EffectParam; 8] = [
 
 struct SecondPlane;
 
-/// Distance above the plane [m].
-fn gap<D: Number>(at: &Input<D>) -> D {
-    along(sub(at.x(), at.vector(5)), at.vector(2)) + at.p(1)
+/// Old and new distance above the plane [m].
+fn gaps<D: Number>(at: &Input<D>) -> [D; 2] {
+    [at.old(), at.x()].map(|x| along(sub(x, at.vector(5)), at.vector(2)) + at.p(1))
 }
 
 impl PointLaw for SecondPlane {
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
-        contact::energy_of(gap(&at), at.p(0) * at.default_stiffness(), place.width) * place.measure
+        let energy = |gap| contact::energy_of(gap, at.p(0) * at.default_stiffness(), place.width);
+        along_way(place, gaps(&at), energy) * place.measure
     }
 
     fn idle(&self, place: &Place, z: &[f64]) -> bool {
-        gap(&Input::new(z)) >= place.width
+        let [old, new] = gaps(&Input::new(z));
+        old.min(new) >= place.width
     }
 }
