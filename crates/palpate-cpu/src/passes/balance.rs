@@ -3,7 +3,8 @@
 //! Dynamic (a step of the θ-scheme) and static problems are the same sum with and without inertia:
 //! `r(u₁) = M[(1/(θΔt²))(u₁−u₀) − v₀/(θΔt)] + αM(u₁−u₀)/Δt + cells(u₁,u₀) + ghost + clamps(u₁) + contact(u₁) − weight`.
 //! Contact acts along the way between the states (`palpate_model::contact`): its work is never less than its energy's change, so it
-//! limits no time step. Clamps are weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
+//! limits no time step. Clamps are weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where
+//! both see the same state.
 
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, dot};

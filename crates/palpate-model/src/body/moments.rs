@@ -1,7 +1,7 @@
 //! Lumped volumes whose second moments are the body's: a rigid body of nodes with the right moment of inertia.
 //!
-//! Row sums of the shape functions put the volume of a cell into its corners. Volume and centre are right, but products of inertia
-//! about each axis come out too large by V h²/6: a ball on cells of a quarter of its radius turns with 5 % too much inertia. Every
+//! Row sums of the shape functions put the volume of a cell into its corners. Volume and centre are right, but the second moment
+//! along each axis comes out too large by V h²/6: a ball on cells of a quarter of its radius turns with 5 % too much inertia. Every
 //! nodal volume is therefore multiplied by 1 + q(x) with the quadratic polynomial q of least Σ V q² that mends the second moments and
 //! leaves volume and centre (in one dimension and with two cells this is Simpson's rule). Masses stay diagonal and positive. That is
 //! for bodies that may turn: where a clamp holds one, row sums are better, for they share a weight out as linear elements want it, and a

@@ -291,7 +291,6 @@ fn nodes_have_the_second_moments_of_the_body() {
     let block = Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.12, 0.09, 0.07) };
     for (shape, h) in [(torus, 0.02), (ball, 0.0125), (block, 0.015)] {
         for pose in [DAffine3::IDENTITY, turned] {
-            let shape = shape.clone();
             let mut body = Body::build(&Placed::new(shape.clone(), pose), h, h, 4).unwrap();
             let off = |body: &Body| {
                 let [nodes, exact] = second_moments(body);
