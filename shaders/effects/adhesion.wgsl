@@ -5,6 +5,9 @@ fn adhesion() -> Dual {
     var depth = number(0.0);
     for (var k = 0u; k < INSTANTS; k++) {
         let at = along_way(k, old_gap(), gap());
+        if at.weight == 0.0 {
+            break;
+        }
         let beyond = at.gap - number(spot.width);
         if beyond.x >= range.x {
             continue;

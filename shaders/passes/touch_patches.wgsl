@@ -58,6 +58,9 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let s = area * plane.stiffness;
         for (var i = 0u; i < INSTANTS; i++) {
             let at = instant(i, theta);
+            if at.x == 0.0 {
+                break;
+            }
             let law = contact_law(gap + (1.0 - at.y) * (old_gap - gap), width);
             let pressure = s * at.x * law.pressure;
             let slope = s * at.x * law.slope;

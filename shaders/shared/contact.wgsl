@@ -9,10 +9,14 @@ override contact_damped: f32;
 
 const INSTANTS = 3u;
 
-// Weight of an evaluation of the law, and its place in the step.
+// Weight of an evaluation of the law, and its place in the step; of no weight are all but the first where the new state counts alone.
 fn instant(k: u32, theta: f32) -> vec2<f32> {
+    // θ may have been made of a step's factors.
+    if theta > contact_damped - 1e-6 {
+        return vec2(select(0.0, 1.0, k == 0u), 1.0);
+    }
     let away = f32(k) - 1.0;
-    let start = min((theta - 0.5) / (contact_damped - 0.5), 1.0);
+    let start = (theta - 0.5) / (contact_damped - 0.5);
     let at = start + (1.0 - start) * (0.5 + away * instant_offset);
     return vec2(select(instant_weight, 1.0 - 2.0 * instant_weight, k == 1u), at);
 }

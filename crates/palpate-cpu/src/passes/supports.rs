@@ -74,7 +74,7 @@ impl<'a> Contact<'a> {
                 lever: DVec3::ZERO,
                 energy: 0.0,
             };
-            for (weight, at) in instants {
+            for (weight, at) in instants.into_iter().filter(|i| i.0 > 0.0) {
                 let gap = gaps[0] + (1.0 - at) * (gaps[1] - gaps[0]);
                 let (pressure, slope) = contact::pressure(gap, plane.stiffness, width);
                 t.pressure += weight * pressure;

@@ -145,8 +145,9 @@ impl<'a, D: Number> Input<'a, D> {
 /// Potential of what acts along the way from the old `gap` [m] to the new one as contact does (`crate::contact`), from its `energy` at
 /// a gap: the derivative by the new gap is the mean of the energy's.
 pub fn along_way<D: Number>(place: &Place, [old, new]: [D; 2], energy: impl Fn(D) -> D) -> D {
-    let parts = contact::instants(place.theta()).map(|(weight, at)| energy(new + (old - new) * (1.0 - at)) * (weight / at));
-    parts.into_iter().fold(D::from(0.0), |sum, part| sum + part)
+    let acting = contact::instants(place.theta()).into_iter().filter(|i| i.0 > 0.0);
+    let parts = acting.map(|(weight, at)| energy(new + (old - new) * (1.0 - at)) * (weight / at));
+    parts.fold(D::from(0.0), |sum, part| sum + part)
 }
 
 /// a − b.
