@@ -57,7 +57,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     // Contact and effects on patches leave their share where contact has its force.
-    if shape.planes > 0u || (shape.fields & FIELD_PATCHES) != 0u {
+    if (shape.fields & FIELD_COUPLED) != 0u {
         for (var k = cells[c.cell].patch_start; k < cells[c.cell].patch_end; k++) {
             f -= patches[k].weights[c.number] * touches[3u * (c.member * shape.patches + k)].xyz;
         }

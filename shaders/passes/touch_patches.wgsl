@@ -22,6 +22,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let site = patches[p.item];
     let what = call.extra % PLANE_ASKS;
     let theta = select(1.0, shape.theta, call.mode != 0u);
+    let along = acts_along(theta);
     var whole = site.point.xyz;
     var rest = vec3(0.0);
     var old_whole = site.point.xyz;
@@ -32,11 +33,17 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let w = site.weights[i];
         whole += w * next[a].xyz;
         rest += w * next[part(1u) + a].xyz;
-        old_whole += w * now[a].xyz;
-        old_rest += w * now[part(1u) + a].xyz;
+        if along {
+            old_whole += w * now[a].xyz;
+            old_rest += w * now[part(1u) + a].xyz;
+        }
         if what == TOUCH_OLD {
             mean += w * probe[a].xyz;
         }
+    }
+    if !along {
+        old_whole = whole;
+        old_rest = rest;
     }
     let area = site.point.w;
     let width = contact_width * shape.h;

@@ -9,10 +9,14 @@ override contact_damped: f32;
 
 const INSTANTS = 3u;
 
+// True where contact acts along the way of a step, not in its new state alone. θ may have been made of a step's factors.
+fn acts_along(theta: f32) -> bool {
+    return theta <= contact_damped - 1e-6;
+}
+
 // Weight of an evaluation of the law, and its place in the step; of no weight are all but the first where the new state counts alone.
 fn instant(k: u32, theta: f32) -> vec2<f32> {
-    // θ may have been made of a step's factors.
-    if theta > contact_damped - 1e-6 {
+    if !acts_along(theta) {
         return vec2(select(0.0, 1.0, k == 0u), 1.0);
     }
     let away = f32(k) - 1.0;

@@ -170,6 +170,19 @@ fn along_way(k: u32, old: Dual, new_gap: Dual) -> Instant {
     return Instant(at.x / at.y, new_gap + (1.0 - at.y) * (old - new_gap));
 }
 
+// Potential of contact of this stiffness along that way.
+fn energy_along_way(old: Dual, new_gap: Dual, stiffness: Dual) -> Dual {
+    var energy = number(0.0);
+    for (var k = 0u; k < INSTANTS; k++) {
+        let at = along_way(k, old, new_gap);
+        if at.weight == 0.0 {
+            break;
+        }
+        energy += at.weight * energy_of(at.gap, stiffness);
+    }
+    return energy;
+}
+
 // Shares of nodes in one load do not change in time: the host computes them.
 
 struct Response {

@@ -97,7 +97,7 @@ struct HoldSlope { // mirrored
 }
 
 // Bits of `Shape.fields`: effects vary the stiffness over the body, the density; act on patches; vary the stiffness in time; change the
-// stress-free shape, and the body starts in it; act on clamps.
+// stress-free shape, and the body starts in it; act on clamps. The last: what patches do depends on the old state.
 const FIELD_MODULUS = 1u;
 const FIELD_DENSITY = 2u;
 const FIELD_PATCHES = 4u;
@@ -105,6 +105,7 @@ const FIELD_AGING = 8u;
 const FIELD_REST = 16u;
 const FIELD_STARTS = 32u;
 const FIELD_GRIPS = 64u;
+const FIELD_COUPLED = 128u;
 // From this bit on the number of scalars that laws of cells depend on, and from that bit on how many such laws there are.
 const SCALARS_AT = 8u;
 const MOST_SCALARS = 15u;

@@ -4,6 +4,7 @@ use crate::effects::Effects;
 use crate::error::GpuError;
 use crate::layout::{Cell, Mass, Patch, Shape};
 use crate::memory::Maker;
+use crate::pipelines::shared::structs::FIELD_COUPLED;
 use palpate_model::elements::Classes;
 use palpate_model::grips::within_reach;
 use palpate_model::pattern::{Pattern, Places};
@@ -119,6 +120,8 @@ impl Geometry {
     ) -> Result<Geometry, GpuError> {
         let effects = Effects::new(plan)?;
         let touched = !plan.planes.is_empty() || effects.on_patches();
+        let along = !plan.planes.is_empty() && palpate_model::contact::beginning(plan.clock.theta) < 1.0;
+        let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();
         let pattern = Pattern::new(body);
@@ -219,7 +222,7 @@ impl Geometry {
             most: MOST_ITERATIONS as u32,
             quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
-            fields: effects.bits,
+            fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 },
             slope_rows: effects.slope_rows,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);

@@ -257,7 +257,7 @@ impl<'a, 'r> Solve<'a, 'r> {
 
     /// What planes and effects on patches have to say of the old state, for `couple_old`.
     pub(crate) fn couple_patches(&mut self, question: u32, more: &Named) {
-        if self.world.geometry.effects.on_patches() || !self.world.plan.planes.is_empty() {
+        if self.world.geometry.shape.fields & structs::FIELD_COUPLED != 0 {
             self.run_with(pass::TOUCH_PATCHES, ALL, Per::Patch, asks::TOUCH_OLD, more);
             self.press_patches(ALL, question, None, more);
         }

@@ -46,10 +46,14 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
         Resolution::CellSize(h) => ("object.cell_size", h),
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
     };
-    let parts = body::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
+    let mut parts = body::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
         let key = if matches!(e, BodyError::Empty { .. }) { "object" } else { key };
         error(key, e.to_string())
     })?;
+    // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
+    if scene.clamps.is_empty() && scene.time.theta < contact::DAMPED {
+        parts.body.mend_moments();
+    }
     Ok((parts, shape))
 }
 
@@ -61,11 +65,7 @@ fn band_cells(scene: &Scene) -> f64 {
 /// Everything a backend needs for a scene. `observation` comes with frames, cameras and noise; its markers are filled here, one per
 /// entry of `marker_rest` in the same order.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
-    let (mut parts, shape) = build_parts(scene)?;
-    // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
-    if scene.clamps.is_empty() && scene.time.theta < contact::DAMPED {
-        parts.body.mend_moments();
-    }
+    let (parts, shape) = build_parts(scene)?;
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);

@@ -15,6 +15,7 @@ use crate::passes::points::Acting;
 use crate::passes::posed::{Before, Curvature, Posed};
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
+use palpate_model::contact;
 use palpate_model::elements::Elements;
 use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
@@ -349,6 +350,9 @@ impl<'a> Balance<'a> {
 
     /// Adds the derivative of contact by the old state, times `d`; symmetric.
     fn contact_by_old(&self, s: States<'a>, d: &[DVec3], out: &mut [DVec3]) {
+        if contact::beginning(self.mix.new) == 1.0 {
+            return;
+        }
         for plane in self.planes {
             let n = plane.normal[0];
             for (_, t) in self.contact(plane, s).touches() {

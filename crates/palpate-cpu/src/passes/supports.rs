@@ -53,13 +53,12 @@ impl<'a> Contact<'a> {
         let Contact { body, plane, theta, u: [u1, u0] } = self;
         let width = contact::WIDTH * body.grid.h;
         let instants = contact::instants(theta);
+        let along = contact::beginning(theta) < 1.0;
         body.patches.iter().filter_map(move |patch| {
             let nodes = &body.cells[patch.cell as usize].nodes;
-            let (mut new, mut old) = (patch.point, patch.point);
-            for i in 0..8 {
-                new += patch.weights[i] * u1[nodes[i] as usize];
-                old += patch.weights[i] * u0[nodes[i] as usize];
-            }
+            let at = |u: &[DVec3]| (0..8).fold(patch.point, |x, i| x + patch.weights[i] * u[nodes[i] as usize]);
+            let new = at(u1);
+            let old = if along { at(u0) } else { new };
             let n = plane.normal[0];
             if n.dot(new).min(n.dot(old)) - plane.height >= width {
                 return None;

@@ -275,12 +275,9 @@ fn sharp_edges_are_kept() {
 fn second_moments(body: &Body) -> [DVec3; 2] {
     let about = |x: DVec3| (x - body.center) * (x - body.center);
     let nodes = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| about(*x) * *v).sum();
-    let h = body.grid.h;
-    let cells = body.cells.iter().flat_map(|c| {
-        let low = body.grid.position(c.lattice);
-        (0..27).map(move |q| about(low + POINTS27[q] * h) * c.weights[q] * h.powi(3))
-    });
-    [nodes, cells.sum()]
+    let second = moments(body).volume_second;
+    let origin = DVec3::new(second.x_axis.x, second.y_axis.y, second.z_axis.z);
+    [nodes, origin - body.center * body.center * body.volume]
 }
 
 #[test]
