@@ -3,7 +3,7 @@
 fn adhesion() -> Dual {
     let range = param(1u);
     var depth = number(0.0);
-    for (var k = 0u; k < INSTANTS; k++) {
+    for (var k = 0u; k < instant_count; k++) {
         let at = along_way(k, old_gap(), gap());
         if at.weight == 0.0 {
             break;

@@ -1,9 +1,13 @@
-//! Twin of palpate-model/src/effects/structural_damping.rs, with its slowest rate of 0.01/s and smallest strain of 1e-4.
+//! Twin of palpate-model/src/effects/structural_damping.rs.
+
+const STRUCTURAL_DAMPING_SLOW = 1e-2;
+const STRUCTURAL_DAMPING_SMALL = 1e-4;
 
 fn structural_damping(which: u32) -> Dual {
     if which != LOSS_PART {
         return number(0.0);
     }
-    let slow = 1e-2 / step_rate;
-    return mul(param(0u), mul(root(2.0 * old_density() + number(1e-8)), root(2.0 * density() + number(slow * slow))));
+    let slow = STRUCTURAL_DAMPING_SLOW / step_rate;
+    let small = STRUCTURAL_DAMPING_SMALL;
+    return mul(param(0u), mul(root(2.0 * old_density() + number(small * small)), root(2.0 * density() + number(slow * slow))));
 }

@@ -63,7 +63,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             continue;
         }
         let s = area * plane.stiffness;
-        for (var i = 0u; i < INSTANTS; i++) {
+        for (var i = 0u; i < instant_count; i++) {
             let at = instant(i, theta);
             if at.x == 0.0 {
                 break;

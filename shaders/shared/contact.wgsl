@@ -1,13 +1,12 @@
 //! Contact law of a plane. Twin of palpate-model/src/contact.rs; all per unit stiffness.
 
 override contact_width: f32;
-// Distance of the outer points of the quadrature over a step from its middle, and their weight (`contact::instants`).
+// Points of the quadrature over a step, distance of the outer ones from its middle, and their weight (`contact::instants`).
+override instant_count: u32;
 override instant_offset: f32;
 override instant_weight: f32;
 // Weight of the new state from which on contact acts there alone.
 override contact_damped: f32;
-
-const INSTANTS = 3u;
 
 // True where contact acts along the way of a step, not in its new state alone. θ may have been made of a step's factors.
 fn acts_along(theta: f32) -> bool {

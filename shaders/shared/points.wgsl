@@ -173,7 +173,7 @@ fn along_way(k: u32, old: Dual, new_gap: Dual) -> Instant {
 // Potential of contact of this stiffness along that way.
 fn energy_along_way(old: Dual, new_gap: Dual, stiffness: Dual) -> Dual {
     var energy = number(0.0);
-    for (var k = 0u; k < INSTANTS; k++) {
+    for (var k = 0u; k < instant_count; k++) {
         let at = along_way(k, old, new_gap);
         if at.weight == 0.0 {
             break;

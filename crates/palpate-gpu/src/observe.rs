@@ -12,6 +12,8 @@ mod fault_tests;
 #[cfg(test)]
 mod front_tests;
 mod looks;
+#[cfg(test)]
+mod match_tests;
 mod readings;
 mod results;
 #[cfg(test)]

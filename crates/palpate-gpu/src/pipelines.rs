@@ -53,6 +53,7 @@ pub(crate) fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_width" => palpate_model::contact::WIDTH,
         "contact_damped" => palpate_model::contact::DAMPED,
+        "instant_count" => palpate_model::contact::INSTANTS as f64,
         "instant_offset" => palpate_model::contact::INSTANT_OFFSET,
         "instant_weight" => palpate_model::contact::INSTANT_WEIGHT,
         "front_far" => palpate_model::front::FAR,

@@ -41,7 +41,10 @@ fn everything(plan: &Plan, lanes: Lanes, tuning: Tuning) -> Option<(Vec<palpate_
 
 #[test]
 fn evaluations_have_the_same_bits_with_subgroups_and_with_workgroup_memory() {
+    // Without any adapter this is where a test that requires one ends.
+    let Some(_) = device(None) else { return };
     if !crate::adapters().iter().any(|a| a.subgroups) {
+        println!("skipped: no adapter has subgroups");
         return;
     }
     let plan = seen(&scene());

@@ -33,7 +33,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("place_rows[") => 8,
         // The new and the old state.
         () if has("instant < end") => 2,
-        () if has("< INSTANTS") => palpate_model::contact::INSTANTS as u64,
+        () if has("< instant_count") => palpate_model::contact::INSTANTS as u64,
         () if has("hold_start") || has("patch_start") => most.supports,
         () if has("max(shape.planes, 1u)") => most.pressed.max(1),
         () if has("shape.planes") => most.planes,
