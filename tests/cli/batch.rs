@@ -37,6 +37,20 @@ fn one_bad_scene_harms_no_other_and_finished_ones_are_taken_over() {
     let csv = fs::read_to_string(out.join("summary.csv")).unwrap();
     let head = csv.lines().next().unwrap();
     assert!(head.contains("material.youngs_modulus,material.youngs_modulus standard error"), "{head}");
+    // What computed each scene is told where it was left open; nothing computed the one without a recording.
+    assert!(head.starts_with("name,scene,status,seconds,backend,"), "{head}");
+    let rows = json(out.join("summary.json"));
+    let backends = [0, 1, 2].map(|k| rows["scenes"][k]["backend"].as_str().unwrap_or_default().to_string());
+    let told: Vec<String> = csv.lines().skip(1).map(|l| l.split(',').nth(4).unwrap().to_string()).collect();
+    assert_eq!((backends[1].as_str(), told.as_slice()), ("", &backends[..]));
+    for (k, name) in [(1, "a"), (3, "c")] {
+        let by = format!(" s ({})", backends[k - 1]);
+        assert!(
+            first.err.lines().any(|l| l.starts_with(&format!("{k}/3 {name}: complete in ")) && l.ends_with(&by)),
+            "{}",
+            first.err
+        );
+    }
     assert_eq!(csv.lines().count(), 4);
     for name in ["a", "c"] {
         let value = json(out.join(name).join("result.json"))["parameters"][0]["value"].as_f64().unwrap();
@@ -102,6 +116,7 @@ fn a_resumed_run_that_stops_early_forgets_no_scene_ahead() {
     fs::write(scenes.join("a.toml"), a.replace("seed = 4", "seed = 5")).unwrap();
     let cut = stopped(&[&arguments[..], &["--resume"]].concat(), Interrupt::after(1));
     assert_eq!((cut.code, statuses(&out)), (INTERRUPTED, ["interrupted", "bad-input", "complete"].map(String::from).to_vec()));
+    assert!(cut.err.contains(": the best so far is written; --resume goes on from there"), "{}", cut.err);
     let last = palpate(&[&arguments[..], &["--resume"]].concat());
     assert!(last.err.contains("3/3 c: taken over"), "{}", last.err);
 }

@@ -1,6 +1,6 @@
 //! What adapters there are, and what each can do.
 
-use crate::device::{Choice, all, instance, rank, refused};
+use crate::device::{Choice, all, fits, instance, rank, refused};
 use crate::error::GpuError;
 
 /// One adapter, for lists.
@@ -26,6 +26,21 @@ impl AdapterReport {
     /// The largest buffer that a kernel can bind [B].
     pub fn largest_buffer(&self) -> u64 {
         self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
+    }
+
+    /// Whether this adapter has room for the largest buffer of an evaluation ([`crate::Memory::largest`]).
+    ///
+    /// # Errors
+    /// It is beyond one of its limits.
+    pub fn holds(&self, largest: u64) -> Result<(), GpuError> {
+        let l = &self.limits;
+        match fits("", largest, l.max_storage_buffer_binding_size, l.max_buffer_size) {
+            // Which one it is is not known before it is made.
+            Err(GpuError::Limit { limit, available, needed, .. }) => {
+                Err(GpuError::Limit { limit, available, needed, what: "the largest buffer".into() })
+            }
+            done => done,
+        }
     }
 
     /// True when this is an adapter that the choice means.

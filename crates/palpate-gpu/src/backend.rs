@@ -17,6 +17,7 @@ pub struct GpuBackend {
     gpu: Arc<Gpu>,
     tuning: Option<Tuning>,
     levels: Option<&'static [Effort]>,
+    alone: bool,
 }
 
 impl GpuBackend {
@@ -30,7 +31,7 @@ impl GpuBackend {
 
     /// On an open device.
     pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
-        GpuBackend { gpu, tuning: None, levels: None }
+        GpuBackend { gpu, tuning: None, levels: None, alone: false }
     }
 
     /// The same with given ways to solve, instead of those that the environment or a measurement chooses.
@@ -42,6 +43,20 @@ impl GpuBackend {
     #[cfg(test)]
     pub(crate) fn levels(self, levels: &'static [Effort]) -> GpuBackend {
         GpuBackend { levels: Some(levels), ..self }
+    }
+
+    /// The same for one simulation at a time: what fails for want of room advises no smaller batch.
+    pub fn alone(self) -> GpuBackend {
+        GpuBackend { alone: true, ..self }
+    }
+
+    fn world(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
+        let mut world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
+        world.alone = self.alone;
+        if let Some(levels) = self.levels {
+            world.effort = Level::of(levels);
+        }
+        self.gpu.take_trouble().map_or(Ok(world), Err)
     }
 
     /// The device.
@@ -62,14 +77,7 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        let mut world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
-        if let Some(levels) = self.levels {
-            world.effort = Level::of(levels);
-        }
-        match self.gpu.take_trouble() {
-            Some(e) => Err(e.into()),
-            None => Ok(world),
-        }
+        self.world(plan, members).map_err(|e| BuildError { message: e.to_string(), hint: e.hint_for(self.alone) })
     }
 
     fn set_params(&self, world: &mut World, theta: &ParamBatch) {

@@ -158,8 +158,8 @@ impl Gpu {
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| GpuError::Refused { message: e.to_string() })?;
+        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) = opened.map_err(|e| GpuError::refused(format!("while it is opened: {e}")))?;
         let trouble = Arc::new(Mutex::new(None));
         let lost = Arc::new(AtomicBool::new(false));
         let (slot, gone) = (trouble.clone(), lost.clone());
@@ -407,7 +407,7 @@ pub(crate) fn translate(e: wgpu::Error) -> GpuError {
             GpuError::Lost { reason: flat(description) }
         }
         wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
-            GpuError::Refused { message: flat(description) }
+            GpuError::refused(flat(description))
         }
     }
 }

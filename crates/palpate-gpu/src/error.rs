@@ -1,7 +1,5 @@
 //! What can go wrong with a device: one clear error each, with the way out.
 
-use palpate_engine::BuildError;
-
 /// A device that cannot be had, cannot do the work, or broke.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
@@ -22,7 +20,7 @@ pub enum GpuError {
         feature: String,
     },
     /// The adapter is too small for some kernel, whatever the body.
-    #[error("{adapter} is too small: a kernel needs {needed}, and its limit {limit} is {available}")]
+    #[error("{adapter} is too small: a kernel needs {needed}{0}, and its limit {limit} is {available}{0}", unit(.limit))]
     TooSmall {
         /// Its name.
         adapter: String,
@@ -34,7 +32,7 @@ pub enum GpuError {
         needed: u64,
     },
     /// A limit of the device is too small.
-    #[error("{what} needs {needed}, and the limit {limit} of this device is {available}")]
+    #[error("{what} needs {needed}{0}, and the limit {limit} of this device is {available}{0}", unit(.limit))]
     Limit {
         /// Name of the limit.
         limit: &'static str,
@@ -89,13 +87,44 @@ pub enum GpuError {
     },
 }
 
+/// What follows a number of this limit.
+fn unit(limit: &str) -> &'static str {
+    match limit {
+        "max_storage_buffer_binding_size" | "max_buffer_size" | "max_compute_workgroup_storage_size" => " bytes",
+        _ => "",
+    }
+}
+
+/// What wgpu and the drivers behind it say of full memory: not only in errors of that kind, and in none of the others.
+const FULL: [&str; 5] =
+    ["not enough memory", "out of memory", "out of device memory", "out of host memory", "memory allocation has failed"];
+
 fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
 
 impl GpuError {
+    /// An operation that the driver refuses in these words; for want of memory, where they say so.
+    pub(crate) fn refused(message: String) -> GpuError {
+        let words = message.to_lowercase().replace('_', " ");
+        if FULL.iter().any(|f| words.contains(f)) {
+            GpuError::OutOfMemory { what: message }
+        } else {
+            GpuError::Refused { message }
+        }
+    }
+
     /// What a user can do.
     pub fn hint(&self) -> String {
+        self.hint_for(false)
+    }
+
+    /// The same where one simulation runs, so that no batch can be smaller.
+    pub fn hint_alone(&self) -> String {
+        self.hint_for(true)
+    }
+
+    pub(crate) fn hint_for(&self, alone: bool) -> String {
         let hint = match self {
             GpuError::NoAdapter { found, .. } if !found.is_empty() => {
                 return format!(
@@ -110,9 +139,11 @@ impl GpuError {
             | GpuError::Refused { .. }
             | GpuError::Plan { .. } => "use --backend cpu, or another adapter",
             GpuError::Setting { .. } => "unset the variable, and what is faster is chosen",
-            GpuError::Limit { .. } | GpuError::OutOfMemory { .. } => {
-                "use coarser cells, a smaller batch (--batch N), or --backend cpu"
-            }
+            GpuError::Limit { .. } if alone => "use coarser cells, or --backend cpu",
+            GpuError::Limit { .. } => "use coarser cells, a smaller batch (--batch N), or --backend cpu",
+            GpuError::OutOfMemory { .. } if alone => "free memory, or use coarser cells or --backend cpu",
+            GpuError::OutOfMemory { .. } => "free memory, or use coarser cells, a smaller batch (--batch N), or --backend cpu",
+            GpuError::Lost { .. } if alone => "run again, or use --backend cpu",
             // Drivers also drop a device whose memory is full.
             GpuError::Lost { .. } => "run again, with a smaller batch (--batch N) or --backend cpu; results so far are kept",
         };
@@ -120,8 +151,40 @@ impl GpuError {
     }
 }
 
-impl From<GpuError> for BuildError {
-    fn from(e: GpuError) -> BuildError {
-        BuildError { message: e.to_string(), hint: e.hint() }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn full_memory_is_recognised_in_whatever_words_it_comes() {
+        for words in [
+            "Not enough memory left.",
+            "In Device::create_bind_group, label = 'press_cells' Out of Memory",
+            "ERROR_OUT_OF_DEVICE_MEMORY",
+            "A host memory allocation has failed",
+        ] {
+            let e = GpuError::refused(words.into());
+            assert!(matches!(&e, GpuError::OutOfMemory { what } if what == words), "{e}");
+            assert!(
+                ["memory", "coarser cells", "--batch N", "--backend cpu"].iter().all(|w| e.hint().contains(w)),
+                "{}",
+                e.hint()
+            );
+        }
+        let other = "workgroup memory of 20000 bytes is more than the limit";
+        assert_eq!(GpuError::refused(other.into()), GpuError::Refused { message: other.into() });
+    }
+
+    #[test]
+    fn sizes_have_units_and_a_single_simulation_is_told_of_no_batch() {
+        let limit = |limit| GpuError::Limit { limit, available: 999, needed: 1000, what: "the buffer `values`".into() };
+        let text = limit("max_buffer_size").to_string();
+        assert_eq!(text, "the buffer `values` needs 1000 bytes, and the limit max_buffer_size of this device is 999 bytes");
+        assert!(limit("members").to_string().ends_with("needs 1000, and the limit members of this device is 999"));
+        let (what, reason) = ("full".to_string(), "gone".to_string());
+        for e in [limit("max_buffer_size"), GpuError::OutOfMemory { what }, GpuError::Lost { reason }] {
+            assert!(e.hint().contains("--batch N") && e.hint().contains("--backend cpu"), "{}", e.hint());
+            assert!(!e.hint_alone().contains("batch") && e.hint_alone().contains("--backend cpu"), "{}", e.hint_alone());
+        }
     }
 }

@@ -65,7 +65,7 @@ pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
     match try_tally(world, tally) {
         Ok(all) => all,
         Err(e) => {
-            let detail = format!("{e} (hint: {})", e.hint());
+            let detail = format!("{e} (hint: {})", e.hint_for(world.alone));
             let failed = Evaluation::failed(Failure { kind: FailureKind::Device, time: 0.0, detail });
             vec![failed; world.members()]
         }

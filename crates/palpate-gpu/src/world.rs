@@ -44,6 +44,8 @@ pub struct World {
     pub(crate) many: bool,
     pub(crate) product: Product,
     pub(crate) effort: Level,
+    /// True where its owner runs one simulation at a time.
+    pub(crate) alone: bool,
 }
 
 /// One work buffer: name, items per member as a function of the shape, bytes per item.
@@ -140,6 +142,7 @@ impl World {
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
             effort,
+            alone: false,
         };
         if world.geometry.effects.on_nodes() || world.geometry.effects.on_cells() {
             // What effects add to blocks is in the matrix alone.

@@ -67,6 +67,12 @@ fn gpu() -> Result<GpuBackend, GpuError> {
     Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
 }
 
+/// The device for so many simulations at once.
+fn gpu_for(members: usize) -> Result<GpuBackend, Error> {
+    let device = gpu().map_err(|e| refused(&e))?;
+    Ok(if members == 1 { device.alone() } else { device })
+}
+
 /// False where the system has no device file of a graphics processor: drivers need not be asked then, which takes time and makes
 /// some of them write to the terminal.
 fn may_have_processor() -> bool {
@@ -92,8 +98,9 @@ impl Evaluate for InTurn {
     }
 }
 
+/// What a device refuses that is asked for nothing yet, or for one simulation.
 fn refused(e: &GpuError) -> Error {
-    Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint()))
+    Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint_alone()))
 }
 
 /// The first steps of a plan, with as many frames a step as the whole has where they are compared; the first ones, in which the body is
@@ -113,16 +120,21 @@ fn trial(plan: &Plan, compared: bool) -> Plan {
     Plan { observation: Arc::new(seen), ..short }
 }
 
-/// Seconds of a step of such a trial with what is asked of it, for `members` simulations, so many at once; the first round warms up.
-fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Request, members: [usize; 2]) -> Option<f64> {
+/// Seconds of a step of such a trial with what is asked of it, for `members` simulations, so many at once, or why there are none; the
+/// first round warms up.
+fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Request, members: [usize; 2]) -> Result<f64, String> {
     let [members, at_once] = members;
     let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
-    let mut rollout = Rollout::new(backend, plan, at_once).ok()?;
+    let mut rollout = Rollout::new(backend, plan, at_once).map_err(|e| e.message)?;
     rollout.evaluate(&rows, request);
     let clock = Instant::now();
     let done = rollout.evaluate(&rows, request);
     let seconds = clock.elapsed().as_secs_f64() / plan.clock.steps.max(1) as f64;
-    done.iter().all(|e| e.failure.is_none()).then_some(seconds)
+    match done.into_iter().find_map(|e| e.failure) {
+        None => Ok(seconds),
+        // The way out is taken here.
+        Some(f) => Err(f.to_string().split(" (hint: ").next().unwrap_or_default().to_string()),
+    }
 }
 
 impl Backend {
@@ -167,9 +179,10 @@ impl Backend {
         let what = demand.step();
         let ms = |s: f64| format!("{:.2} ms", s * 1e3);
         match (cpu, gpu) {
-            (Some(c), Some(g)) if g < c => (Backend::Gpu, format!("{what} takes {} on {name}, {} on the CPU", ms(g), ms(c))),
-            (Some(c), Some(g)) => (Backend::Cpu, format!("{what} takes {}, {} on {name}", ms(c), ms(g))),
-            _ => (Backend::Cpu, format!("{name} cannot compute this body")),
+            (Ok(c), Ok(g)) if g < c => (Backend::Gpu, format!("{what} takes {} on {name}, {} on the CPU", ms(g), ms(c))),
+            (Ok(c), Ok(g)) => (Backend::Cpu, format!("{what} takes {}, {} on {name}", ms(c), ms(g))),
+            (Ok(_), Err(why)) => (Backend::Cpu, format!("{name} cannot compute this body: {why}")),
+            (Err(why), _) => (Backend::Cpu, format!("the first steps fail on the CPU: {why}")),
         }
     }
 
@@ -202,7 +215,7 @@ impl Backend {
     pub fn evaluator_until(self, plan: &Plan, members: usize, stop: Arc<AtomicBool>) -> Result<Box<dyn Evaluate>, Error> {
         match self.resolve(plan, members).0 {
             Backend::Gpu => {
-                let device = gpu().map_err(|e| refused(&e))?;
+                let device = gpu_for(members)?;
                 let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
                 Ok(Box::new(InTurn(Rollout::new(device, plan, members)?.stopped_by(stop))))
             }
@@ -223,7 +236,7 @@ impl Backend {
     ) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
             Backend::Gpu => {
-                let device = gpu().map_err(|e| refused(&e))?;
+                let device = gpu_for(1)?;
                 let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
                 Ok(Rollout::new(device, plan, 1)?.visit(theta, visit)?)
             }

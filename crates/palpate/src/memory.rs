@@ -2,7 +2,7 @@
 
 use palpate_engine::Request;
 use palpate_fit::{Want, want};
-use palpate_gpu::{Choice, GpuError, Load};
+use palpate_gpu::{AdapterReport, Choice, GpuError, Load};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Optimizer;
@@ -116,11 +116,10 @@ fn largest<T>(most: usize, of: impl Fn(usize) -> T, fits: impl Fn(&T) -> bool) -
     (low.0, low.1.unwrap_or_else(|| of(1)))
 }
 
-/// The largest buffer of the device that would be used [B]; without any no limit is known.
-pub(crate) fn room() -> u64 {
+/// The adapter that would be used.
+pub(crate) fn adapter() -> Option<AdapterReport> {
     let choice = Choice::from_env();
-    let usable = palpate_gpu::adapters().into_iter().find(|a| a.refusal.is_none() && a.is_meant(&choice));
-    usable.map_or(u64::MAX, |a| a.largest_buffer())
+    palpate_gpu::adapters().into_iter().find(|a| a.refusal.is_none() && a.is_meant(&choice))
 }
 
 #[cfg(test)]

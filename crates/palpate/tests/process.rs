@@ -125,6 +125,15 @@ fn auto_takes_what_it_measured_to_be_faster_and_says_so() {
         assert_eq!(code, 0, "{err}");
         check_choice(&err, step, &name);
     }
+    // Of a body that the device cannot compute it says why.
+    let laws = "[[effect]]\nkind = \"strain-stiffening\"\ncoefficient = 0.1\n".repeat(17);
+    fs::write(path("laws.toml"), BLOCK.to_string() + &laws).expect("writable");
+    let mut command = program();
+    command.arg("simulate").arg(path("laws.toml")).args(["--every", "8", "--out"]).arg(path("laws"));
+    let (code, _, err) = run(command.env("PALPATE_ADAPTER", &name));
+    assert_eq!(code, 0, "{err}");
+    let told = err.lines().find(|l| l.starts_with("backend: cpu (auto: ")).unwrap_or_else(|| panic!("no choice is told: {err}"));
+    assert!(told.ends_with("cannot compute this body: the GPU backend does not support more than 16 laws of cells)"), "{told}");
 }
 
 #[test]
@@ -192,9 +201,9 @@ fn inspect_foresees_the_memory_of_a_fit_on_the_cpu() {
 }
 
 /// `.ci/batch-lavapipe` with the program that was just built.
-fn job(scenes: &Path, out: &Path) -> (i32, String, String) {
+fn job(from: &Path, scenes: &Path, out: &Path) -> (i32, String, String) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.ci/batch-lavapipe");
-    run(Command::new(script).args([scenes, out]).env("PALPATE", env!("CARGO_BIN_EXE_palpate")))
+    run(Command::new(script).args([scenes, out]).current_dir(from).env("PALPATE", env!("CARGO_BIN_EXE_palpate")))
 }
 
 #[test]
@@ -219,7 +228,8 @@ fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
         assert_eq!(fs::read_to_string(out.join("summary.csv")).expect("a table").lines().count(), 3);
         serde_json::from_str(&fs::read_to_string(out.join("summary.json")).expect("a summary")).expect("it is JSON")
     };
-    let (code, told, err) = job(&scenes, &out);
+    // Paths are those of whoever runs it.
+    let (code, told, err) = job(folder.path(), Path::new("scenes"), Path::new("out"));
     assert_eq!(code, 1, "{err}");
     assert!(told.contains("1 of 2 scenes complete") && err.contains("1/2 firm: bad-input"), "{told}{err}");
     let rows = summary();
@@ -229,7 +239,7 @@ fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
     assert!(row(0, "message").as_str().is_some_and(|m| m.contains("nowhere")), "{rows}");
     let written = || fs::metadata(out.join("soft/result.json")).and_then(|m| m.modified()).expect("a result");
     let before = written();
-    let (code, _, err) = job(&scenes, &out);
+    let (code, _, err) = job(&assets, &scenes, &out);
     assert_eq!(code, 1, "{err}");
     assert!(err.contains("2/2 soft: taken over"), "{err}");
     // What was wrong with it before is still said.
@@ -238,7 +248,7 @@ fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
     assert_eq!(written(), before);
     // What was broken is mended: everything succeeds, and only that is computed.
     copy("firm.toml", false);
-    let (code, _, err) = job(&scenes, &out);
+    let (code, _, err) = job(&assets, &scenes, &out);
     assert_eq!((code, written()), (0, before), "{err}");
 }
 

@@ -43,7 +43,7 @@ pub struct Line {
     pub cost: Times,
     /// Adjoint of comparison and step together.
     pub adjoint: Times,
-    /// Newton iterations of a step, on average; 0 where they were not counted.
+    /// Newton iterations of a step, on average; 0 where they were not counted, as on a device.
     #[serde(default)]
     pub newton: f64,
     /// Iterations of conjugate gradients for all of them together; 0 where the matrix was factorised.
@@ -88,6 +88,11 @@ pub struct Report {
     pub left_out: Vec<String>,
 }
 
+/// Iterations with so many digits after the point; nobody counts those of a device.
+fn counted(l: &Line, iterations: f64, digits: usize) -> String {
+    if l.gpu.is_some() { "-".into() } else { format!("{iterations:.digits$}") }
+}
+
 fn milliseconds(t: &Times) -> String {
     format!("{:.1} [{:.1}, {:.1}]", 1e3 * t.median, 1e3 * t.min, 1e3 * t.max)
 }
@@ -129,8 +134,8 @@ impl Report {
                 milliseconds(&l.forward),
                 milliseconds(&l.cost),
                 milliseconds(&l.adjoint),
-                format!("{:.1}", l.newton),
-                format!("{:.0}", l.linear),
+                counted(l, l.newton, 1),
+                counted(l, l.linear, 0),
                 mb(l.tape),
                 mb(l.matrix),
                 mb(l.peak),
@@ -202,6 +207,11 @@ pub fn compare(before: &Path, after: &Path) -> Result<(), String> {
     let of = |r: &Report| format!("{} ({} threads, {})", r.date, r.threads, r.adapter.as_deref().unwrap_or("no adapter"));
     println!("before: {}\nafter: {}", of(&a), of(&b));
     table::print("after over before; below 1 is faster; shares of a copy's bandwidth before → after", &rows(&a, &b));
+    let sizes = |l: &&Line| find(&a, &l.name).is_some_and(|old| old.nodes != l.nodes);
+    let differ: Vec<&str> = b.lines.iter().filter(sizes).map(|l| l.name.as_str()).collect();
+    if !differ.is_empty() {
+        println!("  no ratio, because sizes differ: {}", differ.join(", "));
+    }
     for (report, other, which) in [(&a, &b, "before"), (&b, &a, "after")] {
         let alone: Vec<&str> = report.lines.iter().map(|l| l.name.as_str()).filter(|n| find(other, n).is_none()).collect();
         if !alone.is_empty() {
@@ -229,7 +239,9 @@ fn rows(a: &Report, b: &Report) -> Vec<Vec<String>> {
     let mut rows = vec![head.map(String::from).to_vec()];
     for l in &b.lines {
         let Some(old) = find(a, &l.name) else { continue };
-        let ratio = |new: f64, old: f64| if old > 0.0 { format!("{:.2}", new / old) } else { "-".into() };
+        // A ratio of different bodies says nothing.
+        let same = l.nodes == old.nodes;
+        let ratio = |new: f64, old: f64| if same && old > 0.0 { format!("{:.2}", new / old) } else { "-".into() };
         let time = |new: &Times, old: &Times| ratio(new.median, old.median);
         // What is the same in both is said once.
         let both = |of: fn(&Line) -> String| {
@@ -320,6 +332,13 @@ mod tests {
         let expected = ["ball", "770", "0.50", "0.50", "0.50", "1.00", "csr, many workgroups", "30 % → 60 %"];
         assert_eq!(rows[1], expected);
         assert!(find(&after, "torus").is_none());
+        let coarse = report(vec![Line { nodes: 432, ..line("ball", 1e-3, 0.6) }]);
+        let expected = ["ball", "770 → 432", "-", "-", "-", "-", "csr, many workgroups", "30 % → 60 %"];
+        assert_eq!(super::rows(&before, &coarse)[1], expected, "no ratio of bodies of different sizes");
+        assert_eq!(
+            [counted(&before.lines[0], 3.0, 1), counted(&Line { gpu: None, ..line("ball", 1.0, 0.0) }, 3.0, 1)],
+            ["-", "3.0"]
+        );
         let none = file("none", &before);
         std::fs::write(&none, "{}").unwrap_or_else(|e| panic!("{e}"));
         assert!(compare(&none, &paths[1]).is_err_and(|e| e.contains("no result of a benchmark")));

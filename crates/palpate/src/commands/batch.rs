@@ -48,6 +48,9 @@ const MARK: &str = "fit.fingerprint";
 /// What is said of a scene that an earlier run finished, before its warning if there was one.
 const TAKEN_OVER: &str = "taken over";
 
+/// What is said of a scene that was interrupted when it had something to keep.
+const BEST_KEPT: &str = "the best so far is written; --resume goes on from there";
+
 /// What became of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
@@ -75,10 +78,19 @@ struct Row {
     status: Status,
     message: String,
     seconds: f64,
+    /// What computed it; empty where it did not come to that.
+    backend: String,
     /// What was fitted and how; a later run takes the result over when it is the same.
     fingerprint: String,
     /// `result.json`.
     result: Value,
+}
+
+impl Row {
+    /// What computed it, in brackets behind the time that it took.
+    fn by(&self) -> String {
+        if self.backend.is_empty() { String::new() } else { format!(" ({})", self.backend) }
+    }
 }
 
 fn read(path: &Path) -> Result<String, Error> {
@@ -158,6 +170,7 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         status: Status::Failed,
         message: String::new(),
         seconds: 0.0,
+        backend: String::new(),
         fingerprint: String::new(),
         result: Value::Null,
     };
@@ -173,6 +186,7 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
             return Ok(Some(done));
         }
         let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment))?;
+        row.backend = backend.name().into();
         let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
@@ -188,11 +202,10 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         track.finish();
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);
-        row.message = fitted.result.broken.as_ref().or(fitted.warnings.first()).cloned().unwrap_or_default();
-        row.status = match (&fitted.result.broken, fitted.interrupted) {
-            (Some(_), _) => Status::Failed,
-            (None, true) => Status::Interrupted,
-            (None, false) => Status::Complete,
+        (row.status, row.message) = match (fitted.result.broken, fitted.interrupted) {
+            (Some(why), _) => (Status::Failed, why),
+            (None, true) => (Status::Interrupted, BEST_KEPT.into()),
+            (None, false) => (Status::Complete, fitted.warnings.into_iter().next().unwrap_or_default()),
         };
         row.result = result;
         Ok(None)
@@ -201,6 +214,7 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         Ok(Ok(None)) => {}
         Ok(Ok(Some((message, result)))) => {
             row.seconds = result["seconds"].as_f64().unwrap_or(0.0);
+            row.backend = result["backend"].as_str().unwrap_or_default().into();
             (row.status, row.message, row.result) = (Status::Complete, message, result);
             return row;
         }
@@ -235,8 +249,8 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
 fn entry(r: &Row) -> Value {
     json!({
         "name": r.name, "scene": r.scene.display().to_string(), "status": r.status.name(), "message": r.message,
-        "seconds": r.seconds, "backend": r.result["backend"], "fingerprint": r.fingerprint, "parameters": r.result["parameters"],
-        "cost": r.result["cost"]["final"], "residual": r.result["residual"],
+        "seconds": r.seconds, "backend": Some(&r.backend).filter(|b| !b.is_empty()), "fingerprint": r.fingerprint,
+        "parameters": r.result["parameters"], "cost": r.result["cost"]["final"], "residual": r.result["residual"],
     })
 }
 
@@ -265,13 +279,24 @@ fn table(summary: &Value) -> String {
         }
     }
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let mut head = ["name", "scene", "status", "seconds", "cost", "rms", "noise", "points"].map(str::to_string).to_vec();
+    let mut head =
+        ["name", "scene", "status", "seconds", "backend", "cost", "rms", "noise", "points"].map(str::to_string).to_vec();
     head.extend(paths.iter().flat_map(|p| [p.clone(), format!("{p} standard error")]));
     head.push("message".into());
     csv.write_record(&head).expect("writing to memory cannot fail");
     for r in &rows {
         let of = &r["residual"];
-        let fixed = [&r["name"], &r["scene"], &r["status"], &r["seconds"], &r["cost"], &of["rms"], &of["noise"], &of["points"]];
+        let fixed = [
+            &r["name"],
+            &r["scene"],
+            &r["status"],
+            &r["seconds"],
+            &r["backend"],
+            &r["cost"],
+            &of["rms"],
+            &of["noise"],
+            &of["points"],
+        ];
         let mut row: Vec<String> = fixed.into_iter().map(&text).collect();
         for path in &paths {
             let p = list(&r["parameters"]).into_iter().find(|p| p["path"] == path.as_str()).unwrap_or(Value::Null);
@@ -298,8 +323,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let row = one(a, &earlier, scene, name, &label, console);
         console.note(&match row.status {
             Status::Complete if row.message.starts_with(TAKEN_OVER) => format!("{label}: {TAKEN_OVER}"),
-            Status::Complete => format!("{label}: complete in {:.1} s", row.seconds),
-            other => format!("{label}: {} in {:.1} s: {}", other.name(), row.seconds, row.message),
+            Status::Complete => format!("{label}: complete in {:.1} s{}", row.seconds, row.by()),
+            other => format!("{label}: {} in {:.1} s{}: {}", other.name(), row.seconds, row.by(), row.message),
         });
         rows.push(row);
         all = summary(&rows, &earlier, &names[i + 1..]);

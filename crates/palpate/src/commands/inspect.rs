@@ -6,8 +6,9 @@ use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
-use crate::memory::{Demand, room};
+use crate::memory::{Demand, adapter};
 use clap::Args;
+use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, read_recording};
 use palpate_model::plan::Physics;
 use palpate_model::scene::{BodySource, Optimizer};
@@ -116,9 +117,9 @@ fn demand(e: &Experiment) -> (Demand, String) {
     (demand, format!("{name}, {numbers} free number{}", if numbers == 1 { "" } else { "s" }))
 }
 
-/// Memory of a fit on either backend: in all, by its parts, and for how many starts at once. Nothing for the device where it
-/// cannot run the scene.
-fn memory(e: &Experiment) -> Vec<Line> {
+/// Memory of a fit on either backend: in all, by its parts, and for how many starts at once; and why the device cannot run it, if it
+/// cannot.
+fn memory(e: &Experiment, device: Option<&AdapterReport>) -> Vec<Line> {
     let (demand, what) = demand(e);
     let text = |backend: &str, total: u64, members: usize, parts: &[(&str, u64)]| {
         let parts: Vec<String> = parts.iter().map(|(name, bytes)| format!("{name} {}", megabytes(*bytes as f64))).collect();
@@ -136,10 +137,21 @@ fn memory(e: &Experiment) -> Vec<Line> {
     ];
     let cpu = text("cpu", m.total(), members, &parts);
     let mut lines = vec![line("memory", "memory", json!(m.total()), cpu), line("batch", "", json!(members), "")];
-    if let Ok((members, m)) = demand.on_device(e.plan(), room()) {
+    // Without a device no limit is known.
+    let on_device = demand.on_device(e.plan(), device.map_or(u64::MAX, |a| a.largest_buffer()));
+    let refusal = match (device, &on_device) {
+        (None, _) => None,
+        (Some(_), Err(why)) => Some(why.clone()),
+        (Some(a), Ok((_, m))) => a.holds(m.largest).err(),
+    };
+    if let Ok((members, m)) = on_device {
         let parts = [("body and frames", m.constants), ("work space", m.work), ("states", m.states), ("derivatives", m.tangents)];
         lines.push(line("device_memory", "device", json!(m.total()), text("gpu", m.total(), members, &parts)));
         lines.push(line("device_batch", "", json!(members), ""));
+    }
+    if let Some((a, why)) = device.zip(refusal) {
+        let text = format!("by {}: {why} (hint: {})", a.name, why.hint_alone());
+        lines.push(line("device_refusal", "refused", json!(why.to_string()), text));
     }
     lines
 }
@@ -206,7 +218,7 @@ fn scene(e: &Experiment) -> Vec<Line> {
             },
         ),
     ]);
-    lines.extend(memory(e));
+    lines.extend(memory(e, adapter().as_ref()));
     lines.retain(|l| l.key != "title" || !l.text.is_empty());
     lines
 }
@@ -311,4 +323,36 @@ fn recording(r: &Recording) -> Vec<Line> {
     }
     lines.retain(|l| l.key != "title" || !l.text.is_empty());
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_that_is_too_small_is_named_with_its_limit_and_the_way_out() {
+        let e = Experiment::from_toml(include_str!("../../tests/block.toml"), "block.toml").unwrap_or_else(|e| panic!("{e}"));
+        let said = |device: Option<&AdapterReport>| {
+            memory(&e, device).into_iter().filter(|l| l.key.starts_with("device")).map(|l| (l.key, l.text)).collect::<Vec<_>>()
+        };
+        let keys = |lines: &[(&'static str, String)]| lines.iter().map(|l| l.0).collect::<Vec<_>>();
+        assert_eq!(keys(&said(None)), ["device_memory", "device_batch"]);
+        let Some(mut device) = adapter() else {
+            return assert!(std::env::var("PALPATE_GPU").as_deref() != Ok("require"), "there is no adapter");
+        };
+        assert_eq!(said(Some(&device)), said(None));
+        device.limits.max_storage_buffer_binding_size = 2000;
+        let lines = said(Some(&device));
+        assert_eq!(keys(&lines), ["device_memory", "device_batch", "device_refusal"]);
+        let text = &lines[2].1;
+        for words in [&device.name, "max_storage_buffer_binding_size", "2000 bytes", "coarser cells, or --backend cpu"] {
+            assert!(text.contains(words), "{words} is not in: {text}");
+        }
+        // What no device runs is refused by the one that is there.
+        let laws = "[[effect]]\nkind = \"strain-stiffening\"\ncoefficient = 0.1\n".repeat(17);
+        let e = Experiment::from_toml(&(include_str!("../../tests/block.toml").to_string() + &laws), "laws.toml");
+        let lines = memory(&e.unwrap_or_else(|e| panic!("{e}")), Some(&device));
+        let last = lines.last().map(|l| (l.key, l.text.contains("more than 16 laws of cells")));
+        assert_eq!(last, Some(("device_refusal", true)));
+    }
 }
