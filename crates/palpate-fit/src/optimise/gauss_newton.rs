@@ -13,12 +13,17 @@ const FIRST_DAMPING: f64 = 1e-3;
 const FLOOR: f64 = 1e-12;
 /// If an undamped step promises less than this share of the cost, rejections come from the accuracy of the cost itself.
 const COST_NOISE: f64 = 1e-5;
+/// Two costs that differ by less of themselves are the same in single precision.
+const SAME_COST: f64 = 1e-6;
+/// So many rejected steps in a row that changed nothing, where nothing is promised either, are the end: shorter ones only follow rounding.
+const LEVEL: u32 = 2;
 
 pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
     let q = z.len();
     let tolerance = search.settings.tolerance.clone();
     let mut damping = None;
     let mut growth = 2.0;
+    let mut level = 0;
     let mut longest = search.settings.max_step.min(search.settings.first_step);
     loop {
         if at.curvature.len() != q * q {
@@ -59,7 +64,12 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
             }
             z = trial_z;
             at = trial;
+            level = 0;
         } else {
+            level = if trial.cost <= at.cost * (1.0 + SAME_COST) { level + 1 } else { 0 };
+            if level == LEVEL && settled(search, &z, &at, scale) {
+                return Ok(Status::Converged);
+            }
             damping = Some(lambda * growth);
             growth *= 2.0;
             // A failure says nothing about the curvature, only that the step was too long.

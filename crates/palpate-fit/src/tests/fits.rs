@@ -2,6 +2,7 @@
 
 use super::models::*;
 use crate::*;
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_model::params::Transform;
 use palpate_model::scene::Optimizer;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -270,6 +271,15 @@ fn an_interrupted_fit_keeps_its_best() {
         let again = oscillator_problem().evaluate_values(&[values(&result)], Want::Cost).remove(0);
         assert!((again.cost / result.cost - 1.0).abs() < 1e-12, "{optimizer:?}");
     }
+    // In the last iteration as well: that the iterations are used up is not why it ended.
+    let settings_of_two = Settings { iterations: 2, ..settings(Optimizer::Rprop) };
+    for (at, said) in [(2, false), (usize::MAX, true)] {
+        let flag = AtomicBool::new(false);
+        let mut stop = |p: &Progress| flag.store(p.iteration == at, Ordering::SeqCst);
+        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: Some(&flag), ..Hooks::default() };
+        let result = fit(&mut oscillator_problem(), &settings_of_two, hooks).expect("something was evaluated");
+        assert_eq!(result.warnings.iter().any(|w| w.contains("used up its 2 iterations")), said, "{:?}", result.warnings);
+    }
     let flag = AtomicBool::new(true);
     let hooks = Hooks { interrupt: Some(&flag), ..Hooks::default() };
     let error = fit(&mut rosenbrock(), &settings(Optimizer::Lbfgs), hooks).expect_err("nothing was evaluated");
@@ -293,4 +303,56 @@ fn senseless_problems_are_refused_by_name() {
     assert!(with(&|p| p.slots[0].scene = 1).contains("scene number 1"));
     assert!(with(&|p| p.slots[0].factor = 0.0).contains("factor"));
     assert!(with(&|p| p.slots.push(p.slots[0])).contains("same number"));
+}
+
+/// Derivatives and costs as a graphics device has them: right to some 1e-4 and 1e-7.
+struct SinglePrecision(LeastSquares);
+
+impl Evaluate for SinglePrecision {
+    fn parameters(&self) -> usize {
+        self.0.parameters()
+    }
+
+    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        let mut all = self.0.evaluate(theta, request);
+        for (member, e) in all.iter_mut().enumerate() {
+            // Errors of rounding change with every bit of the parameters.
+            let bits = theta.row(member).iter().fold(0u64, |hash, x| (hash ^ x.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let error = |place: u32| (bits.rotate_left(8 * place) >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
+            e.cost *= 1.0 + 2e-7 * error(0);
+            if let Some(c) = &mut e.curvature {
+                let size = (0..c.gradient.len()).map(|p| (2.0 * e.cost * c.matrix[p * c.gradient.len() + p]).sqrt());
+                let sizes: Vec<f64> = size.collect();
+                c.gradient.iter_mut().zip(sizes).enumerate().for_each(|(p, (g, s))| *g += 3e-4 * s * error(p as u32 + 1));
+            }
+        }
+        all
+    }
+}
+
+#[test]
+fn gauss_newton_ends_where_single_precision_has_nothing_more_to_say() {
+    let noisy = |t: &[f64]| {
+        let seen = oscillator(4.0, 0.3, 60);
+        let off = |(i, (a, b)): (usize, (&f64, f64))| (a - b) / 0.01 + (7.0 * i as f64).sin();
+        Some(oscillator(t[0], t[1], 60).iter().zip(seen).enumerate().map(off).collect::<Vec<f64>>())
+    };
+    let free = || {
+        vec![parameter(0, Transform::Log, (0.04, 400.0), (0.4, 40.0)), parameter(1, Transform::Log, (0.003, 30.0), (0.03, 3.0))]
+    };
+    let of = |evaluate: Box<dyn Evaluate>| {
+        let one = FitScene { evaluate, ..scene(&[4.0, 0.3], LeastSquares::new(2, |_| None)) };
+        let mut problem = Problem::new(vec![one], free()).expect("the problem is valid");
+        solve(&mut problem, &Settings { starts: 6, iterations: 40, ..settings(Optimizer::GaussNewton) })
+    };
+    let exact = of(Box::new(LeastSquares::new(2, noisy)));
+    let rounded = of(Box::new(SinglePrecision(LeastSquares::new(2, noisy))));
+    for (a, b) in exact.runs.iter().zip(&rounded.runs).filter(|(a, _)| a.status == Status::Converged) {
+        assert_eq!(b.status, Status::Converged, "{b:?}");
+        assert!(b.iterations <= a.iterations + 4, "{} and {} iterations", a.iterations, b.iterations);
+    }
+    // Of the errors that noise leaves the rounding takes a hundredth.
+    for (a, b) in exact.parameters.iter().zip(&rounded.parameters) {
+        assert!((a.value - b.value).abs() < 1e-2 * a.standard_error.expect("it is determined"), "{a:?} {b:?}");
+    }
 }
