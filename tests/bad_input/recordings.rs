@@ -117,6 +117,17 @@ fn truncated_png() {
 }
 
 #[test]
+fn images_that_are_not_there() {
+    for (file, line) in [("depth/cam0/000001.png", 35), ("mask/cam0/000001.png", 36)] {
+        let case = Case::new(&wall());
+        let png = case.file(file);
+        std::fs::remove_file(&png).unwrap();
+        let key = file.split('/').next().unwrap();
+        assert_eq!(case.fault_of_recording(line), format!("frame.1.{key}: there is no file {}", png.display()));
+    }
+}
+
+#[test]
 fn depth_in_the_wrong_unit() {
     let e = Case::new(&wall()).change_recording("depth_scale = 0.001", "depth_scale = 1.0").fault_of_recording(21);
     let wanted = "the median depth of camera \"cam0\" is 500.000000 m (500 counts), expected 0.02 to 20 m; depth_scale = 0.001 would make it 0.500 m";

@@ -26,6 +26,17 @@ fn a_mesh_in_millimetres() {
 }
 
 #[test]
+fn cells_in_metres_of_an_object_in_millimetres() {
+    let hint = "; is the object in millimetres or centimetres? convert it to metres (scale by 0.001 or 0.01)";
+    let e = scene_fault(BOX, &changed(MILLIMETRES, "cell_size = 4", "cell_size = 0.005"), 5);
+    let wanted = "0.005 m makes 8000 cells along the longest side of 40 m, at most 4096 are allowed";
+    assert_eq!(e, format!("object.cell_size: {wanted}{hint}"));
+    // The clamp of the scene is small enough for eight metres.
+    let e = scene_fault(BOX, "max = [8, 2.4, 2.4] } }\ncell_size = 0.01", 5);
+    assert!(e.starts_with("object.cell_size: cell size 0.01 m gives a lattice of ") && e.ends_with(hint), "{e}");
+}
+
+#[test]
 fn a_clamp_a_thousand_times_smaller_than_the_object() {
     let e = scene_fault(BOX, MILLIMETRES, 13);
     assert!(e.starts_with("clamp.0.box: its diagonal is 0.0715 m, the object's longest side is 40.0000 m; "), "{e}");

@@ -164,8 +164,17 @@ fn a_journal_of_another_problem_is_refused() {
     stopped(&["fit", arg(&scene), "--out", arg(&out)], Interrupt::after(1));
     let a = palpate(&["fit", arg(&scene), "--out", arg(&out), "--resume", "--seed", "99"]);
     assert_eq!(a.code, 2);
-    assert!(a.err.contains("journal.jsonl") && a.err.contains("seed"), "{}", a.err);
-    assert!(out.join("previous-1/result.json").exists(), "the earlier result was not lost");
+    assert!(a.err.contains("journal.jsonl") && a.err.contains("(its seed differs)"), "{}", a.err);
+    let other = file("other.toml");
+    fs::write(&other, fs::read_to_string(&scene).unwrap().replace("steps = 16", "steps = 15")).unwrap();
+    let a = palpate(&["fit", arg(&other), "--out", arg(&out), "--resume"]);
+    assert!(a.code == 2 && a.err.contains("(its scenes or recordings differ)"), "{}", a.err);
+    // A scene without anything to compare with is refused before a journal is even looked at.
+    fs::write(&other, BALL.to_string() + STIFFNESS.split_once("[fit]").map(|(_, fit)| format!("[fit]{fit}")).unwrap().as_str())
+        .unwrap();
+    let a = palpate(&["fit", arg(&other), "--out", arg(&out)]);
+    assert!(a.code == 2 && a.err.contains("observation is missing"), "{}", a.err);
+    assert!(out.join("result.json").exists() && !out.join("previous-1").exists(), "everything stays where it was");
 }
 
 #[test]

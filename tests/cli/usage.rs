@@ -34,7 +34,9 @@ fn wrong_usage_exits_2_and_names_what_is_wrong() {
         (&["simulate", arg(&typo)], &["typo.toml:11", "young_modulus", "youngs_modulus"]),
         (&["simulate", s, "--backend", "tpu"], &["tpu", "--backend", "gpu"]),
         (&["simulate", s, "--format", "stl"], &["stl", "obj"]),
-        (&["simulate", s, "--every", "0"], &["--every"]),
+        (&["simulate", s, "--every", "0"], &["--every", "must be a whole number from 1"]),
+        (&["fit", s, "--threads", "-1"], &["'-1' for '--threads <N>': must be a whole number from 0 to 4096"]),
+        (&["fit", s, "--starts", "0"], &["'0' for '--starts <N>': must be a whole number from 1 to 1000000"]),
         (&["simulate", s, "--progress", "dots"], &["dots", "--progress", "none", "bar", "lines"]),
         (&["observe", s, "--out", o], &["--camera", "--markers"]),
         (&["observe", s, "--out", o, "--camera", "eye=1,0,0"], &["eye=1,0,0", "target"]),
@@ -212,4 +214,28 @@ fn simulate_writes_what_was_asked_for() {
     let picture = image::open(out.join("frame_00010.png")).unwrap().to_rgb8();
     let body = picture.pixels().filter(|p| p.0[2] > p.0[0].saturating_add(20)).count();
     assert!(body > 5000, "the body is to be seen: {body} blue pixels of {}", picture.len() / 3);
+}
+
+#[test]
+fn a_shorter_simulation_leaves_no_frames_of_a_longer_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::write(file("block.toml"), BLOCK).unwrap();
+    let (scene, out) = (file("block.toml"), file("frames"));
+    let simulate = |every: &str, format: &str| {
+        succeed(&["simulate", arg(&scene), "--backend", "cpu", "--out", arg(&out), "--format", format, "--every", every]).err
+    };
+    assert!(!simulate("1", "obj,ply").contains("removed"));
+    // What only looks similar, and a series that begins elsewhere, belong to somebody else.
+    let foreign = ["frame_7.obj", "frame_00003.obj.bak", "frame_00003.png"];
+    foreign.iter().for_each(|name| fs::write(out.join(name), "mine").unwrap());
+    let told = simulate("8", "obj,png");
+    assert!(told.contains(&format!("removed from {}: 14 frames of an earlier simulation", out.display())), "{told}");
+    let count = |ending: &str| {
+        let names = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.filter(|n| n.ends_with(ending) && !foreign.contains(&n.as_str())).count()
+    };
+    // The format that was not asked for again is left alone.
+    assert_eq!([".obj", ".png", ".ply"].map(count), [3, 3, 17]);
+    assert!(foreign.iter().all(|name| fs::read(out.join(name)).unwrap() == b"mine"));
 }

@@ -197,7 +197,8 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         warnings
             .push(format!("all {} starts would be the same, so one was run: give start ranges to draw from", settings.starts));
     }
-    if runs[best].status == Status::IterationLimit {
+    // Of a fit that was cut short, another start may still become the best.
+    if cut.is_none() && runs[best].status == Status::IterationLimit {
         warnings.push(format!("the best start used up its {} iterations; more may lower the cost", settings.iterations));
     }
     let parameters = problem

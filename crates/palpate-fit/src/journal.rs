@@ -16,6 +16,15 @@ use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "palpate-journal/1";
 
+/// Keys of line 1 and what is said where they are not those of the fit.
+const HEAD: [(&str, &str); 5] = [
+    ("optimizer", "its optimizer differs"),
+    ("seed", "its seed differs"),
+    ("options", "its steps or tolerances differ"),
+    ("parameters", "its free parameters differ"),
+    ("scenes", "its scenes or recordings differ"),
+];
+
 /// Where a fit keeps its journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JournalFile {
@@ -188,11 +197,10 @@ fn read(path: &Path, text: &str, head: &Value, q: usize) -> Result<Entries, Jour
             if value.get("format").and_then(Value::as_str) != Some(FORMAT) {
                 return Err(wrong(line, format!("not a fit's journal; its first line would name the format {FORMAT}")));
             }
-            let keys = ["optimizer", "seed", "options", "parameters", "scenes"];
-            if let Some(key) = keys.into_iter().find(|&key| value.get(key) != head.get(key)) {
+            if let Some((_, what)) = HEAD.into_iter().find(|(key, _)| value.get(key) != head.get(key)) {
                 let message = format!(
-                    "the journal belongs to another fit ({key} differs); give the same scene, recording and options, or fit \
-                     without resuming"
+                    "the journal belongs to another fit ({what}); give the same scene, recording and options, or fit without \
+                     resuming"
                 );
                 return Err(wrong(line, message));
             }

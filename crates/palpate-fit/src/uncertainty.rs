@@ -19,6 +19,7 @@ use crate::multistart::StartRun;
 use crate::optimise::Sample;
 use crate::problem::Problem;
 use crate::settings::ErrorModel;
+use palpate_engine::number;
 use palpate_model::params::{Transform, unit_behind};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -210,10 +211,12 @@ pub fn compare_starts(problem: &Problem, runs: &[StartRun], best: usize, u: &Unc
         let ends: Vec<f64> = equal.iter().map(|r| problem.charts()[i].value(r.outcome.z[i])).collect();
         let (low, high) = ends.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
         sentences.push(format!(
-            "{} is not unique: {} of {} starts reach equal costs with values from {low:.4e} to {high:.4e}{}",
+            "{} is not unique: {} of {} starts reach equal costs with values from {} to {}{}",
             f.path,
             equal.len(),
             runs.len(),
+            digits(low, 4),
+            digits(high, 4),
             unit_behind(&f.unit)
         ));
     }
@@ -232,11 +235,12 @@ impl Names<'_, '_> {
     fn undetermined(&self, i: usize, spread: f64, value: f64, z: f64) -> String {
         let f = &self.problem.free()[i];
         let range = if f.transform == Transform::Log {
-            format!("a factor of {:.3e} up or down", spread.min(300.0).exp())
+            format!("a factor of {} up or down", digits(spread.min(300.0).exp(), 2))
         } else {
             let chart = &self.problem.charts()[i];
             let (low, high) = (chart.value(z - spread), chart.value(z + spread));
-            format!("anything from {low:.3e} to {high:.3e}{} around {value:.3e}", unit_behind(&f.unit))
+            let [low, value, high] = [low, value, high].map(|v| digits(v, 3));
+            format!("anything from {low}{unit} to {high}{unit} around {value}{unit}", unit = unit_behind(&f.unit))
         };
         format!("{} is not determined: {range} changes the fit no more than the noise does", f.path)
     }
@@ -267,6 +271,12 @@ impl Names<'_, '_> {
         };
         format!("{} and {} cannot be told apart: only their combination {combination} is determined", a.path, b.path)
     }
+}
+
+/// A number for sentences with its first `n` digits, with an exponent only where it is very large or small.
+fn digits(x: f64, n: usize) -> String {
+    let rounded = format!("{x:.*e}", n.saturating_sub(1));
+    number(rounded.parse().unwrap_or(x))
 }
 
 /// Last part of a path that says something: `youngs_modulus`, but `gravity.z` and `plane.0.height` whole.

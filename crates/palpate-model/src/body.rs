@@ -3,7 +3,7 @@
 mod build;
 mod moments;
 
-pub use build::{BodyError, MAX_CELLS, SUBDIVISIONS};
+pub use build::{BodyError, LARGE, MAX_CELLS, SUBDIVISIONS, unit_hint};
 pub(crate) use build::{Parts, build_parts, world_cell};
 
 use crate::distances::Distances;

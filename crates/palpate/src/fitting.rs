@@ -122,15 +122,8 @@ fn specs(experiment: &Experiment) -> Option<&FitSpec> {
     experiment.scene().fit.as_ref()
 }
 
-/// Fits the free parameters of one or several experiments. A path named free in several scenes is shared by them unless it says
-/// `per_scene = true`; where it is shared, start and bounds must agree.
-///
-/// # Errors
-/// [`Error::Input`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
-/// [`Error::Failed`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
-/// [`FitResult::broken`].
-pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
-    let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
+/// Refuses experiments that name nothing to be found or have nothing to compare with.
+pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
     for e in experiments {
         let name = e.scene().path.display();
         if specs(e).is_none_or(|f| f.parameters.is_empty()) {
@@ -143,6 +136,19 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
             return Err(Error::Input(format!("{name}: observation is missing or has no data to fit to; name a recording")));
         }
     }
+    Ok(())
+}
+
+/// Fits the free parameters of one or several experiments. A path named free in several scenes is shared by them unless it says
+/// `per_scene = true`; where it is shared, start and bounds must agree.
+///
+/// # Errors
+/// [`Error::Input`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
+/// [`Error::Failed`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
+/// [`FitResult::broken`].
+pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
+    let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
+    check(experiments)?;
     let spec = specs(first).expect("every scene was just found to have a [fit]");
     let usual = Tolerance::default();
     let settings = Settings {

@@ -6,6 +6,7 @@ use crate::memory::Demand;
 use crate::progress::Liveliness;
 use clap::{Args, ValueEnum};
 use palpate_model::plan::Plan;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// What `--backend` may say.
@@ -61,6 +62,16 @@ pub struct Talk {
     /// Progress on stderr [default: bar on a terminal, none otherwise]
     #[arg(long, global = true, value_enum, value_name = "HOW")]
     pub progress: Option<Liveliness>,
+}
+
+/// Reads a whole number in a range, and says which are allowed where it is none of them. Clap by itself takes a negative number for an
+/// option that it does not know, and a word for a wrong digit.
+pub fn count(allowed: RangeInclusive<u64>) -> impl Fn(&str) -> Result<u64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse() {
+        Ok(n) if allowed.contains(&n) => Ok(n),
+        _ if *allowed.end() == u64::MAX => Err(format!("must be a whole number from {}", allowed.start())),
+        _ => Err(format!("must be a whole number from {} to {}", allowed.start(), allowed.end())),
+    }
 }
 
 /// Name of a scene without folder and ending.

@@ -157,6 +157,23 @@ fn a_parameter_without_effect_is_named() {
 }
 
 #[test]
+fn what_is_not_determined_has_a_range_in_its_unit() {
+    // An offset of 0.1 m read four times with an error of 2 m each, and a stiffness with one of 0.6 in its logarithm.
+    let model = LeastSquares::new(2, |t| {
+        let offset = |i: i32| if i < 4 { (t[0] - 0.1) / 2.0 } else { 0.0 };
+        Some((0..8).map(|i| offset(i) + if i < 4 { 0.0 } else { (t[1] / 2e4).ln() / 1.2 }).collect())
+    });
+    let mut free =
+        vec![parameter(0, Transform::Linear, (-50.0, 50.0), (0.3, 0.3)), parameter(1, Transform::Log, (1e2, 1e7), (1e4, 1e4))];
+    (free[0].unit, free[1].unit) = ("m".into(), "Pa".into());
+    let mut problem = Problem::new(vec![scene(&[0.3, 1e4], model)], free).expect("valid");
+    let result = solve(&mut problem, &settings(Optimizer::GaussNewton));
+    let told = |words: &str| result.warnings.iter().any(|w| w == &format!("{words} changes the fit no more than the noise does"));
+    assert!(told("p0 is not determined: anything from -0.9 m to 1.1 m around 0.1 m"), "{:?}", result.warnings);
+    assert!(told("p1 is not determined: a factor of 1.8 up or down"), "{:?}", result.warnings);
+}
+
+#[test]
 fn starts_with_equal_costs_elsewhere_are_reported() {
     // An even function: −1 and 1 cannot be told apart, yet each is sharply determined by the curvature.
     let even = |tilt: f64| {
@@ -168,7 +185,14 @@ fn starts_with_equal_costs_elsewhere_are_reported() {
     };
     let many = Settings { starts: 8, ..settings(Optimizer::GaussNewton) };
     let result = solve(&mut even(0.0), &many);
-    assert!(result.warnings.iter().any(|w| w.starts_with("p0 is not unique: 8 of 8 starts")), "{:?}", result.warnings);
+    assert!(
+        result
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("p0 is not unique: 8 of 8 starts reach equal costs with values from -1 to 1")),
+        "{:?}",
+        result.warnings
+    );
     let result = solve(&mut even(2.0), &many);
     assert!(result.warnings.is_empty(), "the cost tells the minima apart: {:?}", result.warnings);
 }

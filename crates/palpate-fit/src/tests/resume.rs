@@ -73,7 +73,7 @@ fn a_journal_of_another_fit_is_refused() {
     let message = refused(&mut oscillator_problem(), &Settings { seed: 9, ..base.clone() });
     assert!(message.contains("journal.jsonl, line 1") && message.contains("seed differs"), "{message}");
     assert!(refused(&mut oscillator_problem(), &settings(Optimizer::Lbfgs)).contains("optimizer differs"));
-    assert!(refused(&mut rosenbrock(), &base).contains("parameters differs"));
+    assert!(refused(&mut rosenbrock(), &base).contains("free parameters differ)"));
 
     let text = std::fs::read_to_string(&path).expect("the journal is there");
     // One digit of a cost or place is lost: the line is complete but cannot be read.

@@ -95,7 +95,7 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     })
 }
 
-/// A path in the file, which must stay inside the recording's folder.
+/// A file that is there; its path must stay inside the recording's folder.
 fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, InputError> {
     let Some(text) = t.optional_str(key)? else { return Ok(None) };
     let mut depth = 0i32;
@@ -118,6 +118,9 @@ fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, Inpu
         && !real.starts_with(&folder)
     {
         return Err(t.error(key, format!("\"{text}\" is a link out of the recording's folder")));
+    }
+    if !path.exists() {
+        return Err(t.error(key, format!("there is no file {}", path.display())));
     }
     Ok(Some(path))
 }

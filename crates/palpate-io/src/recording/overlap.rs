@@ -1,8 +1,9 @@
 //! Is the recording where the body is?
 
 use crate::mesh::bounds;
-use crate::scene::scale::{FAR_SMALLER, LARGE};
+use crate::scene::scale::FAR_SMALLER;
 use glam::DVec3;
+use palpate_model::body::LARGE;
 use palpate_model::observation::{Frame, Observation};
 
 fn positions(frame: &Frame) -> impl Iterator<Item = DVec3> {

@@ -221,7 +221,7 @@ fn faults_of_the_text_are_named() {
         ("recording.toml", "distortion = [0.1,", "distortion = [-90.0,", "cannot be inverted"),
         ("recording.toml", "\"depth/cam0/000000.png\"", "\"../x.png\"", "leaves the recording's folder"),
         ("recording.toml", "\"depth/cam0/000000.png\"", "\"/etc/x.png\"", "leaves the recording's folder"),
-        ("recording.toml", "\"depth/cam0/000000.png\"", "\"depth/no.png\"", "no.png: no such file"),
+        ("recording.toml", "\"depth/cam0/000000.png\"", "\"depth/no.png\"", "frame.0.depth: there is no file"),
         (
             "recording.toml",
             "\"depth/cam0/000000.png\"",

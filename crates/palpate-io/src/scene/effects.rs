@@ -4,6 +4,7 @@ use crate::document::Table;
 use crate::error::InputError;
 use crate::keys::suggest;
 use palpate_model::effects::{self, Effect, EffectParam, Unstated};
+use palpate_model::params::unit_behind;
 
 /// Every effect of a scene, in the order of the file.
 pub(super) fn effects(root: &Table) -> Result<Vec<Effect>, InputError> {
@@ -40,7 +41,8 @@ fn stated(t: &Table, p: &EffectParam) -> Result<Option<f64>, InputError> {
             Err(t.error(p.key, format!("{v} is not allowed: {} is a whole number from 0", p.doc)))
         }
         Some(v) if !(p.lower..=p.upper).contains(&v) => {
-            Err(t.error(p.key, format!("{v} is not allowed: {} must lie in [{}, {}] {}", p.doc, p.lower, p.upper, p.unit)))
+            let unit = unit_behind(p.unit);
+            Err(t.error(p.key, format!("{v} is not allowed: {} must lie in [{}, {}]{unit}", p.doc, p.lower, p.upper)))
         }
         v => Ok(v),
     }

@@ -6,6 +6,7 @@ use crate::error::{InputError, number};
 use crate::mesh::{LARGEST_SIDE, read_repaired};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
+use palpate_model::body::unit_hint;
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 use palpate_model::shape::Repaired;
 
@@ -58,9 +59,11 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
                 return Err(t.error(
                     "cell_size",
                     format!(
-                        "{} m makes {} cells along the longest side, at most 4096 are allowed",
+                        "{} m makes {} cells along the longest side of {} m, at most 4096 are allowed{}",
                         number(h),
-                        number((longest / h).round())
+                        number((longest / h).round()),
+                        number(longest),
+                        unit_hint(longest)
                     ),
                 ));
             }

@@ -152,6 +152,14 @@ fn numbers_out_of_range_say_what_is_allowed() {
         assert!(e.contains(wanted), "{to}: {e}");
         assert!(e.starts_with("scene.toml:") && !e.contains('\n'), "{e}");
     }
+    // Bounds have a unit where there is one.
+    for (kind, wanted) in [
+        ("coulomb-friction\"\ncoefficient = -1", "must lie in [0, 10]"),
+        ("adhesion\"\npressure = -1", "must lie in [0, 1000000000] Pa"),
+    ] {
+        let e = error_with("[time]", &format!("[[effect]]\nkind = \"{kind}\n[time]"));
+        assert!(e.ends_with(wanted), "{e}");
+    }
 }
 
 #[test]

@@ -18,6 +18,18 @@ pub const MAX_CELLS: f64 = 5e6;
 /// Most cells of a body.
 pub const MAX_BODY_CELLS: f64 = 1e6;
 
+/// Longest side from which on an object may be one in another unit [m]: soft bodies in front of cameras are smaller.
+pub const LARGE: f64 = 3.0;
+
+/// What is added to an error about too many cells where the object's longest side [m] says that its unit is to blame, not its cells.
+pub fn unit_hint(longest: f64) -> &'static str {
+    if longest < LARGE {
+        ""
+    } else {
+        "; is the object in millimetres or centimetres? convert it to metres (scale by 0.001 or 0.01)"
+    }
+}
+
 /// Memory that a cell of a body takes while its plan is made [B], measured on blocks.
 const CELL_MEMORY: f64 = 2.1e3;
 
@@ -59,22 +71,24 @@ pub enum BodyError {
     /// The body would have too many cells.
     #[error(
         "cell size {h} m gives about {cells:.1e} cells, which take {:.1} GB before anything is computed; at most {MAX_BODY_CELLS:.0e} are \
-         allowed, use cells of {suggestion:.2e} m or more",
-        cells * CELL_MEMORY * 1e-9
+         allowed, use cells of {suggestion:.2e} m or more{}",
+        cells * CELL_MEMORY * 1e-9, unit_hint(*longest)
     )]
     TooLarge {
         /// Edge of a cell [m].
         h: f64,
         /// Number of cells, as estimated.
         cells: f64,
+        /// Longest side of the object's bounding box [m].
+        longest: f64,
         /// A cell size that fits [m].
         suggestion: f64,
     },
     /// The lattice would be huge.
     #[error(
         "cell size {h} m gives a lattice of {cells:.2e} cells for an object of {:.4} × {:.4} × {:.4} m; at most {MAX_CELLS:.0e} are \
-         allowed, use {suggestion:.2e} m or more",
-        size.x, size.y, size.z
+         allowed, use {suggestion:.2e} m or more{}",
+        size.x, size.y, size.z, unit_hint(size.max_element())
     )]
     TooManyCells {
         /// Edge of a cell [m].
@@ -254,7 +268,8 @@ fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<(Grid, usiz
     if count > MAX_BODY_CELLS {
         let cells = filled(shape, min, size) * (size / h).element_product();
         if cells > MAX_BODY_CELLS {
-            return Err(BodyError::TooLarge { h, cells, suggestion: 1.02 * h * (cells / MAX_BODY_CELLS).cbrt() });
+            let (longest, suggestion) = (size.max_element(), 1.02 * h * (cells / MAX_BODY_CELLS).cbrt());
+            return Err(BodyError::TooLarge { h, cells, longest, suggestion });
         }
     }
     let border = border as i32;

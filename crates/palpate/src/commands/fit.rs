@@ -4,9 +4,9 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::{FitOptions, Fitted, demand, fit, free_parameters};
+use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters};
 use crate::grid::grid_shift;
-use crate::options::{BackendName, out_folder};
+use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
 use crate::report::{FramePicture, ReportInput, history_csv, html, pictures, result_json, summary};
 use clap::{Args, ValueEnum};
@@ -54,22 +54,22 @@ pub struct Choices {
     #[arg(long, value_enum, default_value = "auto")]
     pub backend: BackendName,
     /// Number of starts [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = count(1..=1_000_000), allow_negative_numbers = true)]
     starts: Option<u64>,
     /// Most simulations at once, where memory is short (or plenty) [default: all starts, as far as 2 GB and the device's buffers go]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = count(1..=1_000_000), allow_negative_numbers = true)]
     batch: Option<u64>,
     /// Most iterations per start [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = count(0..=1_000_000), allow_negative_numbers = true)]
     iterations: Option<u64>,
     /// Optimiser [default: the scene's]
     #[arg(long, value_enum, value_name = "NAME")]
     optimizer: Option<OptimizerName>,
     /// Seed of the starts [default: the scene's]
-    #[arg(long)]
+    #[arg(long, value_parser = count(0..=u64::MAX), allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Threads; 0 = one per core [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=4096))]
+    #[arg(long, value_name = "N", value_parser = count(0..=4096), allow_negative_numbers = true)]
     threads: Option<u64>,
     /// Also say how far cells and time step half as large would move the result (costs about as much as ten evaluations)
     #[arg(long)]
@@ -261,14 +261,22 @@ pub fn run_in(
     track: &mut Track,
     console: &mut Console,
 ) -> Result<(Fitted, serde_json::Value), Error> {
+    check(experiments)?;
     make_folder(folder)?;
     let journal = folder.join(JOURNAL);
     if resume && !journal.exists() {
         // Not what was asked for: --quiet does not silence it.
         console.warn(&[format!("{}: there is no journal to go on with; the fit begins anew", journal.display())]);
     }
-    if let Some(aside) = keep_previous(folder, experiments.len(), resume)? {
-        console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));
+    let make_room = |console: &mut Console| -> Result<(), Error> {
+        if let Some(aside) = keep_previous(folder, experiments.len(), resume)? {
+            console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));
+        }
+        Ok(())
+    };
+    // A journal is begun at once. One that is gone on with may turn out to be of another fit, and then everything stays where it is.
+    if !resume {
+        make_room(console)?;
     }
     let mut best = f64::INFINITY;
     let mut hear = |p: &Progress| {
@@ -291,6 +299,9 @@ pub fn run_in(
             on_iteration: Some(&mut hear),
         },
     )?;
+    if resume {
+        make_room(console)?;
+    }
     if a.grid_check && fitted.status() == "complete" {
         match grid_shift(experiments, &fitted, 2.0, backend) {
             Ok(shift) => fitted.grid_shift = Some(shift),

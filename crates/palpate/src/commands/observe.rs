@@ -3,7 +3,7 @@
 use crate::cli::Console;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::options::BackendName;
+use crate::options::{BackendName, count};
 use crate::render::{Pinhole, Sensor};
 use crate::synthetic::{Observers, observe};
 use clap::Args;
@@ -56,7 +56,7 @@ pub struct Arguments {
     #[arg(long, value_name = "T,…", value_delimiter = ',', allow_negative_numbers = true)]
     times: Option<Vec<f64>>,
     /// Seed of the noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = count(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Divide cells and time step of the recorded simulation by this
     #[arg(long, value_name = "R", default_value_t = 1.0, allow_negative_numbers = true)]

@@ -4,7 +4,7 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::embed::Embedding;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::options::{BackendName, out_folder};
+use crate::options::{BackendName, count, out_folder};
 use crate::render::{Pinhole, shade};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -22,7 +22,8 @@ Examples:
   palpate simulate found/model.toml --out frames       what a fit has found, simulated again
 
 obj, ply: the deformed surface; vtu: the cells with displacement and velocity, and a .pvd for the whole series;
-png: shaded pictures. The scene's recording is not read.";
+png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
+formats are replaced: those that this one has no frame for are removed.";
 
 /// Simulate a scene and write its motion
 #[derive(Clone, Debug, Args)]
@@ -40,7 +41,7 @@ pub struct Arguments {
     #[arg(long, value_enum, value_delimiter = ',', default_value = "obj")]
     format: Vec<Format>,
     /// Write every N-th state
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1..=u64::MAX), allow_negative_numbers = true)]
     every: u64,
 }
 
@@ -50,6 +51,43 @@ enum Format {
     Ply,
     Vtu,
     Png,
+}
+
+impl Format {
+    fn ending(self) -> &'static str {
+        match self {
+            Format::Obj => "obj",
+            Format::Ply => "ply",
+            Format::Vtu => "vtu",
+            Format::Png => "png",
+        }
+    }
+}
+
+fn frame_name(number: usize, format: Format) -> String {
+    format!("frame_{number:05}.{}", format.ending())
+}
+
+/// Removes the frames of an earlier simulation that this one, with its frames `numbers`, does not replace: whoever plays the folder would
+/// see both. Returns how many there were. Series without a frame 0, which every simulation writes, come from elsewhere and stay.
+fn remove_stale(folder: &Path, format: Format, numbers: &[usize]) -> Result<usize, Error> {
+    let list = std::fs::read_dir(folder).map_err(|e| Error::write(folder, e))?;
+    let number = |name: &str| {
+        let n = name.strip_prefix("frame_")?.strip_suffix(format.ending())?.strip_suffix('.')?.parse().ok()?;
+        (frame_name(n, format) == name).then_some(n)
+    };
+    let there: Vec<usize> = list
+        .filter_map(|e| e.ok().filter(|e| e.file_type().is_ok_and(|t| t.is_file()))?.file_name().to_str().and_then(number))
+        .collect();
+    if !there.contains(&0) {
+        return Ok(0);
+    }
+    let stale: Vec<usize> = there.into_iter().filter(|n| !numbers.contains(n)).collect();
+    for n in &stale {
+        let path = folder.join(frame_name(*n, format));
+        std::fs::remove_file(&path).map_err(|e| Error::Failed(format!("{}: cannot be removed: {e}", path.display())))?;
+    }
+    Ok(stale.len())
 }
 
 /// Writes frames of one simulation.
@@ -67,16 +105,16 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn write(&mut self, number: usize, state: &Snapshot) -> Result<(), Error> {
-        let file = |ending: &str| self.folder.join(format!("frame_{number:05}.{ending}"));
         let vertices = self.surface.deform(&state.displacement);
         let time = self.experiment.scene().time.start + state.time;
         for format in self.formats.clone() {
+            let file = self.folder.join(frame_name(number, format));
             match format {
                 Format::Obj | Format::Ply => {
                     let mesh = TriMesh { vertices: vertices.clone(), triangles: self.triangles.clone() };
                     match format {
-                        Format::Obj => palpate_io::write_obj(file("obj"), &mesh)?,
-                        _ => palpate_io::write_ply(file("ply"), &mesh)?,
+                        Format::Obj => palpate_io::write_obj(file, &mesh)?,
+                        _ => palpate_io::write_ply(file, &mesh)?,
                     }
                 }
                 Format::Vtu => {
@@ -84,18 +122,18 @@ impl Writer<'_> {
                     let points: Vec<DVec3> = body.nodes.iter().zip(&state.displacement).map(|(x, u)| *x + *u).collect();
                     let fractions: Vec<f64> = body.cells.iter().map(|c| c.fraction).collect();
                     palpate_io::write_vtu(
-                        file("vtu"),
+                        file,
                         &points,
                         &self.hexes,
                         &[("displacement", &state.displacement), ("velocity", &state.velocity)],
                         &[("fraction", &fractions)],
                     )?;
-                    self.series.push((time, format!("frame_{number:05}.vtu")));
+                    self.series.push((time, frame_name(number, format)));
                 }
                 Format::Png => {
                     let blue = |_| DVec3::new(0.45, 0.62, 0.85);
                     let picture = shade(&self.camera, &vertices, &self.triangles, self.experiment.up(), blue);
-                    write_file(file("png"), |w| w.write_all(&picture.png()))?;
+                    write_file(file, |w| w.write_all(&picture.png()))?;
                 }
             }
             self.files += 1;
@@ -145,6 +183,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
 
     let mut formats = a.format.clone();
     formats.dedup();
+    let numbers: Vec<usize> = states.iter().map(|(k, _)| *k).collect();
+    let stale = formats.iter().map(|f| remove_stale(&folder, *f, &numbers)).sum::<Result<usize, Error>>()?;
+    if stale > 0 {
+        console.note(&format!("removed from {}: {stale} frames of an earlier simulation", folder.display()));
+    }
     let mut writer = Writer {
         camera: camera(&experiment, &extent),
         hexes: plan.body.cells.iter().map(|c| c.nodes).collect(),

@@ -242,6 +242,16 @@ fn impossible_resolutions_are_refused_with_numbers() {
     assert!(message(0.3).contains("0.3 m is too large"), "{}", message(0.3));
     assert!(message(1e-5).contains("lattice of 1.00e12 cells"), "{}", message(1e-5));
     assert!(message(1e-300).contains("at most"), "{}", message(1e-300));
+    assert!(!message(1e-5).contains("is the object in"), "{}", message(1e-5));
+    // Eight metres are more likely eight centimetres.
+    let large = placed(Analytic::Ball { radius: 4.0, center: DVec3::ZERO });
+    for (h, words) in [(0.005, "gives a lattice of"), (0.05, "gives about")] {
+        let e = Body::build(&large, h, 0.0, 4).unwrap_err().to_string();
+        assert!(
+            e.contains(words) && e.ends_with("in millimetres or centimetres? convert it to metres (scale by 0.001 or 0.01)"),
+            "{e}"
+        );
+    }
     for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(Body::build(&shape, h, 0.0, 4), Err(BodyError::BadCellSize { .. })), "{h}");
     }
