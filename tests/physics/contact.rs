@@ -8,16 +8,16 @@ use support::{run, scenes};
 
 #[test]
 fn contact_force_of_a_resting_body_is_its_weight() {
-    for shape in [
-        Analytic::Ball { radius: 0.04, center: DVec3::new(0.001, 0.002, 0.0405) },
-        Analytic::Box { min: DVec3::new(-0.031, -0.022, 0.001), max: DVec3::new(0.033, 0.021, 0.043) },
-    ] {
+    let ball = || Analytic::Ball { radius: 0.04, center: DVec3::new(0.001, 0.002, 0.0405) };
+    let block = || Analytic::Box { min: DVec3::new(-0.031, -0.022, 0.001), max: DVec3::new(0.033, 0.021, 0.043) };
+    // On the new state alone, and along the way of each step.
+    for (shape, theta) in [(ball(), 0.6), (block(), 0.6), (ball(), 0.5), (block(), 0.5)] {
         let mut s = scenes::body(shape, 0.012);
         s.gravity = DVec3::new(0.0, 0.0, -9.81);
         s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::Z)];
         s.material.mass_damping = 40.0;
         s.material.stiffness_damping = 0.01;
-        s.time = Time { step: 0.01, steps: 150, start: 0.0, theta: 0.6 };
+        s.time = Time { step: 0.01, steps: 150, start: 0.0, theta };
         let plan = scenes::plan(&s);
         let end = run::states(&plan).pop().unwrap();
         let plane = PlaneNow {
@@ -27,10 +27,10 @@ fn contact_force_of_a_resting_body_is_its_weight() {
             scales: true,
         };
         // At rest both states of a step are the same.
-        let contact = Contact { body: &plan.body, plane: &plane, theta: 0.6, u: [&end.displacement; 2] };
+        let contact = Contact { body: &plan.body, plane: &plane, theta, u: [&end.displacement; 2] };
         let force: f64 = contact.touches().map(|(_, t)| t.area * t.pressure).sum();
         let weight = 1000.0 * plan.body.volume * 9.81;
-        println!("contact force over weight: {:.6}", force / weight);
+        println!("contact force over weight at θ = {theta}: {:.6}", force / weight);
         assert!((force / weight - 1.0).abs() < 1e-3, "{force} N against {weight} N");
     }
 }

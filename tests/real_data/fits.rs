@@ -3,9 +3,9 @@
 
 use palpate::{Experiment, Fitted};
 use std::path::Path;
-use studies::real::found;
 use studies::real::swing::Swing;
 use studies::real::tracks::rms;
+use studies::real::{found, height_at_rest};
 use support::data::data_dir;
 use support::measured::{fit, open, swings, track};
 
@@ -49,6 +49,9 @@ fn swinging_beams_and_what_one_tells_of_the_other() {
     let (seen, simulated) = compare("own weight", &own, &fitted, "tip1", 7.5);
     // Frequency follows from E, which the sag wants a little smaller (docs/real-data.md).
     assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.01, "{seen:?} {simulated:?}");
+    // The aim: sag within 3 %, the difference of rest height and centre; of the sag after three seconds 6 % are missing (docs/real-data.md).
+    let rest = height_at_rest(&own, "tip1");
+    assert!(((rest - simulated.centre) / (rest - seen.centre) - 1.0).abs() < 0.03, "{rest} {seen:?} {simulated:?}");
     // Decay of three periods is less certain than their frequency.
     assert!((simulated.damping_ratio() / seen.damping_ratio() - 1.0).abs() < 0.15, "{seen:?} {simulated:?}");
     for marker in ["tip1", "tip2", "tip3"] {
@@ -67,6 +70,15 @@ fn swinging_beams_and_what_one_tells_of_the_other() {
     assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.03, "{seen:?} {simulated:?}");
     // The hold's shape is straight to about 1 mm and the markers fit the frame to 0.8 mm: together 1.3 mm of the sag of 17 mm.
     assert!((simulated.centre - seen.centre).abs() < 1.3e-3, "{seen:?} {simulated:?}");
+
+    // And back: E of the loaded beam says how far the unloaded one sags (aim: 5 %), and its frequency but for the known miss of 3.6 %.
+    let e = stiffness(&fit(&open(&data, "beam-load52", SHORT[1])));
+    let known = format!("youngs_modulus    = {e}");
+    let given = [("youngs_modulus    = 2.5e5", known.as_str()), (free, "")];
+    let own = open(&data, "beam-gravity", &[SHORT[0], &given].concat());
+    let (seen, simulated) = compare("own weight, E of the load", &own, &fit(&own), "tip1", 7.5);
+    assert!(((rest - simulated.centre) / (rest - seen.centre) - 1.0).abs() < 0.05, "{rest} {seen:?} {simulated:?}");
+    assert!((simulated.frequency / seen.frequency - 1.0).abs() < 0.045, "{seen:?} {simulated:?}");
 }
 
 #[test]

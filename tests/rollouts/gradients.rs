@@ -204,6 +204,31 @@ fn bouncing_ball_that_touches_along_the_way_of_each_step() {
 }
 
 #[test]
+fn each_cost_by_itself() {
+    let plan = observed(&ball(), &[0.025, 0.0437, 0.06]);
+    for (kept, name) in ["points", "markers", "displacements"].into_iter().enumerate() {
+        let mut observation = (*plan.observation).clone();
+        for f in &mut observation.frames {
+            f.points.retain(|_| kept == 0);
+            f.markers.retain(|_| kept == 1);
+            f.displacements.retain(|_| kept == 2);
+        }
+        check(&Plan { observation: observation.into(), ..plan.clone() }, name);
+    }
+}
+
+#[test]
+fn bouncing_ball_of_other_elements() {
+    for element in [Element::Corner, Element::Trilinear] {
+        for rotation in [RotationUpdate::Lagged, RotationUpdate::Converged] {
+            let mut s = ball();
+            (s.solver.element, s.solver.rotation) = (element, rotation);
+            check(&observed(&s, &[0.025, 0.0437, 0.06]), &format!("{element:?}, {rotation:?}"));
+        }
+    }
+}
+
+#[test]
 fn static_equilibrium_then_motion() {
     let mut s = ball();
     s.initial.state = InitialShape::StaticEquilibrium;
