@@ -67,3 +67,13 @@ pub fn swings(experiment: &Experiment, theta: &[f64], marker: &str, guess: f64) 
     let simulated: Vec<(f64, f64)> = all.iter().map(|s| (s.time, s.simulated.dot(up))).collect();
     Ok((Swing::fit(&seen, guess), Swing::fit(&simulated, guess)))
 }
+
+/// Where a marker is along the vertical as long as nothing moves it [m].
+///
+/// # Panics
+/// The recording does not have the marker.
+pub fn height_at_rest(experiment: &Experiment, marker: &str) -> f64 {
+    let plan = experiment.plan();
+    let site = plan.observation.markers.iter().find(|m| m.name == marker).unwrap_or_else(|| panic!("no marker {marker}"));
+    (site.carry(|node| plan.body.nodes[node]).0 + site.stalk).dot(experiment.up())
+}

@@ -1,8 +1,9 @@
 //! The tables: each recording's own fit, both beams with one modulus, what one beam says of the other, and how the load of 52 g may hang.
 
-use super::tracks::{rms, track};
-use super::{fit, found, open, scene_path, swings};
+use super::tracks::{Sighting, rms, track};
+use super::{fit, found, height_at_rest, open, scene_path, swings};
 use crate::table;
+use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, Fitted};
 use palpate_model::params::ParamKey;
 use serde::Serialize;
@@ -78,7 +79,14 @@ struct Row {
     /// The marker's distance from its measured places, root mean square, in the frames that were fitted and in all from the first of them to the
     /// end of the recording [m].
     marker_rms: Option<[f64; 2]>,
+    /// Stiffness-proportional damping and its standard error [s].
+    stiffness_damping: Option<[f64; 2]>,
+    /// Mean sag from [`LATE`] on, when the swing has died away [m].
+    late_sag: Option<Pair>,
 }
+
+/// Time on a recording's clock [s] from which a beam counts as at rest.
+const LATE: f64 = 3.0;
 
 /// Every table, as it is printed.
 #[derive(Debug, Serialize)]
@@ -87,12 +95,15 @@ struct Report {
     recordings: Vec<Row>,
     predictions: Vec<Row>,
     loads: Vec<Row>,
+    /// Cells, the band of the cost and gravity across the swing.
+    variants: Vec<Row>,
 }
 
 /// How a fit did on one of its scenes.
 fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted, scene: usize) -> Result<Row, Error> {
     let theta = &fitted.result.theta[scene];
     let modulus = fitted.result.parameters.iter().find(|p| p.path == MODULUS);
+    let damping = fitted.result.parameters.iter().find(|p| p.path == DAMPING);
     let of_plan = || theta[experiment.plan().layout.index(ParamKey::YoungsModulus)];
     let left = &fitted.after[scene];
     let mut row = Row {
@@ -105,17 +116,26 @@ fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted
         rms: left.rms,
         noise: left.noise,
         marker_rms: None,
+        stiffness_damping: damping.and_then(|p| Some([p.value, p.standard_error?])),
+        late_sag: None,
     };
     if let Some((marker, guess)) = recorded.marker {
         let (seen, simulated) = swings(experiment, theta, marker, guess)?;
-        let plan = experiment.plan();
-        let site = plan.observation.markers.iter().find(|m| m.name == marker).expect("its swing was found");
-        let rest = (site.carry(|node| plan.body.nodes[node]).0 + site.stalk).dot(experiment.up());
+        let rest = height_at_rest(experiment, marker);
         row.damping_ratio = Some(Pair { simulated: simulated.damping_ratio(), measured: seen.damping_ratio() });
         row.frequency = Some(Pair { simulated: simulated.frequency, measured: seen.frequency });
         row.sag = Some(Pair { simulated: rest - simulated.centre, measured: rest - seen.centre });
     }
     Ok(row)
+}
+
+/// Mean sag of a marker from [`LATE`] on; none where the recording ends before.
+fn late_sag(experiment: &Experiment, track: &[Sighting], marker: &str) -> Option<Pair> {
+    let late: Vec<&Sighting> = track.iter().filter(|s| s.time >= LATE).collect();
+    let rest = height_at_rest(experiment, marker);
+    let sag =
+        |of: fn(&Sighting) -> DVec3| rest - late.iter().map(|s| of(s).dot(experiment.up())).sum::<f64>() / late.len() as f64;
+    (!late.is_empty()).then(|| Pair { simulated: sag(|s| s.simulated), measured: sag(|s| s.seen) })
 }
 
 /// Each recording by itself, and the beams with one modulus; the fits of the beams by themselves are handed on.
@@ -127,8 +147,10 @@ fn recordings(data: &Path) -> Result<(Vec<Row>, [Fitted; 2]), Error> {
         let mut row = row(r.name, r, &experiment, &fitted, 0)?;
         if let (Some((marker, _)), false) = (r.marker, r.whole.is_empty()) {
             let whole = open(data, r.scene, r.whole)?;
-            let left = |e: &Experiment| Ok::<_, Error>(rms(&track(e, &fitted.result.theta[0], marker)?));
-            row.marker_rms = Some([left(&experiment)?, left(&whole)?]);
+            let seen = |e: &Experiment| track(e, &fitted.result.theta[0], marker);
+            let all = seen(&whole)?;
+            row.marker_rms = Some([rms(&seen(&experiment)?), rms(&all)]);
+            row.late_sag = late_sag(&whole, &all, marker);
         }
         rows.push(told(row));
         Ok::<_, Error>((experiment, fitted))
@@ -161,9 +183,31 @@ fn predictions(data: &Path, own: &[Fitted; 2]) -> Result<Vec<Row>, Error> {
         let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
         let other = open(data, scene, &changes)?;
         let name = format!("{} → {}", BEAMS[from].scene, scene);
-        rows.push(told(row(&name, &BEAMS[to], &other, &fit(&other)?, 0)?));
+        let fitted = fit(&other)?;
+        let mut row = row(&name, &BEAMS[to], &other, &fitted, 0)?;
+        let (marker, _) = BEAMS[to].marker.expect("beams have markers");
+        let whole = open(data, scene, &[&changes[..], BEAMS[to].whole].concat())?;
+        row.late_sag = late_sag(&whole, &track(&whole, &fitted.result.theta[0], marker)?, marker);
+        rows.push(told(row));
     }
     Ok(rows)
+}
+
+/// A recording's own fit with one thing changed in its scene.
+const VARIANTS: [(&str, usize, (&str, &str)); 4] = [
+    ("Ecoflex, cells of 7.5 mm", 1, ("cell_size = 0.010", "cell_size = 0.0075")),
+    ("Ecoflex, a band of 2 cells", 1, ("band      = 4.0", "band = 2.0")),
+    ("Ecoflex, a band of 8 cells", 1, ("band      = 4.0", "band = 8.0")),
+    ("MoldStar, with the gravity across that the rig shows", 0, ("gravity = [0.0, -9.80, 0.0]", "gravity = [0.0, -9.80, -0.49]")),
+];
+
+fn variants(data: &Path) -> Result<Vec<Row>, Error> {
+    let of = |(name, which, change): &(&str, usize, (&str, &str))| {
+        let recorded = &CANTILEVERS[*which];
+        let experiment = open(data, recorded.scene, &[*change])?;
+        Ok(told(row(name, recorded, &experiment, &fit(&experiment)?, 0)?))
+    };
+    VARIANTS.iter().map(of).collect()
 }
 
 fn read(scene: &str) -> Result<String, Error> {
@@ -266,10 +310,21 @@ fn print(title: &str, rows: &[Row]) {
             both(r.sag, 1e3, 2, true),
             format!("{:.2} ({:.2})", 1e3 * r.rms, 1e3 * r.noise),
             r.marker_rms.map_or("–".into(), |[fitted, whole]| format!("{:.2} / {:.2}", 1e3 * fitted, 1e3 * whole)),
+            r.stiffness_damping.map_or("–".into(), |[value, error]| format!("{:.1} ± {:.1}", 1e3 * value, 1e3 * error)),
+            both(r.late_sag, 1e3, 2, true),
         ]
     };
-    let head =
-        ["", "E [kPa]", "damping ratio", "frequency [Hz]", "sag [mm]", "rms (noise) [mm]", "tip, fitted / to the end [mm]"];
+    let head = [
+        "",
+        "E [kPa]",
+        "damping ratio",
+        "frequency [Hz]",
+        "sag [mm]",
+        "rms (noise) [mm]",
+        "tip, fitted / to the end [mm]",
+        "stiffness damping [ms]",
+        "sag after 3 s [mm]",
+    ];
     let rows: Vec<Vec<String>> = std::iter::once(head.map(String::from).to_vec()).chain(rows.iter().map(line)).collect();
     table::print(title, &rows);
 }
@@ -282,11 +337,13 @@ pub fn run() -> Result<PathBuf, String> {
     let data = crate::bench::data().ok_or("no recordings: set PALPATE_DATA to their folder")?;
     let all = || -> Result<Report, Error> {
         let (recordings, own) = recordings(&data)?;
-        Ok(Report { date: table::today(), recordings, predictions: predictions(&data, &own)?, loads: loads(&data)? })
+        let predictions = predictions(&data, &own)?;
+        Ok(Report { date: table::today(), recordings, predictions, loads: loads(&data)?, variants: variants(&data)? })
     };
     let report = all().map_err(|e| e.to_string())?;
     print("Fits of measured recordings (simulated / measured)", &report.recordings);
     print("What one beam says of the other", &report.predictions);
     print("How the load of 52 g acts", &report.loads);
+    print("Cantilevers with one thing changed", &report.variants);
     table::save("real", &report)
 }
