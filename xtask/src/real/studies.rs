@@ -195,7 +195,7 @@ fn predictions(data: &Path, own: &[Fitted; 2]) -> Result<Vec<Row>, Error> {
 
 /// A recording's own fit with one thing changed in its scene.
 const VARIANTS: [(&str, usize, (&str, &str)); 4] = [
-    ("Ecoflex, cells of 7.5 mm", 1, ("cell_size = 0.010", "cell_size = 0.0075")),
+    ("Ecoflex, cells of 7.5 mm", 1, ("cell_size = 0.01 ", "cell_size = 0.0075 ")),
     ("Ecoflex, a band of 2 cells", 1, ("band      = 4.0", "band = 2.0")),
     ("Ecoflex, a band of 8 cells", 1, ("band      = 4.0", "band = 8.0")),
     ("MoldStar, with the gravity across that the rig shows", 0, ("gravity = [0.0, -9.80, 0.0]", "gravity = [0.0, -9.80, -0.49]")),
