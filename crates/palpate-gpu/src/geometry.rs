@@ -120,7 +120,7 @@ impl Geometry {
     ) -> Result<Geometry, GpuError> {
         let effects = Effects::new(plan)?;
         let touched = !plan.planes.is_empty() || effects.on_patches();
-        let along = !plan.planes.is_empty() && palpate_model::contact::beginning(plan.clock.theta) < 1.0;
+        let along = !plan.planes.is_empty() && palpate_model::contact::acts_along(plan.clock.theta);
         let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();

@@ -25,20 +25,25 @@ pub const INSTANT_OFFSET: f64 = 0.387_298_334_620_741_7;
 /// Weight of each of its outer points.
 pub const INSTANT_WEIGHT: f64 = 5.0 / 18.0;
 
-/// Where in a step contact begins to act, 0 to 1, for weight `theta` of the new state.
-pub fn beginning(theta: f64) -> f64 {
+/// True where contact acts along the way of a step, not in its new state alone, for weight `theta` of the new state.
+pub fn acts_along(theta: f64) -> bool {
     // θ may have been made of a step's factors.
-    if theta > DAMPED - 1e-6 { 1.0 } else { (theta - 0.5) / (DAMPED - 0.5) }
+    theta <= DAMPED - 1e-6
+}
+
+/// Where in a step contact begins to act, 0 to 1, for weight `theta` of the new state.
+fn beginning(theta: f64) -> f64 {
+    if acts_along(theta) { (theta - 0.5) / (DAMPED - 0.5) } else { 1.0 }
 }
 
 /// (weight, place σ in the step) of every evaluation of the law, for weight `theta` of the new state: gaps are taken at
 /// old + σ (new − old). Weights add to 1. Where the new state counts alone (θ from [`DAMPED`] on; 1 in a static problem) that is the first
 /// evaluation, and the others weigh nothing.
 pub fn instants(theta: f64) -> [(f64, f64); INSTANTS] {
-    let from = beginning(theta);
-    if from == 1.0 {
+    if !acts_along(theta) {
         return [(1.0, 1.0), (0.0, 1.0), (0.0, 1.0)];
     }
+    let from = beginning(theta);
     let at = |t: f64| from + (1.0 - from) * t;
     [
         (INSTANT_WEIGHT, at(0.5 - INSTANT_OFFSET)),

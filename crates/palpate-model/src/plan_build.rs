@@ -51,7 +51,7 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
         error(key, e.to_string())
     })?;
     // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
-    if scene.clamps.is_empty() && scene.time.theta < contact::DAMPED {
+    if scene.clamps.is_empty() && contact::acts_along(scene.time.theta) {
         parts.body.mend_moments();
     }
     Ok((parts, shape))

@@ -350,7 +350,7 @@ impl<'a> Balance<'a> {
 
     /// Adds the derivative of contact by the old state, times `d`; symmetric.
     fn contact_by_old(&self, s: States<'a>, d: &[DVec3], out: &mut [DVec3]) {
-        if contact::beginning(self.mix.new) == 1.0 {
+        if !contact::acts_along(self.mix.new) {
             return;
         }
         for plane in self.planes {

@@ -53,7 +53,7 @@ impl<'a> Contact<'a> {
         let Contact { body, plane, theta, u: [u1, u0] } = self;
         let width = contact::WIDTH * body.grid.h;
         let instants = contact::instants(theta);
-        let along = contact::beginning(theta) < 1.0;
+        let along = contact::acts_along(theta);
         body.patches.iter().filter_map(move |patch| {
             let nodes = &body.cells[patch.cell as usize].nodes;
             let at = |u: &[DVec3]| (0..8).fold(patch.point, |x, i| x + patch.weights[i] * u[nodes[i] as usize]);
