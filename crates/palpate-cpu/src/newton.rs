@@ -39,7 +39,7 @@ const STRICT: f64 = 0.01;
 
 /// Attaches the time of the simulation to a reason.
 pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
-    move |(kind, detail)| Failure { kind, time, detail }
+    move |(kind, detail)| Failure::new(kind, time, detail)
 }
 
 fn trouble(t: Trouble) -> Reason {

@@ -1,6 +1,7 @@
 //! Why a member of a batch stopped.
 
 use palpate_model::params::{Layout, unit_behind};
+use std::borrow::Cow;
 use std::fmt;
 
 /// A member that stopped: what happened, when, and what may help.
@@ -10,8 +11,10 @@ pub struct Failure {
     pub kind: FailureKind,
     /// Simulation time [s] since the initial state at which it happened.
     pub time: f64,
-    /// Details with numbers; those of a device with the way out.
+    /// Details with numbers.
     pub detail: String,
+    /// What a user can try: that of the kind, unless whoever met the failure knows better.
+    pub hint: Cow<'static, str>,
 }
 
 /// Kinds of failure.
@@ -38,6 +41,26 @@ pub enum FailureKind {
 }
 
 impl Failure {
+    /// With the hint of its kind.
+    pub fn new(kind: FailureKind, time: f64, detail: impl Into<String>) -> Failure {
+        Failure { kind, time, detail: detail.into(), hint: kind.hint().into() }
+    }
+
+    /// A device that broke, with the way out that its error knows.
+    pub fn of_device(detail: impl Into<String>, hint: impl Into<String>) -> Failure {
+        Failure { hint: Cow::Owned(hint.into()), ..Failure::new(FailureKind::Device, 0.0, detail) }
+    }
+
+    /// What happened and when, without the hint.
+    pub fn message(&self) -> String {
+        let what = self.kind.what();
+        if self.kind == FailureKind::Device {
+            // It has no place in the simulation.
+            return format!("{what}: {}", self.detail);
+        }
+        format!("{what} at t = {} s: {}", number(self.time), self.detail)
+    }
+
     /// Adds the values θ `[P]` of the parameters that are not zero to the details.
     pub fn with_values(mut self, layout: &Layout, theta: &[f64]) -> Failure {
         let stated = layout.keys.iter().zip(theta).filter(|(_, v)| **v != 0.0).map(|(k, v)| {
@@ -70,8 +93,22 @@ pub fn number(x: f64) -> String {
 }
 
 impl FailureKind {
+    fn what(self) -> &'static str {
+        match self {
+            FailureKind::NotFinite => "a number became infinite or undefined",
+            FailureKind::NewtonStalled => "the nonlinear solve of a step did not converge",
+            FailureKind::LinearSolve => "the linear solve of a step failed",
+            FailureKind::FellOut => "the body left the world",
+            FailureKind::NoEquilibrium => "no static equilibrium was found",
+            FailureKind::BadParameter => "a parameter is out of range",
+            FailureKind::Unsupported => "the backend cannot do this",
+            FailureKind::Stopped => "stopped on request",
+            FailureKind::Device => "the device failed",
+        }
+    }
+
     /// What a user can try.
-    pub fn hint(self) -> &'static str {
+    fn hint(self) -> &'static str {
         match self {
             FailureKind::NotFinite => "use a smaller [time] step, or narrower bounds for the parameters named",
             FailureKind::NewtonStalled => "use a smaller [time] step, or set solver.rotation = \"lagged\"",
@@ -93,22 +130,7 @@ impl FailureKind {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let what = match self.kind {
-            FailureKind::NotFinite => "a number became infinite or undefined",
-            FailureKind::NewtonStalled => "the nonlinear solve of a step did not converge",
-            FailureKind::LinearSolve => "the linear solve of a step failed",
-            FailureKind::FellOut => "the body left the world",
-            FailureKind::NoEquilibrium => "no static equilibrium was found",
-            FailureKind::BadParameter => "a parameter is out of range",
-            FailureKind::Unsupported => "the backend cannot do this",
-            FailureKind::Stopped => "stopped on request",
-            FailureKind::Device => "the device failed",
-        };
-        if self.kind == FailureKind::Device {
-            // It has no place in the simulation, and brings its own way out.
-            return write!(f, "{what}: {}", self.detail);
-        }
-        write!(f, "{what} at t = {} s: {} (hint: {})", number(self.time), self.detail, self.kind.hint())
+        write!(f, "{} (hint: {})", self.message(), self.hint)
     }
 }
 
@@ -141,7 +163,7 @@ mod tests {
     fn details_name_values_with_units_that_are_units() {
         let layout = Layout::new(0, 0, &[]);
         let theta: Vec<f64> = layout.keys.iter().map(|k| if k.spec().path.contains("velocity") { 0.0 } else { 0.4 }).collect();
-        let f = Failure { kind: FailureKind::NotFinite, time: 0.1 + 0.2, detail: "a node".into() }.with_values(&layout, &theta);
+        let f = Failure::new(FailureKind::NotFinite, 0.1 + 0.2, "a node").with_values(&layout, &theta);
         let text = f.to_string();
         assert!(text.starts_with("a number became infinite or undefined at t = 0.3 s: a node, with "), "{text}");
         assert!(text.contains("material.youngs_modulus = 0.4 Pa, material.poisson_ratio = 0.4, "), "{text}");

@@ -58,7 +58,7 @@ impl<B: Backend> Rollout<B> {
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
         loop {
             let Some(all) = self.attempt(theta, request) else {
-                let failure = Failure { kind: FailureKind::Stopped, time: 0.0, detail: "the rollout was cut short".into() };
+                let failure = Failure::new(FailureKind::Stopped, 0.0, "the rollout was cut short");
                 return vec![Evaluation::failed(failure); theta.members()];
             };
             if !self.backend.again(&mut self.world) {
@@ -210,10 +210,8 @@ impl<B: Backend> Rollout<B> {
         let (mut t, mut t_next) = (b.new_tangent(w, directions), b.new_tangent(w, directions));
         let mut rows = Rows::default();
         let mut add = |more: Option<Rows>| {
-            let more = more.ok_or_else(|| Failure {
-                kind: FailureKind::Unsupported,
-                time: 0.0,
-                detail: format!("backend {} has no single residuals", b.name()),
+            let more = more.ok_or_else(|| {
+                Failure::new(FailureKind::Unsupported, 0.0, format!("backend {} has no single residuals", b.name()))
             })?;
             rows.residuals.extend(more.residuals);
             rows.sensitivity.extend(more.sensitivity);

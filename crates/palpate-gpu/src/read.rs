@@ -57,7 +57,7 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
         kind => kind,
     };
     let time = f64::from(h.step) * world.plan.clock.step;
-    Some(Failure { kind, time, detail: what }.with_values(&world.plan.layout, &world.batch.theta[member]))
+    Some(Failure::new(kind, time, what).with_values(&world.plan.layout, &world.batch.theta[member]))
 }
 
 /// Costs, gradients and health of every member.
@@ -65,9 +65,8 @@ pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
     match try_tally(world, tally) {
         Ok(all) => all,
         Err(e) => {
-            let detail = format!("{e} (hint: {})", e.hint_for(world.alone));
-            let failed = Evaluation::failed(Failure { kind: FailureKind::Device, time: 0.0, detail });
-            vec![failed; world.members()]
+            let failure = Failure::of_device(e.to_string(), e.hint_for(world.alone));
+            vec![Evaluation::failed(failure); world.members()]
         }
     }
 }

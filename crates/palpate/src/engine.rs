@@ -133,7 +133,7 @@ fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Requ
     match done.into_iter().find_map(|e| e.failure) {
         None => Ok(seconds),
         // The way out is taken here.
-        Some(f) => Err(f.to_string().split(" (hint: ").next().unwrap_or_default().to_string()),
+        Some(f) => Err(f.message()),
     }
 }
 

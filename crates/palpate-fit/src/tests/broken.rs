@@ -24,7 +24,7 @@ impl Evaluate for Fragile {
         self.calls = self.calls.saturating_sub(1);
         if self.calls == 0 {
             self.calls = usize::MAX;
-            let failure = Failure { kind: self.kind, time: 0.0, detail: "out of memory (hint: less)".into() };
+            let failure = Failure { hint: "less".into(), ..Failure::new(self.kind, 0.0, "out of memory") };
             all.iter_mut().skip(self.from).for_each(|e| *e = Evaluation::failed(failure.clone()));
         }
         all

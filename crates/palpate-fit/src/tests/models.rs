@@ -24,8 +24,7 @@ impl LeastSquares {
     }
 
     fn one(&self, theta: &[f64], request: &Request) -> Evaluation {
-        let failed =
-            || Evaluation::failed(Failure { kind: FailureKind::NewtonStalled, time: 0.1, detail: format!("at {theta:?}") });
+        let failed = || Evaluation::failed(Failure::new(FailureKind::NewtonStalled, 0.1, format!("at {theta:?}")));
         let Some(r) = (self.residuals)(theta) else { return failed() };
         let n = r.len() as f64;
         let cost = r.iter().map(|r| r * r / 2.0).sum::<f64>() / n;
