@@ -9,8 +9,8 @@
 mod validate;
 
 use naga::{AddressSpace, Expression, Literal, StorageAccess, TypeInner};
-use palpate_model::contact::DEFAULT_STIFFNESS;
 use palpate_model::effects::{self, Law, Site, cell, law};
+use palpate_model::mechanics::contact::DEFAULT_STIFFNESS;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

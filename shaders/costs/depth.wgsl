@@ -1,4 +1,4 @@
-//! Tukey's biweight on the distance of a depth point. Twin of palpate-model/src/kernel.rs.
+//! Tukey's biweight on the distance of a depth point. Twin of palpate-model/src/observation/kernel.rs.
 
 // ρ(r) for the band c.
 fn depth_cost(r: f32, c: f32) -> f32 {

@@ -1,4 +1,4 @@
-//! Contact law of a plane. Twin of palpate-model/src/contact.rs; all per unit stiffness.
+//! Contact law of a plane. Twin of palpate-model/src/mechanics/contact.rs; all per unit stiffness.
 
 override contact_width: f32;
 // Points of the quadrature over a step, distance of the outer ones from its middle, and their weight (`contact::instants`).

@@ -1,4 +1,4 @@
-//! The side that a camera saw: where the line of sight towards it leaves the deformed body. Twin of palpate-model/src/front.rs, where the
+//! The side that a camera saw: where the line of sight towards it leaves the deformed body. Twin of palpate-model/src/cutcells/front.rs, where the
 //! formulas stand; one loop marches and then finds the root, so that what it calls is compiled once.
 // use shared/hexahedron
 

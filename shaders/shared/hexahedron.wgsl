@@ -1,5 +1,5 @@
 //! A deformed band cell and the place in it where an observed point lies. Positions count from the cell's first corner, so that
-//! single precision is relative to the cell and not to the world. Twin of palpate-model/src/pullback.rs.
+//! single precision is relative to the cell and not to the world. Twin of palpate-model/src/cutcells/pullback.rs.
 // use shared/seen
 
 struct BandCell { // mirrored

@@ -139,7 +139,7 @@ fn old_gap() -> Dual {
     return vec4((dot(n, spot.origin + spot.old_whole) - z[PLANE_AT + 3u].x) + dot(n, spot.old_rest), g.yzw);
 }
 
-// Contact pressure and energy at a gap, with derivatives (shared/contact.wgsl, palpate-model/src/contact.rs).
+// Contact pressure and energy at a gap, with derivatives (shared/contact.wgsl, palpate-model/src/mechanics/contact.rs).
 fn pressure_of(g: Dual, stiffness: Dual) -> Dual {
     let l = contact_law(g.x, spot.width);
     var bend = 0.0;

@@ -1,5 +1,5 @@
 //! Variational corotation of a cell in single precision, one lane per corner: rest-frame deformation q and its first and second
-//! derivatives. Twin of palpate-model/src/corotation.rs, where the formulas stand; names are the same.
+//! derivatives. Twin of palpate-model/src/cutcells/corotation.rs, where the formulas stand; names are the same.
 // use shared/lanes
 // use shared/rotation
 // use shared/mix

@@ -1,5 +1,5 @@
 //! Rotation of a deformation gradient F = I + H in single precision, as a unit quaternion: (R − I) is then free of cancellation
-//! for small rotations. Twin of palpate-model/src/rotation.rs.
+//! for small rotations. Twin of palpate-model/src/mechanics/rotation.rs.
 
 override newton_determinant: f32;
 override smallest_pair: f32;

@@ -1,7 +1,7 @@
 //! Clamps that move: what they hold follows, and what hangs on them is turned as a rigid body.
 
 use glam::{DQuat, DVec3};
-use palpate_model::motion::RigidMotion;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::plan::clamp_pose;
 use palpate_model::scene::*;
 use support::{run, scenes};

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate_cpu::passes::supports::{Contact, PlaneNow};
-use palpate_model::contact;
+use palpate_model::mechanics::contact;
 use palpate_model::scene::*;
 use support::{run, scenes};
 
@@ -44,7 +44,7 @@ fn stiff_contact_limits_no_time_step() {
     s.time = Time { step: 0.01, steps: 60, start: 0.0, theta: 0.6 };
     let plan = scenes::plan(&s);
     let body = &plan.body;
-    let point = |p: &palpate_model::body::Patch, u: &[DVec3]| -> DVec3 {
+    let point = |p: &palpate_model::space::body::Patch, u: &[DVec3]| -> DVec3 {
         let nodes = body.cells[p.cell as usize].nodes;
         p.point + (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum::<DVec3>()
     };

@@ -11,7 +11,7 @@ use palpate_io::recording::Recording;
 use palpate_model::effects::{self, Effect, Unstated};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::{PlanError, build_plan};
+use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::scene::*;
 use studies::paper::study::{self, Unknown};
 use support::scenes;

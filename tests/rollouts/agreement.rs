@@ -5,7 +5,7 @@ use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
 use palpate_model::observation::{Frame, Observation};
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use support::scenes;
 

@@ -5,13 +5,13 @@
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Source};
-use palpate_model::body::SUBDIVISIONS;
-use palpate_model::motion::RigidMotion;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
+use palpate_model::space::body::SUBDIVISIONS;
 use support::scenes;
 
 pub(super) fn ball() -> Scene {

@@ -7,7 +7,7 @@ use palpate_engine::Rollout;
 use palpate_model::effects::{ALL, Effect};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::ParamKey;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use std::ops::ControlFlow;
 use support::measured::compared;

@@ -1,8 +1,8 @@
 //! Energies computed from the model's laws alone, independently of any backend.
 
 use glam::DVec3;
-use palpate_model::corotation::CellPose;
-use palpate_model::element;
+use palpate_model::cutcells::corotation::CellPose;
+use palpate_model::cutcells::element;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Scene;
 

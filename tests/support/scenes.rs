@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 
 /// A body in free space at rest, E = 5 kPa, ν = 0.4, 1000 kg/m³, no damping, no gravity, 10 steps of 5 ms at θ = ½.

@@ -1,5 +1,5 @@
 //! A body too soft for its own weight collapses on the ground and its cells turn inside out. Without the guard of
-//! `palpate_model::corotation::inversion` and the tamed tangent, Newton's method ended at jumps of the potential, or crept.
+//! `palpate_model::cutcells::corotation::inversion` and the tamed tangent, Newton's method ended at jumps of the potential, or crept.
 
 use crate::CpuBackend;
 use crate::linear::vector::dot;
@@ -9,10 +9,10 @@ use crate::simulate;
 use crate::world::{MemberState, MemberTangent, World};
 use glam::{DAffine3, DVec3};
 use palpate_engine::{Backend, Failure, ParamBatch};
-use palpate_model::corotation::CellPose;
+use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 
 /// A torus of density 1000 kg/m³ that falls on its edge; at 500 Pa its own weight strains it by several hundred per cent.

@@ -8,12 +8,12 @@ use crate::simulate::balance;
 use crate::world::World;
 use glam::{DAffine3, DVec3};
 use palpate_engine::ParamBatch;
-use palpate_model::corotation::CellPose;
+use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::effects::{ALL, Effect, Site};
-use palpate_model::motion::RigidMotion;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.

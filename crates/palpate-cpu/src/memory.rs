@@ -4,12 +4,12 @@ use crate::linear::{Purpose, is_direct};
 use crate::passes::posed::Posed;
 use glam::{DMat3, DVec3};
 use palpate_engine::Request;
-use palpate_model::body::{BandCell, Cell};
-use palpate_model::corotation::V24;
-use palpate_model::elements::Classes;
+use palpate_model::cutcells::corotation::V24;
+use palpate_model::cutcells::elements::Classes;
 use palpate_model::observation::ObservedPoint;
-use palpate_model::pattern::Pattern;
 use palpate_model::plan::Plan;
+use palpate_model::space::body::{BandCell, Cell};
+use palpate_model::space::pattern::Pattern;
 
 /// Vectors over all nodes that a solve keeps at a time: forces, directions, conjugate gradients.
 const VECTORS: usize = 16;

@@ -8,8 +8,8 @@ use crate::passes::cells::{Mix, zeros};
 use crate::world::{Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
 use palpate_engine::{FailureKind, number};
-use palpate_model::changes;
 use palpate_model::params::ParamKey;
+use palpate_model::params::changes;
 use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
 

@@ -4,7 +4,7 @@ use crate::collapse_tests::{Ran, run, run_in, scene};
 use crate::world::World;
 use palpate_engine::FailureKind;
 use palpate_model::observation::Observation;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{LinearSolver, Resolution};
 
 /// A torus on the ground after six steps.

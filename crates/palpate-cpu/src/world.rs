@@ -10,10 +10,10 @@ use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::points::{self, Acting};
 use crate::passes::supports::{self, PlaneNow};
 use palpate_engine::{Evaluation, Failure, ParamBatch};
+use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::elements::{Classes, Elements};
-use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
+use palpate_model::space::pattern::{Pattern, Places};
 use std::sync::Arc;
 
 /// A plan made ready, and the current batch.

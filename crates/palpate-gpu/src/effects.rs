@@ -17,9 +17,9 @@ use crate::pipelines::shared::structs::{
 };
 use crate::recorder::Named;
 use crate::solve::{Per, Solve};
-use palpate_model::changes::{self, Changes};
 use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
+use palpate_model::params::changes::{self, Changes};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::{InitialShape, RotationUpdate};
 use std::collections::HashMap;

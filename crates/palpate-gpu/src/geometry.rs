@@ -5,11 +5,11 @@ use crate::error::GpuError;
 use crate::layout::{Cell, Mass, Patch, Shape};
 use crate::memory::Maker;
 use crate::pipelines::shared::structs::FIELD_COUPLED;
-use palpate_model::elements::Classes;
-use palpate_model::grips::within_reach;
-use palpate_model::pattern::{Pattern, Places};
+use palpate_model::cutcells::elements::Classes;
+use palpate_model::params::grips::within_reach;
 use palpate_model::plan::{Plan, WORLD_SIZE};
 use palpate_model::scene::RotationUpdate;
+use palpate_model::space::pattern::{Pattern, Places};
 use std::collections::HashMap;
 
 /// Best relative accuracy of a Newton solve in single precision: 30 roundings. Newton's method is quadratic there, so the
@@ -74,7 +74,7 @@ impl Most {
             ("step_back", 2 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 380 * self.pressed.max(1) + 100),
-            ("touch_patches", (1 + palpate_model::contact::INSTANTS as u64) * self.planes + 20),
+            ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]
@@ -120,7 +120,7 @@ impl Geometry {
     ) -> Result<Geometry, GpuError> {
         let effects = Effects::new(plan)?;
         let touched = !plan.planes.is_empty() || effects.on_patches();
-        let along = !plan.planes.is_empty() && palpate_model::contact::acts_along(plan.clock.theta);
+        let along = !plan.planes.is_empty() && palpate_model::mechanics::contact::acts_along(plan.clock.theta);
         let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();

@@ -7,10 +7,10 @@ use crate::layout::{ClampPose, Member, Plane};
 use crate::memory::Maker as _;
 use glam::DVec3;
 use palpate_engine::ParamBatch;
-use palpate_model::corotation::M24;
-use palpate_model::elements::Elements;
+use palpate_model::cutcells::corotation::M24;
+use palpate_model::cutcells::elements::Elements;
+use palpate_model::mechanics::plane::planes;
 use palpate_model::plan::{Physics, Plan};
-use palpate_model::plane::planes;
 use std::collections::HashMap;
 
 fn vec4(v: DVec3, w: f64) -> [f32; 4] {
@@ -63,8 +63,8 @@ impl Batch {
                 mass_damping: p.mass_damping as f32,
                 stiffness_damping: p.stiffness_damping as f32,
                 ghost: [
-                    shear(palpate_model::material::lame(1.0, p.poisson_ratio).1),
-                    shear(palpate_model::material::lame_by_nu(1.0, p.poisson_ratio).1),
+                    shear(palpate_model::mechanics::lame::lame(1.0, p.poisson_ratio).1),
+                    shear(palpate_model::mechanics::lame::lame_by_nu(1.0, p.poisson_ratio).1),
                 ],
                 slot: slot as u32,
                 start: p.start as f32,

@@ -124,7 +124,7 @@ impl Shape for SdfGrid {
         let held = local.clamp(DVec3::ZERO, DVec3::from_array(last.map(|n| n as f64)));
         let cell = [0, 1, 2].map(|a| (held[a].floor() as usize).min(last[a] - 1));
         let xi = held - DVec3::from_array(cell.map(|i| i as f64));
-        let n = palpate_model::grid::shape_functions(xi);
+        let n = palpate_model::cutcells::grid::shape_functions(xi);
         let phi: f64 = cube(cell).iter().zip(n).map(|(c, w)| w * self.values[self.index(*c)]).sum();
         (phi + (local - held).length()) * self.h
     }

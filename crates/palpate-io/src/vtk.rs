@@ -12,7 +12,7 @@ use vtkio::model::{
 /// which runs around the bottom and then around the top (VTK User's Guide, `VTK_HEXAHEDRON`).
 const VTK_ORDER: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// Writes hexahedra with data: `points` [m] shape `[N]`; `hexes` in the order of `palpate_model::grid::CORNERS`; vectors per
+/// Writes hexahedra with data: `points` [m] shape `[N]`; `hexes` in the order of `palpate_model::cutcells::grid::CORNERS`; vectors per
 /// point, shape `[N]` each; numbers per cell, shape `[cells]` each.
 ///
 /// # Errors
@@ -99,7 +99,7 @@ pub fn write_pvd(path: impl AsRef<Path>, frames: &[(f64, String)]) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::grid::CORNERS;
+    use palpate_model::cutcells::grid::CORNERS;
     use vtkio::model::Piece;
 
     /// One unit cell with a displacement per corner.

@@ -2,7 +2,7 @@
 //! Reading and writing the TOML is `palpate-io`'s business.
 
 use crate::effects::Effect;
-use crate::motion::RigidMotion;
+use crate::mechanics::motion::RigidMotion;
 use crate::observation::MarkerRest;
 use crate::params::Layout;
 use crate::shape::TriMesh;

@@ -1,8 +1,8 @@
 //! A fine surface carried by the coarse grid: points of the rest configuration as weights of simulation nodes.
 
 use glam::DVec3;
-use palpate_model::body::Body;
-use palpate_model::grid::shape_functions;
+use palpate_model::cutcells::grid::shape_functions;
+use palpate_model::space::body::Body;
 
 /// Points of the rest configuration that follow the simulation's nodes.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,8 +100,8 @@ fn nearest_cell(body: &Body, cell_at: &[u32], p: DVec3) -> (usize, f64) {
 mod tests {
     use super::*;
     use glam::DMat3;
-    use palpate_model::body::{Band, Cell};
-    use palpate_model::grid::{CORNERS, Grid};
+    use palpate_model::cutcells::grid::{CORNERS, Grid};
+    use palpate_model::space::body::{Band, Cell};
 
     /// Two cells in a row, side 0.1.
     fn body() -> Body {

@@ -12,7 +12,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_er
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::{PlanError, build_plan};
+use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;

@@ -17,7 +17,7 @@ use crate::scatter::{Excess, Scatter};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Snapshot};
 use palpate_io::recording::RecordedCamera;
-use palpate_model::distances::interpolate;
+use palpate_model::cutcells::distances::interpolate;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;

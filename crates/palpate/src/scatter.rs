@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 use palpate_engine::FrameResiduals;
-use palpate_model::kernel;
+use palpate_model::observation::kernel;
 use palpate_model::plan::Plan;
 use std::collections::BTreeMap;
 

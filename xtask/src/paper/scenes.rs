@@ -80,7 +80,7 @@ pub fn creeping_ball(cell: f64) -> Scene {
     s.material.youngs_modulus = 20.0;
     s.material.stiffness_damping = 5.0;
     // The plane of a body of 2000 Pa: one that followed E would be soft enough to be seen.
-    s.planes[0].stiffness = Some(palpate_model::contact::DEFAULT_STIFFNESS * 2000.0 / cell);
+    s.planes[0].stiffness = Some(palpate_model::mechanics::contact::DEFAULT_STIFFNESS * 2000.0 / cell);
     s
 }
 

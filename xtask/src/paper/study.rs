@@ -7,7 +7,7 @@ use palpate_fit::{FitResult, FitScene, FreeParameter, Hooks, Problem, Settings, 
 use palpate_io::recording::Recording;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{CostKind, ObservationSpec, Optimizer, Scene};
 
 /// Metres per count of a depth image: far below every noise studied, and 65535 counts reach past every scene.

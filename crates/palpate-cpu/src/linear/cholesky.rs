@@ -8,7 +8,7 @@ use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCho
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, Mat, Par, Side};
 use glam::DVec3;
-use palpate_model::pattern::BlockRows;
+use palpate_model::space::pattern::BlockRows;
 use std::sync::Arc;
 
 /// Fill-reducing order and structure of the factor, shared by all members and steps.

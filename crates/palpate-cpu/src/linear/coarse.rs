@@ -9,8 +9,8 @@ use super::conjugate_gradient::Precondition;
 use super::jacobi::BlockJacobi;
 use super::matrix::Matrix;
 use glam::{DMat3, DVec3};
-use palpate_model::body::Body;
-use palpate_model::pattern::{BlockRows, Pattern};
+use palpate_model::space::body::Body;
+use palpate_model::space::pattern::{BlockRows, Pattern};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -145,7 +145,7 @@ impl Coarsening {
 }
 
 fn cross(w: DVec3) -> DMat3 {
-    palpate_model::rotation::cross_matrix(w)
+    palpate_model::mechanics::rotation::cross_matrix(w)
 }
 
 /// The factorised stiffness of the groups. It stays a good preconditioner for the neighbouring matrices of one Newton solve.

@@ -4,7 +4,7 @@ use super::conjugate_gradient::Precondition;
 use super::matrix::Matrix;
 use super::vector::{Nodes, dot};
 use glam::{DMat3, DVec3};
-use palpate_model::pattern::BlockRows;
+use palpate_model::space::pattern::BlockRows;
 
 /// Inverted diagonal blocks; also the norm in which residuals are measured.
 #[derive(Clone, Debug)]

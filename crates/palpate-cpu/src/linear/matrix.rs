@@ -2,7 +2,7 @@
 
 use super::simd::wide;
 use glam::{DMat3, DVec3};
-use palpate_model::pattern::BlockRows;
+use palpate_model::space::pattern::BlockRows;
 use rayon::prelude::*;
 
 /// Values of a [`BlockRows`]; row-major blocks: entry (r, c) of a block is the effect of component c on component r.

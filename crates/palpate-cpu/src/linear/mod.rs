@@ -14,9 +14,9 @@ use conjugate_gradient::{CgEnd, Precondition};
 use glam::DVec3;
 use jacobi::BlockJacobi;
 use matrix::{Matrix, Operator, Packed};
-use palpate_model::body::Body;
-use palpate_model::pattern::Pattern;
 use palpate_model::scene::LinearSolver;
+use palpate_model::space::body::Body;
+use palpate_model::space::pattern::Pattern;
 use std::sync::OnceLock;
 
 /// Most CG iterations; a solve that needs more is a symptom.

@@ -7,10 +7,10 @@ use crate::passes::clamps;
 use crate::passes::materials::{CellActing, Materials, cell_laws};
 use crate::passes::supports;
 use glam::DVec3;
-use palpate_model::changes::{self, Changes};
-use palpate_model::corotation::CellPose;
-use palpate_model::elements::Elements;
-use palpate_model::grips::{Grip, Pose};
+use palpate_model::cutcells::corotation::CellPose;
+use palpate_model::cutcells::elements::Elements;
+use palpate_model::params::changes::{self, Changes};
+use palpate_model::params::grips::{Grip, Pose};
 use palpate_model::plan::{Physics, Plan};
 
 /// What a member's effects make of the body; all empty without such effects.

@@ -10,8 +10,8 @@ use crate::passes::cells::{Elasticity, Mix};
 use crate::passes::materials::Materials;
 use crate::passes::posed::{Curvature, Posed};
 use glam::{DMat3, DVec3};
-use palpate_model::corotation::M24;
-use palpate_model::pattern::{Pattern, Places};
+use palpate_model::cutcells::corotation::M24;
+use palpate_model::space::pattern::{Pattern, Places};
 use rayon::prelude::*;
 
 /// Blocks of one part's cells in rows of every other part `[part]`: place in the matrix, and block.

@@ -2,7 +2,7 @@
 //!
 //! Dynamic (a step of the θ-scheme) and static problems are the same sum with and without inertia:
 //! `r(u₁) = M[(1/(θΔt²))(u₁−u₀) − v₀/(θΔt)] + αM(u₁−u₀)/Δt + cells(u₁,u₀) + ghost + clamps(u₁) + contact(u₁) − weight`.
-//! Contact acts along the way between the states (`palpate_model::contact`): its work is never less than its energy's change, so it
+//! Contact acts along the way between the states (`palpate_model::mechanics::contact`): its work is never less than its energy's change, so it
 //! limits no time step. Clamps are weighted like the cells: Nitsche's traction terms are bounded by the cells' energy only where
 //! both see the same state.
 
@@ -15,10 +15,10 @@ use crate::passes::points::Acting;
 use crate::passes::posed::{Before, Curvature, Posed};
 use crate::passes::supports::{self, PlaneNow};
 use glam::{DMat3, DVec3};
-use palpate_model::contact;
-use palpate_model::elements::Elements;
-use palpate_model::pattern::{Pattern, Places};
+use palpate_model::cutcells::elements::Elements;
+use palpate_model::mechanics::contact;
 use palpate_model::plan::{Physics, Plan};
+use palpate_model::space::pattern::{Pattern, Places};
 
 /// Factors of the inertia terms; `None` in a static problem.
 #[derive(Clone, Copy, Debug)]

@@ -9,11 +9,11 @@
 use crate::linear::simd::wide;
 use crate::linear::vector::Nodes;
 use glam::DVec3;
-use palpate_model::body::Body;
-use palpate_model::corotation::{CellPose, M24, V24, multiply};
-use palpate_model::elements::Elements;
-use palpate_model::pattern::Pattern;
+use palpate_model::cutcells::corotation::{CellPose, M24, V24, multiply};
+use palpate_model::cutcells::elements::Elements;
 use palpate_model::scene::RotationUpdate;
+use palpate_model::space::body::Body;
+use palpate_model::space::pattern::Pattern;
 use rayon::prelude::*;
 
 /// Cells that one task treats in a row.

@@ -6,12 +6,12 @@
 
 use crate::passes::cells::Matrices;
 use glam::{DMat3, DVec3};
-use palpate_model::body::Body;
-use palpate_model::changes::Changes;
-use palpate_model::corotation::{M24, V24, corners, flatten, multiply};
-use palpate_model::elements::Elements;
-use palpate_model::grips::{Grip, Grips, Pose};
+use palpate_model::cutcells::corotation::{M24, V24, corners, flatten, multiply};
+use palpate_model::cutcells::elements::Elements;
+use palpate_model::params::changes::Changes;
+use palpate_model::params::grips::{Grip, Grips, Pose};
 use palpate_model::plan::{ClampCell, Physics, Plan, clamp_pose};
+use palpate_model::space::body::Body;
 
 /// A member's clamps.
 #[derive(Clone, Copy)]

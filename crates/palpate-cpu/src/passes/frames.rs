@@ -9,8 +9,8 @@ use crate::passes::matching::{BandLookup, Match, PointHash, Seen, extend, extend
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, ResidualRow, Rows, Source};
 use palpate_model::effects::sensors::Sensors;
-pub use palpate_model::instant::{Instant, instants};
-use palpate_model::kernel;
+pub use palpate_model::observation::instant::{Instant, instants};
+use palpate_model::observation::kernel;
 use palpate_model::plan::Plan;
 
 /// Σ factor · vector over u₀, v₀, u₁, v₁.

@@ -1,9 +1,9 @@
 //! Markers: carried rigidly by the surface point that they are attached to, also on a stalk.
 
 use glam::{DMat3, DVec3};
-use palpate_model::body::Body;
+use palpate_model::mechanics::rotation::{Polar, cross_matrix};
 use palpate_model::observation::MarkerSite;
-use palpate_model::rotation::{Polar, cross_matrix};
+use palpate_model::space::body::Body;
 
 /// A marker at one state.
 pub struct Carried {
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
     use crate::collapse_tests::scene;
     use palpate_model::observation::{MarkerRest, Observation};
-    use palpate_model::plan_build::build_plan;
+    use palpate_model::plan::build::build_plan;
     use palpate_model::scene::{Analytic, BodySource};
 
     #[test]

@@ -5,12 +5,12 @@
 
 use crate::passes::cells::Corners;
 use glam::DVec3;
-use palpate_model::body::Body;
-use palpate_model::distances::interpolate;
-use palpate_model::front::Sight;
-use palpate_model::grid::shape_functions;
+use palpate_model::cutcells::distances::interpolate;
+use palpate_model::cutcells::front::Sight;
+use palpate_model::cutcells::grid::shape_functions;
+use palpate_model::cutcells::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back};
 use palpate_model::observation::{Camera, ObservedPoint};
-use palpate_model::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back};
+use palpate_model::space::body::Body;
 use rayon::prelude::*;
 
 /// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
@@ -219,9 +219,9 @@ pub fn match_points(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::body::SUBDIVISIONS;
     use palpate_model::scene::Analytic;
     use palpate_model::shape::Placed;
+    use palpate_model::space::body::SUBDIVISIONS;
 
     /// Cells of the band, and how many points they are handed and how many lie in their boxes, over the number of points.
     fn asked(h: f64, band: f64) -> (usize, f64, f64) {

@@ -6,10 +6,10 @@
 
 use crate::passes::cells::{Corners, Elasticity, Mix, pick};
 use glam::DVec3;
-use palpate_model::corotation::{CellPose, M24, V24, flatten, multiply};
+use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply};
+use palpate_model::cutcells::grid::SIGNS;
 use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
-use palpate_model::grid::SIGNS;
 use palpate_model::plan::{Physics, Plan};
 
 /// A law of cells with its parameters.

@@ -7,9 +7,9 @@ use crate::linear::matrix::Matrix;
 use crate::passes::balance::{Balance, States};
 use crate::passes::supports::PlaneNow;
 use glam::{DMat3, DVec3};
-use palpate_model::contact;
 use palpate_model::effects::law::{COMMON, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
 use palpate_model::effects::{Law, Site};
+use palpate_model::mechanics::contact;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::{Physics, Plan};
 

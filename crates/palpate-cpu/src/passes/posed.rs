@@ -6,7 +6,7 @@ use crate::linear::vector::{Nodes, dot};
 use crate::passes::cells::{CHUNK, Corners, Elasticity, Mix, corners, dot24, times, zeros};
 use faer::{Mat, Side};
 use glam::{DMat3, DVec3};
-use palpate_model::corotation::{CellPose, M24, V24};
+use palpate_model::cutcells::corotation::{CellPose, M24, V24};
 use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 

@@ -1,9 +1,9 @@
 //! Ghost penalty and contact planes: what pushes besides cells, clamps and inertia.
 
 use glam::DVec3;
-use palpate_model::body::{Body, Patch};
-use palpate_model::contact;
-pub use palpate_model::plane::{PlaneNow, planes};
+use palpate_model::mechanics::contact;
+pub use palpate_model::mechanics::plane::{PlaneNow, planes};
+use palpate_model::space::body::{Body, Patch};
 
 /// Adds scale · Σ weight (u_a − 2u_b + u_c) of the ghost lines: the product with their matrix.
 pub fn ghost_product(body: &Body, scale: f64, u: &[DVec3], out: &mut [DVec3]) {

@@ -5,10 +5,10 @@ use crate::error::GpuError;
 use crate::layout::{ClampPose, HoldSlope};
 use crate::pipelines::shared::structs::FIELD_GRIPS;
 use glam::{DMat3, DVec3};
-use palpate_model::changes;
+use palpate_model::cutcells::elements::Elements;
 use palpate_model::effects::field::Spot;
-use palpate_model::elements::Elements;
-use palpate_model::grips::{Grip, Grips, Pose};
+use palpate_model::params::changes;
+use palpate_model::params::grips::{Grip, Grips, Pose};
 use palpate_model::plan::{Physics, Plan, clamp_pose};
 
 /// Numbers of a [`HoldSlope`].

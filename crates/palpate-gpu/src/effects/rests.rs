@@ -4,9 +4,9 @@
 use super::Effects;
 use crate::pipelines::shared::structs::FIELD_REST;
 use glam::DVec3;
-use palpate_model::changes::{self, Changes};
-use palpate_model::corotation::CellPose;
+use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::effects::Site;
+use palpate_model::params::changes::{self, Changes};
 use palpate_model::plan::{Physics, Plan};
 
 fn put(out: &mut Vec<f32>, v: &[f64]) {

@@ -5,7 +5,7 @@ use super::tables::{BandTables, SiteTables};
 use super::{MOST_LOOPS, PARTS};
 use crate::error::GpuError;
 use crate::layout::Sight;
-use palpate_model::pullback::ITERATIONS;
+use palpate_model::cutcells::pullback::ITERATIONS;
 
 /// Most derivatives of an evaluation: a workgroup of `weigh_rows` goes through as many rows of the Gauss–Newton matrix.
 pub(crate) const MOST_DIRECTIONS: u64 = 256;

@@ -9,13 +9,13 @@ use glam::DVec3;
 use palpate_cpu::passes::frames::{self, Look};
 use palpate_cpu::passes::matching::{BandLookup, PointHash};
 use palpate_engine::{Backend, ParamBatch};
-use palpate_model::body::Body;
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::instant::instants;
 use palpate_model::observation::Observation;
+use palpate_model::observation::instant::instants;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Analytic;
+use palpate_model::space::body::Body;
 use std::sync::Arc;
 
 fn body(plan: &mut Plan) -> &mut Body {

@@ -11,7 +11,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout};
 use palpate_model::effects::Effect;
-use palpate_model::kernel;
+use palpate_model::observation::kernel;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource, InitialShape};

@@ -1,7 +1,7 @@
 //! Which frames belong to which step, member by member, in rounds that hold at most one frame of each member.
 
 use crate::layout::Look;
-use palpate_model::instant::instants;
+use palpate_model::observation::instant::instants;
 use palpate_model::plan::Plan;
 
 /// Looks that are worked on together: `count` of them from `first` on in the buffer of all looks.
@@ -33,7 +33,7 @@ impl Agenda {
                 .iter()
                 .enumerate()
                 .map(|(member, &start)| {
-                    let look = |at: &palpate_model::instant::Instant| Look {
+                    let look = |at: &palpate_model::observation::instant::Instant| Look {
                         member: member as u32,
                         frame: at.frame as u32,
                         shot: at.frame as u32,

@@ -14,11 +14,11 @@ use glam::DVec3;
 use palpate_cpu::passes::frames::{self, Look};
 use palpate_cpu::passes::matching::{BandLookup, PointHash, extend};
 use palpate_engine::{Backend, ParamBatch};
+use palpate_model::cutcells::pullback::{TURNED_AWAY, pull_back};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
-use palpate_model::pullback::{TURNED_AWAY, pull_back};
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::Analytic;
 use std::sync::Arc;
 
@@ -99,7 +99,7 @@ fn holders(plan: &Plan, u: &[DVec3], point: &ObservedPoint) -> Vec<Holder> {
     let (body, all) = (&*plan.body, extend(&plan.body, u));
     let rest = |a: usize| if a < body.nodes.len() { body.nodes[a] } else { body.band.nodes[a - body.nodes.len()] };
     let line = (point.position - plan.observation.cameras[0].center).normalize();
-    let hold = |(c, cell): (usize, &palpate_model::body::BandCell)| {
+    let hold = |(c, cell): (usize, &palpate_model::space::body::BandCell)| {
         let place = pull_back(&cell.nodes.map(|a| rest(a as usize) + all[a as usize]), &cell.sdf, point.position)?;
         Some((c as u32, place.phi.abs(), place.gradient.dot(line) <= TURNED_AWAY * place.gradient.length()))
     };

@@ -9,7 +9,7 @@ use crate::pipelines::shared::structs::NONE;
 use crate::world::{Buffers, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, Source};
-use palpate_model::kernel;
+use palpate_model::observation::kernel;
 
 impl Observer {
     /// What a tally of `members` holds of observations along `directions` directions: buffers, and their bytes.

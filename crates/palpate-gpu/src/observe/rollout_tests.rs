@@ -12,7 +12,7 @@ use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, Scene};
 use std::ops::ControlFlow;
 
@@ -38,7 +38,7 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     let (mut frames, mut noise) = (Vec::new(), Noise(11));
     let theta = bare.theta.clone();
     let visit = |_: usize, s: palpate_engine::Snapshot, _: Vec<palpate_engine::FrameResiduals>| {
-        let place = |p: &palpate_model::body::Patch| {
+        let place = |p: &palpate_model::space::body::Patch| {
             let nodes = &body.cells[p.cell as usize].nodes;
             p.point + (0..8).map(|i| p.weights[i] * s.displacement[nodes[i] as usize]).sum::<DVec3>()
         };

@@ -11,11 +11,11 @@ use palpate_cpu::passes::matching::{BandLookup, PointHash};
 use palpate_engine::{Backend, Evaluation, ParamBatch};
 use palpate_model::effects::Effect;
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::instant::instants;
+use palpate_model::observation::instant::instants;
 use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, BodySource, CostKind, ObservationSpec, Resolution, Scene};
 
 /// Cost, sums and derivatives agree to this much of their size. Rounding of φ is some 1e-7 of a cell, 1e-6 of a residual of a tenth

@@ -1,4 +1,4 @@
-//! Cells that are turned inside out, where the barrier of `palpate_model::corotation::inversion` acts: passes, states and evaluations
+//! Cells that are turned inside out, where the barrier of `palpate_model::cutcells::corotation::inversion` acts: passes, states and evaluations
 //! against the CPU, each with a device whose barrier is one percent too stiff, which must be seen.
 
 use super::effects::Noise;
@@ -12,12 +12,12 @@ use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_cpu::passes::cells::corners;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
-use palpate_model::corotation::CellPose;
-use palpate_model::motion::RigidMotion;
+use palpate_model::cutcells::corotation::CellPose;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{Frame, Observation};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, BodySource, Clamp, Scene, Time};
 use std::sync::{Arc, OnceLock};
 

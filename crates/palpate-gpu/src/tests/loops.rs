@@ -6,7 +6,7 @@ use crate::observe::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::pipelines::PASSES;
 use crate::pipelines::shared::laws;
 use crate::world::KINDS;
-use palpate_model::{front, pullback};
+use palpate_model::cutcells::{front, pullback};
 use std::collections::HashMap;
 
 /// Iterations of a loop by its header (variable names and indices left out), or `None` for a loop that nobody knows.
@@ -33,7 +33,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("place_rows[") => 8,
         // The new and the old state.
         () if has("instant < end") => 2,
-        () if has("< instant_count") => palpate_model::contact::INSTANTS as u64,
+        () if has("< instant_count") => palpate_model::mechanics::contact::INSTANTS as u64,
         () if has("hold_start") || has("patch_start") => most.supports,
         () if has("max(shape.planes, 1u)") => most.pressed.max(1),
         () if has("shape.planes") => most.planes,

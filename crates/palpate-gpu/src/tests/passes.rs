@@ -14,14 +14,14 @@ use palpate_cpu::passes::balance::{Balance, Inertia, States};
 use palpate_cpu::passes::cells::{Mix, corners};
 use palpate_cpu::passes::points::acting;
 use palpate_engine::{Backend, ParamBatch};
-use palpate_model::corotation::{CellPose, multiply};
+use palpate_model::cutcells::corotation::{CellPose, multiply};
+use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::{self, Effect};
-use palpate_model::elements::{Classes, Elements};
+use palpate_model::mechanics::plane::planes;
 use palpate_model::params::ParamKey;
-use palpate_model::pattern::{Pattern, Places};
 use palpate_model::plan::{Physics, Plan};
-use palpate_model::plane::planes;
 use palpate_model::scene::Scene;
+use palpate_model::space::pattern::{Pattern, Places};
 
 /// What one pass computed: its name, numbers, and the part of the largest number that may differ.
 pub(super) type Part = (&'static str, Vec<f64>, f64);
@@ -377,7 +377,7 @@ fn passes_agree_with_the_cpu_and_one_percent_shows() {
     let plan = plan(&scene());
     let mut right = Exact::new(&plan, given);
     // Stiffness varies over the body: the CPU's cells by themselves were computed without.
-    let factors = palpate_model::changes::Changes::new(&plan, &Physics::new(&plan.layout, &plan.theta)).modulus;
+    let factors = palpate_model::params::changes::Changes::new(&plan, &Physics::new(&plan.layout, &plan.theta)).modulus;
     if let Some(factors) = factors {
         for (f, factor) in right.parts[1].1.chunks_exact_mut(24).zip(factors) {
             f.iter_mut().for_each(|f| *f *= factor);

@@ -3,11 +3,11 @@
 use crate::device::{Choice, Gpu, Lanes};
 use crate::error::GpuError;
 use glam::{DAffine3, DQuat, DVec3};
-use palpate_model::motion::RigidMotion;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan_build::build_plan;
+use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};

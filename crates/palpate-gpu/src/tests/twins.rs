@@ -75,7 +75,7 @@ fn laws_and_their_twins_state_the_same_constants() {
     println!("{laws} laws with {named} constants");
     assert!(laws >= 14 && named >= 5, "{laws} {named}");
     // Of contact the rest comes from the host.
-    let (own, twin) = (law_of(&read("crates/palpate-model/src/contact.rs")), read("shaders/shared/contact.wgsl"));
+    let (own, twin) = (law_of(&read("crates/palpate-model/src/mechanics/contact.rs")), read("shaders/shared/contact.wgsl"));
     assert!(small(&twin).iter().all(|n| small(&own).contains(n)) && !small(&twin).is_empty(), "{:?}", small(&twin));
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::InputError;
 use glam::{DQuat, DVec3};
-use palpate_model::motion::RigidMotion;
+use palpate_model::mechanics::motion::RigidMotion;
 use std::path::Path;
 
 const COLUMNS: [&str; 8] = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"];

@@ -6,9 +6,9 @@ use crate::error::{InputError, number};
 use crate::mesh::{LARGEST_SIDE, read_repaired};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
-use palpate_model::body::unit_hint;
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 use palpate_model::shape::Repaired;
+use palpate_model::space::body::unit_hint;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;

@@ -1,7 +1,7 @@
 //! A clamp whose edge lies elsewhere: the held region ends `shift` further along the body than its box says, or before it.
 //!
 //! The faces of the clamp's box that cut through the body move along their outward normals; faces beside the body stay. What the
-//! grown box holds of surface and body is integrated exactly ([`crate::clamp_edge`]), so the held shares of the cells at the edge, and
+//! grown box holds of surface and body is integrated exactly ([`crate::cutcells::clamp_edge`]), so the held shares of the cells at the edge, and
 //! with them the motion, depend smoothly on the shift.
 
 use super::field::{FieldLaw, Spot};

@@ -7,7 +7,7 @@
 use super::field::{FieldLaw, Spot};
 use super::law::Number;
 use super::{EffectParam, Family, Law, Site, Trial, component};
-use crate::changes::HOLD;
+use crate::params::changes::HOLD;
 
 const OFFSET: &str = "displacement of the clamps";
 const TURN: &str = "rotation of the clamps about their middle";

@@ -6,7 +6,7 @@
 use super::field::{FieldLaw, Spot};
 use super::law::Number;
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
-use crate::changes::HOLD;
+use crate::params::changes::HOLD;
 
 pub(super) const LAW: Law = Law {
     kind: "compliant-clamp",

@@ -1,12 +1,12 @@
 //! Contact that is stiffer or softer than the plane's stated stiffness: a padded floor, a skin that gives before the body does.
 //!
-//! Adds c times the contact energy of `palpate_model::contact`, so that every pressure is (1 + c) times the stated one.
+//! Adds c times the contact energy of `palpate_model::mechanics::contact`, so that every pressure is (1 + c) times the stated one.
 //! Relative to the stiffness in use, whether the scene states it or it follows Young's modulus. Valid for all c above −1; the
 //! layer keeps its width, so a soft floor lets the body sink in by its pressure over the stiffness.
 
 use super::law::{Input, Number, Place, PointLaw, along_way};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
-use crate::contact;
+use crate::mechanics::contact;
 use crate::params::Transform;
 
 pub(super) const LAW: Law = Law {

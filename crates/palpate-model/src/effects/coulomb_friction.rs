@@ -6,7 +6,7 @@
 
 use super::law::{Input, Number, Place, PointLaw, dot, sub};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, number};
-use crate::contact;
+use crate::mechanics::contact;
 
 /// Sliding speed [m/s] below which friction is proportional to it: far slower than anything a camera sees in a frame.
 const CREEP: f64 = 5e-3;

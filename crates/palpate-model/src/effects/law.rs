@@ -6,7 +6,7 @@
 //! derivatives are therefore symmetric, Newton's line search has something to descend, and the adjoint needs no transposed
 //! matrix. Derivatives come from hyper-dual numbers (Fike & Alonso, AIAA 2011-886), exact to rounding.
 
-use crate::contact;
+use crate::mechanics::contact;
 use glam::DVec3;
 use num_dual::{DualNum, HyperDual64};
 
@@ -142,7 +142,7 @@ impl<'a, D: Number> Input<'a, D> {
     }
 }
 
-/// Potential of what acts along the way from the old `gap` [m] to the new one as contact does (`crate::contact`), from its `energy` at
+/// Potential of what acts along the way from the old `gap` [m] to the new one as contact does (`crate::mechanics::contact`), from its `energy` at
 /// a gap: the derivative by the new gap is the mean of the energy's.
 pub fn along_way<D: Number>(place: &Place, [old, new]: [D; 2], energy: impl Fn(D) -> D) -> D {
     let acting = contact::instants(place.theta()).into_iter().filter(|i| i.0 > 0.0);

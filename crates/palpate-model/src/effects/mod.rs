@@ -44,8 +44,8 @@ mod structural_damping;
 mod transverse_anisotropy;
 mod two_part_stiffness;
 
-use crate::changes::HOLD;
 use crate::params::Transform;
+use crate::params::changes::HOLD;
 use cell::Cell;
 use field::Field;
 use law::Point;
@@ -175,7 +175,7 @@ pub enum Site {
     Cells(&'static dyn Cell),
     /// The stress-free shape: displacement of every node from the shape given.
     Rest(&'static dyn Field<3>),
-    /// Every clamp: numbers as in [`crate::changes::HOLD`].
+    /// Every clamp: numbers as in [`crate::params::changes::HOLD`].
     Clamps(&'static dyn Field<HOLD>),
     /// What every clamp holds: how far its edges are shifted along the body [m].
     Edges(&'static dyn Field<1>),

@@ -1,6 +1,6 @@
 //! A plane that the scene does not know: a wall, a table's edge, a tilted floor. Place and tilt are parameters.
 //!
-//! The contact law of `palpate_model::contact`, as for the scene's own planes, with `stiffness` times their default
+//! The contact law of `palpate_model::mechanics::contact`, as for the scene's own planes, with `stiffness` times their default
 //! penalty. The body stays on the side that the normal points to; of that only the direction counts (two angles would leave a fit stuck
 //! where the normal is their pole). The plane lies at `distance` from `point` against it, so that turning it leaves it near the body.
 //! Without friction.
@@ -8,7 +8,7 @@
 use super::field::along;
 use super::law::{Input, Number, Place, PointLaw, along_way, sub};
 use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, direction, number};
-use crate::contact;
+use crate::mechanics::contact;
 
 pub(super) const LAW: Law = Law {
     kind: "second-plane",

@@ -2,9 +2,9 @@
 
 use super::sensors::{MOST, Sensors};
 use super::{ALL, Law, Site, Unstated};
+use crate::mechanics::rotation::tests::Noise;
 use crate::observation::{Camera, ObservedPoint};
 use crate::params::{Layout, ParamKey};
-use crate::rotation::tests::Noise;
 use glam::{DAffine3, DMat3, DVec3};
 
 fn reading_laws() -> Vec<usize> {

@@ -2,7 +2,7 @@
 
 use super::law::{COMMON, PLANE, Place, Point, STIFFNESS, TIME};
 use super::{ALL, Law, Site, Unstated};
-use crate::rotation::tests::Noise;
+use crate::mechanics::rotation::tests::Noise;
 use glam::DVec3;
 
 /// The point laws of the table.

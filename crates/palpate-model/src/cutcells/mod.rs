@@ -1,0 +1,15 @@
+//! The privileged domain: hexahedra of a lattice, cut by the body's surface, enhanced and corotated.
+//!
+//! Invariant: outside this room (and its twins in the backends) nobody knows of eight corners or of a lattice spacing.
+
+pub mod clamp_edge;
+pub mod corotation;
+pub mod cut;
+pub mod distances;
+pub mod element;
+pub mod elements;
+pub mod extension;
+pub mod front;
+pub mod grid;
+pub mod held;
+pub mod pullback;

@@ -1,0 +1,246 @@
+//! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
+
+use crate::cutcells::clamp_edge::Edge;
+use crate::cutcells::cut::{ClipBox, HeldMoments, Lattice, held_moments};
+use crate::cutcells::extension::{NodeLookup, active_cell, affine_weights};
+use crate::cutcells::grid::shape_functions;
+use crate::cutcells::held::Pins;
+use crate::effects::check_choices;
+use crate::mechanics::contact;
+use crate::observation::{MarkerRest, MarkerSite, Observation};
+use crate::params::ParamKey;
+use crate::plan::{ClampCell, ClampSite, Clock, MassSite, Plan, PlaneSite};
+use crate::scene::{Clamp, Inertia, Resolution, Scene};
+use crate::shape::{Shape, shape_of};
+use crate::space::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
+use glam::{DAffine3, DVec3};
+use std::sync::Arc;
+
+/// Radius of the fit that a marker's rotation is taken from, in cells: the smallest that spans a cut cell's neighbourhood.
+const MARKER_RADIUS: f64 = 2.0;
+
+/// Why a scene gives no plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key}: {message}")]
+pub struct PlanError {
+    /// Key of the scene (`clamp.0.box`) or recording (`markers.rest "tip"`) concerned.
+    pub key: String,
+    /// What is wrong and what is allowed, with numbers.
+    pub message: String,
+}
+
+fn error(key: impl Into<String>, message: String) -> PlanError {
+    PlanError { key: key.into(), message }
+}
+
+/// Cuts a scene's body. The shape is returned with it.
+pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanError> {
+    let (parts, shape) = build_parts(scene)?;
+    Ok((Arc::new(parts.body), shape))
+}
+
+fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
+    let shape = shape_of(&scene.object);
+    let (min, max) = shape.bounds();
+    let (key, h) = match scene.object.resolution {
+        Resolution::CellSize(h) => ("object.cell_size", h),
+        Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
+    };
+    let mut parts = body::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
+        let key = if matches!(e, BodyError::Empty { .. }) { "object" } else { key };
+        error(key, e.to_string())
+    })?;
+    // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
+    if scene.clamps.is_empty() && contact::acts_along(scene.time.theta) {
+        parts.body.mend_moments();
+    }
+    Ok((parts, shape))
+}
+
+/// Width of the band in cells; without observation just enough to draw the surface.
+fn band_cells(scene: &Scene) -> f64 {
+    scene.observation.as_ref().map_or(1.0, |o| o.band)
+}
+
+/// Everything a backend needs for a scene. `observation` comes with frames, cameras and noise; its markers are filled here, one per
+/// entry of `marker_rest` in the same order.
+pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
+    let (parts, shape) = build_parts(scene)?;
+    let clamps =
+        scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
+    let body = Arc::new(parts.body);
+    let masses = scene
+        .masses
+        .iter()
+        .enumerate()
+        .map(|(i, m)| mass_site(&format!("mass.{i}.point"), m.point, &body))
+        .collect::<Result<Vec<_>, _>>()?;
+    let lookup = NodeLookup::new(&body);
+    observation.markers =
+        marker_rest.iter().map(|m| marker_site(m, &body, &lookup, shape.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    // A scene that is only simulated concerns no camera.
+    if !observation.frames.is_empty() {
+        check_choices(&scene.effects, observation.cameras.len(), observation.markers.len()).map_err(|(k, m)| error(k, m))?;
+    }
+    let planes = scene
+        .planes
+        .iter()
+        .map(|p| PlaneSite { polar_axis: PlaneSite::polar_axis_for(p.normal), stiffness: p.stiffness })
+        .collect::<Vec<_>>();
+    Ok(Plan {
+        theta: theta(scene, &planes, &body),
+        layout: scene.layout(),
+        planes,
+        clamps,
+        masses,
+        clock: Clock { step: scene.time.step, steps: scene.time.steps, theta: scene.time.theta },
+        initial: scene.initial.state,
+        pivot: scene.initial.pivot.unwrap_or(body.center),
+        observation: Arc::new(observation),
+        band: band_cells(scene) * body.grid.h,
+        solver: scene.solver,
+        body,
+    })
+}
+
+/// The scene's parameter values in the order of its layout.
+fn theta(scene: &Scene, planes: &[PlaneSite], body: &Body) -> Vec<f64> {
+    let m = &scene.material;
+    let plane = |i: u16| (&scene.planes[i as usize], &planes[i as usize]);
+    let value = |key: &ParamKey| match *key {
+        ParamKey::YoungsModulus => m.youngs_modulus,
+        ParamKey::PoissonRatio => m.poisson_ratio,
+        ParamKey::Density => match m.inertia {
+            Inertia::Density(d) => d,
+            Inertia::Mass(mass) => mass / body.volume,
+        },
+        ParamKey::MassDamping => m.mass_damping,
+        ParamKey::StiffnessDamping => m.stiffness_damping,
+        ParamKey::Gravity(a) => scene.gravity[a as usize],
+        ParamKey::Velocity(a) => scene.initial.velocity[a as usize],
+        ParamKey::AngularVelocity(a) => scene.initial.angular_velocity[a as usize],
+        ParamKey::TimeStart => scene.time.start,
+        ParamKey::PlaneHeight(i) => plane(i).0.normal.dot(plane(i).0.point),
+        ParamKey::PlaneTheta(i) => plane(i).1.angles(plane(i).0.normal).0,
+        ParamKey::PlanePhi(i) => plane(i).1.angles(plane(i).0.normal).1,
+        ParamKey::PointMass(i) => scene.masses[i as usize].mass,
+        ParamKey::Effect { effect, slot, .. } => scene.effects[effect as usize].value(slot as usize, body.center),
+    };
+    scene.layout().keys.iter().map(value).collect()
+}
+
+fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {
+    let body = &parts.body;
+    let (grid, h) = (&body.grid, body.grid.h);
+    let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
+    let region = ClipBox { to_frame, min: clamp.min, max: clamp.max };
+    let distance = |p: DVec3| shape.signed_distance(p);
+    let lattice = Lattice { distance: &distance, h, subdivisions: SUBDIVISIONS };
+    let misses = |c: [usize; 3]| region.misses(grid.position(c) + 0.5 * h, 0.5 * 3f64.sqrt() * h * 1.01);
+
+    let mut held: Vec<Option<HeldMoments>> = vec![None; body.cells.len()];
+    for (n, cell) in body.cells.iter().enumerate().filter(|(_, c)| !misses(c.lattice)) {
+        let world = body::world_cell(grid, cell.lattice);
+        // A full cell may still have surface on its faces; only cells away from the surface take the short way.
+        let deep = shape.signed_distance(grid.position(cell.lattice) + 0.5 * h) < -0.5 * 3f64.sqrt() * h * 1.01;
+        held_moments(&lattice, world, world, deep, &region, held[n].get_or_insert_default());
+    }
+    for &(from, to) in parts.merged.iter().filter(|(c, _)| !misses(*c)) {
+        let (cell, basis) = (body::world_cell(grid, from), body::world_cell(grid, body.cells[to as usize].lattice));
+        held_moments(&lattice, cell, basis, false, &region, held[to as usize].get_or_insert_default());
+    }
+    let mut cells: Vec<ClampCell> = held
+        .into_iter()
+        .enumerate()
+        .filter_map(|(n, m)| Some((n, m?)))
+        // Rounding of a box that only touches a cell's face holds nothing.
+        .filter(|(_, m)| m.area() > 1e-9 * h * h || m.volume() > 1e-9 * h.powi(3))
+        .map(|(n, m)| ClampCell::new(body, n as u32, &m))
+        .collect();
+    if cells.is_empty() {
+        let (lo, hi) = shape.bounds();
+        return Err(error(
+            format!("clamp.{i}.box"),
+            format!(
+                "the box from {} to {} m ({}) holds no part of the body, which lies between {lo} and {hi} m (world); \
+                 move or enlarge the box",
+                clamp.min,
+                clamp.max,
+                if clamp.object_frame { "in the object's own frame" } else { "world" }
+            ),
+        ));
+    }
+    let pins = Pins::new(body, cells.iter());
+    cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));
+    let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
+    Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })
+}
+
+fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<MassSite, PlanError> {
+    if let Some((cell, xi)) = active_cell(body, point) {
+        return Ok(MassSite { nodes: body.cells[cell].nodes, weights: shape_functions(xi) });
+    }
+    let h = body.grid.h;
+    let local = |c: &body::Cell| (point - body.grid.position(c.lattice)) / h;
+    let gap = |c: &body::Cell| (local(c) - local(c).clamp(DVec3::ZERO, DVec3::ONE)).length();
+    let nearest = body.cells.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
+    match nearest {
+        Some(c) if gap(c) <= 1.0 => {
+            Ok(MassSite { nodes: c.nodes, weights: shape_functions(local(c).clamp(DVec3::ZERO, DVec3::ONE)) })
+        }
+        _ => Err(error(
+            key,
+            format!(
+                "{point} m lies {:.4} m away from the body; a point mass must lie on it or within one cell ({h} m)",
+                nearest.map_or(f64::INFINITY, gap) * h
+            ),
+        )),
+    }
+}
+
+/// Where markers sit on a body, for a recording that is to be made.
+///
+/// # Errors
+/// A marker that lies far from the surface.
+pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
+    let lookup = NodeLookup::new(body);
+    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
+}
+
+fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
+    let h = body.grid.h;
+    let surface = m.surface.unwrap_or_else(|| shape.closest_point(m.position));
+    let (min, max) = shape.bounds();
+    // Scans and hand-measured points are off by millimetres, not by a large part of the body.
+    let allowed = (0.1 * (max - min).length()).max(2.0 * h);
+    let (key, point) = if m.surface.is_some() { ("surface", surface) } else { ("position", m.position) };
+    let away = shape.signed_distance(point);
+    if !(away.is_finite() && m.position.is_finite()) || (m.surface.is_some() && away.abs() > allowed) {
+        return Err(error(
+            format!("markers.rest \"{}\".{key}", m.name),
+            format!("{point} m lies {:.4} m from the body's surface; allowed are {allowed:.4} m", away.abs()),
+        ));
+    }
+    let (stalk, longest) = ((m.position - surface).length(), (max - min).length());
+    if stalk > longest {
+        return Err(error(
+            format!("markers.rest \"{}\".position", m.name),
+            format!(
+                "{} m lies {stalk:.4} m from where it is attached to the body; a stalk may be as long as the body's diagonal, {longest:.4} m",
+                m.position
+            ),
+        ));
+    }
+    let w = affine_weights(body, lookup, surface, MARKER_RADIUS * h);
+    Ok(MarkerSite {
+        name: m.name.clone(),
+        nodes: w.nodes,
+        position_weights: w.position_weights,
+        gradient_weights: w.gradient_weights,
+        stalk: m.position - surface,
+    })
+}
+
+#[cfg(test)]
+#[path = "build_tests.rs"]
+mod tests;

@@ -1,0 +1,257 @@
+//! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
+
+pub mod build;
+
+use crate::cutcells::clamp_edge::Edge;
+use crate::cutcells::cut::HeldMoments;
+use crate::cutcells::held::FreePart;
+use crate::mechanics::motion::RigidMotion;
+use crate::observation::Observation;
+use crate::params::{Layout, ParamKey};
+use crate::scene::{InitialShape, Solver};
+use crate::space::body::Body;
+use glam::{DMat3, DVec3};
+use std::sync::Arc;
+
+/// A body that has moved this many times its own size has left the world.
+pub const WORLD_SIZE: f64 = 1000.0;
+/// Newton iterations that a static problem has at least: it starts far from its solution.
+pub const STATIC_ITERATIONS: usize = 200;
+
+/// A batch's common part: geometry, clock, observations. Members differ only in θ.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The body on its grid.
+    pub body: Arc<Body>,
+    /// Order of θ.
+    pub layout: Layout,
+    /// The scene's own parameter values [P].
+    pub theta: Vec<f64>,
+    /// Contact planes.
+    pub planes: Vec<PlaneSite>,
+    /// Held regions.
+    pub clamps: Vec<ClampSite>,
+    /// Point masses.
+    pub masses: Vec<MassSite>,
+    /// Time steps.
+    pub clock: Clock,
+    /// Shape at the start.
+    pub initial: InitialShape,
+    /// Centre of the initial spin [m].
+    pub pivot: DVec3,
+    /// What was measured.
+    pub observation: Arc<Observation>,
+    /// Half width of the cost's band φ_max [m].
+    pub band: f64,
+    /// Numerical choices.
+    pub solver: Solver,
+}
+
+/// A contact plane's constant part; height and angles are parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneSite {
+    /// Axis (0 to 2) that θ is measured from: normal = cos θ e_p + sin θ (cos φ e_{p+1} + sin φ e_{p+2}).
+    pub polar_axis: usize,
+    /// Fixed penalty stiffness [Pa/m], or `None`: [`crate::mechanics::contact::DEFAULT_STIFFNESS`] · E / h.
+    pub stiffness: Option<f64>,
+}
+
+/// A held region: per-cell weights of Nitsche's terms and of the held volume.
+#[derive(Clone)]
+pub struct ClampSite {
+    /// Cells with surface or volume in the region, in increasing order.
+    pub cells: Vec<ClampCell>,
+    /// Prescribed motion; `None` = held still.
+    pub motion: Option<RigidMotion>,
+    /// What is held when an effect moves the region's edge.
+    pub edge: Arc<Edge>,
+}
+
+impl std::fmt::Debug for ClampSite {
+    /// Without the edge, which follows from the rest and the body.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_struct("ClampSite").field("cells", &self.cells).field("motion", &self.motion).finish()
+    }
+}
+
+/// One cell of a held region.
+#[derive(Clone, Debug)]
+pub struct ClampCell {
+    /// Number of the cell in [`Body::cells`].
+    pub cell: u32,
+    /// ∫_Γ N_i n dS over the faces of the region inside the body [m²]; n points into the region.
+    pub surface_normal: [DVec3; 8],
+    /// ∫_Γ N_i N_j dS over them [m²].
+    pub surface_mass: [[f64; 8]; 8],
+    /// ∫ N_i N_j dV over the held part of the cell [m³].
+    pub volume_mass: [[f64; 8]; 8],
+    /// How much each node is pinned, 0 to 1 ([`crate::cutcells::held`]): the volume is held as far as both nodes are.
+    pub pins: [f64; 8],
+    /// Gauss weights of the held part of the cell; they sum to the fraction of the cell that is held.
+    pub held: [f64; 27],
+    /// Mean of ∇N_i over the free part of the body in the cell [1/m]; traction is taken from the mean strain.
+    pub mean_gradient: [DVec3; 8],
+}
+
+impl ClampCell {
+    /// The held part of a cell among a clamp's, which stand in increasing order.
+    pub fn find(held: &[ClampCell], cell: u32) -> Option<&ClampCell> {
+        held.binary_search_by_key(&cell, |c| c.cell).ok().map(|i| &held[i])
+    }
+
+    /// A held part of a cell; all of its nodes are pinned.
+    pub(crate) fn new(body: &Body, cell: u32, m: &HeldMoments) -> ClampCell {
+        let mut c = ClampCell {
+            cell,
+            surface_normal: m.surface_normal,
+            surface_mass: m.surface_mass,
+            volume_mass: m.volume_mass,
+            pins: [1.0; 8],
+            held: m.weights(),
+            mean_gradient: [DVec3::ZERO; 8],
+        };
+        c.mean_gradient = c.free(body).mean_gradient(body.grid.h);
+        c
+    }
+
+    /// The part of the body in the cell that is not held.
+    pub fn free(&self, body: &Body) -> FreePart {
+        let mut free = FreePart::of(&body.cells[self.cell as usize]);
+        free.take(&self.held);
+        free
+    }
+}
+
+/// A point mass' place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassSite {
+    /// Nodes of the cell that carries it.
+    pub nodes: [u32; 8],
+    /// Shape functions at the point; they sum to one.
+    pub weights: [f64; 8],
+}
+
+/// Time steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    /// Length of a step [s].
+    pub step: f64,
+    /// Number of steps.
+    pub steps: usize,
+    /// Weight of the new state.
+    pub theta: f64,
+}
+
+/// One member's θ decoded into the numbers that passes use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Physics {
+    /// Young's modulus [Pa].
+    pub youngs_modulus: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Density [kg/m³].
+    pub density: f64,
+    /// Rayleigh damping [1/s].
+    pub mass_damping: f64,
+    /// Rayleigh damping [s].
+    pub stiffness_damping: f64,
+    /// Gravity [m/s²].
+    pub gravity: DVec3,
+    /// Initial velocity [m/s].
+    pub velocity: DVec3,
+    /// Initial angular velocity [rad/s].
+    pub angular_velocity: DVec3,
+    /// Time of the initial state [s].
+    pub start: f64,
+    /// Per plane: height [m], θ, φ [rad].
+    pub planes: Vec<[f64; 3]>,
+    /// Point masses [kg].
+    pub masses: Vec<f64>,
+    /// Parameters of every effect.
+    pub effects: Vec<Vec<f64>>,
+}
+
+impl Physics {
+    /// Decodes a parameter vector `[P]`.
+    pub fn new(layout: &Layout, theta: &[f64]) -> Physics {
+        let get = |k| theta[layout.index(k)];
+        let vec = |k: fn(u8) -> ParamKey| DVec3::new(get(k(0)), get(k(1)), get(k(2)));
+        let count = |f: fn(&ParamKey) -> bool| layout.keys.iter().filter(|k| f(k)).count() as u16;
+        Physics {
+            youngs_modulus: get(ParamKey::YoungsModulus),
+            poisson_ratio: get(ParamKey::PoissonRatio),
+            density: get(ParamKey::Density),
+            mass_damping: get(ParamKey::MassDamping),
+            stiffness_damping: get(ParamKey::StiffnessDamping),
+            gravity: vec(ParamKey::Gravity),
+            velocity: vec(ParamKey::Velocity),
+            angular_velocity: vec(ParamKey::AngularVelocity),
+            start: get(ParamKey::TimeStart),
+            planes: (0..count(|k| matches!(k, ParamKey::PlaneHeight(_))))
+                .map(|i| [get(ParamKey::PlaneHeight(i)), get(ParamKey::PlaneTheta(i)), get(ParamKey::PlanePhi(i))])
+                .collect(),
+            masses: (0..count(|k| matches!(k, ParamKey::PointMass(_)))).map(|i| get(ParamKey::PointMass(i))).collect(),
+            effects: layout.effects().map(|(_, range)| theta[range].to_vec()).collect(),
+        }
+    }
+}
+
+impl PlaneSite {
+    /// The axis most across a normal, so that both angles are regular there (never parallel to the normal).
+    pub fn polar_axis_for(normal: DVec3) -> usize {
+        // Prefer z, the textbook's polar axis, unless the normal is within 45 degrees of it.
+        if normal.z.abs() < 0.7 {
+            2
+        } else if normal.x.abs() <= normal.y.abs() {
+            0
+        } else {
+            1
+        }
+    }
+
+    /// Angles (θ, φ) [rad] of a unit normal.
+    pub fn angles(&self, normal: DVec3) -> (f64, f64) {
+        let p = self.polar_axis;
+        (normal[p].clamp(-1.0, 1.0).acos(), normal[(p + 2) % 3].atan2(normal[(p + 1) % 3]))
+    }
+
+    /// Unit normal of angles (θ, φ) [rad] with its derivatives by θ and φ.
+    pub fn normal(&self, theta: f64, phi: f64) -> [DVec3; 3] {
+        let (st, ct) = theta.sin_cos();
+        let (sp, cp) = phi.sin_cos();
+        let p = self.polar_axis;
+        let build = |a: f64, b: f64, c: f64| {
+            let mut v = DVec3::ZERO;
+            v[p] = a;
+            v[(p + 1) % 3] = b;
+            v[(p + 2) % 3] = c;
+            v
+        };
+        [build(ct, st * cp, st * sp), build(-st, ct * cp, ct * sp), build(0.0, -st * sp, st * cp)]
+    }
+}
+
+/// Rigid motion of a clamp at a time on the recording's clock: rotation and translation [m].
+pub fn clamp_pose(motion: Option<&RigidMotion>, time: f64) -> (DMat3, DVec3) {
+    motion.map_or((DMat3::IDENTITY, DVec3::ZERO), |m| m.at(time))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plane_angles_round_trip_and_derive() {
+        for n in [DVec3::Z, DVec3::Y, DVec3::X, DVec3::new(0.3, -0.5, 0.9).normalize(), DVec3::new(-0.2, 0.9, 0.1).normalize()] {
+            let site = PlaneSite { polar_axis: PlaneSite::polar_axis_for(n), stiffness: None };
+            let (t, p) = site.angles(n);
+            let [m, dt, dp] = site.normal(t, p);
+            assert!((m - n).length() < 1e-14);
+            let d = 1e-6;
+            let ft = (site.normal(t + d, p)[0] - site.normal(t - d, p)[0]) / (2.0 * d);
+            let fp = (site.normal(t, p + d)[0] - site.normal(t, p - d)[0]) / (2.0 * d);
+            assert!((ft - dt).length() < 1e-9 && (fp - dp).length() < 1e-9);
+            assert!(dt.length() > 0.5 && dp.length() > 0.5, "both angles turn the normal");
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! What a body is made of for everybody else: nodes, masses, surface, and who touches whom.
+
+pub mod body;
+pub mod pattern;

@@ -1,0 +1,146 @@
+//! Which nodes touch which: the block pattern of the system matrix and the way into it.
+
+use crate::plan::Plan;
+use crate::space::body::Body;
+use std::collections::BTreeMap;
+
+/// Block-compressed rows over the simulation nodes (3 × 3 blocks), with the places where cells, ghost lines and point
+/// masses add. The pattern is symmetric and every row's columns increase.
+#[derive(Debug)]
+pub struct Pattern {
+    /// The blocks.
+    pub blocks: BlockRows,
+    /// Start of each node's entries in `cell_list`, shape `[N + 1]`.
+    pub cell_rows: Vec<usize>,
+    /// (cell, corner) pairs of each node, increasing.
+    pub cell_list: Vec<(u32, u8)>,
+    /// Row ranges that are assembled side by side; fixed by the size alone, so results do not depend on threads.
+    pub parts: Vec<std::ops::Range<usize>>,
+}
+
+/// Block-compressed rows alone.
+#[derive(Clone, Debug)]
+pub struct BlockRows {
+    /// Start of each row, shape `[N + 1]`.
+    pub rows: Vec<usize>,
+    /// Column of each block, increasing in a row.
+    pub columns: Vec<u32>,
+    /// Place of each diagonal block.
+    pub diagonal: Vec<usize>,
+}
+
+impl BlockRows {
+    /// Rows from lists of neighbours (with repetitions, each holding the row itself).
+    pub fn new(mut neighbours: Vec<Vec<u32>>) -> BlockRows {
+        let mut rows = vec![0];
+        let mut columns = Vec::new();
+        let mut diagonal = Vec::with_capacity(neighbours.len());
+        for (a, list) in neighbours.iter_mut().enumerate() {
+            list.sort_unstable();
+            list.dedup();
+            let own = list.binary_search(&(a as u32)).expect("every node belongs to a cell");
+            diagonal.push(columns.len() + own);
+            columns.extend_from_slice(list);
+            rows.push(columns.len());
+        }
+        BlockRows { rows, columns, diagonal }
+    }
+
+    /// Number of block rows.
+    pub fn len(&self) -> usize {
+        self.diagonal.len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.diagonal.is_empty()
+    }
+
+    /// Place of block (a, b).
+    pub fn find(&self, a: u32, b: u32) -> usize {
+        let row = self.rows[a as usize]..self.rows[a as usize + 1];
+        row.start + self.columns[row].binary_search(&b).expect("block is in the pattern")
+    }
+}
+
+impl Pattern {
+    /// The pattern of a body (27 neighbours in the bulk, and the ends of ghost lines).
+    pub fn new(body: &Body) -> Pattern {
+        let n = body.nodes.len();
+        let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
+        let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
+        for (e, cell) in body.cells.iter().enumerate() {
+            for (i, &a) in cell.nodes.iter().enumerate() {
+                neighbours[a as usize].extend_from_slice(&cell.nodes);
+                cells[a as usize].push((e as u32, i as u8));
+            }
+        }
+        for ghost in &body.ghosts {
+            for a in ghost.nodes {
+                neighbours[a as usize].extend_from_slice(&ghost.nodes);
+            }
+        }
+        let blocks = BlockRows::new(neighbours);
+        let mut cell_rows = vec![0];
+        let mut cell_list = Vec::new();
+        for list in cells {
+            cell_list.extend(list);
+            cell_rows.push(cell_list.len());
+        }
+        // About 300 rows are worth a task of their own; the blocks of cells that two parts share are set aside and added afterwards.
+        let count = (n / 300).clamp(1, 16);
+        let parts = (0..count).map(|p| p * n / count..(p + 1) * n / count).collect();
+        Pattern { blocks, cell_rows, cell_list, parts }
+    }
+
+    /// Number of nodes N.
+    pub fn nodes(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// Number of the part that a row belongs to.
+    pub fn part_of(&self, row: usize) -> usize {
+        self.parts.partition_point(|p| p.end <= row)
+    }
+
+    /// Places of all 64 blocks of a group of eight nodes, row by row.
+    pub fn blocks8(&self, nodes: &[u32; 8]) -> [u32; 64] {
+        std::array::from_fn(|k| self.blocks.find(nodes[k / 8], nodes[k % 8]) as u32)
+    }
+}
+
+/// Places where a plan's terms add into the matrix.
+#[derive(Debug)]
+pub struct Places {
+    /// Per cell, the 64 blocks of its nodes.
+    pub cells: Vec<[u32; 64]>,
+    /// Blocks that ghost lines add to, increasing, and the factor on the identity there: the sum over its lines.
+    pub ghosts: Vec<(u32, f64)>,
+    /// Per point mass, the 64 blocks of its nodes.
+    pub masses: Vec<[u32; 64]>,
+}
+
+impl Places {
+    /// Looks every place up once.
+    pub fn new(plan: &Plan, pattern: &Pattern) -> Places {
+        Places {
+            cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
+            ghosts: ghosts(&plan.body, pattern),
+            masses: plan.masses.iter().map(|m| pattern.blocks8(&m.nodes)).collect(),
+        }
+    }
+}
+
+/// The ghost penalty's matrix for a unit scale, block by block.
+fn ghosts(body: &Body, pattern: &Pattern) -> Vec<(u32, f64)> {
+    const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
+    let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
+    for line in &body.ghosts {
+        for (i, a) in line.nodes.iter().enumerate() {
+            for (j, b) in line.nodes.iter().enumerate() {
+                *sums.entry(pattern.blocks.find(*a, *b) as u32).or_default() += line.weight * STENCIL[i] * STENCIL[j];
+            }
+        }
+    }
+    sums.into_iter().collect()
+}
