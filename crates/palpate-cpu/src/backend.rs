@@ -8,10 +8,8 @@ use crate::simulate;
 use crate::world::{Adjoint, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
 use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch, Rows};
-use palpate_model::effects;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 
 /// The reference backend.
@@ -72,15 +70,6 @@ impl Backend for CpuBackend {
     fn build(&self, plan: &Plan, _members: usize) -> Result<World, BuildError> {
         // One factorisation at a time per member: parallel ones would make results depend on the number of threads.
         faer::set_global_parallelism(faer::Par::Seq);
-        let of_cells = |law: &effects::Law| matches!(law.site, effects::Site::Cells(_));
-        if let Some((law, _)) = plan.layout.effects().find(|(law, _)| of_cells(law))
-            && plan.solver.rotation == RotationUpdate::Lagged
-        {
-            return Err(BuildError {
-                message: format!("the effect \"{}\" needs the cells' own rotation at the new state", law.kind),
-                hint: "take away `rotation = \"lagged\"` from [solver]".into(),
-            });
-        }
         Ok(World::new(plan))
     }
 

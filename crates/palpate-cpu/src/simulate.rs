@@ -22,7 +22,7 @@ pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usiz
         None => (None, Mix::STATIC, p.start),
         Some(k) => (
             Some(Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt }),
-            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / dt, rotation: shared.plan.solver.rotation },
+            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / dt },
             p.start + (k + 1) as f64 * dt,
         ),
     };

@@ -4,14 +4,12 @@
 //! the new state x₁ is the gradient by x₁ of
 //! `E [θ ½ q₁ᵀKq₁ + (β/2Δt) (q₁−q₀)ᵀK(q₁−q₀)] + (1−θ) f(x₀)·x₁`,
 //! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
-//! With lagged rotation both q use R(x₀) and R is not differentiated by x₁, as in the paper.
 
 use crate::linear::simd::wide;
 use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_model::cutcells::corotation::{CellPose, M24, V24, multiply};
 use palpate_model::cutcells::elements::Elements;
-use palpate_model::scene::RotationUpdate;
 use palpate_model::space::body::Body;
 use palpate_model::space::pattern::Pattern;
 use rayon::prelude::*;
@@ -31,18 +29,15 @@ pub struct Mix {
     pub old: f64,
     /// β/Δt: weight of the change between them.
     pub rate: f64,
-    /// When the rotation is taken.
-    pub rotation: RotationUpdate,
 }
 
 impl Mix {
     /// The elastic force of one state alone.
-    pub const STATIC: Mix = Mix { new: 1.0, old: 0.0, rate: 0.0, rotation: RotationUpdate::Converged };
+    pub const STATIC: Mix = Mix { new: 1.0, old: 0.0, rate: 0.0 };
 
     /// Factors of q₁ and q₀ in the new pose's force.
     pub(super) fn factors(&self) -> (f64, f64) {
-        let own = if self.rotation == RotationUpdate::Lagged { self.old } else { 0.0 };
-        (self.new + self.rate, own - self.rate)
+        (self.new + self.rate, -self.rate)
     }
 }
 
@@ -64,31 +59,17 @@ pub(super) fn dot24(a: &V24, b: &V24) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-fn vector(a: &V24, i: usize) -> DVec3 {
-    DVec3::new(a[3 * i], a[3 * i + 1], a[3 * i + 2])
-}
-
-/// The two poses of a cell. With lagged rotation both carry R(x₀), and `spin` is the pose that knows how R(x₀) turns.
+/// The two poses of a cell; without the old one where the balance does not see it.
 struct Poses {
     new: CellPose,
     old: Option<CellPose>,
-    spin: Option<CellPose>,
 }
 
 impl Poses {
     #[inline(always)]
     fn new(mix: &Mix, h: f64, x1: &Corners, x0: &Corners) -> Poses {
-        match mix.rotation {
-            RotationUpdate::Converged => {
-                let needs_old = mix.old != 0.0 || mix.rate != 0.0;
-                Poses { new: CellPose::new(x1, h), old: needs_old.then(|| CellPose::new(x0, h)), spin: None }
-            }
-            RotationUpdate::Lagged => {
-                let spin = CellPose::new(x0, h);
-                let r = spin.polar.r;
-                Poses { new: CellPose::lagged(x1, r, h), old: Some(CellPose::lagged(x0, r, h)), spin: Some(spin) }
-            }
-        }
+        let needs_old = mix.old != 0.0 || mix.rate != 0.0;
+        Poses { new: CellPose::new(x1, h), old: needs_old.then(|| CellPose::new(x0, h)) }
     }
 
     /// Body-frame force that goes with the new pose, and the one that goes with the old pose.
@@ -98,7 +79,7 @@ impl Poses {
         let zero = [0.0; 24];
         let q0 = self.old.as_ref().map_or(&zero, |p| &p.q);
         let combined: V24 = std::array::from_fn(|i| a * self.new.q[i] + b * q0[i]);
-        let old = (self.spin.is_none() && mix.old != 0.0).then(|| times(k, q0, e * mix.old));
+        let old = (mix.old != 0.0).then(|| times(k, q0, e * mix.old));
         (times(k, &combined, e), old)
     }
 
@@ -176,7 +157,7 @@ impl<'a> Elasticity<'a> {
         self.matrix(e, Matrices::ByPoisson)
     }
 
-    /// A cell in both states, for laws of cells (converged rotation only).
+    /// A cell in both states, for laws of cells.
     pub(super) fn both(&self, mix: &Mix, e: usize, u1: &[DVec3], u0: &[DVec3]) -> (CellPose, Option<CellPose>) {
         let poses = self.poses(mix, e, u1, u0);
         (poses.new, poses.old)
@@ -243,9 +224,9 @@ impl<'a> Elasticity<'a> {
         );
     }
 
-    /// Derivative by the old state with converged rotation, for one cell: `b` Pᵀ_to E K P_from d, and the symmetric share of the
+    /// Derivative by the old state, for one cell: `b` Pᵀ_to E K P_from d, and the symmetric share of the
     /// old state's own force. `[from, to]` is [old, new]; the other way round it is the transpose.
-    fn converged_by_old(
+    fn cell_by_old(
         &self,
         mix: &Mix,
         k: &M24,
@@ -273,21 +254,9 @@ impl<'a> Elasticity<'a> {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, du0);
-                let (a, b) = mix.factors();
-                if let Some(turn) = &poses.spin {
-                    let old = poses.old.as_ref().expect("lagged rotation has an old pose");
-                    let y = poses.stress(mix, k, young).0;
-                    let w = turn.spin_of(&d);
-                    let direct = old.strain_rate(&d);
-                    let dq: V24 = std::array::from_fn(|i| {
-                        let (c, r) = (i / 3, i % 3);
-                        b * direct[i] - w.cross(a * vector(&poses.new.z, c) + b * vector(&old.z, c))[r]
-                    });
-                    let ky = times(k, &dq, young);
-                    let turned: V24 = std::array::from_fn(|i| ky[i] + w.cross(vector(&y, i / 3))[i % 3]);
-                    poses.new.force(&turned)
-                } else if let Some(old) = &poses.old {
-                    self.converged_by_old(mix, k, old, [old, &poses.new], [young, b], &d)
+                let b = mix.factors().1;
+                if let Some(old) = &poses.old {
+                    self.cell_by_old(mix, k, old, [old, &poses.new], [young, b], &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
@@ -304,25 +273,9 @@ impl<'a> Elasticity<'a> {
                 let poses = self.poses(mix, e, u1, u0);
                 let (k, young) = (self.matrix(e, Matrices::Stiffness), self.young_of(e));
                 let d = pick(self.body, e, z);
-                let (a, b) = mix.factors();
-                if let Some(turn) = &poses.spin {
-                    let old = poses.old.as_ref().expect("lagged rotation has an old pose");
-                    let y = poses.stress(mix, k, young).0;
-                    let s = poses.new.strain_rate(&d);
-                    let t = times(k, &s, young);
-                    let mut g = DVec3::ZERO;
-                    for i in 0..8 {
-                        g += vector(&y, i).cross(vector(&s, i));
-                        g -= (a * vector(&poses.new.z, i) + b * vector(&old.z, i)).cross(vector(&t, i));
-                    }
-                    let mut f = old.force(&std::array::from_fn(|i| b * t[i]));
-                    let c = turn.spin_adjoint(g);
-                    for i in 0..8 {
-                        f[i] += c[i];
-                    }
-                    f
-                } else if let Some(old) = &poses.old {
-                    self.converged_by_old(mix, k, old, [&poses.new, old], [young, b], &d)
+                let b = mix.factors().1;
+                if let Some(old) = &poses.old {
+                    self.cell_by_old(mix, k, old, [&poses.new, old], [young, b], &d)
                 } else {
                     [DVec3::ZERO; 8]
                 }
@@ -340,9 +293,8 @@ impl<'a> Elasticity<'a> {
                 let ds = rest[e].strain_rate(&pick(self.body, e, dw));
                 let y = times(self.matrix(e, Matrices::Stiffness), &ds, -self.young_of(e));
                 // The rate's part does not see it: both states shift alike.
-                let weight = if poses.spin.is_some() { mix.new + mix.old } else { mix.new };
-                let mut f = poses.new.force(&y.map(|y| weight * y));
-                if let (None, Some(old), true) = (&poses.spin, &poses.old, mix.old != 0.0) {
+                let mut f = poses.new.force(&y.map(|y| mix.new * y));
+                if let (Some(old), true) = (&poses.old, mix.old != 0.0) {
                     for (f, g) in f.iter_mut().zip(old.force(&y)) {
                         *f += mix.old * g;
                     }

@@ -50,7 +50,7 @@ impl<'a> Balance<'a> {
             }
             ParamKey::StiffnessDamping => {
                 let t = self.inertia?;
-                let mix = Mix { new: 0.0, old: 0.0, rate: t.rate, ..self.mix };
+                let mix = Mix { new: 0.0, old: 0.0, rate: t.rate };
                 self.elasticity().force(&mix, Matrices::Stiffness, self.young(), s.u1, s.u0, &mut out);
                 self.ghost(young * elements.shear[0], &mix, s, &mut out);
             }

@@ -5,9 +5,8 @@ use crate::linear::simd::wide;
 use crate::linear::vector::{Nodes, dot};
 use crate::passes::cells::{CHUNK, Corners, Elasticity, Mix, corners, dot24, times, zeros};
 use faer::{Mat, Side};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use palpate_model::cutcells::corotation::{CellPose, M24, V24};
-use palpate_model::scene::RotationUpdate;
 use rayon::prelude::*;
 
 /// Distance from the jump of the rotation (8/9 at rest) below which a cell's tangent may be far from positive definite: flattened to
@@ -31,8 +30,6 @@ pub enum Curvature {
 pub struct Before {
     /// q₀ of every cell [m]; empty where the balance does not see the old state.
     q: Vec<V24>,
-    /// R(x₀) of every cell; empty where rotations follow the new state.
-    turns: Vec<DMat3>,
     /// (1 − θ) f(x₀) `[N]` [N]; empty where the old state has no force of its own.
     force: Nodes,
 }
@@ -57,15 +54,6 @@ impl Elasticity<'_> {
             self.shift(e, &mut pose);
             pose
         };
-        if mix.rotation == RotationUpdate::Lagged {
-            let turned = |e: usize| {
-                let x = corners(self.body, e, u0);
-                let r = CellPose::new(&x, h).polar.r;
-                (shifted(CellPose::lagged(&x, r, h), e).q, r)
-            };
-            let (q, turns) = (0..cells).into_par_iter().with_min_len(CHUNK).map(turned).unzip();
-            return Before { q, turns, force: Vec::new() };
-        }
         if mix.old == 0.0 && mix.rate == 0.0 {
             return Before::default();
         }
@@ -91,23 +79,19 @@ impl Elasticity<'_> {
             force = zeros(u0.len());
             self.sum_corners(|e, i| own[e][i], &mut force);
         }
-        Before { q, turns: Vec::new(), force }
+        Before { q, force }
     }
 
     #[inline(always)]
-    fn pose(&self, before: &Before, e: usize, u1: &[DVec3]) -> CellPose {
-        let (h, x) = (self.body.grid.h, corners(self.body, e, u1));
-        let mut pose = match before.turns.get(e) {
-            Some(r) => CellPose::lagged(&x, *r, h),
-            None => CellPose::new(&x, h),
-        };
+    fn pose(&self, e: usize, u1: &[DVec3]) -> CellPose {
+        let mut pose = CellPose::new(&corners(self.body, e, u1), self.body.grid.h);
         self.shift(e, &mut pose);
         pose
     }
 
     #[inline(always)]
     fn posed(&self, mix: &Mix, before: &Before, e: usize, u1: &[DVec3]) -> Posed {
-        let pose = self.pose(before, e, u1);
+        let pose = self.pose(e, u1);
         let (a, b) = mix.factors();
         let mut q = pose.q.map(|q| a * q);
         if let Some(old) = before.q.get(e) {
@@ -153,7 +137,7 @@ impl Elasticity<'_> {
         let cells = self.each_cell(
             #[inline(always)]
             |e| {
-                let pose = self.pose(before, e, u1);
+                let pose = self.pose(e, u1);
                 let q = pose.q;
                 let kq = times(self.stiffness(e), &q, self.young_of(e));
                 let guard = pose.guard().map_or(0.0, |g| self.guard_scale(mix, e, self.young_of(e)) * g.energy);
@@ -168,7 +152,7 @@ impl Elasticity<'_> {
     pub fn upper_tangent(&self, mix: &Mix, posed: &[Posed], e: usize, curvature: Curvature, out: &mut M24) {
         let Posed { pose, stress, .. } = &posed[e];
         let convex = curvature == Curvature::Convex;
-        let second = (!convex && mix.rotation == RotationUpdate::Converged).then_some(stress);
+        let second = (!convex).then_some(stress);
         pose.upper_hessian(self.stiffness(e), self.young_of(e) * mix.factors().0, second, out);
         if let Some(guard) = pose.guard() {
             guard.add_hessian(self.guard_scale(mix, e, self.young_of(e)), convex, out);
