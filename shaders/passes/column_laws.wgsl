@@ -33,7 +33,7 @@ fn column_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         ds_old[0] = 0.5 * mean(c, old.q, kq_old);
         change = vec2(0.5 * mean(c, fresh.q - old.q, kd), ds_old[0]);
     } else if kind == REST_SLOPE {
-        let shifted = free_pose(rests[c.node].xyz - rests[c.first].xyz, c.sign);
+        let shifted = pose_of(rests[c.node].xyz - rests[c.first].xyz, c.sign);
         let dq = -strain_rate(shifted, rest_slope(index, c.node) - rest_slope(index, c.first), c.sign);
         kq = stiff(stiffness_of(c), c.number, dq);
         kq_old = kq;

@@ -22,37 +22,20 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let d = probe[c.node].xyz - probe[c.first].xyz;
     let matrix = matrix_at(c.m.slot, 0u, cells[c.cell].kind);
     let before = old_stress[c.at].xyz;
-    let turning = free_pose(u0, c.sign);
+    let turning = pose_of(u0, c.sign);
+    let fresh = pose_of(u1, c.sign);
     var f = vec3(0.0);
-    if is_lagged() {
-        let fresh = held_pose(turning.turn, u1, c.sign);
-        let old = held_pose(turning.turn, u0, c.sign);
-        let arms = c.mix.on_new * fresh.z + c.mix.on_old * old.z;
-        let y = (c.mix.on_new * c.young) * stiff(matrix, c.number, from_rest(fresh.q, c.at)) + c.mix.on_old * before;
-        if call.extra == ALONG {
-            let omega = spin_body(turning, centred(transpose(turning.r) * d), c.sign);
-            let dq = c.mix.on_old * strain_rate(old, d, c.sign) - cross(omega, arms);
-            f = force(fresh, c.young * stiff(matrix, c.number, dq) + cross(omega, y), c.sign);
-        } else {
-            let s = strain_rate(fresh, d, c.sign);
-            let t = c.young * stiff(matrix, c.number, s);
-            let g = sum8(cross(y, s) - cross(arms, t));
-            f = force(old, c.mix.on_old * t, c.sign) + turning.r * spin_adjoint_body(turning, g, c.sign);
-        }
+    if call.extra == ALONG {
+        f = force(fresh, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(turning, d, c.sign)), c.sign);
     } else {
-        let fresh = free_pose(u1, c.sign);
-        if call.extra == ALONG {
-            f = force(fresh, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(turning, d, c.sign)), c.sign);
-        } else {
-            f = force(turning, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(fresh, d, c.sign)), c.sign);
-        }
-        // The old state's own force, whose derivative is symmetric.
-        let body = centred(transpose(turning.r) * d);
-        let dq = body - cross(spin_body(turning, body, c.sign), turning.z);
-        let own = force_body(turning, centred(c.young * stiff(matrix, c.number, dq)), c.sign)
-            + second_body(turning, centred(before), body, c.sign);
-        f += turning.r * (c.mix.old * own);
+        f = force(turning, (c.mix.on_old * c.young) * stiff(matrix, c.number, strain_rate(fresh, d, c.sign)), c.sign);
     }
+    // The old state's own force, whose derivative is symmetric.
+    let body = centred(transpose(turning.r) * d);
+    let dq = body - cross(spin_body(turning, body, c.sign), turning.z);
+    let own = force_body(turning, centred(c.young * stiff(matrix, c.number, dq)), c.sign)
+        + second_body(turning, centred(before), body, c.sign);
+    f += turning.r * (c.mix.old * own);
     for (var k = cells[c.cell].hold_start; k < cells[c.cell].hold_end; k++) {
         f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
     }

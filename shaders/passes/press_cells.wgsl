@@ -5,7 +5,6 @@
 // use shared/supports
 
 var<storage, read> next: array<vec4<f32>>;
-var<storage, read> old_turn: array<vec4<f32>>;
 var<storage, read> old_stress: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 var<storage, read_write> cell_support: array<vec4<f32>>;
@@ -15,12 +14,7 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
                @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
     let d = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
-    var pose: Pose;
-    if is_lagged() {
-        pose = held_pose(old_turn[c.member * shape.cells + c.cell], d, c.sign);
-    } else {
-        pose = free_pose(d, c.sign);
-    }
+    var pose = pose_of(d, c.sign);
     pose.q = from_rest(pose.q, c.at);
     // Nothing is left of an old state in a static problem.
     var before = vec3(0.0);
@@ -29,8 +23,7 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     let y = (c.mix.on_new * c.young) * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, pose.q) + before;
     var f = vec4(force(pose, y, c.sign), 0.5 * dot(pose.q, y + before));
-    // A rotation that is given does not jump.
-    if !is_lagged() && is_guarded(pose.s) {
+    if is_guarded(pose.s) {
         let g = guard_force(pose.s, c.sign, guard_unit(c.mix.fresh * c.young, cells[c.cell]));
         f += vec4(pose.r * g.xyz, g.w);
     }

@@ -15,14 +15,10 @@ var<storage, read_write> cell_force: array<vec4<f32>>;
 fn by_rest(c: Corner, row: u32) -> vec3<f32> {
     let u0 = (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz);
     let u1 = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
-    let shifted = free_pose(rests[c.node].xyz - rests[c.first].xyz, c.sign);
+    let shifted = pose_of(rests[c.node].xyz - rests[c.first].xyz, c.sign);
     let dq = strain_rate(shifted, rest_slope(row, c.node) - rest_slope(row, c.first), c.sign);
     let y = -c.young * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, dq);
-    let old = free_pose(u0, c.sign);
-    if is_lagged() {
-        return force(held_pose(old.turn, u1, c.sign), (c.mix.fresh + c.mix.old) * y, c.sign);
-    }
-    return force(free_pose(u1, c.sign), c.mix.fresh * y, c.sign) + force(old, c.mix.old * y, c.sign);
+    return force(pose_of(u1, c.sign), c.mix.fresh * y, c.sign) + force(pose_of(u0, c.sign), c.mix.old * y, c.sign);
 }
 
 @compute @workgroup_size(64)
@@ -54,22 +50,15 @@ fn press_column(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             on_old = 0.0;
             own = 0.0;
         }
-        var old = free_pose(u0, c.sign);
-        var fresh: Pose;
-        if is_lagged() {
-            fresh = held_pose(old.turn, u1, c.sign);
-        } else {
-            fresh = free_pose(u1, c.sign);
-        }
+        var old = pose_of(u0, c.sign);
+        var fresh = pose_of(u1, c.sign);
         old.q = from_rest(old.q, c.at);
         fresh.q = from_rest(fresh.q, c.at);
         f = force(fresh, factor * stiff(matrix, c.number, on_new * fresh.q + on_old * old.q), c.sign);
-        if !is_lagged() {
-            f += force(old, (factor * own) * stiff(matrix, c.number, old.q), c.sign);
-            // The guard is a multiple of the modulus, at the new state only, and damps nothing.
-            if kind != POISSON_RATIO && kind != STIFFNESS_DAMPING && is_guarded(fresh.s) {
-                f += fresh.r * guard_force(fresh.s, c.sign, guard_unit(factor * c.mix.fresh, cells[c.cell])).xyz;
-            }
+        f += force(old, (factor * own) * stiff(matrix, c.number, old.q), c.sign);
+        // The guard is a multiple of the modulus, at the new state only, and damps nothing.
+        if kind != POISSON_RATIO && kind != STIFFNESS_DAMPING && is_guarded(fresh.s) {
+            f += fresh.r * guard_force(fresh.s, c.sign, guard_unit(factor * c.mix.fresh, cells[c.cell])).xyz;
         }
     }
     if kind == REST_SLOPE {

@@ -1,8 +1,7 @@
-//! What the old state leaves for the whole solve of a step: its rotation, E K q₀ per corner, and its own constant force.
+//! What the old state leaves for the whole solve of a step: E K q₀ per corner, and its own constant force.
 // use shared/corner
 
 var<storage, read> now: array<vec4<f32>>;
-var<storage, read_write> old_turn: array<vec4<f32>>;
 var<storage, read_write> old_stress: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 var<storage, read> hold_forces: array<vec4<f32>>;
@@ -11,22 +10,15 @@ var<storage, read> hold_forces: array<vec4<f32>>;
 fn press_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
              @builtin(local_invocation_index) local: u32) {
     let c = find_corner(group, groups, local);
-    var pose = free_pose((now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz), c.sign);
+    var pose = pose_of((now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz), c.sign);
     pose.q = from_rest(pose.q, c.at);
     let y = c.young * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, pose.q);
-    // With lagged rotation the old force goes through the new pose, which has the same rotation.
     var f = force(pose, c.mix.old * y, c.sign);
-    if is_lagged() {
-        f = vec3(0.0);
-    }
     for (var k = cells[c.cell].hold_start; k < cells[c.cell].hold_end; k++) {
         f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     if c.live {
         old_stress[c.at] = vec4(y, 0.0);
         cell_force[c.at] = vec4(f, 0.0);
-        if c.number == 0u {
-            old_turn[c.member * shape.cells + c.cell] = pose.turn;
-        }
     }
 }

@@ -6,7 +6,6 @@
 // use shared/unstrained
 
 var<storage, read> next: array<vec4<f32>>;
-var<storage, read> old_turn: array<vec4<f32>>;
 var<storage, read> old_stress: array<vec4<f32>>;
 var<storage, read> newton: array<Newton>;
 var<storage, read_write> tangents: array<vec4<f32>>;
@@ -28,12 +27,7 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let d = (next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz);
     let scale = mix.on_new * young;
     let matrix = matrix_at(m.slot, 0u, cell.kind);
-    var pose: Pose;
-    if is_lagged() {
-        pose = held_pose(old_turn[p.member * shape.cells + e], d, sign);
-    } else {
-        pose = free_pose(d, sign);
-    }
+    var pose = pose_of(d, sign);
     pose.q = from_rest(pose.q, (p.member * shape.cells + e) * 8u + corner);
     var before = vec3(0.0);
     if call.mode != 0u {
@@ -41,12 +35,7 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let y = centred(scale * stiff(matrix, corner, pose.q) + before);
     let convex = newton[p.member].convex != 0u;
-    var half = rank_six(pose, matrix, corner, sign, scale, y, convex);
-    // A rotation that is given does not answer to the corners.
-    if is_lagged() {
-        half = mat3x3<f32>();
-    }
-    let turned = pose.r * half;
+    let turned = pose.r * rank_six(pose, matrix, corner, sign, scale, y, convex);
     if p.live {
         let at = (p.member * shape.cells + e) * TANGENT_VECTORS;
         for (var c = 0u; c < 3u; c++) {
@@ -57,8 +46,7 @@ fn tangent_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 tangents[at + c] = vec4(pose.r[c], 0.0);
                 tangents[at + 3u + c] = vec4(pose.g[c], 0.0);
             }
-            // A rotation that is given does not jump.
-            if !is_lagged() && is_guarded(pose.s) {
+            if is_guarded(pose.s) {
                 let guard = guard_at(pose.s);
                 let unit = guard_unit(mix.fresh * young, cell);
                 let s = pose.s;

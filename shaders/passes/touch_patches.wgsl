@@ -46,7 +46,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         old_rest = rest;
     }
     let area = site.point.w;
-    let width = contact_width * shape.h;
+    let width = shape.contact_width;
     var vector = vec3(0.0);
     var energy = 0.0;
     var diagonal = vec3(0.0);

@@ -1,6 +1,5 @@
 //! Contact law of a plane. Twin of palpate-model/src/mechanics/contact.rs; all per unit stiffness.
 
-override contact_width: f32;
 // Points of the quadrature over a step, distance of the outer ones from its middle, and their weight (`contact::instants`).
 override instant_count: u32;
 override instant_offset: f32;

@@ -133,7 +133,7 @@ fn mean(c: Corner, a: vec3<f32>, b: vec3<f32>) -> f32 {
 
 fn side_at(c: Corner, u: vec3<f32>) -> Side {
     var s: Side;
-    s.pose = free_pose(u, c.sign);
+    s.pose = pose_of(u, c.sign);
     s.q = from_rest(s.pose.q, c.at);
     s.kq = stiff(stiffness_of(c), c.number, s.q);
     s.s = strains(c, s.q);

@@ -30,13 +30,5 @@ fn mix_of(m: Member) -> Mix {
     x.on_ghost = x.fresh + x.rate;
     x.on_new = x.fresh + x.rate;
     x.on_old = -x.rate;
-    if is_lagged() {
-        x.on_old = x.old - x.rate;
-    }
     return x;
-}
-
-// Lagged rotation is for steps only; a static problem has no old rotation.
-fn is_lagged() -> bool {
-    return shape.lagged == 1u && call.mode != 0u;
 }

@@ -196,7 +196,7 @@ struct Response {
 
 // Fills the input with what does not depend on the point, for a member's effect; the slope of the measure is what COLUMN needs.
 fn prepare(effect: EffectSite, member: u32, m: Member, mix: Mix) {
-    spot.width = contact_width * shape.h;
+    spot.width = shape.contact_width;
     spot.rate = 0.0;
     spot.inertia = 0.0;
     spot.momentum = 0.0;

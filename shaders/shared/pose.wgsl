@@ -5,8 +5,7 @@
 // use shared/mix
 
 struct Pose {
-    // Rotation (x, y, z, w), R, S, G⁻¹ (zero where R is given).
-    turn: vec4<f32>,
+    // R, S, G⁻¹.
     r: mat3x3<f32>,
     s: mat3x3<f32>,
     g: mat3x3<f32>,
@@ -31,31 +30,19 @@ fn gradient_of(d: vec3<f32>, sign: vec3<f32>) -> mat3x3<f32> {
     return mat3x3(a, b, c) * (0.25 / shape.h);
 }
 
-fn pose_with(turn: vec4<f32>, d: vec3<f32>, sign: vec3<f32>) -> Pose {
-    var p: Pose;
-    let e = excess_of(turn);
+// Pose of displacements `u` (any common part left out).
+fn pose_of(u: vec3<f32>, sign: vec3<f32>) -> Pose {
+    let d = centred(u);
+    let h = gradient_of(d, sign);
+    let e = excess_of(rotation_of(h));
     let arm = sign * (0.5 * shape.h);
-    p.turn = turn;
+    var p: Pose;
     p.r = identity3() + e;
     p.q = transpose(p.r) * d + transpose(e) * arm;
     p.z = p.q + arm;
-    return p;
-}
-
-// Pose of displacements `u` (any common part left out); R follows them.
-fn free_pose(u: vec3<f32>, sign: vec3<f32>) -> Pose {
-    let d = centred(u);
-    let h = gradient_of(d, sign);
-    let turn = rotation_of(h);
-    var p = pose_with(turn, d, sign);
-    p.s = stretch_of(excess_of(turn), h);
+    p.s = stretch_of(e, h);
     p.g = pair_inverse(p.s);
     return p;
-}
-
-// Pose with a given rotation: q is linear in u.
-fn held_pose(turn: vec4<f32>, u: vec3<f32>, sign: vec3<f32>) -> Pose {
-    return pose_with(turn, centred(u), sign);
 }
 
 // ω of body-frame increments.

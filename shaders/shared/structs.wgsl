@@ -20,14 +20,13 @@ struct Shape { // mirrored
     masses: u32,
     parameters: u32,
     classes: u32,
-    lagged: u32,
+    steps: u32,
     h: f32,
     dt: f32,
     theta: f32,
     world: f32,
     pivot: vec3<f32>,
     tolerance: f32,
-    steps: u32,
     iterations: u32,
     chunk: u32,
     most: u32,
@@ -35,6 +34,7 @@ struct Shape { // mirrored
     ghosts: u32,
     fields: u32,
     slope_rows: u32,
+    contact_width: f32,
 }
 
 struct Member { // mirrored

@@ -21,7 +21,7 @@ use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
 use palpate_model::plan::{Physics, Plan};
-use palpate_model::scene::{InitialShape, RotationUpdate};
+use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
 
 /// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
@@ -95,9 +95,6 @@ impl Effects {
                     field = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
                     None
-                }
-                Site::Cells(_) if plan.solver.rotation == RotationUpdate::Lagged => {
-                    return Err(GpuError::Plan { what: format!("the effect `{}` together with lagged rotation", law.kind) });
                 }
                 Site::Cells(_) if e.cells.len() == MOST_LAWS => {
                     return Err(GpuError::Plan { what: format!("more than {MOST_LAWS} laws of cells") });

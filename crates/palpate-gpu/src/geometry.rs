@@ -8,7 +8,6 @@ use crate::pipelines::shared::structs::FIELD_COUPLED;
 use palpate_model::cutcells::elements::Classes;
 use palpate_model::params::grips::within_reach;
 use palpate_model::plan::{Plan, WORLD_SIZE};
-use palpate_model::scene::RotationUpdate;
 use palpate_model::space::pattern::{Pattern, Places};
 use std::collections::HashMap;
 
@@ -209,14 +208,13 @@ impl Geometry {
             masses: masses.len() as u32,
             parameters: plan.layout.len() as u32,
             classes: classes.parts.len() as u32,
-            lagged: u32::from(plan.solver.rotation == RotationUpdate::Lagged),
+            steps: plan.clock.steps as u32,
             h: body.grid.h as f32,
             dt: plan.clock.step as f32,
             theta: plan.clock.theta as f32,
             world: (WORLD_SIZE * size) as f32,
             pivot: [plan.pivot.x as f32, plan.pivot.y as f32, plan.pivot.z as f32],
             tolerance: plan.solver.tolerance.max(FINEST) as f32,
-            steps: plan.clock.steps as u32,
             iterations: 0,
             chunk: chunk as u32,
             most: MOST_ITERATIONS as u32,
@@ -224,6 +222,7 @@ impl Geometry {
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 },
             slope_rows: effects.slope_rows,
+            contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);

@@ -45,8 +45,8 @@ pub struct Shape {
     pub parameters: u32,
     /// Classes of cells that share element matrices.
     pub classes: u32,
-    /// 1 with lagged rotation.
-    pub lagged: u32,
+    /// Steps of the clock.
+    pub steps: u32,
     /// Edge of a cell [m].
     pub h: f32,
     /// Time step [s].
@@ -59,8 +59,6 @@ pub struct Shape {
     pub pivot: [f32; 3],
     /// Relative accuracy of a Newton solve.
     pub tolerance: f32,
-    /// Steps of the clock.
-    pub steps: u32,
     /// Most Newton iterations of a step.
     pub iterations: u32,
     /// CG iterations of one dispatch.
@@ -75,6 +73,8 @@ pub struct Shape {
     pub fields: u32,
     /// Rows of the slopes of such fields, per member.
     pub slope_rows: u32,
+    /// Half width of contact [m].
+    pub contact_width: f32,
 }
 
 /// Parameters of one member.

@@ -52,7 +52,7 @@ pub struct World {
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 21] = [
+const WORK: [Work; 20] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -71,7 +71,6 @@ const WORK: [Work; 21] = [
     ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
     ("cell_support", |s| 8 * s.cells, VECTOR),
     ("old_stress", |s| 8 * s.cells, VECTOR),
-    ("old_turn", |s| s.cells, VECTOR),
     ("touches", |s| 3 * s.patches, VECTOR),
     ("hold_forces", |s| 8 * s.holds, VECTOR),
 ];

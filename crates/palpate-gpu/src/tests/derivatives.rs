@@ -9,7 +9,6 @@ use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, ParamBatch};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::scene::RotationUpdate;
 
 /// Weights of the last displacement and velocity in the test's cost; smooth, so that no node stands out.
 fn weights(plan: &Plan) -> (Vec<DVec3>, Vec<DVec3>) {
@@ -156,11 +155,7 @@ fn check(backend: &GpuBackend, plan: &Plan, members: usize) -> Vec<Vec<Slope>> {
 #[test]
 fn every_parameter_of_a_falling_ball() {
     let Some(gpu) = device(None) else { return };
-    for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
-        let mut scene = ball(0.03);
-        scene.solver.rotation = rotation;
-        check(&GpuBackend::on(gpu.clone()), &plan(&scene), 2);
-    }
+    check(&GpuBackend::on(gpu), &plan(&ball(0.03)), 2);
 }
 
 #[test]
