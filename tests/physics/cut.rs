@@ -4,7 +4,7 @@ use super::effects_materials::effect;
 use faer::{Mat, Side};
 use glam::{DAffine3, DMat3, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::plan::Plan;
 use palpate_model::scene::*;
 use support::scenes;
@@ -18,7 +18,7 @@ fn spectrum(s: &Scene) -> (Plan, Vec<f64>, Vec<DVec3>) {
     let mut world = backend.build(&plan, 1).unwrap();
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     let mut state = backend.new_state(&world);
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     backend.start(&mut world, &mut state, &mut tally);
     assert!(!backend.all_failed(&tally), "{:?}", backend.read(&world, &tally)[0].failure);
     let n = 3 * plan.body.nodes.len();

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::observation::{Frame, Observation};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
@@ -16,7 +16,7 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
     s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::new(0.1, 0.0, 1.0))];
     s.initial.angular_velocity = DVec3::new(0.0, 3.0, 0.0);
     s.material.stiffness_damping = 0.002;
-    s.time = Time { step: 0.01, steps: 8, start: 0.0, theta: 0.6 };
+    s.time = Time { step: 0.01, steps: 8, start: 0.0, theta: 0.6, ..Time::default() };
     s.solver.linear = linear;
     s.solver.tolerance = 1e-10;
     let nodes = scenes::plan(&s).body.nodes.len();
@@ -27,7 +27,7 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
 }
 
 fn request() -> Request {
-    Request { gradient: true, sensitivities: vec![0, 1, 4] }
+    Request { gradient: Wanted::All, sensitivities: vec![0, 1, 4] }
 }
 
 fn evaluate(plan: &Plan, rows: &[Vec<f64>], members: usize) -> Vec<Evaluation> {

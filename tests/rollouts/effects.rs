@@ -4,7 +4,7 @@
 use super::gradients::{ball, observed};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, ALL, Family};
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::params::Transform;
@@ -51,8 +51,8 @@ pub(super) fn check(plan: &Plan, name: &str) {
         all.into_iter().inspect(|e| assert!(e.failure.is_none(), "{name}: {:?}", e.failure)).collect::<Vec<_>>()
     };
     let here = [plan.theta.clone()];
-    let adjoint = evaluate(&here, Request { gradient: true, sensitivities: Vec::new() }).remove(0).gradient;
-    let along = Request { gradient: false, sensitivities: chosen.clone() };
+    let adjoint = evaluate(&here, Request { gradient: Wanted::All, sensitivities: Vec::new() }).remove(0).gradient;
+    let along = Request { gradient: Wanted::Nothing, sensitivities: chosen.clone() };
     let forward = evaluate(&here, along).remove(0).curvature.unwrap().gradient;
     let size = |i: usize| {
         let spec = plan.layout.keys[i].spec();

@@ -4,7 +4,7 @@
 
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Source};
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Source, Wanted};
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
 use palpate_model::params::ParamKey;
@@ -26,7 +26,7 @@ pub(super) fn ball() -> Scene {
     s.masses = vec![PointMass { point: DVec3::new(0.0, 0.02, 0.09), mass: 0.02 }];
     s.initial.velocity = DVec3::new(-0.3, 0.1, -0.8);
     s.initial.angular_velocity = DVec3::new(2.0, -5.0, 1.0);
-    s.time = Time { step: 0.01, steps: 6, start: 0.002, theta: 0.6 };
+    s.time = Time { step: 0.01, steps: 6, start: 0.002, theta: 0.6, ..Time::default() };
     s.solver.tolerance = 1e-13;
     s
 }
@@ -135,9 +135,9 @@ pub(super) fn check_some(plan: &Plan, name: &str, some: impl Fn(ParamKey) -> boo
     let p = plan.layout.len();
     let chosen: Vec<usize> = (0..p).filter(|i| some(plan.layout.keys[*i])).collect();
     let mut rollout = Rollout::new(CpuBackend, plan, 2 * p).unwrap();
-    let adjoint = evaluate(&mut rollout, &plan.theta, &Request { gradient: true, sensitivities: Vec::new() });
+    let adjoint = evaluate(&mut rollout, &plan.theta, &Request { gradient: Wanted::All, sensitivities: Vec::new() });
     let all: Vec<usize> = (0..p).collect();
-    let forward = evaluate(&mut rollout, &plan.theta, &Request { gradient: false, sensitivities: all.clone() });
+    let forward = evaluate(&mut rollout, &plan.theta, &Request { gradient: Wanted::Nothing, sensitivities: all.clone() });
     let forward = forward.curvature.unwrap().gradient;
     assert!(adjoint.matched > 0, "{name}: something is compared");
     // Differences are of fourth order, over 1e-4 of a size that matters. No frame lies on a step boundary: there the curve through

@@ -2,7 +2,7 @@
 
 use super::gradients::{ball, observed};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Source};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Source, Wanted};
 use palpate_model::observation::ObservedPoint;
 use palpate_model::params::ParamKey::*;
 use palpate_model::plan::Plan;
@@ -20,7 +20,7 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
     let q = directions.len();
     let mut rollout = Rollout::new(CpuBackend, &plan, 1).unwrap();
     let lin = rollout.linearise(&plan.theta, &directions).unwrap();
-    let request = Request { gradient: false, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::Nothing, sensitivities: directions.clone() };
     let e = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
     let rows = &lin.rows.residuals;
     assert_eq!((rows.len(), lin.rows.sensitivity.len()), (e.residuals, e.residuals * q));
@@ -72,7 +72,7 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
 fn sums(plan: &Plan) -> [f64; 3] {
     let at = plan.layout.index(Velocity(2));
     let mut rollout = Rollout::new(CpuBackend, plan, 1).unwrap();
-    let request = Request { gradient: false, sensitivities: vec![at] };
+    let request = Request { gradient: Wanted::Nothing, sensitivities: vec![at] };
     let e = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
     assert_eq!(e.matched, e.residuals, "{:?}", e.failure);
     let c = e.curvature.unwrap();

@@ -7,9 +7,10 @@ use crate::passes::frames::{self, Along, Instant};
 use crate::simulate;
 use crate::world::{Adjoint, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
-use palpate_engine::{Backend, BuildError, Curvature, Evaluation, FrameResiduals, ParamBatch, Rows};
+use palpate_engine::{Backend, BuildError, Curvature, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 use rayon::prelude::*;
 
 /// The reference backend.
@@ -37,14 +38,21 @@ fn displacement(at: &Instant, now: &MemberState, next: &MemberState) -> Vec<DVec
 }
 
 /// Derivatives of a frame's displacement along the tangent directions, `[Q][N]`.
-fn derivatives(at: &Instant, shifts: &[usize], directions: &[usize], s: [&MemberState; 2], d: [&MemberTangent; 2]) -> Vec<Nodes> {
+fn derivatives(
+    at: &Instant,
+    shifts: &[usize],
+    directions: &[Direction],
+    s: [&MemberState; 2],
+    d: [&MemberTangent; 2],
+) -> Vec<Nodes> {
     (0..directions.len())
         .map(|q| {
             let mut du = frames::blend(&at.value, [&d[0].du[q], &d[0].dv[q], &d[1].du[q], &d[1].dv[q]]);
-            if shifts.contains(&directions[q]) {
+            let later: f64 = shifts.iter().map(|p| directions[q].component(*p)).sum();
+            if later != 0.0 {
                 // A later start, or stamps that are further ahead, mean an earlier place on the curve.
                 let rate = frames::blend(&at.rate, [&s[0].u, &s[0].v, &s[1].u, &s[1].v]);
-                crate::linear::vector::add_scaled(&mut du, -1.0, &rate);
+                crate::linear::vector::add_scaled(&mut du, -later, &rate);
             }
             du
         })
@@ -85,14 +93,14 @@ impl Backend for CpuBackend {
         Adjoint { members: blank(world) }
     }
 
-    fn new_tangent(&self, world: &World, directions: &[usize]) -> Tangent {
+    fn new_tangent(&self, world: &World, directions: &[Direction]) -> Tangent {
         let n = world.shared.plan.body.nodes.len();
         let blank = || MemberTangent { du: vec![zeros(n); directions.len()], dv: vec![zeros(n); directions.len()] };
         Tangent { directions: directions.to_vec(), members: world.members.iter().map(|_| blank()).collect() }
     }
 
-    fn new_tally(&self, world: &World, directions: &[usize]) -> Tally {
-        let q = directions.len();
+    fn new_tally(&self, world: &World, request: &Request) -> Tally {
+        let q = request.sensitivities.len();
         let evaluation = Evaluation {
             gradient: vec![0.0; world.shared.plan.layout.len()],
             curvature: (q > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
@@ -111,12 +119,12 @@ impl Backend for CpuBackend {
         });
     }
 
-    fn step(&self, world: &mut World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
+    fn step(&self, world: &mut World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
         let shared = &world.shared;
-        let time = (k + 1) as f64 * shared.plan.clock.step;
-        (&mut world.members, &now.members, &mut next.members, &mut tally.members).into_par_iter().for_each(|(m, a, b, t)| {
+        let time = stage.time;
+        (&mut world.members, &past[0].members, &mut next.members, &mut tally.members).into_par_iter().for_each(|(m, a, b, t)| {
             if !t.failed()
-                && let Err(reason) = simulate::step(shared, m, k, a, b)
+                && let Err(reason) = simulate::step(shared, m, stage, a, b)
             {
                 t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
             }
@@ -180,20 +188,20 @@ impl Backend for CpuBackend {
     fn step_adjoint(
         &self,
         world: &mut World,
-        k: usize,
-        now: &State,
+        stage: &Stage,
+        past: &[&State],
         next: &State,
         adj: &Adjoint,
-        adj_now: &mut Adjoint,
+        adj_past: &mut [Adjoint],
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let time = (k + 1) as f64 * shared.plan.clock.step;
-        (&mut world.members, &now.members, &next.members, &adj.members, &mut adj_now.members, &mut tally.members)
+        let time = stage.time;
+        (&mut world.members, &past[0].members, &next.members, &adj.members, &mut adj_past[0].members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, from, to, t)| {
                 if !t.failed()
-                    && let Err(reason) = simulate::step_adjoint(shared, m, k, a, b, from, to, &mut t.evaluation.gradient)
+                    && let Err(reason) = simulate::step_adjoint(shared, m, stage, a, b, from, to, &mut t.evaluation.gradient)
                 {
                     t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
                 }
@@ -235,21 +243,28 @@ impl Backend for CpuBackend {
     fn step_tangent(
         &self,
         world: &mut World,
-        k: usize,
-        now: &State,
+        stage: &Stage,
+        past: &[&State],
         next: &State,
-        tangent: &Tangent,
+        tangent_past: &[&Tangent],
         tangent_next: &mut Tangent,
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let directions = &tangent.directions;
-        let time = (k + 1) as f64 * shared.plan.clock.step;
-        (&mut world.members, &now.members, &next.members, &tangent.members, &mut tangent_next.members, &mut tally.members)
+        let directions = &tangent_past[0].directions;
+        let time = stage.time;
+        (
+            &mut world.members,
+            &past[0].members,
+            &next.members,
+            &tangent_past[0].members,
+            &mut tangent_next.members,
+            &mut tally.members,
+        )
             .into_par_iter()
             .for_each(|(m, a, b, d, d_next, t)| {
                 if !t.failed()
-                    && let Err(reason) = simulate::step_tangent(shared, m, k, a, b, directions, d, d_next)
+                    && let Err(reason) = simulate::step_tangent(shared, m, stage, a, b, directions, d, d_next)
                 {
                     t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
                 }

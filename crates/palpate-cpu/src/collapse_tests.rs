@@ -8,7 +8,7 @@ use crate::passes::cells::{corners, zeros};
 use crate::simulate;
 use crate::world::{MemberState, MemberTangent, World};
 use glam::{DAffine3, DVec3};
-use palpate_engine::{Backend, Failure, ParamBatch};
+use palpate_engine::{Backend, Direction, Failure, ParamBatch, Request};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
@@ -44,7 +44,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
         masses: Vec::new(),
         effects: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6 },
+        time: Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6, ..Time::default() },
         solver: Solver::default(),
         observation: None,
         fit: None,
@@ -70,12 +70,12 @@ pub(crate) fn run(plan: &Plan) -> Ran {
 pub(crate) fn run_in(mut world: World, plan: &Plan) -> Ran {
     let backend = CpuBackend;
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let (mut now, mut next) = (backend.new_state(&world), backend.new_state(&world));
     backend.start(&mut world, &mut now, &mut tally);
     let (mut solved, mut failure) = (0, None);
     while solved < plan.clock.steps && failure.is_none() {
-        backend.step(&mut world, solved, &now, &mut next, &mut tally);
+        backend.step(&mut world, &plan.clock.stages()[solved], &[&now], &mut next, &mut tally);
         failure = backend.read(&world, &tally).remove(0).failure;
         if failure.is_none() {
             solved += 1;
@@ -112,12 +112,12 @@ fn derivatives_of_a_crushed_step_agree() {
     let blank = || MemberState { u: zeros(n), v: zeros(n) };
     let (mut now, mut next) = (blank(), blank());
     simulate::start(shared, member, &mut now).unwrap();
-    let last = 29;
+    let (stages, last) = (plan.clock.stages(), 29);
     for k in 0..=last {
         if k > 0 {
             std::mem::swap(&mut now, &mut next);
         }
-        simulate::step(shared, member, k, &now, &mut next).unwrap();
+        simulate::step(shared, member, &stages[k], &now, &mut next).unwrap();
     }
     let pose = |e: usize| CellPose::new(&corners(&plan.body, e, &next.u), plan.body.grid.h);
     let guarded = (0..plan.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count();
@@ -125,13 +125,23 @@ fn derivatives_of_a_crushed_step_agree() {
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
     let tangents = || MemberTangent { du: vec![zeros(n); directions.len()], dv: vec![zeros(n); directions.len()] };
     let mut moved = tangents();
-    simulate::step_tangent(shared, member, last, &now, &next, &directions, &tangents(), &mut moved).unwrap();
+    simulate::step_tangent(
+        shared,
+        member,
+        &stages[last],
+        &now,
+        &next,
+        &Direction::parameters(&directions),
+        &tangents(),
+        &mut moved,
+    )
+    .unwrap();
     let wave = |scale: f64| {
         (0..n).map(|i| scale * DVec3::new((i as f64).sin(), (2.0 * i as f64).cos(), (3.0 * i as f64).sin())).collect()
     };
     let (adj, mut adj_now) = (MemberState { u: wave(1.0), v: wave(0.01) }, blank());
     let mut gradient = vec![0.0; plan.layout.len()];
-    simulate::step_adjoint(shared, member, last, &now, &next, &adj, &mut adj_now, &mut gradient).unwrap();
+    simulate::step_adjoint(shared, member, &stages[last], &now, &next, &adj, &mut adj_now, &mut gradient).unwrap();
     for p in directions {
         let forward = dot(&adj.u, &moved.du[p]) + dot(&adj.v, &moved.dv[p]);
         // Rounding through a matrix with a condition number of about 1e5.

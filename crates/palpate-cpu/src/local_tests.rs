@@ -14,19 +14,14 @@ use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
+use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::*;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
 fn altering() -> Vec<Effect> {
-    let alters = |site: &Site| match site {
-        Site::Modulus(_)
-        | Site::Density(_)
-        | Site::Aging(_)
-        | Site::Rest(_)
-        | Site::Clamps(_)
-        | Site::Edges(_)
-        | Site::Cells(_) => true,
-        _ => false,
+    let alters = |site: &Site| {
+        let of_body = matches!(site, Site::Modulus(_) | Site::Density(_) | Site::Aging(_) | Site::Rest(_) | Site::Cells(_));
+        of_body || matches!(site, Site::Clamps(_) | Site::Edges(_))
     };
     let make = |law: usize| {
         let mut effect = Effect::absent(law);
@@ -78,7 +73,7 @@ fn plan(effects: Vec<Effect>) -> Plan {
             pivot: None,
             state: InitialShape::StaticEquilibrium,
         },
-        time: Time { step: 0.01, steps: 3, start: 0.05, theta: 0.55 },
+        time: Time { step: 0.01, steps: 3, start: 0.05, theta: 0.55, ..Time::default() },
         solver: Solver::default(),
         observation: None,
         fit: None,
@@ -126,11 +121,12 @@ fn inverted(p: &Plan) -> Vec<DVec3> {
 
 /// Runs a check for the static balance and for a step, without effects and with all that change
 /// the body, at three states each.
-fn everywhere(check: impl Fn(&Plan, Option<usize>, &[Vec<DVec3>; 3])) {
+fn everywhere(check: impl Fn(&Plan, Option<&Stage>, &[Vec<DVec3>; 3])) {
     for effects in [Vec::new(), altering()] {
         let p = plan(effects);
         let n = p.body.nodes.len();
-        for step in [None, Some(1)] {
+        let stages = p.clock.stages();
+        for step in [None, Some(&stages[1])] {
             // Strains of some 10 % or cells turned inside out, contact active, the old state elsewhere, fast.
             for (seed, u) in [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))] {
                 check(&p, step, &[u, random(n, 0.003, seed + 10), random(n, 0.3, seed + 20)]);

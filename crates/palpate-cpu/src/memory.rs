@@ -82,7 +82,7 @@ impl<'a> Sizes<'a> {
         let direct = is_direct(plan.solver.linear, nodes, Purpose::Step(usize::MAX));
         let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
         let solve = copy + cells * (size_of::<Posed>() + size_of::<V24>()) + VECTORS * vector;
-        let kept = if request.gradient { plan.clock.steps + 3 } else { 2 };
+        let kept = if request.gradient.any() { plan.clock.stages().len() + 3 } else { 3 };
         let bytes = |n: usize| n as u64;
         Memory {
             shared: bytes(tables + ratios * matrices * MATRICES),

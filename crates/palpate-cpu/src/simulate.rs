@@ -7,23 +7,22 @@ use crate::passes::balance::{Balance, Inertia, States};
 use crate::passes::cells::{Mix, zeros};
 use crate::world::{Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
-use palpate_engine::{FailureKind, number};
+use palpate_engine::{Direction, FailureKind, number};
 use palpate_model::params::ParamKey;
 use palpate_model::params::changes;
+use palpate_model::plan::scheme::Stage;
 use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
 
-/// The balance of step k, or of the static problem (`None`).
-pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, k: Option<usize>) -> Balance<'a> {
-    let clock = &shared.plan.clock;
-    let (dt, theta) = (clock.step, clock.theta);
+/// The balance of a stage, or of the static problem (`None`).
+pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>) -> Balance<'a> {
     let p = &member.physics;
-    let (inertia, mix, time) = match k {
+    let (inertia, mix, time) = match stage {
         None => (None, Mix::STATIC, p.start),
-        Some(k) => (
-            Some(Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt }),
-            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / dt },
-            p.start + (k + 1) as f64 * dt,
+        Some(&Stage { length, theta, time, .. }) => (
+            Some(Inertia { displacement: 1.0 / (theta * length * length), velocity: 1.0 / (theta * length), rate: 1.0 / length }),
+            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / length },
+            p.start + time,
         ),
     };
     Balance {
@@ -181,32 +180,45 @@ fn add_columns(b: &Balance, s: States, z: &[DVec3], gradient: &mut [f64]) {
     }
 }
 
-/// Derivatives of the start along some parameters.
+/// (∂r/∂θ) dθ.
+fn column(b: &Balance, direction: &Direction, s: States) -> Nodes {
+    let mut sum = zeros(s.u1.len());
+    for (p, d) in direction.entries() {
+        if let Some(column) = b.column(b.plan.layout.keys[p], s) {
+            crate::linear::vector::add_scaled(&mut sum, d, &column);
+        }
+    }
+    sum
+}
+
+/// Derivatives of the start along some directions.
 pub fn start_tangent(
     shared: &Shared,
     member: &mut Member,
     s: &MemberState,
-    directions: &[usize],
+    directions: &[Direction],
     t: &mut MemberTangent,
 ) -> Result<(), Reason> {
     let plan = &shared.plan;
-    for (q, &p) in directions.iter().enumerate() {
-        match plan.layout.keys[p] {
-            ParamKey::Velocity(a) => t.dv[q].fill(DVec3::AXES[a as usize]),
-            ParamKey::AngularVelocity(a) => {
-                for (i, v) in t.dv[q].iter_mut().enumerate() {
-                    let arm = plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
-                    *v = DVec3::AXES[a as usize].cross(arm);
+    for (q, direction) in directions.iter().enumerate() {
+        for (p, d) in direction.entries() {
+            match plan.layout.keys[p] {
+                ParamKey::Velocity(a) => t.dv[q].iter_mut().for_each(|v| *v += d * DVec3::AXES[a as usize]),
+                ParamKey::AngularVelocity(a) => {
+                    for (i, v) in t.dv[q].iter_mut().enumerate() {
+                        let arm = plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
+                        *v += d * DVec3::AXES[a as usize].cross(arm);
+                    }
                 }
-            }
-            ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
-                if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(effect), usize::from(slot)) {
-                    let spin = member.physics.angular_velocity;
-                    t.dv[q].iter_mut().zip(&dw).for_each(|(v, w)| *v = spin.cross(*w));
-                    t.du[q] = dw;
+                ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
+                    if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(effect), usize::from(slot)) {
+                        let spin = member.physics.angular_velocity;
+                        t.dv[q].iter_mut().zip(&dw).for_each(|(v, w)| *v += d * spin.cross(*w));
+                        t.du[q].iter_mut().zip(&dw).for_each(|(u, w)| *u += d * *w);
+                    }
                 }
+                _ => {}
             }
-            _ => {}
         }
     }
     if plan.initial == InitialShape::Rest {
@@ -216,7 +228,7 @@ pub fn start_tangent(
     with_matrix(member, |member, matrix| {
         let b = balance(shared, member, None);
         let states = States { u1: &s.u, u0: &zero, v0: &zero };
-        t.du = directions.iter().map(|&p| minus(b.column(plan.layout.keys[p], states).unwrap_or_else(|| zero.clone()))).collect();
+        t.du = directions.iter().map(|d| minus(column(&b, d, states))).collect();
         newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Static, states, &mut t.du)
     })
 }
@@ -226,18 +238,24 @@ fn minus(mut v: Nodes) -> Nodes {
     v
 }
 
-/// Step k.
-pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, next: &mut MemberState) -> Result<(), Reason> {
-    let clock = shared.plan.clock;
+/// One stage.
+pub fn step(
+    shared: &Shared,
+    member: &mut Member,
+    stage: &Stage,
+    now: &MemberState,
+    next: &mut MemberState,
+) -> Result<(), Reason> {
+    let (dt, theta) = (stage.length, stage.theta);
     // Free flight is the guess: exact while nothing touches or deforms.
-    let fall = clock.theta * clock.step * clock.step * member.physics.gravity;
+    let fall = theta * dt * dt * member.physics.gravity;
     for i in 0..now.u.len() {
-        next.u[i] = now.u[i] + clock.step * now.v[i] + fall;
+        next.u[i] = now.u[i] + dt * now.v[i] + fall;
     }
     let solver = shared.plan.solver;
     let mut effort = member.effort;
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(k));
+        let b = balance(shared, member, Some(stage));
         newton::solve(
             &b,
             &shared.solvers,
@@ -252,7 +270,7 @@ pub fn step(shared: &Shared, member: &mut Member, k: usize, now: &MemberState, n
         )
     })?;
     member.effort = effort;
-    let (a, c) = velocity_factors(clock.step, clock.theta);
+    let (a, c) = velocity_factors(dt, theta);
     for i in 0..now.u.len() {
         next.v[i] = a * (next.u[i] - now.u[i]) - c * now.v[i];
     }
@@ -264,21 +282,21 @@ fn velocity_factors(dt: f64, theta: f64) -> (f64, f64) {
     (1.0 / (theta * dt), (1.0 - theta) / theta)
 }
 
-/// Adjoint of step k: adds dJ/d(now) to `adj_now` and dJ/dθ to `gradient`.
+/// Adjoint of a stage: adds dJ/d(now) to `adj_now` and dJ/dθ to `gradient`.
 pub fn step_adjoint(
     shared: &Shared,
     member: &mut Member,
-    k: usize,
+    stage: &Stage,
     now: &MemberState,
     next: &MemberState,
     adj: &MemberState,
     adj_now: &mut MemberState,
     gradient: &mut [f64],
 ) -> Result<(), Reason> {
-    let (a, c) = velocity_factors(shared.plan.clock.step, shared.plan.clock.theta);
+    let (a, c) = velocity_factors(stage.length, stage.theta);
     let mut z = [adj.u.iter().zip(&adj.v).map(|(u, v)| *u + a * *v).collect::<Nodes>()];
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(k));
+        let b = balance(shared, member, Some(stage));
         let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
         newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Step(1), states, &mut z)?;
         let (to_u, to_v) = b.by_old_transposed(states, &z[0]);
@@ -291,29 +309,27 @@ pub fn step_adjoint(
     })
 }
 
-/// Tangent of step k.
+/// Tangent of a stage.
 pub fn step_tangent(
     shared: &Shared,
     member: &mut Member,
-    k: usize,
+    stage: &Stage,
     now: &MemberState,
     next: &MemberState,
-    directions: &[usize],
+    directions: &[Direction],
     t: &MemberTangent,
     t_next: &mut MemberTangent,
 ) -> Result<(), Reason> {
-    let (a, c) = velocity_factors(shared.plan.clock.step, shared.plan.clock.theta);
+    let (a, c) = velocity_factors(stage.length, stage.theta);
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(k));
+        let b = balance(shared, member, Some(stage));
         let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
         t_next.du = directions
             .iter()
             .enumerate()
-            .map(|(q, &p)| {
+            .map(|(q, direction)| {
                 let mut rhs = b.by_old(states, &t.du[q], &t.dv[q]);
-                if let Some(column) = b.column(shared.plan.layout.keys[p], states) {
-                    rhs.iter_mut().zip(column).for_each(|(r, c)| *r += c);
-                }
+                rhs.iter_mut().zip(column(&b, direction, states)).for_each(|(r, c)| *r += c);
                 minus(rhs)
             })
             .collect();

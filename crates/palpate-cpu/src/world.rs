@@ -9,7 +9,7 @@ use crate::passes::frames::{Compared, Look};
 use crate::passes::matching::{BandLookup, PointHash};
 use crate::passes::points::{self, Acting};
 use crate::passes::supports::{self, PlaneNow};
-use palpate_engine::{Evaluation, Failure, ParamBatch};
+use palpate_engine::{Direction, Evaluation, Failure, ParamBatch};
 use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::{Physics, Plan};
@@ -136,7 +136,7 @@ pub struct Adjoint {
 /// du/dθ_q and dv/dθ_q of every member.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    pub(crate) directions: Vec<usize>,
+    pub(crate) directions: Vec<Direction>,
     pub(crate) members: Vec<MemberTangent>,
 }
 

@@ -1,9 +1,10 @@
 //! What a backend does: whole time steps, observations, and the adjoint and tangent of each, for a batch.
 
-use crate::evaluate::{Evaluation, ParamBatch};
+use crate::evaluate::{Direction, Evaluation, ParamBatch, Request};
 use crate::rows::Rows;
 use glam::DVec3;
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 
 /// Why a backend refused a plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,24 +42,28 @@ pub trait Backend: Send {
     fn new_state(&self, world: &Self::World) -> Self::State;
     /// Zeroed memory for an adjoint.
     fn new_adjoint(&self, world: &Self::World) -> Self::Adjoint;
-    /// Zeroed memory for tangents along the parameters `directions` (places in θ).
-    fn new_tangent(&self, world: &Self::World, directions: &[usize]) -> Self::Tangent;
-    /// A zeroed tally.
-    fn new_tally(&self, world: &Self::World, directions: &[usize]) -> Self::Tally;
+    /// Zeroed memory for tangents along `directions`.
+    fn new_tangent(&self, world: &Self::World, directions: &[Direction]) -> Self::Tangent;
+    /// A zeroed tally with room for what is requested.
+    fn new_tally(&self, world: &Self::World, request: &Request) -> Self::Tally;
 
-    /// Told before a rollout whether it is looked at on the way: one that is cannot be computed again. So it is assumed until
-    /// somebody says otherwise.
-    fn watch(&self, _world: &mut Self::World, _watched: bool) {}
-    /// True after [`Backend::read`] when members were cut off because less was planned for them than they are allowed: the same rollout,
-    /// computed again, gives them more.
-    fn again(&self, _world: &mut Self::World) -> bool {
-        false
+    /// Runs `body`, a whole rollout from [`Backend::start`] to [`Backend::read`]. A backend that gives its solves a limited effort may run it
+    /// again with more, unless it is `watched`: what somebody looks at on the way cannot be computed twice.
+    fn rollout<T>(&self, world: &mut Self::World, _watched: bool, mut body: impl FnMut(&mut Self::World) -> T) -> T {
+        body(world)
     }
 
     /// The initial state: rest or static equilibrium, with its velocity.
     fn start(&self, world: &mut Self::World, first: &mut Self::State, tally: &mut Self::Tally);
-    /// Step k (from time k Δt to (k + 1) Δt).
-    fn step(&self, world: &mut Self::World, k: usize, now: &Self::State, next: &mut Self::State, tally: &mut Self::Tally);
+    /// One solve of a step, from the `past` states that the stage names, in its order, to `next`.
+    fn step(
+        &self,
+        world: &mut Self::World,
+        stage: &Stage,
+        past: &[&Self::State],
+        next: &mut Self::State,
+        tally: &mut Self::Tally,
+    );
     /// Adds the cost of every frame that lies in step k: `(k Δt, (k + 1) Δt]` on the simulation's clock. Frames at or before
     /// the start belong to step 0, frames after the end to the last step (both held); in a static problem all belong to step 0
     /// with `now` = `next`.
@@ -75,18 +80,18 @@ pub trait Backend: Send {
         adj_now: &mut Self::Adjoint,
         tally: &mut Self::Tally,
     );
-    /// Adjoint of [`Backend::step`]: consumes dJ/d(next) in `adj`, adds dJ/d(now) to `adj_now`, and adds to dJ/dθ.
+    /// Adjoint of [`Backend::step`]: consumes dJ/d(next) in `adj`, adds the derivatives by the past states to `adj_past`, and adds to dJ/dθ.
     fn step_adjoint(
         &self,
         world: &mut Self::World,
-        k: usize,
-        now: &Self::State,
+        stage: &Stage,
+        past: &[&Self::State],
         next: &Self::State,
         adj: &Self::Adjoint,
-        adj_now: &mut Self::Adjoint,
+        adj_past: &mut [Self::Adjoint],
         tally: &mut Self::Tally,
     );
-    /// Adjoint of [`Backend::start`].
+    /// Adjoint of [`Backend::start`]; ends the way back.
     fn start_adjoint(&self, world: &mut Self::World, first: &Self::State, adj: &Self::Adjoint, tally: &mut Self::Tally);
     /// Sets an adjoint to zero.
     fn clear_adjoint(&self, adj: &mut Self::Adjoint);
@@ -97,10 +102,10 @@ pub trait Backend: Send {
     fn step_tangent(
         &self,
         world: &mut Self::World,
-        k: usize,
-        now: &Self::State,
+        stage: &Stage,
+        past: &[&Self::State],
         next: &Self::State,
-        tangent: &Self::Tangent,
+        tangent_past: &[&Self::Tangent],
         tangent_next: &mut Self::Tangent,
         tally: &mut Self::Tally,
     );

@@ -30,11 +30,86 @@ impl ParamBatch {
     }
 }
 
+/// Parameters that a gradient is wanted by; what is not wanted costs nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Wanted {
+    /// No gradient at all.
+    #[default]
+    Nothing,
+    /// All of θ.
+    All,
+    /// These places in θ; the other entries of the gradient are zero.
+    Places(Vec<usize>),
+}
+
+impl Wanted {
+    /// True where some gradient is wanted.
+    pub fn any(&self) -> bool {
+        !matches!(self, Wanted::Nothing)
+    }
+
+    /// Which of `parameters` numbers are wanted `[P]`.
+    pub fn mask(&self, parameters: usize) -> Vec<bool> {
+        match self {
+            Wanted::Nothing => vec![false; parameters],
+            Wanted::All => vec![true; parameters],
+            Wanted::Places(places) => {
+                let mut mask = vec![false; parameters];
+                places.iter().for_each(|p| mask[*p] = true);
+                mask
+            }
+        }
+    }
+}
+
+/// A direction in the space of parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Direction {
+    /// One parameter alone, by its place in θ.
+    Parameter(usize),
+    /// Any direction dθ `[P]`.
+    Dense(Vec<f64>),
+}
+
+impl Direction {
+    /// The directions of single parameters.
+    pub fn parameters(places: &[usize]) -> Vec<Direction> {
+        places.iter().map(|p| Direction::Parameter(*p)).collect()
+    }
+
+    /// Component along the parameter at place p.
+    pub fn component(&self, p: usize) -> f64 {
+        match self {
+            Direction::Parameter(own) => f64::from(u8::from(*own == p)),
+            Direction::Dense(d) => d[p],
+        }
+    }
+
+    /// Components that are not zero: place in θ and value.
+    pub fn entries(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (own, dense): (Option<usize>, &[f64]) = match self {
+            Direction::Parameter(p) => (Some(*p), &[]),
+            Direction::Dense(d) => (None, d),
+        };
+        own.map(|p| (p, 1.0)).into_iter().chain(dense.iter().copied().enumerate().filter(|(_, v)| *v != 0.0))
+    }
+
+    /// All components `[P]`.
+    pub fn dense(&self, parameters: usize) -> Vec<f64> {
+        let mut d = vec![0.0; parameters];
+        self.entries().for_each(|(p, v)| d[p] = v);
+        d
+    }
+}
+
+/// Most parameters that forward sensitivities are computed for at once: each takes the memory of a state and a linear solve per step.
+pub const MOST_SENSITIVITIES: usize = 256;
+
 /// What is wanted besides the cost.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Request {
-    /// The adjoint gradient dJ/dθ, all P entries.
-    pub gradient: bool,
+    /// The adjoint gradient dJ/dθ by these.
+    pub gradient: Wanted,
     /// Gauss–Newton curvature (and gradient) by forward sensitivities for these places in θ; empty = none.
     pub sensitivities: Vec<usize>,
 }
@@ -47,7 +122,7 @@ pub struct Request {
 pub struct Evaluation {
     /// J, dimensionless. Infinite for a member that failed.
     pub cost: f64,
-    /// dJ/dθ `[P]`; empty unless requested.
+    /// dJ/dθ `[P]`, zero where it is not wanted; empty unless requested.
     pub gradient: Vec<f64>,
     /// Forward sensitivities' result; `None` unless requested.
     pub curvature: Option<Curvature>,

@@ -9,9 +9,10 @@ mod evaluate;
 mod failure;
 mod rollout;
 mod rows;
+mod tape;
 
 pub use backend::{Backend, BuildError, FrameResiduals};
-pub use evaluate::{Curvature, Evaluate, Evaluation, ParamBatch, Request};
+pub use evaluate::{Curvature, Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 pub use failure::{Failure, FailureKind, number};
 pub use rollout::{Rollout, Snapshot};
 pub use rows::{Linearised, ResidualRow, Rows, Source};

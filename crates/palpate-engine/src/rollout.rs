@@ -1,11 +1,13 @@
 //! The driver: forward with tape, back with the adjoint, or forward with tangents. Written once for all backends.
 
 use crate::backend::{Backend, BuildError, FrameResiduals};
-use crate::evaluate::{Evaluate, Evaluation, ParamBatch, Request};
+use crate::evaluate::{Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request};
 use crate::failure::{Failure, FailureKind};
 use crate::rows::{Linearised, Rows};
+use crate::tape::{Adjoints, Tape};
 use glam::DVec3;
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,8 +17,9 @@ pub struct Rollout<B: Backend> {
     backend: B,
     world: B::World,
     plan: Plan,
+    stages: Vec<Stage>,
     members: usize,
-    /// Ends an evaluation at its next step when set.
+    /// Ends an evaluation at its next stage when set.
     stop: Arc<AtomicBool>,
 }
 
@@ -31,11 +34,130 @@ pub struct Snapshot {
     pub velocity: Vec<DVec3>,
 }
 
+/// A step that has been taken and observed, or the start.
+struct Moment<'a, B: Backend> {
+    world: &'a B::World,
+    /// Number of the step that ended; `None` at the start.
+    step: Option<usize>,
+    /// States at both ends of the step; twice the start's at the start.
+    ends: [&'a B::State; 2],
+    /// Tangents at both, where there are directions.
+    tangents: Option<[&'a B::Tangent; 2]>,
+    tally: &'a mut B::Tally,
+}
+
+/// The way forward.
+struct Forward<'a, B: Backend> {
+    backend: &'a B,
+    stages: &'a [Stage],
+    stop: &'a AtomicBool,
+    directions: &'a [Direction],
+    /// Every state is kept, for the way back.
+    keep: bool,
+}
+
+impl<B: Backend> Forward<'_, B> {
+    /// Takes all steps and shows every one of them, until all members have failed, `visit` breaks or somebody asks to stop.
+    /// Breaks with nothing where somebody asked.
+    fn run(
+        &self,
+        w: &mut B::World,
+        tally: &mut B::Tally,
+        mut visit: impl FnMut(Moment<B>) -> ControlFlow<()>,
+    ) -> ControlFlow<(), Tape<B::State>> {
+        let (b, directions) = (self.backend, self.directions);
+        let mut first = b.new_state(w);
+        b.start(w, &mut first, tally);
+        let mut tangents = (!directions.is_empty()).then(|| {
+            let mut t = b.new_tangent(w, directions);
+            b.start_tangent(w, &first, &mut t, tally);
+            Tape::new(self.stages, t, false)
+        });
+        let mut states = Tape::new(self.stages, first, self.keep);
+        if self.stages.is_empty() {
+            let now = states.last();
+            b.observe(w, 0, now, now, tally);
+        }
+        if b.all_failed(tally) {
+            return ControlFlow::Continue(states);
+        }
+        let start = tangents.as_ref().map(|t| [t.last(); 2]);
+        let now = states.last();
+        let mut flow = visit(Moment { world: w, step: None, ends: [now; 2], tangents: start, tally });
+        for s in self.stages {
+            if self.stop.load(Ordering::SeqCst) {
+                // What was begun is waited for, so that the world is idle when it is used again.
+                b.read(w, tally);
+                return ControlFlow::Break(());
+            }
+            if b.all_failed(tally) || flow.is_break() {
+                break;
+            }
+            let mut next = b.new_state(w);
+            b.step(w, s, &states.past(s), &mut next, tally);
+            if b.all_failed(tally) {
+                break;
+            }
+            if let Some(now) = s.completes {
+                b.observe(w, s.step, states.get(now), &next, tally);
+            }
+            if let Some(tape) = &mut tangents {
+                let mut t = tape.forget(s.number).unwrap_or_else(|| b.new_tangent(w, directions));
+                b.step_tangent(w, s, &states.past(s), &next, &tape.past(s), &mut t, tally);
+                tape.push(t);
+            }
+            states.push(next);
+            if let Some(now) = s.completes
+                && !b.all_failed(tally)
+            {
+                let tangents = tangents.as_ref().map(|t| [t.get(now), t.last()]);
+                let ends = [states.get(now), states.last()];
+                flow = visit(Moment { world: w, step: Some(s.step), ends, tangents, tally });
+            }
+            states.forget(s.number + 1);
+        }
+        ControlFlow::Continue(states)
+    }
+
+    /// The way back over all states of a tape; breaks where somebody asked to stop.
+    fn back(&self, w: &mut B::World, mut states: Tape<B::State>, tally: &mut B::Tally) -> ControlFlow<()> {
+        let b = self.backend;
+        let mut adjoints = Adjoints::<B>::new(self.stages.len() + 1);
+        if self.stages.is_empty() {
+            // Both ends of the only step are the same state: both halves of the gradient belong to it.
+            let (mut adj, mut adj_now) = (b.new_adjoint(w), adjoints.take(b, w, 0));
+            b.observe_adjoint(w, 0, states.last(), states.last(), &mut adj, &mut adj_now, tally);
+            adjoints.put(0, adj_now);
+        }
+        for s in self.stages.iter().rev() {
+            if self.stop.load(Ordering::SeqCst) {
+                b.read(w, tally);
+                return ControlFlow::Break(());
+            }
+            let mut adj = adjoints.take(b, w, s.number + 1);
+            if let Some(now) = s.completes {
+                let mut adj_now = adjoints.take(b, w, now);
+                b.observe_adjoint(w, s.step, states.get(now), states.last(), &mut adj, &mut adj_now, tally);
+                adjoints.put(now, adj_now);
+            }
+            let mut past: Vec<B::Adjoint> = s.from.iter().map(|f| adjoints.take(b, w, f.0)).collect();
+            b.step_adjoint(w, s, &states.past(s), states.last(), &adj, &mut past, tally);
+            s.from.iter().zip(past).for_each(|(f, a)| adjoints.put(f.0, a));
+            adjoints.done(adj);
+            states.pop();
+        }
+        let adj = adjoints.take(b, w, 0);
+        b.start_adjoint(w, states.last(), &adj, tally);
+        ControlFlow::Continue(())
+    }
+}
+
 impl<B: Backend> Rollout<B> {
     /// Prepares a plan for up to `members` simulations at once (more are evaluated in turns).
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
-        Ok(Rollout { backend, world, plan: plan.clone(), members: members.max(1), stop: Arc::default() })
+        let stages = plan.clock.stages();
+        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), stop: Arc::default() })
     }
 
     /// The same rollout, whose evaluations end at their next step once `stop` is set; every member then fails as
@@ -55,198 +177,127 @@ impl<B: Backend> Rollout<B> {
         &self.backend
     }
 
+    /// Evaluates a batch of at most as many members as there is room for.
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
-        loop {
-            let Some(all) = self.attempt(theta, request) else {
-                let failure = Failure::new(FailureKind::Stopped, 0.0, "the rollout was cut short");
-                return vec![Evaluation::failed(failure); theta.members()];
-            };
-            if !self.backend.again(&mut self.world) {
-                return all;
-            }
-        }
-    }
-
-    /// Evaluates a batch; `None` when it was asked to stop on the way.
-    fn attempt(&mut self, theta: &ParamBatch, request: &Request) -> Option<Vec<Evaluation>> {
-        let stop = || self.stop.load(Ordering::SeqCst);
-        if stop() {
-            return None;
-        }
-        let b = &self.backend;
-        let w = &mut self.world;
-        b.watch(w, false);
-        b.set_params(w, theta);
-        let directions = &request.sensitivities;
-        let mut tally = b.new_tally(w, directions);
-        let steps = self.plan.clock.steps;
-
-        let mut now = b.new_state(w);
-        b.start(w, &mut now, &mut tally);
-        let mut tangent = (!directions.is_empty()).then(|| (b.new_tangent(w, directions), b.new_tangent(w, directions)));
-        if let Some((t, _)) = &mut tangent {
-            b.start_tangent(w, &now, t, &mut tally);
-        }
-        if steps == 0 {
-            b.observe(w, 0, &now, &now, &mut tally);
-            if let Some((t, _)) = &tangent {
-                b.observe_tangent(w, 0, &now, &now, t, t, &mut tally);
-            }
-        }
-        // The tape holds u and v of every step: 48 bytes a node and step in f64; everything else is rebuilt on the way back.
-        let mut tape = Vec::new();
-        for k in 0..steps {
-            if stop() {
-                // What was begun is waited for, so that the world is idle when it is used again.
-                b.read(w, &tally);
+        let (b, stop, stages) = (&self.backend, &*self.stop, &self.stages);
+        let directions = Direction::parameters(&request.sensitivities);
+        let forward = Forward { backend: b, stages, stop, directions: &directions, keep: request.gradient.any() };
+        let attempt = |w: &mut B::World| {
+            if stop.load(Ordering::SeqCst) {
                 return None;
             }
-            if b.all_failed(&tally) {
-                break;
-            }
-            let mut next = b.new_state(w);
-            b.step(w, k, &now, &mut next, &mut tally);
-            b.observe(w, k, &now, &next, &mut tally);
-            if let Some((t, t_next)) = &mut tangent {
-                b.step_tangent(w, k, &now, &next, t, t_next, &mut tally);
-                b.observe_tangent(w, k, &now, &next, t, t_next, &mut tally);
-                std::mem::swap(t, t_next);
-            }
-            let old = std::mem::replace(&mut now, next);
-            if request.gradient {
-                tape.push(old);
-            }
-        }
-
-        if request.gradient && !b.all_failed(&tally) {
-            let mut adj = b.new_adjoint(w);
-            let mut adj_now = b.new_adjoint(w);
-            let mut next = now;
-            if steps == 0 {
-                // `now` and `next` are the same state: both halves of the gradient belong to it.
-                b.observe_adjoint(w, 0, &next, &next, &mut adj, &mut adj_now, &mut tally);
-                b.start_adjoint(w, &next, &adj_now, &mut tally);
-            }
-            for k in (0..steps).rev() {
-                if stop() {
-                    b.read(w, &tally);
-                    return None;
+            b.set_params(w, theta);
+            let mut tally = b.new_tally(w, request);
+            let visit = |m: Moment<B>| {
+                if let Some([t0, t1]) = m.tangents.filter(|_| m.step.is_some() || stages.is_empty()) {
+                    b.observe_tangent(m.world, m.step.unwrap_or(0), m.ends[0], m.ends[1], t0, t1, m.tally);
                 }
-                let now = tape.pop().expect("one state per step is on the tape");
-                b.observe_adjoint(w, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
-                b.step_adjoint(w, k, &now, &next, &adj, &mut adj_now, &mut tally);
-                std::mem::swap(&mut adj, &mut adj_now);
-                b.clear_adjoint(&mut adj_now);
-                next = now;
+                ControlFlow::Continue(())
+            };
+            let ControlFlow::Continue(states) = forward.run(w, &mut tally, visit) else { return None };
+            if request.gradient.any() && !b.all_failed(&tally) && forward.back(w, states, &mut tally).is_break() {
+                return None;
             }
-            b.start_adjoint(w, &next, &adj, &mut tally);
-        }
-        Some(b.read(w, &tally))
+            Some(b.read(w, &tally))
+        };
+        let all = b.rollout(&mut self.world, false, attempt);
+        all.unwrap_or_else(|| vec![Evaluation::failed(stopped()); theta.members()])
     }
 
     /// Simulates one member and hands every state (the initial one first) to `visit` together with the residuals of the
     /// frames of its step; stops early when `visit` breaks, or with the member's failure.
+    ///
+    /// # Errors
+    /// The simulation fails, or somebody asked to stop.
     pub fn visit(
         &mut self,
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
-        let b = &self.backend;
-        let w = &mut self.world;
-        b.watch(w, true);
-        b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
-        let mut tally = b.new_tally(w, &[]);
-        let mut now = b.new_state(w);
-        b.start(w, &mut now, &mut tally);
-        let steps = self.plan.clock.steps;
-        let snapshot = |w: &B::World, k: usize, s: &B::State| {
-            let (displacement, velocity) = b.read_state(w, s, 0);
-            Snapshot { time: k as f64 * self.plan.clock.step, displacement, velocity }
-        };
-        let mut flow = ControlFlow::Continue(());
-        if !b.all_failed(&tally) {
-            let residuals = if steps == 0 {
-                b.observe(w, 0, &now, &now, &mut tally);
-                b.residuals(w, 0, &now, &now, 0)
-            } else {
-                Vec::new()
+        let (b, dt) = (&self.backend, self.plan.clock.step);
+        let (stages, stop) = (&self.stages, &*self.stop);
+        let forward = Forward { backend: b, stages, stop, directions: &[], keep: false };
+        b.rollout(&mut self.world, true, |w| {
+            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            let mut tally = b.new_tally(w, &Request::default());
+            let each = |m: Moment<B>| {
+                let (displacement, velocity) = b.read_state(m.world, m.ends[1], 0);
+                let state = m.step.map_or(0, |k| k + 1);
+                let observed = m.step.is_some() || stages.is_empty();
+                let residuals =
+                    if observed { b.residuals(m.world, m.step.unwrap_or(0), m.ends[0], m.ends[1], 0) } else { Vec::new() };
+                visit(state, Snapshot { time: state as f64 * dt, displacement, velocity }, residuals)
             };
-            flow = visit(0, snapshot(w, 0, &now), residuals);
-        }
-        for k in 0..steps {
-            if b.all_failed(&tally) || flow.is_break() {
-                break;
-            }
-            let mut next = b.new_state(w);
-            b.step(w, k, &now, &mut next, &mut tally);
-            if b.all_failed(&tally) {
-                break;
-            }
-            b.observe(w, k, &now, &next, &mut tally);
-            let residuals = b.residuals(w, k, &now, &next, 0);
-            flow = visit(k + 1, snapshot(w, k + 1, &next), residuals);
-            now = next;
-        }
-        let evaluation = b.read(w, &tally).remove(0);
-        match &evaluation.failure {
-            Some(f) => Err(f.clone()),
-            None => Ok(evaluation),
-        }
+            forward.run(w, &mut tally, each).continue_value().ok_or_else(stopped)?;
+            let evaluation = b.read(w, &tally).remove(0);
+            evaluation.failure.clone().map_or(Ok(evaluation), Err)
+        })
     }
-}
 
-impl<B: Backend> Rollout<B> {
     /// Simulates one member with tangents along `directions` (places in θ) and collects every residual with its sensitivities.
     ///
     /// # Errors
-    /// The simulation fails, or the backend has no rows ([`FailureKind::Unsupported`]).
+    /// The simulation fails, somebody asked to stop, or the backend has no rows ([`FailureKind::Unsupported`]).
     pub fn linearise(&mut self, theta: &[f64], directions: &[usize]) -> Result<Linearised, Failure> {
+        refuse_many(directions.len())?;
         let b = &self.backend;
-        let w = &mut self.world;
-        b.watch(w, true);
-        b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
-        let mut tally = b.new_tally(w, directions);
-        let mut now = b.new_state(w);
-        let (mut t, mut t_next) = (b.new_tangent(w, directions), b.new_tangent(w, directions));
-        let mut rows = Rows::default();
-        let mut add = |more: Option<Rows>| {
-            let more = more.ok_or_else(|| {
-                Failure::new(FailureKind::Unsupported, 0.0, format!("backend {} has no single residuals", b.name()))
-            })?;
-            rows.residuals.extend(more.residuals);
-            rows.sensitivity.extend(more.sensitivity);
-            Ok(())
-        };
-        b.start(w, &mut now, &mut tally);
-        b.start_tangent(w, &now, &mut t, &mut tally);
-        let steps = self.plan.clock.steps;
-        if steps == 0 && !b.all_failed(&tally) {
-            b.observe(w, 0, &now, &now, &mut tally);
-            add(b.rows(w, 0, [&now, &now], [&t, &t], &tally, 0))?;
-        }
-        for k in 0..steps {
-            if b.all_failed(&tally) {
-                break;
+        let along = Direction::parameters(directions);
+        let (stages, stop) = (&self.stages, &*self.stop);
+        let forward = Forward { backend: b, stages, stop, directions: &along, keep: false };
+        b.rollout(&mut self.world, true, |w| {
+            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            let request = Request { sensitivities: directions.to_vec(), ..Request::default() };
+            let mut tally = b.new_tally(w, &request);
+            let (mut rows, mut without_rows) = (Rows::default(), false);
+            let each = |m: Moment<B>| {
+                let Some(tangents) = m.tangents.filter(|_| m.step.is_some() || stages.is_empty()) else {
+                    return ControlFlow::Continue(());
+                };
+                match b.rows(m.world, m.step.unwrap_or(0), m.ends, tangents, m.tally, 0) {
+                    Some(more) => {
+                        rows.residuals.extend(more.residuals);
+                        rows.sensitivity.extend(more.sensitivity);
+                        ControlFlow::Continue(())
+                    }
+                    None => {
+                        without_rows = true;
+                        ControlFlow::Break(())
+                    }
+                }
+            };
+            forward.run(w, &mut tally, each).continue_value().ok_or_else(stopped)?;
+            let evaluation = b.read(w, &tally).remove(0);
+            if without_rows {
+                let detail = format!("backend {} has no single residuals", b.name());
+                return Err(Failure::new(FailureKind::Unsupported, 0.0, detail));
             }
-            let mut next = b.new_state(w);
-            b.step(w, k, &now, &mut next, &mut tally);
-            b.observe(w, k, &now, &next, &mut tally);
-            b.step_tangent(w, k, &now, &next, &t, &mut t_next, &mut tally);
-            if b.all_failed(&tally) {
-                break;
+            match evaluation.failure {
+                Some(f) => Err(f),
+                None => Ok(Linearised {
+                    evaluation: Evaluation { curvature: None, ..evaluation },
+                    directions: directions.to_vec(),
+                    rows,
+                }),
             }
-            add(b.rows(w, k, [&now, &next], [&t, &t_next], &tally, 0))?;
-            std::mem::swap(&mut t, &mut t_next);
-            now = next;
-        }
-        let evaluation = b.read(w, &tally).remove(0);
-        match evaluation.failure {
-            Some(f) => Err(f),
-            None => {
-                Ok(Linearised { evaluation: Evaluation { curvature: None, ..evaluation }, directions: directions.to_vec(), rows })
-            }
-        }
+        })
     }
+}
+
+fn stopped() -> Failure {
+    Failure::new(FailureKind::Stopped, 0.0, "the rollout was cut short")
+}
+
+/// Forward sensitivities by very many parameters would take the memory of as many states.
+fn refuse_many(directions: usize) -> Result<(), Failure> {
+    if directions <= MOST_SENSITIVITIES {
+        return Ok(());
+    }
+    let detail = format!("sensitivities by {directions} parameters at once; at most {MOST_SENSITIVITIES} are computed directly");
+    Err(Failure {
+        hint: "fit a field with optimizer = \"lbfgs\" or \"gauss-newton-cg\", which need no sensitivities, or free fewer numbers"
+            .into(),
+        ..Failure::new(FailureKind::Unsupported, 0.0, detail)
+    })
 }
 
 impl<B: Backend> Evaluate for Rollout<B> {
@@ -255,6 +306,9 @@ impl<B: Backend> Evaluate for Rollout<B> {
     }
 
     fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        if let Err(failure) = refuse_many(request.sensitivities.len()) {
+            return vec![Evaluation::failed(failure); theta.members()];
+        }
         let rows: Vec<Vec<f64>> = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
         rows.chunks(self.members).flat_map(|rows| self.run(&ParamBatch::from_rows(rows), request)).collect()
     }

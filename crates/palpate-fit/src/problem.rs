@@ -2,7 +2,7 @@
 
 use crate::chart::Chart;
 use crate::optimise::Sample;
-use palpate_engine::{Evaluate, FailureKind, ParamBatch, Request};
+use palpate_engine::{Evaluate, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
 
 /// Where a free parameter acts: `theta[scene][place] = value · factor`.
@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
             let mut places: Vec<usize> = slots.iter().map(|(_, slot)| slot.place).collect();
             places.sort_unstable();
             let request = Request {
-                gradient: want == Want::Gradient,
+                gradient: if want == Want::Gradient { Wanted::Places(places.clone()) } else { Wanted::Nothing },
                 sensitivities: if want == Want::Curvature { places.clone() } else { Vec::new() },
             };
             let rows: Vec<Vec<f64>> = live.iter().map(|&b| self.theta(s, &values[b])).collect();

@@ -7,8 +7,9 @@ use crate::tuning::Tuning;
 use crate::world::{Adjoint, State, Tally, Tangent, World};
 use crate::{backward, forward, observe, read};
 use glam::DVec3;
-use palpate_engine::{Backend, BuildError, Evaluation, FrameResiduals, ParamBatch, Rows};
+use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::{self, Stage};
 use std::sync::Arc;
 
 /// The GPU backend.
@@ -77,6 +78,13 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
+        let scheme = plan.clock.scheme;
+        if *scheme != scheme::ALL[0] {
+            return Err(BuildError {
+                message: format!("the GPU backend cannot take steps of the scheme \"{}\"", scheme.name),
+                hint: format!("use --backend cpu, or scheme = \"{}\"", scheme::ALL[0].name),
+            });
+        }
         self.world(plan, members).map_err(|e| BuildError { message: e.to_string(), hint: e.hint_for(self.alone) })
     }
 
@@ -94,30 +102,37 @@ impl Backend for GpuBackend {
         adjoint
     }
 
-    fn new_tangent(&self, world: &World, directions: &[usize]) -> Tangent {
+    fn new_tangent(&self, world: &World, directions: &[Direction]) -> Tangent {
         let parts: Vec<_> = directions.iter().map(|_| world.lend(2)).collect();
         world.record(|r| parts.iter().for_each(|p| r.clear(&p.buffer)));
-        Tangent { directions: directions.to_vec(), parts }
+        let place = |d: &Direction| match d {
+            Direction::Parameter(p) => *p,
+            Direction::Dense(_) => unreachable!("only products with the Gauss-Newton matrix ask for dense directions"),
+        };
+        Tangent { directions: directions.iter().map(place).collect(), parts }
     }
 
-    fn new_tally(&self, world: &World, directions: &[usize]) -> Tally {
-        Tally::new(world, directions)
+    fn new_tally(&self, world: &World, request: &Request) -> Tally {
+        Tally::new(world, &request.sensitivities)
     }
 
-    fn watch(&self, world: &mut World, watched: bool) {
-        world.effort.watch(watched);
-    }
-
-    fn again(&self, world: &mut World) -> bool {
-        world.effort.rise()
+    fn rollout<T>(&self, world: &mut World, watched: bool, mut body: impl FnMut(&mut World) -> T) -> T {
+        loop {
+            world.effort.watch(watched);
+            let result = body(world);
+            // Members that were cut off because less was recorded for them than they are allowed get more.
+            if !world.effort.rise() {
+                return result;
+            }
+        }
     }
 
     fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {
         forward::start(world, first, tally);
     }
 
-    fn step(&self, world: &mut World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
-        forward::step(world, k, now, next, tally);
+    fn step(&self, world: &mut World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
+        forward::step(world, stage.step, past[0], next, tally);
     }
 
     fn observe(&self, world: &World, k: usize, now: &State, next: &State, tally: &mut Tally) {
@@ -143,14 +158,14 @@ impl Backend for GpuBackend {
     fn step_adjoint(
         &self,
         world: &mut World,
-        k: usize,
-        now: &State,
+        stage: &Stage,
+        past: &[&State],
         next: &State,
         adj: &Adjoint,
-        adj_now: &mut Adjoint,
+        adj_past: &mut [Adjoint],
         tally: &mut Tally,
     ) {
-        backward::step_adjoint(world, k, now, next, adj, adj_now, tally);
+        backward::step_adjoint(world, stage.step, past[0], next, adj, &adj_past[0], tally);
     }
 
     fn start_adjoint(&self, world: &mut World, first: &State, adj: &Adjoint, tally: &mut Tally) {
@@ -168,14 +183,14 @@ impl Backend for GpuBackend {
     fn step_tangent(
         &self,
         world: &mut World,
-        k: usize,
-        now: &State,
+        stage: &Stage,
+        past: &[&State],
         next: &State,
-        tangent: &Tangent,
+        tangent_past: &[&Tangent],
         tangent_next: &mut Tangent,
         tally: &mut Tally,
     ) {
-        backward::step_tangent(world, k, now, next, tangent, tangent_next, tally);
+        backward::step_tangent(world, stage.step, past[0], next, tangent_past[0], tangent_next, tally);
     }
 
     fn observe_tangent(

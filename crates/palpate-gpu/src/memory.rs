@@ -116,14 +116,14 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;
     // A static start keeps a state at rest beside the first one.
-    let kept = if request.gradient { u64::from(shape.steps) + 1 } else { 2 };
+    let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 };
     let all = |sizes: &[u64]| sizes.iter().map(|s| whole(*s)).sum();
     // Each state is a buffer of three vectors.
     let largest = constants.iter().chain(&space).fold(vectors(3), |most, s| most.max(*s));
     Ok(Memory {
         constants: all(&constants),
         work: all(&space),
-        states: vectors(3 * kept.max(2)) + if request.gradient { vectors(4) } else { 0 },
+        states: vectors(3 * kept.max(2)) + if request.gradient.any() { vectors(4) } else { 0 },
         tangents: vectors(4 * q as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
         largest,
     })

@@ -68,7 +68,7 @@ pub(crate) const SCENE: Schema = Schema {
         ("plane", table(&["point", "normal", "stiffness"])),
         ("mass", table(&["point", "mass"])),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
-        ("time", table(&["step", "duration", "steps", "start", "theta"])),
+        ("time", table(&["step", "duration", "steps", "start", "scheme", "theta"])),
         ("solver", table(&["rotation", "element", "linear", "tolerance", "newton_iterations", "ghost"])),
         (
             "observation",

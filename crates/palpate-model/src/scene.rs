@@ -5,6 +5,7 @@ use crate::effects::Effect;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::MarkerRest;
 use crate::params::Layout;
+use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
@@ -217,8 +218,17 @@ pub struct Time {
     pub steps: usize,
     /// Time of the initial state on the recording's clock [s].
     pub start: f64,
-    /// Weight of the new state, 0.5 ≤ θ < 1.
+    /// Weight of the new state, 0.5 ≤ θ < 1, where the scheme leaves it open.
     pub theta: f64,
+    /// How a step is taken.
+    pub scheme: &'static Scheme,
+}
+
+impl Default for Time {
+    /// No step at all, of a length that serves a static problem.
+    fn default() -> Time {
+        Time { step: 1.0, steps: 0, start: 0.0, theta: 0.6, scheme: &scheme::ALL[0] }
+    }
 }
 
 /// Numerical choices; the defaults are what a user wants.

@@ -1,6 +1,6 @@
 //! How many simulations of a fit run at once, and how much memory they take.
 
-use palpate_engine::Request;
+use palpate_engine::{Request, Wanted};
 use palpate_fit::{Want, want};
 use palpate_gpu::{AdapterReport, Choice, GpuError, Load};
 use palpate_model::params::ParamKey;
@@ -36,8 +36,8 @@ impl Demand {
     pub fn request(&self) -> Request {
         match want(self.optimizer) {
             Want::Cost => Request::default(),
-            Want::Gradient => Request { gradient: true, sensitivities: Vec::new() },
-            Want::Curvature => Request { gradient: false, sensitivities: self.places.clone() },
+            Want::Gradient => Request { gradient: Wanted::Places(self.places.clone()), sensitivities: Vec::new() },
+            Want::Curvature => Request { gradient: Wanted::Nothing, sensitivities: self.places.clone() },
         }
     }
 
@@ -54,7 +54,7 @@ impl Demand {
 
     /// What is asked once, at the best point, for standard errors.
     fn last(&self) -> Request {
-        Request { gradient: false, sensitivities: self.places.clone() }
+        Request { gradient: Wanted::Nothing, sensitivities: self.places.clone() }
     }
 
     fn ratios(&self, plan: &Plan, members: usize) -> usize {
@@ -92,7 +92,7 @@ impl Demand {
         let (members, during) = largest(self.most(), of, |m| m.as_ref().is_ok_and(fits));
         let during = during?;
         // Memory of states is kept for the next batch of the same size. The last evaluation is one member.
-        let gradient = members == 1 && self.request().gradient;
+        let gradient = if members == 1 { self.request().gradient } else { Wanted::Nothing };
         let request = Request { gradient, ..self.last() };
         let last = palpate_gpu::memory(plan, &Load { members: 1, ratios: 1, request: &request, room })?;
         let then = palpate_gpu::Memory { states: last.states, tangents: last.tangents, ..during };

@@ -4,10 +4,11 @@ use super::report::{Line, Report, Times};
 use super::{BAND, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
 use crate::table;
 use glam::DVec3;
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, Direction, ParamBatch, Request};
 use palpate_gpu::{Choice, Gpu, GpuBackend, World};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::{Analytic, RotationUpdate};
 use palpate_model::shape::Shape;
 use palpate_model::space::body::{Body, SUBDIVISIONS};
@@ -183,7 +184,7 @@ fn compile(gpu: &Arc<Gpu>) -> Result<(), String> {
     let backend = GpuBackend::on(gpu.clone());
     let mut world = backend.build(&plan, 1).map_err(|e| e.to_string())?;
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    settled(&backend, &mut world, 1, &[1]).map(|_| ())
+    settled(&backend, &mut world, &plan.clock.stages()[..1], &[1]).map(|_| ())
 }
 
 /// The longest step there and back so far: what larger ones will take.
@@ -208,17 +209,18 @@ struct Run {
     failure: Option<String>,
 }
 
-fn run(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]) -> Result<Run, String> {
+fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
+    let steps = stages.len();
     let wait = || backend.gpu().wait().map_err(|e| e.to_string());
     let mut seconds = [Vec::new(), Vec::new(), Vec::new()];
-    let mut tally = backend.new_tally(world, &[]);
+    let mut tally = backend.new_tally(world, &Request::default());
     let mut tape = vec![backend.new_state(world)];
     backend.start(world, &mut tape[0], &mut tally);
     wait()?;
     for k in 0..steps {
         let mut next = backend.new_state(world);
         let clock = Instant::now();
-        backend.step(world, k, &tape[k], &mut next, &mut tally);
+        backend.step(world, &stages[k], &[&tape[k]], &mut next, &mut tally);
         wait()?;
         seconds[0].push(clock.elapsed().as_secs_f64());
         let clock = Instant::now();
@@ -230,12 +232,12 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]
     let mut columns = vec![Vec::new(); together.len()];
     for (&count, seconds) in together.iter().zip(&mut columns) {
         let directions: Vec<usize> = (0..count).collect();
-        let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(world, &directions));
+        let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(world, &Direction::parameters(&directions)));
         backend.start_tangent(world, &tape[0], &mut old, &mut tally);
         wait()?;
         for k in 0..steps {
             let clock = Instant::now();
-            backend.step_tangent(world, k, &tape[k], &tape[k + 1], &old, &mut new, &mut tally);
+            backend.step_tangent(world, &stages[k], &[&tape[k]], &tape[k + 1], &[&old], &mut new, &mut tally);
             wait()?;
             seconds.push(clock.elapsed().as_secs_f64() / count as f64);
             std::mem::swap(&mut old, &mut new);
@@ -246,7 +248,7 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]
     for k in (0..steps).rev() {
         let clock = Instant::now();
         backend.observe_adjoint(world, k, &tape[k], &tape[k + 1], &mut adj, &mut adj_now, &mut tally);
-        backend.step_adjoint(world, k, &tape[k], &tape[k + 1], &adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(world, &stages[k], &[&tape[k]], &tape[k + 1], &adj, std::slice::from_mut(&mut adj_now), &mut tally);
         wait()?;
         seconds[2].push(clock.elapsed().as_secs_f64());
         std::mem::swap(&mut adj, &mut adj_now);
@@ -257,14 +259,8 @@ fn run(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]
 }
 
 /// The run that has what its members need.
-fn settled(backend: &GpuBackend, world: &mut World, steps: usize, together: &[usize]) -> Result<Run, String> {
-    backend.watch(world, false);
-    loop {
-        let run = run(backend, world, steps, together)?;
-        if !backend.again(world) {
-            return Ok(run);
-        }
-    }
+fn settled(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
+    backend.rollout(world, false, |world| run(backend, world, stages, together))
 }
 
 /// One line of the report, and the seconds of a step there and back.
@@ -288,7 +284,7 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
     let clock = Instant::now();
     let once = |world: &mut World| {
         world.time_passes(true);
-        let run = settled(&backend, world, 1, &[])?;
+        let run = settled(&backend, world, &plan.clock.stages()[..1], &[])?;
         let passes = world.pass_times().into_iter().map(|(name, t)| (name.to_string(), t.count, 1e-6 * t.nanoseconds)).collect();
         world.time_passes(false);
         let step = run.seconds.iter().flatten().sum();
@@ -303,7 +299,7 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
     let both: &[usize] = if times > 2 * COLUMNS { &[1, COLUMNS] } else { &[] };
     if times > 0 {
         let steps = (times / if both.is_empty() { 1 } else { 2 + COLUMNS }).clamp(1, plan.clock.steps);
-        run = settled(&backend, &mut world, steps, both)?;
+        run = settled(&backend, &mut world, &plan.clock.stages()[..steps], both)?;
     }
     let speed = world.cg_speed().map_err(|e| e.to_string())?;
     let of_member = |s: Vec<f64>| Times::of(s.into_iter().map(|x| x / batch as f64).collect());

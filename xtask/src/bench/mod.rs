@@ -7,7 +7,7 @@ pub mod report;
 use crate::table;
 use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::effects::{self, Effect, Family};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::{Layout, ParamKey};
@@ -151,7 +151,7 @@ pub(super) fn plan(body: Body, rotation: RotationUpdate, laws: &[usize]) -> Plan
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
         clamps: Vec::new(),
         masses: Vec::new(),
-        clock: Clock { step: 0.01, steps, theta: 0.6 },
+        clock: Clock { step: 0.01, steps, theta: 0.6, scheme: &palpate_model::plan::scheme::ALL[0] },
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),
@@ -227,14 +227,14 @@ struct Seconds {
 fn there_and_back(plan: &Plan, world: &mut World, taken: &mut Seconds) -> Option<String> {
     let backend = CpuBackend;
     backend.set_params(world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(world, &[]);
+    let mut tally = backend.new_tally(world, &Request::default());
     let mut now = backend.new_state(world);
     backend.start(world, &mut now, &mut tally);
     let mut tape = Vec::new();
     for k in 0..plan.clock.steps {
         let mut next = backend.new_state(world);
         let clock = Instant::now();
-        backend.step(world, k, &now, &mut next, &mut tally);
+        backend.step(world, &plan.clock.stages()[k], &[&now], &mut next, &mut tally);
         taken.forward.push(clock.elapsed().as_secs_f64());
         let clock = Instant::now();
         backend.observe(world, k, &now, &next, &mut tally);
@@ -247,7 +247,15 @@ fn there_and_back(plan: &Plan, world: &mut World, taken: &mut Seconds) -> Option
         let Some(now) = tape.pop() else { break };
         let clock = Instant::now();
         backend.observe_adjoint(world, k, &now, &next, &mut adj, &mut adj_now, &mut tally);
-        backend.step_adjoint(world, k, &now, &next, &adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(
+            world,
+            &plan.clock.stages()[k],
+            &[&now],
+            &next,
+            &adj,
+            std::slice::from_mut(&mut adj_now),
+            &mut tally,
+        );
         taken.adjoint.push(clock.elapsed().as_secs_f64());
         std::mem::swap(&mut adj, &mut adj_now);
         backend.clear_adjoint(&mut adj_now);

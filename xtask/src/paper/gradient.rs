@@ -2,7 +2,7 @@
 
 use crate::table;
 use palpate::{Backend, Error};
-use palpate_engine::{ParamBatch, Request};
+use palpate_engine::{ParamBatch, Request, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use serde::Serialize;
@@ -39,6 +39,7 @@ pub fn gradients(plan: &Plan, at: &[f64]) -> Result<Vec<Gradient>, Error> {
     let mut evaluate = |e: f64, gradient: bool| {
         let mut theta = plan.theta.clone();
         theta[place] = e;
+        let gradient = if gradient { Wanted::All } else { Wanted::Nothing };
         let request = Request { gradient, sensitivities: Vec::new() };
         let clock = Instant::now();
         let r = evaluator.evaluate(&ParamBatch::from_rows(&[theta]), &request).remove(0);

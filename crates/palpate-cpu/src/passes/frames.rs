@@ -7,7 +7,7 @@ use crate::linear::vector::Nodes;
 use crate::passes::markers::Carried;
 use crate::passes::matching::{BandLookup, Match, PointHash, Seen, extend, extend_transposed, match_points};
 use glam::DVec3;
-use palpate_engine::{FrameResiduals, ResidualRow, Rows, Source};
+use palpate_engine::{Direction, FrameResiduals, ResidualRow, Rows, Source};
 use palpate_model::effects::sensors::Sensors;
 pub use palpate_model::observation::instant::{Instant, instants};
 use palpate_model::observation::kernel;
@@ -126,8 +126,8 @@ pub fn gradient(look: Look, compared: &Compared, u: &[DVec3], scale: f64, theta:
 /// Tangents at a frame: places in θ and the displacement's derivatives by them.
 #[derive(Clone, Copy, Debug)]
 pub struct Along<'a> {
-    /// Places in θ `[Q]`.
-    pub directions: &'a [usize],
+    /// Directions in θ `[Q]`.
+    pub directions: &'a [Direction],
     /// Derivatives of the displacement `[Q][N]`.
     pub du: &'a [Nodes],
 }
@@ -138,7 +138,6 @@ pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visi
     let Look { plan, sensors, frame } = look;
     let Along { directions, du } = along;
     let (body, obs) = (&*plan.body, &*plan.observation);
-    let column = |at: usize| directions.iter().position(|d| *d == at);
     let f = &obs.frames[frame];
     let mut d = vec![0.0; du.len()];
     if !compared.matches.is_empty() {
@@ -153,8 +152,11 @@ pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visi
             sensors.point_slopes(
                 camera,
                 seen,
-                |at| directions.contains(&at),
-                |at, by| column(at).into_iter().for_each(|q| d[q] += m.place.gradient.dot(by)),
+                |at| directions.iter().any(|d| d.component(at) != 0.0),
+                |at, by| {
+                    let change = m.place.gradient.dot(by);
+                    d.iter_mut().zip(directions).for_each(|(d, along)| *d += along.component(at) * change);
+                },
             );
             let sight = DVec3::from_array(sensors.truth(camera, seen).ray()).normalize_or_zero();
             let row = ResidualRow {
@@ -185,8 +187,8 @@ pub fn rows(look: Look, compared: &Compared, u: &[DVec3], along: Along, mut visi
         let site = sensors.site(obs, m.site);
         let carried = Carried::new(body, &site, u);
         let own = |q: usize| {
-            let axis = |at: usize| (at..at + 3).position(|p| p == directions[q]);
-            sensors.marker_places(m.site).filter_map(axis).map(|a| carried.by_stalk(a)).sum::<DVec3>()
+            let of = |at: usize| (0..3).map(|a| directions[q].component(at + a) * carried.by_stalk(a)).sum::<DVec3>();
+            sensors.marker_places(m.site).map(of).sum::<DVec3>()
         };
         let rest = site.carry(|i| body.nodes[i]).0;
         let source = |axis| Source::Marker { site: m.site, axis };

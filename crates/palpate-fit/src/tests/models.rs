@@ -40,7 +40,7 @@ impl LeastSquares {
         };
         let slope = |c: &[f64]| c.iter().zip(&r).map(|(c, r)| c * r).sum::<f64>() / n;
         let mut gradient = Vec::new();
-        if request.gradient {
+        if request.gradient.any() {
             for p in 0..self.parameters {
                 let Some(c) = column(p) else { return failed() };
                 gradient.push(slope(&c));

@@ -5,7 +5,7 @@ use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use glam::DVec3;
 use palpate_cpu::passes::{frames, matching};
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, ParamBatch, Request};
 
 /// Rounding of displacements of some centimetres in two parts, and of sums over 60 weights.
 const TOLERANCE: f64 = 2e-6;
@@ -20,7 +20,7 @@ fn displacements_in_the_band_are_those_of_the_cpu_and_one_percent_shows() {
     let backend = GpuBackend::on(gpu.clone());
     let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let nodes = &plan.body.nodes;
     let states = [0.0, 1.0].map(|t| {
         let u: Vec<DVec3> =

@@ -9,7 +9,7 @@ use crate::tests::faults::{BALANCE, faulty};
 use crate::tests::scenes::{device, held};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::Effect;
 use palpate_model::observation::kernel;
 use palpate_model::params::ParamKey;
@@ -44,7 +44,7 @@ fn check(plan: &Plan, keys: &[usize]) {
     let Some(gpu) = device(None) else { return };
     let speed = plan.layout.index(ParamKey::Velocity(0));
     let directions = [keys, &[plan.layout.index(ParamKey::YoungsModulus), speed]].concat();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     let rows: Vec<Vec<f64>> = [0.5, 0.3]
         .map(|factor| {
             let mut row = plan.theta.clone();

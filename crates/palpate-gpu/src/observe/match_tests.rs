@@ -13,7 +13,7 @@ use crate::world::{State, World};
 use glam::DVec3;
 use palpate_cpu::passes::frames::{self, Look};
 use palpate_cpu::passes::matching::{BandLookup, PointHash, extend};
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::cutcells::pullback::{TURNED_AWAY, pull_back};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
@@ -74,7 +74,7 @@ fn found(gpu: &Arc<Gpu>, plan: &Plan, u: &[DVec3], room: Room) -> Matched {
     let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
     world.observer = Observer::within(gpu, plan, 1, room).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let (now, next) = (laid(&world, u), laid(&world, u));
     let (mut adj, mut adj_now) = (backend.new_adjoint(&world), backend.new_adjoint(&world));
     backend.observe_adjoint(&world, 0, &now, &next, &mut adj, &mut adj_now, &mut tally);

@@ -8,7 +8,7 @@ use crate::tests::faults::{BALANCE, Fault, faulty};
 use crate::tests::scenes::{device, held};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -129,7 +129,7 @@ fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]], faults: &[Fault])
     for (row, change) in rows.iter_mut().zip(changes) {
         directions.iter().zip(*change).for_each(|(d, c)| row[*d] *= c);
     }
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     let mut cpu = Rollout::new(CpuBackend, plan, rows.len()).unwrap_or_else(|e| panic!("{e}"));
     let right = cpu.evaluate(&ParamBatch::from_rows(&rows), &request);
     for fault in faults {

@@ -5,7 +5,7 @@ use super::tests::{ball_plan, ball_plan_with};
 use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Source};
+use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Source, Wanted};
 use palpate_model::effects::{ALL, Effect, Unstated, find};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -80,7 +80,7 @@ fn markers_that_sit_elsewhere_are_those_of_the_cpu() {
         _ => false,
     };
     let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     // The second member's marker sits elsewhere again.
     let mut other = plan.theta.clone();
     other[directions[1]] += 0.01;
@@ -132,7 +132,7 @@ fn readings_that_are_off_are_those_of_the_cpu() {
         _ => false,
     };
     let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     let mut other = plan.theta.clone();
     other[directions[1]] *= 1.5;
     other[directions[3]] *= 1.2;

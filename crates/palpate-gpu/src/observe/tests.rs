@@ -8,7 +8,7 @@ use crate::world::{State, World};
 use glam::{DQuat, DVec3};
 use palpate_cpu::passes::frames::{self, Along, Look};
 use palpate_cpu::passes::matching::{BandLookup, PointHash};
-use palpate_engine::{Backend, Evaluation, ParamBatch};
+use palpate_engine::{Backend, Direction, Evaluation, ParamBatch, Request};
 use palpate_model::effects::Effect;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::instant::instants;
@@ -232,7 +232,15 @@ pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
                     d
                 })
                 .collect();
-            frames::gauss_newton(look, &compared, &u, Along { directions: &keys, du: &du }, scale, &mut gn, &mut matrix);
+            frames::gauss_newton(
+                look,
+                &compared,
+                &u,
+                Along { directions: &Direction::parameters(&keys), du: &du },
+                scale,
+                &mut gn,
+                &mut matrix,
+            );
         }
         adjoint.extend(adj.iter().flat_map(|v| flat(v).collect::<Vec<_>>()));
     }
@@ -280,11 +288,11 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, members: usize, room: Opt
         .collect();
     backend.set_params(&mut world, &ParamBatch::from_rows(&rows));
     let keys = directions(plan);
-    let mut tally = backend.new_tally(&world, &keys);
+    let mut tally = backend.new_tally(&world, &Request { sensitivities: keys.to_vec(), ..Request::default() });
     let n = plan.body.nodes.len();
     let mut adjoints = vec![Vec::new(); members];
     let tangents = |k: usize| {
-        let t = backend.new_tangent(&world, &keys);
+        let t = backend.new_tangent(&world, &Direction::parameters(&keys));
         for (q, part) in t.parts.iter().enumerate() {
             let of = |i: usize| plan.body.nodes.iter().map(move |x| single(tangent(q, k, *x)[i]));
             let all: Vec<[f32; 4]> = (0..2).flat_map(|i| (0..members).flat_map(move |_| of(i))).collect();

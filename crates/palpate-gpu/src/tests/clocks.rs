@@ -9,7 +9,7 @@ use crate::observe::rollout_tests::{seen, watched};
 use crate::pipelines::{PASSES, pass};
 use crate::recorder::{Args, QUERIES, Recorder, Size};
 use crate::{GpuBackend, Product, Tuning};
-use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::scene::Scene;
 use std::collections::{BTreeSet, HashMap};
 use std::sync::atomic::Ordering;
@@ -69,7 +69,7 @@ fn conjugate_gradients_are_timed_by_whole_iterations_of_the_kernels_that_run() {
             assert!(*product != speed.product || traffic.bytes < speed.iteration.bytes);
         }
         // The world is as good as before.
-        let mut tally = backend.new_tally(&world, &[]);
+        let mut tally = backend.new_tally(&world, &Request::default());
         let mut state = backend.new_state(&world);
         backend.start(&mut world, &mut state, &mut tally);
         assert!(backend.read(&world, &tally).iter().all(|e| e.failure.is_none()));
@@ -87,7 +87,7 @@ fn an_evaluation_waits_once() {
     let plan = seen(&scene);
     let backend = GpuBackend::on(gpu.clone()).levels(&[FULL]);
     let mut rollout = Rollout::new(backend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
-    let request = Request { gradient: true, sensitivities: vec![0, 1] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![0, 1] };
     let before = gpu.waits.load(Ordering::Relaxed);
     let all = rollout.evaluate(&ParamBatch::from_rows(&spread(&plan, 2)), &request);
     assert!(all.iter().all(|e| e.failure.is_none() && e.matched > 100 && e.curvature.is_some()));
@@ -101,15 +101,23 @@ fn dispatched(backend: &GpuBackend, scene: &Scene) -> BTreeSet<&'static str> {
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     world.time_passes(true);
     let all: Vec<usize> = (0..plan.layout.len()).collect();
-    let mut tally = backend.new_tally(&world, &all);
+    let mut tally = backend.new_tally(&world, &Request { sensitivities: all.to_vec(), ..Request::default() });
     let [mut now, mut next] = [0; 2].map(|_| backend.new_state(&world));
-    let [mut tangent, mut tangent_next] = [0; 2].map(|_| backend.new_tangent(&world, &all));
+    let [mut tangent, mut tangent_next] = [0; 2].map(|_| backend.new_tangent(&world, &Direction::parameters(&all)));
     let [adj, mut adj_now] = [0; 2].map(|_| backend.new_adjoint(&world));
     backend.start(&mut world, &mut now, &mut tally);
     backend.start_tangent(&mut world, &now, &mut tangent, &mut tally);
-    backend.step(&mut world, 0, &now, &mut next, &mut tally);
-    backend.step_tangent(&mut world, 0, &now, &next, &tangent, &mut tangent_next, &mut tally);
-    backend.step_adjoint(&mut world, 0, &now, &next, &adj, &mut adj_now, &mut tally);
+    backend.step(&mut world, &plan.clock.stages()[0], &[&now], &mut next, &mut tally);
+    backend.step_tangent(&mut world, &plan.clock.stages()[0], &[&now], &next, &[&tangent], &mut tangent_next, &mut tally);
+    backend.step_adjoint(
+        &mut world,
+        &plan.clock.stages()[0],
+        &[&now],
+        &next,
+        &adj,
+        std::slice::from_mut(&mut adj_now),
+        &mut tally,
+    );
     backend.start_adjoint(&mut world, &now, &adj_now, &mut tally);
     assert!(backend.read(&world, &tally).iter().all(|e| e.failure.is_none()));
     world.pass_times().into_iter().map(|t| t.0).collect()

@@ -11,7 +11,7 @@ use crate::{Gpu, GpuBackend, Lanes, Product, Tuning};
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_cpu::passes::cells::corners;
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{Frame, Observation};
@@ -80,7 +80,7 @@ fn pressed() -> Scene {
     s.material.stiffness_damping = 0.002;
     s.initial.velocity = DVec3::ZERO;
     s.initial.angular_velocity = DVec3::ZERO;
-    s.time = Time { step: 0.01, steps: 6, start: 0.0, theta: 0.6 };
+    s.time = Time { step: 0.01, steps: 6, start: 0.0, theta: 0.6, ..Time::default() };
     let (far, turn) = (DVec3::new(0.004, 0.002, -0.05), DQuat::from_rotation_y(0.1));
     let motion = RigidMotion {
         times: vec![-0.06, 0.0, 0.06, 0.12],
@@ -131,7 +131,7 @@ fn evaluations_of_a_body_pressed_inside_out_agree_and_one_percent_shows() {
         [ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density, ParamKey::StiffnessDamping, ParamKey::Gravity(2)]
             .map(|k| plan.layout.index(k))
             .to_vec();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     let mut row = plan.theta.clone();
     row[directions[0]] *= 1.1;
     row[directions[1]] *= 0.9;
@@ -165,7 +165,7 @@ fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
     s.material.stiffness_damping = 0.002;
     s.initial.velocity = DVec3::new(0.3, 0.1, -4.0);
     s.initial.angular_velocity = DVec3::new(0.5, 1.0, 0.3);
-    s.time = Time { step: 0.01, steps, start: 0.0, theta: 0.6 };
+    s.time = Time { step: 0.01, steps, start: 0.0, theta: 0.6, ..Time::default() };
     s
 }
 

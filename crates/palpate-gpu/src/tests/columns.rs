@@ -8,7 +8,7 @@ use crate::memory::Maker as _;
 use crate::pipelines::{pass, shared::structs};
 use crate::recorder::{Args, Recorder, Size};
 use crate::{GpuBackend, Product, Tuning};
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, Direction, ParamBatch, Request};
 use palpate_model::plan::Plan;
 use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
@@ -17,14 +17,14 @@ use std::collections::HashMap;
 fn tangents(backend: &GpuBackend, plan: &Plan, theta: &[Vec<f64>], directions: &[usize]) -> (Vec<Vec<[u32; 4]>>, Vec<bool>) {
     let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(theta));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let [mut now, mut next] = [0; 2].map(|_| backend.new_state(&world));
-    let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(&world, directions));
+    let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(&world, &Direction::parameters(directions)));
     backend.start(&mut world, &mut now, &mut tally);
     backend.start_tangent(&mut world, &now, &mut old, &mut tally);
     for k in 0..plan.clock.steps {
-        backend.step(&mut world, k, &now, &mut next, &mut tally);
-        backend.step_tangent(&mut world, k, &now, &next, &old, &mut new, &mut tally);
+        backend.step(&mut world, &plan.clock.stages()[k], &[&now], &mut next, &mut tally);
+        backend.step_tangent(&mut world, &plan.clock.stages()[k], &[&now], &next, &[&old], &mut new, &mut tally);
         std::mem::swap(&mut now, &mut next);
         std::mem::swap(&mut old, &mut new);
     }

@@ -12,7 +12,7 @@ use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::passes::balance::{Balance, Inertia, States};
 use palpate_cpu::passes::cells::Mix;
-use palpate_engine::Backend;
+use palpate_engine::{Backend, Request};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::{Physics, Plan};
 
@@ -37,7 +37,7 @@ fn name_of(key: ParamKey) -> String {
 /// The device's numbers; derivatives of the whole in these `sizes`.
 fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
     let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
-    let tally = backend.new_tally(world, &[]);
+    let tally = backend.new_tally(world, &Request::default());
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
     backend.clear_adjoint(&mut adj);

@@ -6,7 +6,7 @@ use crate::GpuBackend;
 use crate::world::Adjoint;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, Direction, ParamBatch, Request};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -27,12 +27,12 @@ fn costs(plan: &Plan, theta: &[Vec<f64>]) -> Vec<f64> {
     let b = CpuBackend;
     let mut world = b.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     b.set_params(&mut world, &ParamBatch::from_rows(theta));
-    let mut tally = b.new_tally(&world, &[]);
+    let mut tally = b.new_tally(&world, &Request::default());
     let mut now = b.new_state(&world);
     b.start(&mut world, &mut now, &mut tally);
     for k in 0..plan.clock.steps {
         let mut next = b.new_state(&world);
-        b.step(&mut world, k, &now, &mut next, &mut tally);
+        b.step(&mut world, &plan.clock.stages()[k], &[&now], &mut next, &mut tally);
         now = next;
     }
     let (wu, wv) = weights(plan);
@@ -48,16 +48,16 @@ fn gradients(backend: &GpuBackend, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
     let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(theta));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let mut tape = vec![backend.new_state(&world)];
     backend.start(&mut world, &mut tape[0], &mut tally);
-    let mut tangent = backend.new_tangent(&world, &directions);
-    let mut tangent_next = backend.new_tangent(&world, &directions);
+    let mut tangent = backend.new_tangent(&world, &Direction::parameters(&directions));
+    let mut tangent_next = backend.new_tangent(&world, &Direction::parameters(&directions));
     backend.start_tangent(&mut world, &tape[0], &mut tangent, &mut tally);
     for k in 0..plan.clock.steps {
         let mut next = backend.new_state(&world);
-        backend.step(&mut world, k, &tape[k], &mut next, &mut tally);
-        backend.step_tangent(&mut world, k, &tape[k], &next, &tangent, &mut tangent_next, &mut tally);
+        backend.step(&mut world, &plan.clock.stages()[k], &[&tape[k]], &mut next, &mut tally);
+        backend.step_tangent(&mut world, &plan.clock.stages()[k], &[&tape[k]], &next, &[&tangent], &mut tangent_next, &mut tally);
         std::mem::swap(&mut tangent, &mut tangent_next);
         tape.push(next);
     }
@@ -78,7 +78,15 @@ fn gradients(backend: &GpuBackend, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<
     let all: Vec<[f32; 4]> = [vectors(&wu).repeat(members), vectors(&wv).repeat(members)].concat();
     backend.gpu().queue.write_buffer(&adj.0.buffer, 0, bytemuck::cast_slice(&all));
     for k in (0..plan.clock.steps).rev() {
-        backend.step_adjoint(&mut world, k, &tape[k], &tape[k + 1], &adj, &mut adj_now, &mut tally);
+        backend.step_adjoint(
+            &mut world,
+            &plan.clock.stages()[k],
+            &[&tape[k]],
+            &tape[k + 1],
+            &adj,
+            std::slice::from_mut(&mut adj_now),
+            &mut tally,
+        );
         std::mem::swap(&mut adj, &mut adj_now);
         backend.clear_adjoint(&mut adj_now);
     }

@@ -10,7 +10,7 @@ use crate::pipelines::pass;
 use crate::recorder::{Args, Recorder, Size};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend as _, Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Backend as _, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::law::{COMMON, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME};
 use palpate_model::effects::{self, ALL, Effect, Law, Site, Unstated};
 use palpate_model::params::ParamKey;
@@ -206,7 +206,7 @@ pub(super) fn compare_within(plan: &Plan, close: f64) {
         _ => false,
     };
     let directions: Vec<usize> = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     // Away from what was measured, so that there is something to explain, and by another effect than the first member's.
     let mut row = plan.theta.clone();
     row[plan.layout.index(ParamKey::YoungsModulus)] *= 1.2;

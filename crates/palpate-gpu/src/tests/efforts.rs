@@ -4,7 +4,7 @@ use super::products::crowded;
 use super::scenes::{own_device, plan, spread};
 use crate::effort::{Effort, FULL};
 use crate::{GpuBackend, Product, Tuning};
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
@@ -20,7 +20,7 @@ fn few_dispatches_bring_the_same_bits_as_all_and_more_follow_where_they_are_need
     let Some(gpu) = own_device() else { return };
     let plan = plan(&crowded());
     let theta = ParamBatch::from_rows(&spread(&plan, 3));
-    let request = Request { gradient: true, sensitivities: vec![0, 1, 5] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![0, 1, 5] };
     for many_from in [0, usize::MAX] {
         let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { many_from, product: Some(Product::Matrix) });
         let run = |levels: &'static [Effort]| {

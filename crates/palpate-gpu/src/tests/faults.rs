@@ -6,7 +6,7 @@ use crate::GpuBackend;
 use crate::device::Gpu;
 use crate::observe::rollout_tests::{differences, seen};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Scene;
@@ -116,7 +116,7 @@ fn comparisons_of_evaluations_see_one_percent() {
     let right = seen(&scene);
     let directions: Vec<usize> =
         [ParamKey::YoungsModulus, ParamKey::Density, ParamKey::Gravity(2)].map(|k| right.layout.index(k)).to_vec();
-    let request = Request { gradient: true, sensitivities: directions.clone() };
+    let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
     // Away from the parameters that were measured with, so that there is something to explain.
     let moved = |plan: &Plan| {
         let mut row = plan.theta.clone();

@@ -6,7 +6,7 @@ use super::scenes::{ball, device, held, plan, spread};
 use crate::GpuBackend;
 use crate::device::Lanes;
 use glam::DVec3;
-use palpate_engine::{Backend, Evaluation, FailureKind, ParamBatch};
+use palpate_engine::{Backend, Evaluation, FailureKind, ParamBatch, Request};
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource};
 
@@ -16,14 +16,14 @@ pub(super) type Moment = (Vec<DVec3>, Vec<DVec3>);
 pub(super) fn states<B: Backend>(backend: &B, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<Moment>>, Vec<Evaluation>) {
     let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(theta));
-    let mut tally = backend.new_tally(&world, &[]);
+    let mut tally = backend.new_tally(&world, &Request::default());
     let mut now = backend.new_state(&world);
     backend.start(&mut world, &mut now, &mut tally);
     let all = |world: &B::World, s: &B::State| (0..theta.len()).map(|b| backend.read_state(world, s, b)).collect();
     let mut found = vec![all(&world, &now)];
     for k in 0..plan.clock.steps {
         let mut next = backend.new_state(&world);
-        backend.step(&mut world, k, &now, &mut next, &mut tally);
+        backend.step(&mut world, &plan.clock.stages()[k], &[&now], &mut next, &mut tally);
         found.push(all(&world, &next));
         now = next;
     }

@@ -7,7 +7,7 @@ use crate::device::{Lanes, lanes_for};
 use crate::error::GpuError;
 use crate::observe::rollout_tests::{seen, watched};
 use crate::{GpuBackend, Tuning};
-use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Scene;
@@ -34,7 +34,7 @@ fn everything(plan: &Plan, lanes: Lanes, tuning: Tuning) -> Option<(Vec<palpate_
     let mut other = plan.theta.clone();
     other[plan.layout.index(ParamKey::YoungsModulus)] *= 1.2;
     let rows = ParamBatch::from_rows(&[plan.theta.clone(), other.clone()]);
-    let all = rollout.evaluate(&rows, &Request { gradient: true, sensitivities: directions.clone() });
+    let all = rollout.evaluate(&rows, &Request { gradient: Wanted::All, sensitivities: directions.clone() });
     let single = rollout.linearise(&other, &directions).unwrap_or_else(|e| panic!("{e}"));
     Some((all, single))
 }

@@ -14,7 +14,7 @@ use crate::solve::{ALL, MATRIX, Per, SOLVE, Solve, TRIAL};
 use crate::tuning::Tuning;
 use crate::world::{KINDS, SECTIONS, World};
 use crate::{GpuBackend, device::Gpu};
-use palpate_engine::{Backend, Evaluate, FailureKind, ParamBatch, Request, Rollout};
+use palpate_engine::{Backend, Evaluate, FailureKind, ParamBatch, Request, Rollout, Wanted};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -51,13 +51,13 @@ fn more_members_than_built_for_fail_as_evaluations() {
     let backend = GpuBackend::on(gpu);
     let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(&spread(&plan, 3)));
-    let tally = backend.new_tally(&world, &[]);
+    let tally = backend.new_tally(&world, &Request::default());
     let all = backend.read(&world, &tally);
     assert!(all.len() == 3 && all.iter().all(|e| e.failure.as_ref().is_some_and(|f| f.kind == FailureKind::Device)));
 }
 
 fn evaluate(rollout: &mut Rollout<GpuBackend>, theta: &[f64]) -> palpate_engine::Evaluation {
-    let request = Request { gradient: true, sensitivities: vec![0] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![0] };
     rollout.evaluate(&ParamBatch::from_rows(&[theta.to_vec()]), &request).remove(0)
 }
 
@@ -255,7 +255,7 @@ fn more_derivatives_than_an_invocation_may_look_through_are_refused() {
     let plan = plan(&scene);
     let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
     let mut with = |count: u64| {
-        let request = Request { gradient: false, sensitivities: vec![0; count as usize] };
+        let request = Request { gradient: Wanted::Nothing, sensitivities: vec![0; count as usize] };
         rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0).failure
     };
     let failure = with(MOST_DIRECTIONS + 1).unwrap_or_else(|| panic!("{} derivatives", MOST_DIRECTIONS + 1));
@@ -274,7 +274,7 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
     let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     world.set_iterations(1);
-    let tally = backend.new_tally(&world, &[]);
+    let tally = backend.new_tally(&world, &Request::default());
     let (now, next) = (backend.new_state(&world), backend.new_state(&world));
     let wave: Vec<[f32; 4]> = (0..plan.body.nodes.len()).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), 1.0, 0.0]).collect();
     gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));

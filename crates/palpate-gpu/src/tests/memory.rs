@@ -3,7 +3,7 @@
 use super::scenes::{ball, held, own_device, plan};
 use crate::observe::rollout_tests::{seen, watched};
 use crate::{Gpu, GpuBackend, Load, Product, Tuning, memory, tuning};
-use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, Effect};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -45,11 +45,11 @@ fn check_unused(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) 
     let mut world = backend.build(plan, members).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ratios(plan, members));
     let directions = &request.sensitivities;
-    let _tally = backend.new_tally(&world, directions);
-    let kept = if request.gradient { plan.clock.steps + 1 } else { 2 };
+    let _tally = backend.new_tally(&world, &Request { sensitivities: directions.to_vec(), ..Request::default() });
+    let kept = if request.gradient.any() { plan.clock.steps + 1 } else { 2 };
     let _states: Vec<_> = (0..kept).map(|_| backend.new_state(&world)).collect();
-    let _adjoints: Vec<_> = (0..if request.gradient { 2 } else { 0 }).map(|_| backend.new_adjoint(&world)).collect();
-    let _tangents: Vec<_> = [0; 2].iter().map(|_| backend.new_tangent(&world, directions)).collect();
+    let _adjoints: Vec<_> = (0..if request.gradient.any() { 2 } else { 0 }).map(|_| backend.new_adjoint(&world)).collect();
+    let _tangents: Vec<_> = [0; 2].iter().map(|_| backend.new_tangent(&world, &Direction::parameters(directions))).collect();
     settle(gpu);
     assert_eq!(gpu.take_trouble(), None);
     compare(gpu, before, plan, members, request);
@@ -103,7 +103,12 @@ fn two_sizes_alone_and_in_batches_of_eight() {
         friction.values[0] = Some(0.3);
         scene.effects.push(friction);
         for members in [1, 8] {
-            check(&gpu, &plan(&scene), members, &Request { gradient: h > 0.025, sensitivities: Vec::new() });
+            check(
+                &gpu,
+                &plan(&scene),
+                members,
+                &Request { gradient: if h > 0.025 { Wanted::All } else { Wanted::Nothing }, sensitivities: Vec::new() },
+            );
         }
     }
 }
@@ -115,12 +120,14 @@ fn large_bodies_and_batches_are_foreseen() {
     scene.time.steps = 2;
     let large = plan(&scene);
     assert!(large.body.nodes.len() >= tuning::MANY, "{}", large.body.nodes.len());
-    check_unused(&gpu, &large, 1, &Request { gradient: true, sensitivities: vec![0] });
+    check_unused(&gpu, &large, 1, &Request { gradient: Wanted::All, sensitivities: vec![0] });
     let mut scene = ball(0.02);
     scene.time.steps = 4;
     scene.observation = watched();
     let small = seen(&scene);
-    for request in [Request { gradient: true, ..Request::default() }, Request { gradient: false, sensitivities: vec![0] }] {
+    for request in
+        [Request { gradient: Wanted::All, ..Request::default() }, Request { gradient: Wanted::Nothing, sensitivities: vec![0] }]
+    {
         check_unused(&gpu, &small, 64, &request);
     }
 }
@@ -131,10 +138,10 @@ fn predicted_memory_is_within_a_tenth_of_what_is_made() {
     let mut scene = ball(0.03);
     scene.time.steps = 3;
     scene.observation = watched();
-    let all = Request { gradient: true, sensitivities: vec![0, 1, 2] };
+    let all = Request { gradient: Wanted::All, sensitivities: vec![0, 1, 2] };
     check(&gpu, &seen(&scene), 3, &all);
     scene.time.steps = 5;
-    check(&gpu, &plan(&scene), 1, &Request { gradient: true, sensitivities: Vec::new() });
+    check(&gpu, &plan(&scene), 1, &Request { gradient: Wanted::All, sensitivities: Vec::new() });
     let mut held = held(0.03);
     held.time.steps = 1;
     // What effects keep per node, cell and clamp.

@@ -13,7 +13,7 @@ use palpate_cpu::passes::altered::Altered;
 use palpate_cpu::passes::balance::{Balance, Inertia, States};
 use palpate_cpu::passes::cells::{Mix, corners};
 use palpate_cpu::passes::points::acting;
-use palpate_engine::{Backend, ParamBatch};
+use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::cutcells::corotation::{CellPose, multiply};
 use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::{self, Effect};
@@ -84,7 +84,7 @@ pub(super) fn stepwise(backend: &GpuBackend, plan: &Plan) -> World {
 /// The device's numbers, with A of the CPU to check solutions by.
 pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Part> {
     let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
-    let tally = backend.new_tally(world, &[]);
+    let tally = backend.new_tally(world, &Request::default());
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let quantum = f64::from(world.geometry.shape.quantum);
     let all: Vec<[DVec3; 3]> = plan.body.nodes.iter().map(|x| (right.given)(*x)).collect();
@@ -180,7 +180,7 @@ pub(super) fn with_balance<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
     let effects = acting(plan, &physics);
     let planes = planes(plan, &physics);
     let (dt, theta) = (plan.clock.step, plan.clock.theta);
-    let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt, rotation: plan.solver.rotation };
+    let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt };
     let inertia = Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt };
     let balance = Balance {
         plan,

@@ -10,7 +10,7 @@ use crate::tuning;
 use crate::world::World;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Plane, Scene};
 
@@ -35,10 +35,11 @@ pub(super) fn crowded() -> Scene {
 /// A p of every node, by a product, with p what the preconditioner makes of a wave; after one step with these parameters.
 fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product: Product) -> Vec<f64> {
     backend.set_params(world, &ParamBatch::from_rows(theta));
-    let mut tally = backend.new_tally(world, &[]);
+    let mut tally = backend.new_tally(world, &Request::default());
     let (mut now, mut next) = (backend.new_state(world), backend.new_state(world));
     backend.start(world, &mut now, &mut tally);
-    backend.step(world, 0, &now, &mut next, &mut tally);
+    let stage = world.plan.clock.stages().swap_remove(0);
+    backend.step(world, &stage, &[&now], &mut next, &mut tally);
     let count = world.plan.body.nodes.len() * world.members();
     let wave: Vec<[f32; 4]> =
         (0..count).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), (3.0 * i as f32).sin(), 0.0]).collect();
@@ -132,7 +133,7 @@ fn gradients_by_many_workgroups_agree_with_the_cpu() {
     scene.time.steps = 3;
     scene.observation = watched();
     let plan = seen(&scene);
-    let request = Request { gradient: true, sensitivities: vec![0, 1, 2] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![0, 1, 2] };
     let theta = &spread(&plan, 2)[1..];
     let mut cpu = Rollout::new(CpuBackend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
     let right = cpu.evaluate(&ParamBatch::from_rows(theta), &request).remove(0);

@@ -78,7 +78,7 @@ pub fn ball(h: f64) -> Scene {
             pivot: None,
             state: InitialShape::Rest,
         },
-        time: Time { step: 0.01, steps: 6, start: 0.05, theta: 0.6 },
+        time: Time { step: 0.01, steps: 6, start: 0.05, theta: 0.6, ..Time::default() },
         solver: Solver::default(),
         observation: None,
         fit: None,

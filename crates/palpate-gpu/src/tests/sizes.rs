@@ -8,7 +8,7 @@ use crate::GpuBackend;
 use crate::observe::rollout_tests::{differences, seen, watched};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, ParamBatch, Request, Rollout};
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::scene::{Analytic, BodySource, Scene};
 
@@ -47,7 +47,7 @@ fn members_around_a_workgroup_agree_with_the_cpu_and_with_themselves_alone_and_o
     let mut scene = block([1, 1, 1]);
     scene.observation = watched();
     let plan = seen(&scene);
-    let request = Request { gradient: true, sensitivities: vec![plan.layout.index(ParamKey::YoungsModulus)] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![plan.layout.index(ParamKey::YoungsModulus)] };
     let rows = spread(&plan, 65);
     let mut cpu = Rollout::new(CpuBackend, &plan, 65).unwrap_or_else(|e| panic!("{e}"));
     let right = cpu.evaluate(&ParamBatch::from_rows(&rows), &request);
@@ -83,7 +83,7 @@ fn a_plan_that_nobody_watched_costs_nothing() {
     let Some(gpu) = device(None) else { return };
     let plan = plan(&block([1, 1, 1]));
     let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 2).unwrap_or_else(|e| panic!("{e}"));
-    let request = Request { gradient: true, sensitivities: vec![0] };
+    let request = Request { gradient: Wanted::All, sensitivities: vec![0] };
     for e in rollout.evaluate(&ParamBatch::from_rows(&spread(&plan, 2)), &request) {
         assert!(e.failure.is_none() && e.cost == 0.0 && e.gradient.iter().all(|g| *g == 0.0), "{e:?}");
     }

@@ -16,6 +16,7 @@ use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
+use palpate_model::plan::scheme::{self, Scheme};
 use palpate_model::scene::*;
 use std::path::Path;
 
@@ -232,7 +233,19 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     // A static problem has no step; any positive length serves.
     let step = step.or((count == 0.0).then_some(1.0)).ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
     let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
-    Ok(Time { step, steps: count as usize, start: t.optional_f64("start")?.unwrap_or(0.0), theta: theta.unwrap_or(0.6) })
+    let schemes: Vec<(&str, &'static Scheme)> = scheme::ALL.iter().map(|s| (s.name, s)).collect();
+    let scheme = t.optional_choice("scheme", &schemes)?.unwrap_or(&scheme::ALL[0]);
+    if let (Some(_), false) = (theta, scheme.solves.iter().any(|s| s.theta.is_none())) {
+        return Err(t.error("theta", format!("belongs to scheme = \"theta\"; \"{}\" has none", scheme.name)));
+    }
+    let default = Time::default();
+    Ok(Time {
+        step,
+        steps: count as usize,
+        start: t.optional_f64("start")?.unwrap_or(0.0),
+        theta: theta.unwrap_or(default.theta),
+        scheme,
+    })
 }
 
 /// Shortest time step [s]: the fastest waves need a thousand times as long to cross the smallest cells, and forces overflow long before zero.

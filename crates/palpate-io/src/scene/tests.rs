@@ -43,7 +43,7 @@ fn fit_error(parameter: &str) -> String {
 #[test]
 fn absent_keys_take_the_documented_defaults() {
     let s = read("").unwrap().value;
-    assert_eq!(s.time, Time { step: 0.008333, steps: 180, start: 0.0, theta: 0.6 });
+    assert_eq!(s.time, Time { step: 0.008333, steps: 180, start: 0.0, theta: 0.6, ..Time::default() });
     assert_eq!(s.gravity, DVec3::new(0.0, 0.0, -9.81));
     assert_eq!(s.solver, Solver::default());
     assert_eq!(s.planes[0].normal, DVec3::Z);

@@ -93,7 +93,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         planes,
         clamps,
         masses,
-        clock: Clock { step: scene.time.step, steps: scene.time.steps, theta: scene.time.theta },
+        clock: Clock { step: scene.time.step, steps: scene.time.steps, theta: scene.time.theta, scheme: scene.time.scheme },
         initial: scene.initial.state,
         pivot: scene.initial.pivot.unwrap_or(body.center),
         observation: Arc::new(observation),

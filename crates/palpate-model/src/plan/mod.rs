@@ -1,6 +1,7 @@
 //! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
 
 pub mod build;
+pub mod scheme;
 
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::HeldMoments;
@@ -11,6 +12,7 @@ use crate::params::{Layout, ParamKey};
 use crate::scene::{InitialShape, Solver};
 use crate::space::body::Body;
 use glam::{DMat3, DVec3};
+use scheme::{Scheme, Stage};
 use std::sync::Arc;
 
 /// A body that has moved this many times its own size has left the world.
@@ -138,8 +140,17 @@ pub struct Clock {
     pub step: f64,
     /// Number of steps.
     pub steps: usize,
-    /// Weight of the new state.
+    /// Weight of the new state, where the scheme leaves it open.
     pub theta: f64,
+    /// How a step is taken.
+    pub scheme: &'static Scheme,
+}
+
+impl Clock {
+    /// All solves from the start to the end.
+    pub fn stages(&self) -> Vec<Stage> {
+        self.scheme.stages(self.step, self.steps, self.theta)
+    }
 }
 
 /// One member's θ decoded into the numbers that passes use.

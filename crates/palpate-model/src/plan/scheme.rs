@@ -1,0 +1,190 @@
+//! Time integration schemes: tables over past states.
+//!
+//! Every scheme here is built of one implicit solve, the θ-step of length ℓ from a state (ũ, ṽ) that is a weighted sum of past ones:
+//! `M [(u₁ − ũ)/(θℓ²) − ṽ/(θℓ)] + θ f(u₁) + (1 − θ) f(ũ) = 0` and `v₁ = (u₁ − ũ)/(θℓ) − (1 − θ)/θ ṽ`, f the forces' left side.
+//! - The θ-scheme is one such step of length Δt from the present state.
+//! - BDF2, `v₁ = (3u₁ − 4u₀ + u₋)/(2Δt)`, is one with θ = 1 and ℓ = 2Δt/3 from (4·now − before)/3. Its first step has no state before and is
+//!   one of TR-BDF2, so that the order stays two (Hahn et al. 2019 copy the start backwards instead, which leaves half a step of delay).
+//! - TR-BDF2 (Bank et al., *IEEE Trans. Electron Devices* 32, 1985; Hosea & Shampine, *Appl. Numer. Math.* 20, 1996) is a trapezoidal step
+//!   of γΔt, γ = 2 − √2, and one of BDF2 over both parts: of second order, L-stable, and with one length in both solves.
+//!
+//! A solve from more than one past state has θ = 1, so only forces that depend on a rate see the past states.
+
+/// A past state that a solve starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Past {
+    /// The state at the beginning of the step.
+    Now,
+    /// The state at the beginning of the step before.
+    Before,
+    /// The state that solve `n` of the same step gave.
+    Solved(usize),
+}
+
+/// One row of a table: one implicit solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solve {
+    /// Past states and their weights, which sum to one.
+    pub from: &'static [(Past, f64)],
+    /// ℓ over Δt.
+    pub length: f64,
+    /// θ; `None` = the one that the scene states.
+    pub theta: Option<f64>,
+    /// Where in the step the new state lies, over Δt.
+    pub end: f64,
+}
+
+/// A scheme.
+#[derive(Debug, PartialEq)]
+pub struct Scheme {
+    /// Name in scene files, `[time] scheme = "…"`.
+    pub name: &'static str,
+    /// One sentence for `--help` and reports.
+    pub doc: &'static str,
+    /// The solves of a step.
+    pub solves: &'static [Solve],
+    /// The solves of the first step, where there is no state before.
+    pub first: &'static [Solve],
+}
+
+const SQRT_2: f64 = std::f64::consts::SQRT_2;
+/// Part of a step that TR-BDF2's first solve takes.
+const GAMMA: f64 = 2.0 - SQRT_2;
+
+const THETA_STEP: &[Solve] = &[Solve { from: &[(Past::Now, 1.0)], length: 1.0, theta: None, end: 1.0 }];
+
+const BDF2_STEP: &[Solve] =
+    &[Solve { from: &[(Past::Now, 4.0 / 3.0), (Past::Before, -1.0 / 3.0)], length: 2.0 / 3.0, theta: Some(1.0), end: 1.0 }];
+
+// 1/(γ(2 − γ)) = (1 + √2)/2 with the weight of the first part's end, 1 − that with the step's beginning.
+const TR_BDF2_STEP: &[Solve] = &[
+    Solve { from: &[(Past::Now, 1.0)], length: GAMMA, theta: Some(0.5), end: GAMMA },
+    Solve {
+        from: &[(Past::Solved(0), 0.5 + 0.5 * SQRT_2), (Past::Now, 0.5 - 0.5 * SQRT_2)],
+        length: 0.5 * GAMMA,
+        theta: Some(1.0),
+        end: 1.0,
+    },
+];
+
+/// All schemes; the first is the default.
+pub static ALL: &[Scheme] = &[
+    Scheme {
+        name: "theta",
+        doc: "one step from the present state; `theta` weighs the new state's forces: ½ conserves energy, more damps numerically",
+        solves: THETA_STEP,
+        first: THETA_STEP,
+    },
+    Scheme {
+        name: "bdf2",
+        doc: "second-order backward differences: damps what the step does not resolve",
+        solves: BDF2_STEP,
+        first: TR_BDF2_STEP,
+    },
+    Scheme {
+        name: "tr-bdf2",
+        doc: "a trapezoidal and a backward part, two solves a step: the most accurate of those that damp what the step does not resolve",
+        solves: TR_BDF2_STEP,
+        first: TR_BDF2_STEP,
+    },
+];
+
+/// The scheme of this name.
+pub fn find(name: &str) -> Option<&'static Scheme> {
+    ALL.iter().find(|s| s.name == name)
+}
+
+/// One solve of a rollout. States are numbered from the start, 0; stage s gives state s + 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// Number of the stage.
+    pub number: usize,
+    /// Number of the step that it belongs to.
+    pub step: usize,
+    /// Numbers of the past states that it starts from, the newest first, and their weights.
+    pub from: Vec<(usize, f64)>,
+    /// ℓ [s].
+    pub length: f64,
+    /// θ.
+    pub theta: f64,
+    /// Time of the new state since the start [s].
+    pub time: f64,
+    /// Number of the state at the beginning of the step, where the step ends with this stage.
+    pub completes: Option<usize>,
+}
+
+impl Scheme {
+    /// All solves of `steps` steps of `step` seconds, with θ where the table leaves it open.
+    pub fn stages(&self, step: f64, steps: usize, theta: f64) -> Vec<Stage> {
+        let mut stages: Vec<Stage> = Vec::new();
+        let (mut now, mut before) = (0, 0);
+        for k in 0..steps {
+            let table = if k == 0 { self.first } else { self.solves };
+            let first = stages.len();
+            for (i, solve) in table.iter().enumerate() {
+                let number = |past: Past| match past {
+                    Past::Now => now,
+                    Past::Before => before,
+                    Past::Solved(n) => first + n + 1,
+                };
+                stages.push(Stage {
+                    number: stages.len(),
+                    step: k,
+                    from: solve.from.iter().map(|(past, weight)| (number(*past), *weight)).collect(),
+                    length: solve.length * step,
+                    theta: solve.theta.unwrap_or(theta),
+                    time: if solve.end == 1.0 { (k + 1) as f64 * step } else { (k as f64 + solve.end) * step },
+                    completes: (i + 1 == table.len()).then_some(now),
+                });
+            }
+            (before, now) = (now, stages.len());
+        }
+        stages
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Integrates ẍ = −x from x = 1, v = 0 with θ = ½ where it is open, and returns the error at t = 3.
+    fn error(scheme: &Scheme, steps: usize) -> f64 {
+        let mut states = vec![[1.0, 0.0]];
+        for s in scheme.stages(3.0 / steps as f64, steps, 0.5) {
+            let [u, v] = [0, 1].map(|c| s.from.iter().map(|(n, w)| w * states[*n][c]).sum::<f64>());
+            let (l, t) = (s.length, s.theta);
+            let u1 = (u / (t * l * l) + v / (t * l) - (1.0 - t) * u) / (1.0 / (t * l * l) + t);
+            states.push([u1, (u1 - u) / (t * l) - (1.0 - t) / t * v]);
+        }
+        let [u, v] = states[states.len() - 1];
+        (u - 3f64.cos()).hypot(v + 3f64.sin())
+    }
+
+    #[test]
+    fn every_scheme_is_of_second_order_from_its_first_step_on() {
+        for scheme in ALL {
+            let order = (error(scheme, 200) / error(scheme, 400)).log2();
+            assert!((order - 2.0).abs() < 0.03, "{}: order {order}", scheme.name);
+        }
+    }
+
+    #[test]
+    fn a_state_that_moves_uniformly_stays_exact_and_numbers_fit() {
+        for scheme in ALL {
+            let stages = scheme.stages(0.1, 4, 0.6);
+            let mut at = vec![0.0];
+            for (n, s) in stages.iter().enumerate() {
+                assert_eq!(s.number, n);
+                assert!((s.from.iter().map(|f| f.1).sum::<f64>() - 1.0).abs() < 1e-15);
+                assert!(s.from.len() == 1 || s.theta == 1.0, "{}", scheme.name);
+                // u̇ = 1: the combination lies ℓ before the new state.
+                let from: f64 = s.from.iter().map(|(i, w)| w * at[*i]).sum();
+                assert!((from + s.length - s.time).abs() < 1e-15, "{} {n}", scheme.name);
+                at.push(s.time);
+            }
+            let ends: Vec<usize> = stages.iter().filter_map(|s| s.completes).collect();
+            assert_eq!(ends.len(), 4);
+            assert!(ends.iter().enumerate().all(|(k, n)| (at[*n] - 0.1 * k as f64).abs() < 1e-15));
+        }
+    }
+}
