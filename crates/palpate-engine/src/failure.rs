@@ -111,7 +111,7 @@ impl FailureKind {
     fn hint(self) -> &'static str {
         match self {
             FailureKind::NotFinite => "use a smaller [time] step, or narrower bounds for the parameters named",
-            FailureKind::NewtonStalled => "use a smaller [time] step, or set solver.rotation = \"lagged\"",
+            FailureKind::NewtonStalled => "use a smaller [time] step, or allow more solver.newton_iterations",
             FailureKind::LinearSolve => {
                 "set solver.linear = \"cholesky\" where conjugate gradients stopped; else use a smaller [time] step, or poisson_ratio \
                  further below 0.5"

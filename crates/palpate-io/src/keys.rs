@@ -69,7 +69,7 @@ pub(crate) const SCENE: Schema = Schema {
         ("mass", table(&["point", "mass"])),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
         ("time", table(&["step", "duration", "steps", "start", "scheme", "theta"])),
-        ("solver", table(&["rotation", "element", "linear", "tolerance", "newton_iterations", "ghost"])),
+        ("solver", table(&["element", "linear", "tolerance", "newton_iterations", "ghost"])),
         (
             "observation",
             Schema {

@@ -234,8 +234,6 @@ impl Default for Time {
 /// Numerical choices; the defaults are what a user wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// When a cell's rotation is taken.
-    pub rotation: RotationUpdate,
     /// Element formulation.
     pub element: Element,
     /// Linear solver.
@@ -250,24 +248,8 @@ pub struct Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Solver {
-            rotation: RotationUpdate::Converged,
-            element: Element::Enhanced,
-            linear: LinearSolver::Auto,
-            tolerance: 1e-8,
-            newton_iterations: 30,
-            ghost: 0.02,
-        }
+        Solver { element: Element::Enhanced, linear: LinearSolver::Auto, tolerance: 1e-8, newton_iterations: 30, ghost: 0.02 }
     }
-}
-
-/// When a cell's rotation is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RotationUpdate {
-    /// At the old state, constant in the step (the paper).
-    Lagged,
-    /// At the new state, iterated to convergence with the exact energy gradient.
-    Converged,
 }
 
 /// Element formulation.

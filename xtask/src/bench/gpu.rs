@@ -9,7 +9,7 @@ use palpate_gpu::{Choice, Gpu, GpuBackend, World};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
-use palpate_model::scene::{Analytic, RotationUpdate};
+use palpate_model::scene::Analytic;
 use palpate_model::shape::Shape;
 use palpate_model::space::body::{Body, SUBDIVISIONS};
 use serde::{Deserialize, Serialize};
@@ -142,11 +142,11 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
     compile(&gpu)?;
     let mut longest: Option<Longest> = None;
     for s in subjects(quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
-        let mut cpu = one(s.name, &*s.shape, s.h, RotationUpdate::Converged, &[])?;
+        let mut cpu = one(s.name, &*s.shape, s.h, &[])?;
         cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
         let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
-        let mut plan = plan(body, RotationUpdate::Converged, &[]);
+        let mut plan = plan(body, &[]);
         plan.clock.steps = plan.clock.steps.min(STEPS);
         report.lines.push(cpu.clone());
         for batch in BATCHES.into_iter().filter(|b| !quick || *b < 64) {
@@ -179,7 +179,7 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
 fn compile(gpu: &Arc<Gpu>) -> Result<(), String> {
     let ball = placed(Analytic::Ball { radius: 0.1, center: DVec3::new(0.0, 0.0, 0.103) });
     let body = Body::build(&ball, 0.07, BAND * 0.07, SUBDIVISIONS).map_err(|e| e.to_string())?;
-    let mut plan = plan(body, RotationUpdate::Converged, &[]);
+    let mut plan = plan(body, &[]);
     plan.clock.steps = 1;
     let backend = GpuBackend::on(gpu.clone());
     let mut world = backend.build(&plan, 1).map_err(|e| e.to_string())?;

@@ -12,7 +12,7 @@ use palpate_model::effects::{self, Effect, Family};
 use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
 use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
-use palpate_model::scene::{Analytic, InitialShape, RotationUpdate, Solver};
+use palpate_model::scene::{Analytic, InitialShape, Solver};
 use palpate_model::shape::{Placed, Shape};
 use palpate_model::space::body::{Body, SUBDIVISIONS};
 use peak_alloc::PeakAlloc;
@@ -64,16 +64,13 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         Some(file) => {
             // Longest side 0.3 m: the file's unit is a fifth of it, with 6 cells to a unit.
             let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
-            for rotation in [RotationUpdate::Converged, RotationUpdate::Lagged] {
-                let name = format!("dragon, {rotation:?}").to_lowercase();
-                if wanted(&name) {
-                    let line = one(&name, &sdf, 0.3 / 5.0 / 6.0, rotation, &[])?;
-                    add(Line { paper: Some(PAPER_DRAGON), ..line });
-                }
+            if wanted("dragon") {
+                let line = one("dragon", &sdf, 0.3 / 5.0 / 6.0, &[])?;
+                add(Line { paper: Some(PAPER_DRAGON), ..line });
             }
             // Beside the first: a tenth more for a step, but the adjoint takes derivatives by every number of every effect, absent or not.
             if wanted("dragon, effects absent") {
-                add(one("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, RotationUpdate::Converged, &effects())?);
+                add(one("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, &effects())?);
             }
         }
         None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
@@ -87,7 +84,7 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         for (kind, shape, across) in [("ball", ball, balls[k]), ("block", block, blocks[k])] {
             let name = format!("{kind} {}", SIZES[k]);
             if wanted(&name) {
-                add(one(&name, &placed(shape), 0.2 / across, RotationUpdate::Converged, &[])?);
+                add(one(&name, &placed(shape), 0.2 / across, &[])?);
             }
         }
     }
@@ -113,7 +110,7 @@ fn effects() -> Vec<usize> {
 }
 
 /// A body that is dropped from just above the ground and watched in every step, with effects of these laws, all of them absent.
-pub(super) fn plan(body: Body, rotation: RotationUpdate, laws: &[usize]) -> Plan {
+pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     let layout = Layout::new(1, 0, laws);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
@@ -156,7 +153,7 @@ pub(super) fn plan(body: Body, rotation: RotationUpdate, laws: &[usize]) -> Plan
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),
         band: BAND * body.grid.h,
-        solver: Solver { rotation, ..Solver::default() },
+        solver: Solver::default(),
         body: Arc::new(body),
     }
 }
@@ -170,14 +167,14 @@ pub(super) fn blocks(body: &Body) -> usize {
     pairs.len()
 }
 
-pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, rotation: RotationUpdate, laws: &[usize]) -> Result<Line, String> {
+pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, laws: &[usize]) -> Result<Line, String> {
     reserve();
     PeakAlloc.reset_peak_usage();
     let before = PeakAlloc.current_usage();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
     let build = clock.elapsed().as_secs_f64();
-    let plan = plan(body, rotation, laws);
+    let plan = plan(body, laws);
     let body = &plan.body;
     let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
     let mut taken = Seconds::default();

@@ -27,7 +27,7 @@ impl Times {
 /// One body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Body and kind of rotation.
+    /// Body.
     pub name: String,
     /// Simulation nodes.
     pub nodes: usize,

@@ -375,5 +375,5 @@ fn more_laws_of_cells_than_kernels_have_room_for_are_refused() {
     (0..16).for_each(|_| with(&mut s, "strain-stiffening", &[]));
     assert_eq!(refusal(&s), "");
     with(&mut s, "strain-stiffening", &[]);
-    assert_eq!(refusal(&s), "the GPU backend does not support more than 16 laws of cells");
+    assert!(refusal(&s).starts_with("the GPU backend does not support more than 16 laws of cells"));
 }

@@ -254,8 +254,6 @@ const SHORTEST_STEP: f64 = 1e-9;
 fn solver(root: &Table) -> Result<Solver, InputError> {
     let mut s = Solver::default();
     let Some(t) = root.optional_table("solver")? else { return Ok(s) };
-    let rotations = [("lagged", RotationUpdate::Lagged), ("converged", RotationUpdate::Converged)];
-    s.rotation = t.optional_choice("rotation", &rotations)?.unwrap_or(s.rotation);
     let elements = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
     s.element = t.optional_choice("element", &elements)?.unwrap_or(s.element);
     let linear = [("auto", LinearSolver::Auto), ("cholesky", LinearSolver::Cholesky), ("cg", LinearSolver::ConjugateGradient)];

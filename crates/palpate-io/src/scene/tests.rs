@@ -62,7 +62,6 @@ fn absent_keys_take_the_documented_defaults() {
 fn a_full_scene_is_read() {
     let s = read(
         r#"[solver]
-rotation = "lagged"
 element = "corner"
 linear = "cg"
 tolerance = 1e-6
@@ -86,7 +85,6 @@ position = [0, 0, 0.05]
     )
     .unwrap()
     .value;
-    assert_eq!(s.solver.rotation, RotationUpdate::Lagged);
     assert_eq!((s.solver.element, s.solver.linear), (Element::Corner, LinearSolver::ConjugateGradient));
     assert_eq!((s.solver.tolerance, s.solver.newton_iterations, s.solver.ghost), (1e-6, 7, 0.0));
     assert_eq!((s.initial.velocity, s.initial.pivot), (DVec3::new(1.0, 2.0, 3.0), Some(DVec3::Z)));

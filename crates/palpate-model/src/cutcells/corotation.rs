@@ -118,30 +118,19 @@ pub struct CellPose {
     pub q: V24,
     /// 1 / (4h) [1/m].
     scale: f64,
-    /// R is given, not a function of x.
-    fixed: bool,
 }
 
 impl CellPose {
     /// Pose of a cell with corners `x` [m] and edge `h` [m]; R follows x.
     #[inline(always)]
     pub fn new(x: &[DVec3; 8], h: f64) -> CellPose {
-        CellPose::build(Polar::new(deformation_gradient(x, h)), x, h, false)
-    }
-
-    /// Pose with a given rotation (the published lagged scheme): q is linear in x, and `P` is the identity.
-    pub fn lagged(x: &[DVec3; 8], r: DMat3, h: f64) -> CellPose {
-        CellPose::build(Polar { r, s: DMat3::IDENTITY, g_inv: DMat3::ZERO }, x, h, true)
-    }
-
-    #[inline(always)]
-    fn build(polar: Polar, x: &[DVec3; 8], h: f64, fixed: bool) -> CellPose {
+        let polar = Polar::new(deformation_gradient(x, h));
         let z = turned(polar.r.transpose(), &centred(flatten(x)));
         let mut q = z;
         for i in 0..24 {
             q[i] -= 0.5 * h * SIGNS[i / 3][i % 3];
         }
-        CellPose { polar, z, q, scale: 0.25 / h, fixed }
+        CellPose { polar, z, q, scale: 0.25 / h }
     }
 
     /// Rᵀ v per corner.
@@ -160,30 +149,8 @@ impl CellPose {
         0.5 * scale * dot(&self.q, &multiply(k, &self.q))
     }
 
-    /// ω with dR = R [ω]× (body frame) for corner increments `dx` in the world frame; zero if R is given.
-    ///
-    /// The lagged scheme calls this on the pose of the *old* state: with q = Rᵀ(x − x_c) − X at new corners x, a change
-    /// of the old ones changes q by −ω × z_i ([`CellPose::turn_arms`]) and a world force R y by R (ω × y_i).
-    pub fn spin_of(&self, dx: &[DVec3; 8]) -> DVec3 {
-        self.spin_body(&self.to_body(dx))
-    }
-
-    /// World-frame c with c·dx = g·[`CellPose::spin_of`]`(dx)`: c_i = R (G⁻¹g × b_i).
-    pub fn spin_adjoint(&self, g: DVec3) -> [DVec3; 8] {
-        self.to_world(&self.spin_adjoint_body(g))
-    }
-
-    /// −ω × z_i: change of q when R alone turns by dR = R [ω]×. Its adjoint is y ↦ −[`cross_sum`]`(z, y)`.
-    pub fn turn_arms(&self, omega: DVec3) -> V24 {
-        let mut out = [0.0; 24];
-        subtract_cross(&mut out, omega, &self.z);
-        out
-    }
-
+    /// ω with dR = R \[ω\]×, for corner increments in the body frame.
     fn spin_body(&self, dx: &V24) -> DVec3 {
-        if self.fixed {
-            return DVec3::ZERO;
-        }
         let mut m = [0.0; 3];
         for i in 0..8 {
             let (s, d) = (&SIGNS[i], &dx[3 * i..3 * i + 3]);
@@ -224,11 +191,9 @@ impl CellPose {
     #[inline(always)]
     fn force_body(&self, y: &V24) -> V24 {
         let mut f = *y;
-        if !self.fixed {
-            let turn = self.spin_adjoint_body(cross_sum(&self.z, y));
-            for i in 0..24 {
-                f[i] -= turn[i];
-            }
+        let turn = self.spin_adjoint_body(cross_sum(&self.z, y));
+        for i in 0..24 {
+            f[i] -= turn[i];
         }
         f
     }
@@ -252,9 +217,6 @@ impl CellPose {
 
     /// World-frame second derivative of y·q at fixed `y`, times `dx`.
     pub fn second(&self, y: &V24, dx: &[DVec3; 8]) -> [DVec3; 8] {
-        if self.fixed {
-            return [DVec3::ZERO; 8];
-        }
         self.to_world(&self.second_body(&centred(*y), &centred(self.to_body(dx))))
     }
 
@@ -275,11 +237,9 @@ impl CellPose {
         for v in &mut out {
             *v *= scale;
         }
-        if !self.fixed {
-            let second = self.second_body(&centred(*y), &d);
-            for i in 0..24 {
-                out[i] += second[i];
-            }
+        let second = self.second_body(&centred(*y), &d);
+        for i in 0..24 {
+            out[i] += second[i];
         }
         self.to_world(&out)
     }

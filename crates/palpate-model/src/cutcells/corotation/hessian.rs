@@ -22,23 +22,20 @@ impl CellPose {
     #[inline(always)]
     pub fn upper_hessian(&self, k: &M24, scale: f64, y: Option<&V24>, out: &mut M24) {
         // W = scale K + ΩᵀD + DᵀΩ with D = B + ½QΩ − scale (N − ½TΩ), rows of N = ZᵀK; then H = R W Rᵀ.
-        let (mut omega, mut d) = ([[0.0; 24]; 3], [[0.0; 24]; 3]);
-        if !self.fixed {
-            omega = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| self.spin_adjoint_body(e));
-            let arms = self.arm_rows();
-            d = self.arm_products(k);
-            let mut q = DMat3::from_cols_array_2d(&arms.map(|z| d.map(|n| scale * dot(&n, &z))));
-            d.iter_mut().flatten().for_each(|n| *n *= -scale);
-            if let Some(y) = y {
-                let y = centred(*y);
-                add_cross_rows(&mut d, &self.force_body(&y));
-                q += self.spin_stiffness(&y);
-            }
-            let q = q.to_cols_array_2d();
-            for (d, q) in d.iter_mut().zip(&q) {
-                for c in 0..24 {
-                    d[c] += 0.5 * (q[0] * omega[0][c] + q[1] * omega[1][c] + q[2] * omega[2][c]);
-                }
+        let omega = [DVec3::X, DVec3::Y, DVec3::Z].map(|e| self.spin_adjoint_body(e));
+        let arms = self.arm_rows();
+        let mut d = self.arm_products(k);
+        let mut q = DMat3::from_cols_array_2d(&arms.map(|z| d.map(|n| scale * dot(&n, &z))));
+        d.iter_mut().flatten().for_each(|n| *n *= -scale);
+        if let Some(y) = y {
+            let y = centred(*y);
+            add_cross_rows(&mut d, &self.force_body(&y));
+            q += self.spin_stiffness(&y);
+        }
+        let q = q.to_cols_array_2d();
+        for (d, q) in d.iter_mut().zip(&q) {
+            for c in 0..24 {
+                d[c] += 0.5 * (q[0] * omega[0][c] + q[1] * omega[1][c] + q[2] * omega[2][c]);
             }
         }
         let r = self.polar.r.to_cols_array_2d();

@@ -126,10 +126,10 @@ fn second_is_the_derivative_of_force_at_fixed_y() {
 fn hessian_is_symmetric_and_agrees_with_its_product() {
     let mut noise = Noise(14);
     let (mut full, mut part) = ([0.0; 576], [0.0; 576]);
-    for n in 0..100 {
+    for _ in 0..100 {
         let (k, x, d, y) = (stiffness(&mut noise), shape(&mut noise), direction(&mut noise), random(&mut noise));
         let scale = noise.uniform(0.5, 2.0);
-        let pose = if n % 4 == 0 { CellPose::lagged(&x, noise.rotation(), H) } else { CellPose::new(&x, H) };
+        let pose = CellPose::new(&x, H);
         pose.hessian(&k, scale, &y, &mut full);
         pose.gauss_newton(&k, scale, &mut part);
         for i in 0..576 {
@@ -170,27 +170,5 @@ fn energy_is_invariant_under_rigid_motion_and_zero_only_undeformed() {
         assert!((turned / energy - 1.0).abs() < 1e-12);
         let rigid: [DVec3; 8] = std::array::from_fn(|i| r * DVec3::from_array(SIGNS[i]) * (0.5 * H));
         assert!(CellPose::new(&rigid, H).energy(&k, 1.0) < 1e-26 * k[0] * H * H);
-    }
-}
-
-#[test]
-fn lagged_pose_derives_through_the_old_rotation() {
-    let mut noise = Noise(17);
-    for _ in 0..200 {
-        let (old, x, d, y, g) =
-            (shape(&mut noise), shape(&mut noise), direction(&mut noise), random(&mut noise), noise.vector(1.0));
-        let start = CellPose::new(&old, H);
-        let omega = start.spin_of(&d);
-        assert!((g.dot(omega) - inner(&start.spin_adjoint(g), &d)).abs() < 1e-12);
-        let at = |t: f64| CellPose::lagged(&x, CellPose::new(&moved(&old, &d, t), H).polar.r, H);
-        let (pose, up, down) = (at(0.0), at(STEP), at(-STEP));
-        let rate = pose.turn_arms(omega);
-        let push: V24 = flatten(&corners(&y).map(|v| omega.cross(v)));
-        let (force, exact) = ((up.to_world(&y), down.to_world(&y)), pose.to_world(&push));
-        for i in 0..24 {
-            assert!(((up.q[i] - down.q[i]) / (2.0 * STEP) - rate[i]).abs() < 1e-7 * H);
-        }
-        assert!(size(&std::array::from_fn(|i| (force.0[i] - force.1[i]) / (2.0 * STEP) - exact[i])) < 1e-6);
-        assert!((dot(&rate, &y) + omega.dot(cross_sum(&pose.z, &y))).abs() < 1e-13);
     }
 }
