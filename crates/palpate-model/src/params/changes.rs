@@ -156,6 +156,24 @@ pub fn aging_slope(plan: &Plan, physics: &Physics, elapsed: f64, effect: usize, 
     Some(aging(plan, physics, elapsed) * field.slope(&spot, p, slot)[0] / field.at(&spot, p)[0])
 }
 
+/// Derivative of [`aging`] when the effects' numbers change by `rates`.
+pub fn aging_along(plan: &Plan, physics: &Physics, elapsed: f64, rates: &Physics) -> f64 {
+    let numbered = rates.effects.iter().enumerate().flat_map(|(e, r)| r.iter().enumerate().map(move |(slot, r)| (e, slot, *r)));
+    let moved = numbered.filter(|n| n.2 != 0.0);
+    moved.filter_map(|(e, slot, r)| Some(r * aging_slope(plan, physics, elapsed, e, slot)?)).sum()
+}
+
+/// The transpose: adds to the effects' numbers in `gradient` what a derivative by [`aging`] of `by_factor` makes of them.
+pub fn pull_aging(plan: &Plan, physics: &Physics, elapsed: f64, by_factor: f64, gradient: &mut Physics) {
+    for (effect, numbers) in gradient.effects.iter_mut().enumerate() {
+        for (slot, g) in numbers.iter_mut().enumerate() {
+            if let Some(slope) = aging_slope(plan, physics, elapsed, effect, slot) {
+                *g += by_factor * slope;
+            }
+        }
+    }
+}
+
 /// How clamps hold at a spot of the first clamp's middle after `elapsed` seconds: [`HOLD`] numbers, factors multiplied, the others added.
 pub fn hold(plan: &Plan, physics: &Physics, spot: &Spot) -> [f64; HOLD] {
     let mut out = [0.0; HOLD];

@@ -4,6 +4,7 @@
 //! order; a parameter vector θ has one entry per key, in SI units and in the declared (not the optimiser's) variable.
 
 pub mod changes;
+pub mod coefficients;
 pub mod grips;
 
 use crate::effects;

@@ -205,6 +205,27 @@ impl Physics {
             effects: layout.effects().map(|(_, range)| theta[range].to_vec()).collect(),
         }
     }
+
+    /// The numbers as a parameter vector `[P]`: the inverse of [`Physics::new`].
+    pub fn to_theta(&self, layout: &Layout) -> Vec<f64> {
+        let value = |key: &ParamKey| match *key {
+            ParamKey::YoungsModulus => self.youngs_modulus,
+            ParamKey::PoissonRatio => self.poisson_ratio,
+            ParamKey::Density => self.density,
+            ParamKey::MassDamping => self.mass_damping,
+            ParamKey::StiffnessDamping => self.stiffness_damping,
+            ParamKey::Gravity(a) => self.gravity[usize::from(a)],
+            ParamKey::Velocity(a) => self.velocity[usize::from(a)],
+            ParamKey::AngularVelocity(a) => self.angular_velocity[usize::from(a)],
+            ParamKey::TimeStart => self.start,
+            ParamKey::PlaneHeight(i) => self.planes[usize::from(i)][0],
+            ParamKey::PlaneTheta(i) => self.planes[usize::from(i)][1],
+            ParamKey::PlanePhi(i) => self.planes[usize::from(i)][2],
+            ParamKey::PointMass(i) => self.masses[usize::from(i)],
+            ParamKey::Effect { effect, slot, .. } => self.effects[usize::from(effect)][usize::from(slot)],
+        };
+        layout.keys.iter().map(value).collect()
+    }
 }
 
 impl PlaneSite {
