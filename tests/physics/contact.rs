@@ -1,8 +1,9 @@
 //! Resting on the ground.
 
 use glam::DVec3;
-use palpate_cpu::passes::supports::{Contact, PlaneNow};
+use palpate_cpu::terms::contact::touches;
 use palpate_model::mechanics::contact;
+use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::scene::*;
 use support::{run, scenes};
 
@@ -27,8 +28,8 @@ fn contact_force_of_a_resting_body_is_its_weight() {
             scales: true,
         };
         // At rest both states of a step are the same.
-        let contact = Contact { body: &plan.body, plane: &plane, theta, u: [&end.displacement; 2] };
-        let force: f64 = contact.touches().map(|(_, t)| t.area * t.pressure).sum();
+        let touching = touches(&plan.body, &plane, theta, [&end.displacement; 2]);
+        let force: f64 = touching.map(|(_, t)| t.area * t.pressure).sum();
         let weight = 1000.0 * plan.body.volume * 9.81;
         println!("contact force over weight at θ = {theta}: {:.6}", force / weight);
         assert!((force / weight - 1.0).abs() < 1e-3, "{force} N against {weight} N");

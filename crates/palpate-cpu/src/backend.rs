@@ -2,16 +2,17 @@
 
 use crate::linear::vector::Nodes;
 use crate::newton;
-use crate::passes::cells::zeros;
 use crate::passes::frames::{self, Along, Instant};
 use crate::simulate;
-use crate::world::{Adjoint, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
+use crate::terms::zeros;
+use crate::world::{Adjoint, Gradient, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
 use palpate_engine::{Backend, BuildError, Curvature, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The reference backend.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +27,11 @@ impl CpuBackend {
         let of_row = |a: usize| (rows.rows[a]..rows.rows[a + 1]).map(move |k| (a, k));
         (0..rows.len()).flat_map(of_row).map(|(a, k)| (a, rows.columns[k] as usize, matrix.values[k])).collect()
     }
+}
+
+/// The past states of one member.
+fn of_member<'a>(past: &[&'a State], member: usize) -> Vec<&'a MemberState> {
+    past.iter().map(|s| &s.members[member]).collect()
 }
 
 fn blank(world: &World) -> Vec<MemberState> {
@@ -95,8 +101,12 @@ impl Backend for CpuBackend {
 
     fn new_tangent(&self, world: &World, directions: &[Direction]) -> Tangent {
         let n = world.shared.plan.body.nodes.len();
-        let blank = || MemberTangent { du: vec![zeros(n); directions.len()], dv: vec![zeros(n); directions.len()] };
-        Tangent { directions: directions.to_vec(), members: world.members.iter().map(|_| blank()).collect() }
+        let blank = |m: &Member| MemberTangent {
+            rates: Arc::new(simulate::rates(&world.shared, m, directions)),
+            du: vec![zeros(n); directions.len()],
+            dv: vec![zeros(n); directions.len()],
+        };
+        Tangent { directions: directions.to_vec(), members: world.members.iter().map(blank).collect() }
     }
 
     fn new_tally(&self, world: &World, request: &Request) -> Tally {
@@ -107,7 +117,9 @@ impl Backend for CpuBackend {
             residuals: world.shared.plan.observation.residuals(),
             ..Evaluation::default()
         };
-        Tally { members: vec![MemberTally { evaluation, compared: Vec::new() }; world.members.len()] }
+        let plan = &world.shared.plan;
+        let gradient = request.gradient.any().then(|| Box::new(Gradient::new(plan, request.gradient.mask(plan.layout.len()))));
+        Tally { members: vec![MemberTally { evaluation, gradient, compared: Vec::new() }; world.members.len()] }
     }
 
     fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {
@@ -121,12 +133,11 @@ impl Backend for CpuBackend {
 
     fn step(&self, world: &mut World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
         let shared = &world.shared;
-        let time = stage.time;
-        (&mut world.members, &past[0].members, &mut next.members, &mut tally.members).into_par_iter().for_each(|(m, a, b, t)| {
+        (&mut world.members, &mut next.members, &mut tally.members).into_par_iter().enumerate().for_each(|(b, (m, next, t))| {
             if !t.failed()
-                && let Err(reason) = simulate::step(shared, m, stage, a, b)
+                && let Err(reason) = simulate::step(shared, m, stage, &of_member(past, b), next)
             {
-                t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+                t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
             }
         });
     }
@@ -196,26 +207,35 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let time = stage.time;
-        (&mut world.members, &past[0].members, &next.members, &adj.members, &mut adj_past[0].members, &mut tally.members)
-            .into_par_iter()
-            .for_each(|(m, a, b, from, to, t)| {
-                if !t.failed()
-                    && let Err(reason) = simulate::step_adjoint(shared, m, stage, a, b, from, to, &mut t.evaluation.gradient)
-                {
-                    t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+        let mut to: Vec<Vec<&mut MemberState>> = world.members.iter().map(|_| Vec::new()).collect();
+        for adjoint in adj_past {
+            to.iter_mut().zip(&mut adjoint.members).for_each(|(to, m)| to.push(m));
+        }
+        (&mut world.members, &next.members, &adj.members, &mut to, &mut tally.members).into_par_iter().enumerate().for_each(
+            |(b, (m, next, from, to, t))| {
+                if t.failed() {
+                    return;
                 }
-            });
+                let gradient = t.gradient.as_mut().expect("an adjoint goes with a gradient");
+                if let Err(reason) = simulate::step_adjoint(shared, m, stage, &of_member(past, b), next, from, to, gradient) {
+                    t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
+                }
+            },
+        );
     }
 
     fn start_adjoint(&self, world: &mut World, first: &State, adj: &Adjoint, tally: &mut Tally) {
         let shared = &world.shared;
         (&mut world.members, &first.members, &adj.members, &mut tally.members).into_par_iter().for_each(|(m, s, a, t)| {
-            if !t.failed()
-                && let Err(reason) = simulate::start_adjoint(shared, m, s, a, &mut t.evaluation.gradient)
-            {
-                t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+            if t.failed() {
+                return;
             }
+            let gradient = t.gradient.as_mut().expect("an adjoint goes with a gradient");
+            if let Err(reason) = simulate::start_adjoint(shared, m, s, a, gradient) {
+                return t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
+            }
+            let out = &mut t.evaluation.gradient;
+            m.coefficients.pull_back(&shared.plan, &gradient.coefficients, &gradient.wanted, out);
         });
     }
 
@@ -228,11 +248,10 @@ impl Backend for CpuBackend {
 
     fn start_tangent(&self, world: &mut World, first: &State, tangent: &mut Tangent, tally: &mut Tally) {
         let shared = &world.shared;
-        let directions = &tangent.directions;
         (&mut world.members, &first.members, &mut tangent.members, &mut tally.members).into_par_iter().for_each(
             |(m, s, d, t)| {
                 if !t.failed()
-                    && let Err(reason) = simulate::start_tangent(shared, m, s, directions, d)
+                    && let Err(reason) = simulate::start_tangent(shared, m, s, d)
                 {
                     t.fail(newton::at(0.0)(reason), &shared.plan, &m.theta);
                 }
@@ -251,24 +270,16 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let directions = &tangent_past[0].directions;
-        let time = stage.time;
-        (
-            &mut world.members,
-            &past[0].members,
-            &next.members,
-            &tangent_past[0].members,
-            &mut tangent_next.members,
-            &mut tally.members,
-        )
-            .into_par_iter()
-            .for_each(|(m, a, b, d, d_next, t)| {
+        (&mut world.members, &next.members, &mut tangent_next.members, &mut tally.members).into_par_iter().enumerate().for_each(
+            |(b, (m, next, d_next, t))| {
+                let before: Vec<&MemberTangent> = tangent_past.iter().map(|d| &d.members[b]).collect();
                 if !t.failed()
-                    && let Err(reason) = simulate::step_tangent(shared, m, stage, a, b, directions, d, d_next)
+                    && let Err(reason) = simulate::step_tangent(shared, m, stage, &of_member(past, b), next, &before, d_next)
                 {
-                    t.fail(newton::at(time)(reason), &shared.plan, &m.theta);
+                    t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
                 }
-            });
+            },
+        );
     }
 
     fn observe_tangent(

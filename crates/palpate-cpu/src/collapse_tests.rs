@@ -4,9 +4,10 @@
 use crate::CpuBackend;
 use crate::linear::vector::dot;
 use crate::newton::Effort;
-use crate::passes::cells::{corners, zeros};
 use crate::simulate;
-use crate::world::{MemberState, MemberTangent, World};
+use crate::terms::elastic_cells::corners;
+use crate::terms::zeros;
+use crate::world::{Gradient, MemberState, MemberTangent, World};
 use glam::{DAffine3, DVec3};
 use palpate_engine::{Backend, Direction, Failure, ParamBatch, Request};
 use palpate_model::cutcells::corotation::CellPose;
@@ -14,6 +15,7 @@ use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
+use std::sync::Arc;
 
 /// A torus of density 1000 kg/m³ that falls on its edge; at 500 Pa its own weight strains it by several hundred per cent.
 fn torus(youngs_modulus: f64) -> Plan {
@@ -117,31 +119,27 @@ fn derivatives_of_a_crushed_step_agree() {
         if k > 0 {
             std::mem::swap(&mut now, &mut next);
         }
-        simulate::step(shared, member, &stages[k], &now, &mut next).unwrap();
+        simulate::step(shared, member, &stages[k], &[&now], &mut next).unwrap();
     }
     let pose = |e: usize| CellPose::new(&corners(&plan.body, e, &next.u), plan.body.grid.h);
     let guarded = (0..plan.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count();
     assert!(guarded > 0, "no cell is turned inside out far enough");
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
-    let tangents = || MemberTangent { du: vec![zeros(n); directions.len()], dv: vec![zeros(n); directions.len()] };
+    let rates = Arc::new(simulate::rates(shared, member, &Direction::parameters(&directions)));
+    let blanks = || vec![zeros(n); directions.len()];
+    let tangents = || MemberTangent { rates: rates.clone(), du: blanks(), dv: blanks() };
     let mut moved = tangents();
-    simulate::step_tangent(
-        shared,
-        member,
-        &stages[last],
-        &now,
-        &next,
-        &Direction::parameters(&directions),
-        &tangents(),
-        &mut moved,
-    )
-    .unwrap();
+    simulate::step_tangent(shared, member, &stages[last], &[&now], &next, &[&tangents()], &mut moved).unwrap();
     let wave = |scale: f64| {
         (0..n).map(|i| scale * DVec3::new((i as f64).sin(), (2.0 * i as f64).cos(), (3.0 * i as f64).sin())).collect()
     };
     let (adj, mut adj_now) = (MemberState { u: wave(1.0), v: wave(0.01) }, blank());
+    let wanted = vec![true; plan.layout.len()];
+    let mut found = Gradient::new(&plan, wanted.clone());
+    let past = &mut [&mut adj_now];
+    simulate::step_adjoint(shared, member, &stages[last], &[&now], &next, &adj, past, &mut found).unwrap();
     let mut gradient = vec![0.0; plan.layout.len()];
-    simulate::step_adjoint(shared, member, &stages[last], &now, &next, &adj, &mut adj_now, &mut gradient).unwrap();
+    member.coefficients.pull_back(&plan, &found.coefficients, &wanted, &mut gradient);
     for p in directions {
         let forward = dot(&adj.u, &moved.du[p]) + dot(&adj.v, &moved.dv[p]);
         // Rounding through a matrix with a condition number of about 1e5.

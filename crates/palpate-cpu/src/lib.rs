@@ -14,6 +14,7 @@ pub mod passes;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;
+pub mod terms;
 mod world;
 
 pub use backend::CpuBackend;

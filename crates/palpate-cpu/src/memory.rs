@@ -1,7 +1,7 @@
 //! How much memory simulations take, from the sizes of what they keep; found before anything is computed.
 
 use crate::linear::{Purpose, is_direct};
-use crate::passes::posed::Posed;
+use crate::terms::elastic_cells::POSED;
 use glam::{DMat3, DVec3};
 use palpate_engine::Request;
 use palpate_model::cutcells::corotation::V24;
@@ -81,7 +81,7 @@ impl<'a> Sizes<'a> {
         // A copy is padded to vector registers. With many right-hand sides larger bodies are factorised as well.
         let direct = is_direct(plan.solver.linear, nodes, Purpose::Step(usize::MAX));
         let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
-        let solve = copy + cells * (size_of::<Posed>() + size_of::<V24>()) + VECTORS * vector;
+        let solve = copy + cells * (POSED + size_of::<V24>()) + VECTORS * vector;
         let kept = if request.gradient.any() { plan.clock.stages().len() + 3 } else { 3 };
         let bytes = |n: usize| n as u64;
         Memory {

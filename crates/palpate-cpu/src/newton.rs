@@ -1,4 +1,4 @@
-//! Solves a balance by Newton's method with the exact symmetric tangent and a line search on the potential. Close to the solution a tangent
+//! Solves an equation by Newton's method with the exact symmetric tangent and a line search on the potential. Close to the solution a tangent
 //! serves as long as it brings the residual down fast enough.
 
 use crate::linear::cholesky::Factor;
@@ -7,8 +7,7 @@ use crate::linear::jacobi::BlockJacobi;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, add_scaled, dot, is_finite};
 use crate::linear::{Digits, Prepared, Purpose, Solvers, Task, Trouble};
-use crate::passes::balance::{Balance, States};
-use crate::passes::posed::{Before, Curvature, Posed};
+use crate::terms::{Curvature, Equation};
 use glam::DVec3;
 use palpate_engine::{Failure, FailureKind};
 
@@ -55,17 +54,18 @@ fn not_positive(node: usize) -> Reason {
     (FailureKind::LinearSolve, format!("the stiffness of node {node} is not positive"))
 }
 
-/// A linear problem of a balance with the matrix at displacement `u`.
+/// A linear problem of an equation with the matrix at displacement `u`.
 fn task<'a>(
-    balance: &Balance<'a>,
+    equation: &Equation<'a>,
     matrix: &'a Matrix,
     diagonal: &'a BlockJacobi,
     u: &'a [DVec3],
     purpose: Purpose,
     digits: Digits,
 ) -> Task<'a> {
-    let inertia = balance.share_of_inertia(matrix);
-    Task { body: &balance.plan.body, pattern: balance.pattern, matrix, diagonal, u, purpose, digits, inertia }
+    let inertia = equation.share_of_inertia(matrix);
+    let c = &equation.context;
+    Task { body: &c.plan.body, pattern: c.pattern, matrix, diagonal, u, purpose, digits, inertia }
 }
 
 /// A tangent made ready for directions; the matrix is what it was made from.
@@ -84,29 +84,19 @@ pub struct Effort {
     pub linear: usize,
 }
 
-/// What a solve keeps of its cells.
-struct Cells {
-    before: Before,
-    /// Of the displacement that the last residual was computed at.
-    posed: Vec<Posed>,
-}
-
 /// Finds u₁ with r(u₁) = 0 from the guess in `u1`. Converged when the residual, scaled by the inverse diagonal blocks,
 /// is below `tolerance` times the scaled sizes of the forces that it is the sum of.
 pub fn solve(
-    balance: &Balance,
+    equation: &mut Equation,
     solvers: &Solvers,
     matrix: &mut Matrix,
     purpose: Purpose,
     u1: &mut Nodes,
-    u0: &[DVec3],
-    v0: &[DVec3],
     tolerance: f64,
     most: usize,
     effort: &mut Effort,
 ) -> Result<(), Reason> {
-    let mut cells = Cells { before: balance.before(u0), posed: Vec::new() };
-    let mut residual = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
+    let mut residual = equation.residual(u1);
     let (mut scale, mut level) = (None, None);
     let mut history: Vec<f64> = Vec::new();
     let mut forcing = FIRST;
@@ -115,21 +105,19 @@ pub fn solve(
         if !is_finite(&residual) {
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
         }
-        let s = States { u1, u0, v0 };
         if purpose == Purpose::Static || history.len().is_multiple_of(REFRESH) {
             level = None;
         }
         // Steps with the last tangent converge linearly: they stop at the tolerance, where Newton's pass it by far.
         let again = kept.as_ref().is_some_and(|t| t.factor.is_some());
         let aim = if again { STRICT * tolerance } else { tolerance };
-        let (direction, norm, tangent) = direction(
-            balance, solvers, matrix, purpose, s, &cells, &residual, forcing, aim, &mut scale, &mut level, effort, kept,
-        )?;
+        let (direction, norm, tangent) =
+            direction(equation, solvers, matrix, purpose, u1, &residual, forcing, aim, &mut scale, &mut level, effort, kept)?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
         effort.newton += 1;
         let after;
-        (residual, after) = line_search(balance, &tangent.diagonal, u1, u0, v0, &mut cells, &residual, norm, &direction);
+        (residual, after) = line_search(equation, &tangent.diagonal, u1, &residual, norm, &direction);
         if after <= aim * scale.unwrap_or(0.0) {
             return Ok(());
         }
@@ -155,9 +143,10 @@ pub fn solve(
 }
 
 /// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
-fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
-    let body = &balance.plan.body;
-    let squares = balance
+fn rounding(equation: &Equation, matrix: &Matrix, u: &[DVec3]) -> f64 {
+    let body = &equation.context.plan.body;
+    let squares = equation
+        .context
         .pattern
         .blocks
         .diagonal
@@ -172,12 +161,11 @@ fn rounding(balance: &Balance, matrix: &Matrix, u: &[DVec3]) -> f64 {
 /// not positive definite one that is gives a descent direction instead. With an earlier tangent in `kept`, that one is used, and the
 /// matrix stays.
 fn direction(
-    balance: &Balance,
+    equation: &Equation,
     solvers: &Solvers,
     matrix: &mut Matrix,
     purpose: Purpose,
-    s: States,
-    cells: &Cells,
+    u1: &[DVec3],
     residual: &[DVec3],
     forcing: f64,
     tolerance: f64,
@@ -191,8 +179,8 @@ fn direction(
         let mut tangent = match kept.take() {
             Some(tangent) => tangent,
             None => {
-                balance.tangent_from(s, &cells.posed, curvature, matrix);
-                match BlockJacobi::new(&balance.pattern.blocks, matrix) {
+                equation.tangent(u1, curvature, matrix);
+                match BlockJacobi::new(&equation.context.pattern.blocks, matrix) {
                     Ok(diagonal) => TangentStiffness { diagonal, factor: None },
                     Err(_) if !last => continue,
                     Err(a) => return Err(not_positive(a)),
@@ -200,9 +188,9 @@ fn direction(
             }
         };
         let diagonal = &tangent.diagonal;
-        let reference = *scale.get_or_insert_with(|| balance.scale(s, &cells.before, &cells.posed, |f| diagonal.norm(f)));
+        let reference = *scale.get_or_insert_with(|| equation.scale(u1, |f| diagonal.norm(f)));
         let norm = diagonal.norm(residual);
-        if norm <= tolerance * reference || norm <= rounding(balance, matrix, s.u1) {
+        if norm <= tolerance * reference || norm <= rounding(equation, matrix, u1) {
             return Ok((None, norm, tangent));
         }
         let mut d: Nodes = residual.iter().map(|r| -*r).collect();
@@ -215,7 +203,7 @@ fn direction(
                 // CG may leave a third of what is allowed: the residual after the step decides.
                 let absolute = 0.3 * tolerance * reference;
                 let digits = if purpose == Purpose::Static { Digits::All } else { Digits::Few };
-                let prepared = solvers.prepare(task(balance, matrix, diagonal, s.u1, purpose, digits), level);
+                let prepared = solvers.prepare(task(equation, matrix, diagonal, u1, purpose, digits), level);
                 let solved = prepared.and_then(|p| p.solve(&mut d, forcing, absolute).map(|n| (n, p.into_factor())));
                 solved.map(|(iterations, factor)| {
                     effort.linear += iterations;
@@ -237,28 +225,25 @@ fn direction(
 /// Takes the full step where it halves the residual; otherwise the longest of the steps 1, ½, ¼ … that lowers the potential
 /// (Armijo 1966). Returns the residual there and its norm.
 fn line_search(
-    balance: &Balance,
+    equation: &mut Equation,
     diagonal: &BlockJacobi,
     u1: &mut Nodes,
-    u0: &[DVec3],
-    v0: &[DVec3],
-    cells: &mut Cells,
     residual: &[DVec3],
     norm: f64,
     d: &[DVec3],
 ) -> (Nodes, f64) {
     let start = u1.clone();
     add_scaled(u1, 1.0, d);
-    let full = balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed);
+    let full = equation.residual(u1);
     let full_norm = diagonal.norm(&full);
     if full_norm <= 0.5 * norm {
         return (full, full_norm);
     }
     let slope = dot(residual, d);
-    let before = balance.potential_from(States { u1: &start, u0, v0 }, &cells.before);
+    let before = equation.potential(&start);
     let mut step = 1.0;
     for _ in 0..30 {
-        let after = balance.potential_from(States { u1, u0, v0 }, &cells.before);
+        let after = equation.potential(u1);
         // Close to the solution the change drowns in rounding; then the step is as good as any.
         let rounding = 1e-12 * (before.abs() + after.abs());
         if after <= before + 1e-4 * step * slope + rounding {
@@ -268,24 +253,24 @@ fn line_search(
         u1.copy_from_slice(&start);
         add_scaled(u1, step, d);
     }
-    let residual = if step == 1.0 { full } else { balance.residual_from(States { u1, u0, v0 }, &cells.before, &mut cells.posed) };
+    let residual = if step == 1.0 { full } else { equation.residual(u1) };
     let norm = diagonal.norm(&residual);
     (residual, norm)
 }
 
-/// Solves A x = b with the exact tangent at a converged state, for derivatives.
+/// Solves A x = b with the exact tangent at a converged state, for derivatives. The residual has been computed there.
 pub fn solve_exact(
-    balance: &Balance,
+    equation: &Equation,
     solvers: &Solvers,
     matrix: &mut Matrix,
     purpose: Purpose,
-    s: States,
+    u1: &[DVec3],
     columns: &mut [Vec<DVec3>],
 ) -> Result<(), Reason> {
-    balance.tangent(s, false, matrix);
-    let diagonal = BlockJacobi::new(&balance.pattern.blocks, matrix).map_err(not_positive)?;
+    equation.tangent(u1, Curvature::Exact, matrix);
+    let diagonal = BlockJacobi::new(&equation.context.pattern.blocks, matrix).map_err(not_positive)?;
     let mut level = None;
-    let task = task(balance, matrix, &diagonal, s.u1, purpose, Digits::All);
+    let task = task(equation, matrix, &diagonal, u1, purpose, Digits::All);
     let prepared: Prepared = solvers.prepare(task, &mut level).map_err(trouble)?;
-    prepared.solve_many(columns, balance.plan.solver.tolerance.clamp(FINEST, 1e-6)).map_err(trouble)
+    prepared.solve_many(columns, equation.context.plan.solver.tolerance.clamp(FINEST, 1e-6)).map_err(trouble)
 }

@@ -1,55 +1,101 @@
-//! One member's start and steps, with their adjoints and tangents.
+//! One member's start and stages, with their adjoints and tangents.
 
 use crate::linear::Purpose;
-use crate::linear::vector::{Nodes, dot, is_finite};
+use crate::linear::matrix::Matrix;
+use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, Effort, Reason};
-use crate::passes::balance::{Balance, Inertia, States};
-use crate::passes::cells::{Mix, zeros};
-use crate::world::{Member, MemberState, MemberTangent, Shared};
+use crate::terms::{Context, Curvature, Equation, Past, PastChange, Rates, Weights, zeros};
+use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
 use palpate_engine::{Direction, FailureKind, number};
-use palpate_model::params::ParamKey;
-use palpate_model::params::changes;
+use palpate_model::params::coefficients::Coefficients;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
 
-/// The balance of a stage, or of the static problem (`None`).
-pub(crate) fn balance<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>) -> Balance<'a> {
-    let p = &member.physics;
-    let (inertia, mix, time) = match stage {
-        None => (None, Mix::STATIC, p.start),
+/// The past of a stage: the weighted sum of past states, and each of them.
+pub(crate) struct Start<'a> {
+    u: Nodes,
+    v: Nodes,
+    each: Vec<(f64, &'a [DVec3])>,
+}
+
+impl<'a> Start<'a> {
+    /// From the past states that a stage names.
+    pub(crate) fn new(stage: &Stage, past: &[&'a MemberState]) -> Start<'a> {
+        let sum = |pick: fn(&MemberState) -> &Nodes| combined(stage, past.iter().map(|s| pick(s)));
+        let each = stage.from.iter().zip(past).map(|(f, s)| (f.1, s.u.as_slice())).collect();
+        Start { u: sum(|s| &s.u), v: sum(|s| &s.v), each }
+    }
+
+    /// Of a static problem: nothing.
+    fn still(n: usize) -> Start<'a> {
+        Start { u: zeros(n), v: zeros(n), each: Vec::new() }
+    }
+
+    /// ũ and ṽ.
+    #[cfg(test)]
+    pub(crate) fn sums(&self) -> (&[DVec3], &[DVec3]) {
+        (&self.u, &self.v)
+    }
+
+    fn past(&'a self) -> Past<'a> {
+        Past { u: &self.u, v: &self.v, each: &self.each }
+    }
+}
+
+/// Σ weight · vector over a stage's past.
+fn combined<'v>(stage: &Stage, vectors: impl Iterator<Item = &'v Nodes>) -> Nodes {
+    let mut sum: Option<Nodes> = None;
+    for ((_, weight), v) in stage.from.iter().zip(vectors) {
+        match &mut sum {
+            // A single state has the weight one.
+            None if *weight == 1.0 => sum = Some(v.clone()),
+            None => sum = Some(v.iter().map(|x| *weight * *x).collect()),
+            Some(sum) => add_scaled(sum, *weight, v),
+        }
+    }
+    sum.unwrap_or_default()
+}
+
+/// The equation of a stage, or of the static problem (`None`).
+pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>, start: &'a Start<'a>) -> Equation<'a> {
+    let p = &member.coefficients.physics;
+    let (inertia, weights, time) = match stage {
+        None => (None, Weights::STATIC, p.start),
         Some(&Stage { length, theta, time, .. }) => (
-            Some(Inertia { displacement: 1.0 / (theta * length * length), velocity: 1.0 / (theta * length), rate: 1.0 / length }),
-            Mix { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / length },
+            Some(Rates { displacement: 1.0 / (theta * length * length), velocity: 1.0 / (theta * length), rate: 1.0 / length }),
+            Weights { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / length },
             p.start + time,
         ),
     };
-    Balance {
+    Equation::new(Context {
         plan: &shared.plan,
         pattern: &shared.pattern,
         places: &shared.places,
         elements: &member.elements,
-        physics: p,
+        coefficients: &member.coefficients,
         planes: &member.planes,
         effects: &member.effects,
         altered: &member.altered,
         inertia,
-        mix,
+        weights,
         time,
-    }
+        past: start.past(),
+    })
 }
 
 /// The static stiffness at a state.
-pub fn stiffness(shared: &Shared, member: &mut Member, s: &MemberState) -> crate::linear::matrix::Matrix {
-    let zero = zeros(s.u.len());
-    let mut matrix = crate::linear::matrix::Matrix::default();
-    balance(shared, member, None).tangent(States { u1: &s.u, u0: &zero, v0: &zero }, false, &mut matrix);
+pub fn stiffness(shared: &Shared, member: &mut Member, s: &MemberState) -> Matrix {
+    let (start, mut matrix) = (Start::still(s.u.len()), Matrix::default());
+    let mut e = equation(shared, member, None, &start);
+    e.residual(&s.u);
+    e.tangent(&s.u, Curvature::Exact, &mut matrix);
     matrix
 }
 
-/// Takes the scratch matrix out of a member, so that a balance can borrow the rest.
-fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut crate::linear::matrix::Matrix) -> T) -> T {
+/// Takes the scratch matrix out of a member, so that an equation can borrow the rest.
+fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut Matrix) -> T) -> T {
     let mut matrix = std::mem::take(&mut member.matrix);
     let result = f(member, &mut matrix);
     member.matrix = matrix;
@@ -72,10 +118,9 @@ fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
     Ok(())
 }
 
-/// The initial state.
-pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
-    let plan = &shared.plan;
-    let p = &member.physics;
+/// Refuses coefficients that the model is not defined for.
+fn check_parameters(member: &Member) -> Result<(), Reason> {
+    let p = &member.coefficients.physics;
     let positive = [(p.youngs_modulus, "material.youngs_modulus"), (p.density, "material.density")];
     if let Some((value, path)) = positive.iter().find(|(v, _)| v.is_nan() || *v <= 0.0) {
         return Err((FailureKind::BadParameter, format!("{path} = {} must be positive", number(*value))));
@@ -86,11 +131,19 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
             format!("material.poisson_ratio = {} must lie in (-1, 0.5)", number(p.poisson_ratio)),
         ));
     }
+    Ok(())
+}
+
+/// The initial state.
+pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
+    let plan = &shared.plan;
+    check_parameters(member)?;
     s.u.fill(DVec3::ZERO);
-    if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.altered.changes.rest) {
+    if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.coefficients.changes.rest) {
         // At rest is where nothing is strained.
         s.u.copy_from_slice(w);
     }
+    let p = &member.coefficients.physics;
     for ((v, x), u) in s.v.iter_mut().zip(&plan.body.nodes).zip(&s.u) {
         *v = p.velocity + p.angular_velocity.cross(*x + *u - plan.pivot);
     }
@@ -98,23 +151,12 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
         if plan.clamps.is_empty() {
             return Err((FailureKind::NoEquilibrium, "no clamp holds the body".into()));
         }
-        let zero = zeros(s.u.len());
+        let still = Start::still(s.u.len());
         with_matrix(member, |member, matrix| {
-            let b = balance(shared, member, None);
+            let mut e = equation(shared, member, None, &still);
             let iterations = plan.solver.newton_iterations.max(STATIC_ITERATIONS);
-            let effort = &mut Effort::default();
-            newton::solve(
-                &b,
-                &shared.solvers,
-                matrix,
-                Purpose::Static,
-                &mut s.u,
-                &zero,
-                &zero,
-                plan.solver.tolerance,
-                iterations,
-                effort,
-            )
+            let (tolerance, effort) = (plan.solver.tolerance, &mut Effort::default());
+            newton::solve(&mut e, &shared.solvers, matrix, Purpose::Static, &mut s.u, tolerance, iterations, effort)
         })
         .map_err(|(kind, detail)| match kind {
             FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
@@ -124,112 +166,76 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
     check(shared, s)
 }
 
-/// Where a node starts, away from the given shape [m]: the stress-free shape of a body that starts at rest.
-fn rest_offset(shared: &Shared, member: &Member, node: usize) -> DVec3 {
-    match &member.altered.changes.rest {
+/// Place of a node at the start, from the centre of the spin [m].
+fn arm(shared: &Shared, member: &Member, node: usize) -> DVec3 {
+    let offset = match &member.coefficients.changes.rest {
         Some(w) if shared.plan.initial == InitialShape::Rest => w[node],
         _ => DVec3::ZERO,
-    }
+    };
+    shared.plan.body.nodes[node] + offset - shared.plan.pivot
 }
 
-/// dJ/dθ of the start: adds to `gradient` `[P]`.
+/// Derivatives of J by the start's coefficients: adds to `gradient`.
 pub fn start_adjoint(
     shared: &Shared,
     member: &mut Member,
     s: &MemberState,
     adj: &MemberState,
-    gradient: &mut [f64],
+    gradient: &mut Gradient,
 ) -> Result<(), Reason> {
-    let plan = &shared.plan;
-    for (p, key) in plan.layout.keys.iter().enumerate() {
-        match key {
-            ParamKey::Velocity(a) => gradient[p] += adj.v.iter().map(|v| v[*a as usize]).sum::<f64>(),
-            ParamKey::AngularVelocity(a) => {
-                let arm = |i: usize| plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
-                gradient[p] += adj.v.iter().enumerate().map(|(i, v)| arm(i).cross(*v)[*a as usize]).sum::<f64>();
-            }
-            ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
-                if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(*effect), usize::from(*slot)) {
-                    let spin = member.physics.angular_velocity;
-                    gradient[p] += dot(&adj.u, &dw) + adj.v.iter().zip(&dw).map(|(v, w)| v.dot(spin.cross(*w))).sum::<f64>();
-                }
-            }
-            _ => {}
+    let at_rest = shared.plan.initial == InitialShape::Rest;
+    let spin = member.coefficients.physics.angular_velocity;
+    let g = &mut gradient.coefficients;
+    for (i, v) in adj.v.iter().enumerate() {
+        g.physics.velocity += *v;
+        g.physics.angular_velocity += arm(shared, member, i).cross(*v);
+        if let (true, Some(rest)) = (at_rest, &mut g.changes.rest) {
+            rest[i] += adj.u[i] + v.cross(spin);
         }
     }
-    if plan.initial == InitialShape::Rest {
+    if at_rest {
         return Ok(());
     }
-    let zero = zeros(s.u.len());
+    let still = Start::still(s.u.len());
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, None);
-        let states = States { u1: &s.u, u0: &zero, v0: &zero };
+        let mut e = equation(shared, member, None, &still);
+        e.residual(&s.u);
         let mut z = [adj.u.clone()];
-        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Static, states, &mut z)?;
-        add_columns(&b, states, &z[0], gradient);
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut z)?;
+        gradient.take(&e, &s.u, &z[0]);
         Ok(())
     })
 }
 
-/// gradient −= z · ∂r/∂p for every parameter.
-fn add_columns(b: &Balance, s: States, z: &[DVec3], gradient: &mut [f64]) {
-    for (p, key) in b.plan.layout.keys.iter().enumerate() {
-        if let Some(column) = b.column(*key, s) {
-            gradient[p] -= dot(z, &column);
-        }
-    }
-}
-
-/// (∂r/∂θ) dθ.
-fn column(b: &Balance, direction: &Direction, s: States) -> Nodes {
-    let mut sum = zeros(s.u1.len());
-    for (p, d) in direction.entries() {
-        if let Some(column) = b.column(b.plan.layout.keys[p], s) {
-            crate::linear::vector::add_scaled(&mut sum, d, &column);
-        }
-    }
-    sum
-}
-
-/// Derivatives of the start along some directions.
-pub fn start_tangent(
-    shared: &Shared,
-    member: &mut Member,
-    s: &MemberState,
-    directions: &[Direction],
-    t: &mut MemberTangent,
-) -> Result<(), Reason> {
+/// Derivatives of the coefficients along directions.
+pub(crate) fn rates(shared: &Shared, member: &Member, directions: &[Direction]) -> Vec<Coefficients> {
     let plan = &shared.plan;
-    for (q, direction) in directions.iter().enumerate() {
-        for (p, d) in direction.entries() {
-            match plan.layout.keys[p] {
-                ParamKey::Velocity(a) => t.dv[q].iter_mut().for_each(|v| *v += d * DVec3::AXES[a as usize]),
-                ParamKey::AngularVelocity(a) => {
-                    for (i, v) in t.dv[q].iter_mut().enumerate() {
-                        let arm = plan.body.nodes[i] + rest_offset(shared, member, i) - plan.pivot;
-                        *v += d * DVec3::AXES[a as usize].cross(arm);
-                    }
-                }
-                ParamKey::Effect { effect, slot, .. } if plan.initial == InitialShape::Rest => {
-                    if let Some(dw) = changes::rest_slope(plan, &member.physics, usize::from(effect), usize::from(slot)) {
-                        let spin = member.physics.angular_velocity;
-                        t.dv[q].iter_mut().zip(&dw).for_each(|(v, w)| *v += d * spin.cross(*w));
-                        t.du[q].iter_mut().zip(&dw).for_each(|(u, w)| *u += d * *w);
-                    }
-                }
-                _ => {}
-            }
+    directions.iter().map(|d| member.coefficients.along(plan, &d.dense(plan.layout.len()))).collect()
+}
+
+/// Derivatives of the start along `t`'s directions.
+pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &mut MemberTangent) -> Result<(), Reason> {
+    let at_rest = shared.plan.initial == InitialShape::Rest;
+    let spin = member.coefficients.physics.angular_velocity;
+    for (q, rates) in t.rates.iter().enumerate() {
+        let p = &rates.physics;
+        for (i, v) in t.dv[q].iter_mut().enumerate() {
+            *v = p.velocity + p.angular_velocity.cross(arm(shared, member, i));
+        }
+        if let (true, Some(dw)) = (at_rest, &rates.changes.rest) {
+            t.dv[q].iter_mut().zip(dw).for_each(|(v, w)| *v += spin.cross(*w));
+            t.du[q].copy_from_slice(dw);
         }
     }
-    if plan.initial == InitialShape::Rest {
+    if at_rest {
         return Ok(());
     }
-    let zero = zeros(s.u.len());
+    let still = Start::still(s.u.len());
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, None);
-        let states = States { u1: &s.u, u0: &zero, v0: &zero };
-        t.du = directions.iter().map(|d| minus(column(&b, d, states))).collect();
-        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Static, states, &mut t.du)
+        let mut e = equation(shared, member, None, &still);
+        e.residual(&s.u);
+        t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&s.u, r))).collect();
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut t.du)
     })
 }
 
@@ -243,68 +249,62 @@ pub fn step(
     shared: &Shared,
     member: &mut Member,
     stage: &Stage,
-    now: &MemberState,
+    past: &[&MemberState],
     next: &mut MemberState,
 ) -> Result<(), Reason> {
-    let (dt, theta) = (stage.length, stage.theta);
+    let (length, theta) = (stage.length, stage.theta);
+    let from = Start::new(stage, past);
     // Free flight is the guess: exact while nothing touches or deforms.
-    let fall = theta * dt * dt * member.physics.gravity;
-    for i in 0..now.u.len() {
-        next.u[i] = now.u[i] + dt * now.v[i] + fall;
+    let fall = theta * length * length * member.coefficients.physics.gravity;
+    for i in 0..next.u.len() {
+        next.u[i] = from.u[i] + length * from.v[i] + fall;
     }
     let solver = shared.plan.solver;
     let mut effort = member.effort;
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(stage));
-        newton::solve(
-            &b,
-            &shared.solvers,
-            matrix,
-            Purpose::Step(1),
-            &mut next.u,
-            &now.u,
-            &now.v,
-            solver.tolerance,
-            solver.newton_iterations,
-            &mut effort,
-        )
+        let mut e = equation(shared, member, Some(stage), &from);
+        let (purpose, iterations) = (Purpose::Step(1), solver.newton_iterations);
+        newton::solve(&mut e, &shared.solvers, matrix, purpose, &mut next.u, solver.tolerance, iterations, &mut effort)
     })?;
     member.effort = effort;
-    let (a, c) = velocity_factors(dt, theta);
-    for i in 0..now.u.len() {
-        next.v[i] = a * (next.u[i] - now.u[i]) - c * now.v[i];
+    let (a, c) = velocity_factors(length, theta);
+    for i in 0..next.u.len() {
+        next.v[i] = a * (next.u[i] - from.u[i]) - c * from.v[i];
     }
     check(shared, next)
 }
 
-/// v₁ = a (u₁ − u₀) − c v₀.
-fn velocity_factors(dt: f64, theta: f64) -> (f64, f64) {
-    (1.0 / (theta * dt), (1.0 - theta) / theta)
+/// v₁ = a (u₁ − ũ) − c ṽ.
+fn velocity_factors(length: f64, theta: f64) -> (f64, f64) {
+    (1.0 / (theta * length), (1.0 - theta) / theta)
 }
 
-/// Adjoint of a stage: adds dJ/d(now) to `adj_now` and dJ/dθ to `gradient`.
+/// Adjoint of a stage: adds the derivatives by the past states to `adj_past` and those by the coefficients to `gradient`.
 pub fn step_adjoint(
     shared: &Shared,
     member: &mut Member,
     stage: &Stage,
-    now: &MemberState,
+    past: &[&MemberState],
     next: &MemberState,
     adj: &MemberState,
-    adj_now: &mut MemberState,
-    gradient: &mut [f64],
+    adj_past: &mut [&mut MemberState],
+    gradient: &mut Gradient,
 ) -> Result<(), Reason> {
     let (a, c) = velocity_factors(stage.length, stage.theta);
+    let from = Start::new(stage, past);
     let mut z = [adj.u.iter().zip(&adj.v).map(|(u, v)| *u + a * *v).collect::<Nodes>()];
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(stage));
-        let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
-        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Step(1), states, &mut z)?;
-        let (to_u, to_v) = b.by_old_transposed(states, &z[0]);
-        for i in 0..now.u.len() {
-            adj_now.u[i] -= a * adj.v[i] + to_u[i];
-            adj_now.v[i] -= c * adj.v[i] + to_v[i];
+        let mut e = equation(shared, member, Some(stage), &from);
+        e.residual(&next.u);
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Step(1), &next.u, &mut z)?;
+        let back = e.by_past_transposed(&next.u, &z[0]);
+        for ((to, (_, weight)), each) in adj_past.iter_mut().zip(&stage.from).zip(&back.each) {
+            for i in 0..next.u.len() {
+                to.u[i] -= *weight * (a * adj.v[i] + back.u[i]) + each[i];
+                to.v[i] -= *weight * (c * adj.v[i] + back.v[i]);
+            }
         }
-        add_columns(&b, states, &z[0], gradient);
+        gradient.take(&e, &next.u, &z[0]);
         if is_finite(&z[0]) { Ok(()) } else { Err((FailureKind::NotFinite, "adjoint of a step".into())) }
     })
 }
@@ -314,30 +314,32 @@ pub fn step_tangent(
     shared: &Shared,
     member: &mut Member,
     stage: &Stage,
-    now: &MemberState,
+    past: &[&MemberState],
     next: &MemberState,
-    directions: &[Direction],
-    t: &MemberTangent,
+    t: &[&MemberTangent],
     t_next: &mut MemberTangent,
 ) -> Result<(), Reason> {
     let (a, c) = velocity_factors(stage.length, stage.theta);
+    let from = Start::new(stage, past);
+    let directions = t_next.rates.len();
+    let sums: Vec<[Nodes; 2]> = (0..directions)
+        .map(|q| [combined(stage, t.iter().map(|t| &t.du[q])), combined(stage, t.iter().map(|t| &t.dv[q]))])
+        .collect();
     with_matrix(member, |member, matrix| {
-        let b = balance(shared, member, Some(stage));
-        let states = States { u1: &next.u, u0: &now.u, v0: &now.v };
-        t_next.du = directions
-            .iter()
-            .enumerate()
-            .map(|(q, direction)| {
-                let mut rhs = b.by_old(states, &t.du[q], &t.dv[q]);
-                rhs.iter_mut().zip(column(&b, direction, states)).for_each(|(r, c)| *r += c);
-                minus(rhs)
-            })
-            .collect();
-        newton::solve_exact(&b, &shared.solvers, matrix, Purpose::Step(directions.len()), states, &mut t_next.du)
+        let mut e = equation(shared, member, Some(stage), &from);
+        e.residual(&next.u);
+        let rhs = |(q, [u, v]): (usize, &[Nodes; 2])| {
+            let each: Vec<&[DVec3]> = t.iter().map(|t| t.du[q].as_slice()).collect();
+            let mut rhs = e.by_past(&next.u, &PastChange { u, v, each: &each });
+            add_scaled(&mut rhs, 1.0, &e.by_coefficients(&next.u, &t_next.rates[q]));
+            minus(rhs)
+        };
+        t_next.du = sums.iter().enumerate().map(rhs).collect();
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Step(directions), &next.u, &mut t_next.du)
     })?;
-    for q in 0..directions.len() {
-        for i in 0..now.u.len() {
-            t_next.dv[q][i] = a * (t_next.du[q][i] - t.du[q][i]) - c * t.dv[q][i];
+    for (q, [u, v]) in sums.iter().enumerate() {
+        for i in 0..next.u.len() {
+            t_next.dv[q][i] = a * (t_next.du[q][i] - u[i]) - c * v[i];
         }
     }
     Ok(())

@@ -4,15 +4,17 @@ use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::newton::Effort;
-use crate::passes::altered::Altered;
 use crate::passes::frames::{Compared, Look};
 use crate::passes::matching::{BandLookup, PointHash};
-use crate::passes::points::{self, Acting};
-use crate::passes::supports::{self, PlaneNow};
+use crate::terms::altered::Altered;
+use crate::terms::{Acting, Equation, acting};
+use glam::DVec3;
 use palpate_engine::{Direction, Evaluation, Failure, ParamBatch};
 use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::plan::{Physics, Plan};
+use palpate_model::mechanics::plane::{PlaneNow, planes};
+use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::plan::Plan;
 use palpate_model::space::pattern::{Pattern, Places};
 use std::sync::Arc;
 
@@ -41,7 +43,7 @@ pub struct Shared {
 #[derive(Debug)]
 pub struct Member {
     pub(crate) theta: Vec<f64>,
-    pub(crate) physics: Physics,
+    pub(crate) coefficients: Coefficients,
     pub(crate) planes: Vec<PlaneNow>,
     pub(crate) effects: Vec<Acting>,
     pub(crate) sensors: Sensors,
@@ -55,7 +57,7 @@ pub struct Member {
 impl Member {
     /// Time of the initial state as the stamps of frames have it [s].
     pub(crate) fn first_stamp(&self) -> f64 {
-        self.physics.start + self.sensors.ahead()
+        self.coefficients.physics.start + self.sensors.ahead()
     }
 
     /// A frame as this member understands it.
@@ -90,18 +92,19 @@ impl World {
         let mut scratch: Vec<Matrix> = self.members.drain(..).map(|m| m.matrix).collect();
         for b in 0..theta.members() {
             let row = theta.row(b);
-            let physics = Physics::new(&shared.plan.layout, row);
+            let coefficients = Coefficients::new(&shared.plan, row);
+            let physics = &coefficients.physics;
             let elements = known.iter().find(|e| e.nu == physics.poisson_ratio).cloned().unwrap_or_else(|| {
                 let e = Arc::new(Elements::new(&shared.plan, &shared.classes, physics.poisson_ratio));
                 known.push(e.clone());
                 e
             });
-            let planes = supports::planes(&shared.plan, &physics);
-            let effects = points::acting(&shared.plan, &physics);
-            let altered = Altered::new(&shared.plan, &physics, &elements);
+            let planes = planes(&shared.plan, physics);
+            let effects = acting(&shared.plan, physics);
+            let altered = Altered::new(&shared.plan, &coefficients, &elements);
             self.members.push(Member {
                 theta: row.to_vec(),
-                physics,
+                coefficients,
                 planes,
                 effects,
                 sensors: Sensors::new(&shared.plan.layout, row),
@@ -143,6 +146,8 @@ pub struct Tangent {
 /// Tangents of one member, one vector per direction.
 #[derive(Clone, Debug)]
 pub struct MemberTangent {
+    /// Derivatives of the coefficients along the directions.
+    pub(crate) rates: Arc<Vec<Coefficients>>,
     pub(crate) du: Vec<Nodes>,
     pub(crate) dv: Vec<Nodes>,
 }
@@ -157,8 +162,33 @@ pub struct Tally {
 #[derive(Clone, Debug, Default)]
 pub struct MemberTally {
     pub(crate) evaluation: Evaluation,
+    /// Derivatives by the coefficients, where a gradient is wanted.
+    pub(crate) gradient: Option<Box<Gradient>>,
     /// Frames already compared at the state that they were observed in: number, displacement, result.
     pub(crate) compared: Vec<(usize, Nodes, Compared)>,
+}
+
+/// dJ/d(coefficients) of one member, and which of them are wanted.
+#[derive(Clone, Debug)]
+pub struct Gradient {
+    pub(crate) coefficients: Coefficients,
+    pub(crate) sought: Sought,
+    /// Parameters that are wanted `[P]`.
+    pub(crate) wanted: Vec<bool>,
+}
+
+impl Gradient {
+    /// Zero.
+    pub(crate) fn new(plan: &Plan, wanted: Vec<bool>) -> Gradient {
+        let sought = Sought::new(plan, &wanted);
+        Gradient { coefficients: Coefficients::zero_gradient(plan, &sought), sought, wanted }
+    }
+
+    /// Adds −z · ∂r/∂(coefficients) at `u1`.
+    pub(crate) fn take(&mut self, equation: &Equation, u1: &[DVec3], z: &[DVec3]) {
+        let minus: Nodes = z.iter().map(|z| -*z).collect();
+        equation.by_coefficients_transposed(u1, &minus, &self.sought, &mut self.coefficients);
+    }
 }
 
 impl MemberTally {

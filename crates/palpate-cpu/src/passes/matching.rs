@@ -3,7 +3,7 @@
 //! The points of a frame never move, so they are hashed once; each deformed cell asks for the points in its bounding box. A frame
 //! costs points + band cells, not points × cells: a point meets the few cells whose boxes hold it, however many there are.
 
-use crate::passes::cells::Corners;
+use crate::terms::elastic_cells::Corners;
 use glam::DVec3;
 use palpate_model::cutcells::distances::interpolate;
 use palpate_model::cutcells::front::Sight;

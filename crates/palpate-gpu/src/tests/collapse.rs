@@ -10,7 +10,7 @@ use crate::pipelines::constant;
 use crate::{Gpu, GpuBackend, Lanes, Product, Tuning};
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_cpu::passes::cells::corners;
+use palpate_cpu::terms::elastic_cells::corners;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::mechanics::motion::RigidMotion;

@@ -2,7 +2,7 @@
 //! against the same quantities of the CPU; each comparison must see one percent.
 
 use super::faults::{BALANCE, Fault};
-use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, three, vectors, with_balance};
+use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, three, vectors, with_context};
 use super::scenes::{device, plan};
 use crate::effects::{BACK, BY_OLD};
 use crate::pipelines::pass;
@@ -10,8 +10,7 @@ use crate::pipelines::shared::asks;
 use crate::solve::{ALL, Per, Solve};
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
-use palpate_cpu::passes::balance::{Balance, Inertia, States};
-use palpate_cpu::passes::cells::Mix;
+use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
 use palpate_engine::{Backend, Request};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::{Physics, Plan};
@@ -124,11 +123,16 @@ fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
     let a = Exact::new(plan, given);
     let dt = plan.clock.step;
     let [u, v] = along(plan);
-    with_balance(plan, given, |b, s| {
-        let mut parts = vec![("press_old and gather_old".into(), flat(&old_forces(b, s)))];
+    with_context(plan, given, |c, u1| {
+        let mut parts = vec![("press_old and gather_old".into(), flat(&old_forces(c)))];
+        let mut equation = Equation::new(c);
+        equation.residual(u1);
         let (mut gradient, mut sizes) = (vec![0.0; plan.layout.len()], vec![1.0; plan.layout.len()]);
         for (p, key) in plan.layout.keys.iter().enumerate() {
-            if let Some(column) = b.column(*key, s) {
+            let mut unit = vec![0.0; plan.layout.len()];
+            unit[p] = 1.0;
+            let column = equation.by_coefficients(u1, &c.coefficients.along(plan, &unit));
+            if !matches!(key, ParamKey::Velocity(_) | ParamKey::AngularVelocity(_)) {
                 let terms = || column.iter().zip(&v).map(|(c, z)| c.dot(*z));
                 sizes[p] = terms().map(f64::abs).sum();
                 gradient[p] = -terms().sum::<f64>() / sizes[p];
@@ -137,38 +141,35 @@ fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
         }
         parts.push(("dot_column".into(), gradient));
         // What is free of inertia on the device is the sum of two terms here whose inertia cancels.
-        let (to_u, to_v) = b.by_old_transposed(s, &v);
+        let back = equation.by_past_transposed(u1, &v);
+        let to_u: Vec<DVec3> = back.u.iter().zip(&back.each[0]).map(|(a, b)| *a + *b).collect();
         let sum = |x: &[DVec3], f: f64, y: &[DVec3]| -> Vec<DVec3> { x.iter().zip(y).map(|(x, y)| -(f * *x + *y)).collect() };
         parts.push(("couple_old and step_back, displacement".into(), flat(&sum(&a.product(&v), 1.0, &to_u))));
-        parts.push(("couple_old and step_back, velocity".into(), flat(&sum(&a.product(&v), dt, &to_v))));
+        parts.push(("couple_old and step_back, velocity".into(), flat(&sum(&a.product(&v), dt, &back.v))));
+        let by_past = equation.by_past(u1, &PastChange { u: &u, v: &v, each: &[&u] });
         let flight: Vec<DVec3> = u.iter().zip(&v).map(|(u, v)| *u + dt * *v).collect();
-        parts.push(("couple_old and sum_old".into(), flat(&sum(&a.product(&flight), 1.0, &b.by_old(s, &u, &v)))));
+        parts.push(("couple_old and sum_old".into(), flat(&sum(&a.product(&flight), 1.0, &by_past))));
         parts.push(("turn_cg and advance_cg".into(), flat(&three_iterations(&a, &load(plan)))));
         (parts, sizes)
     })
 }
 
 /// The old state's forces that a solve takes over: of cells and clamps with their weight, and all of the ghost penalty's.
-fn old_forces<'a>(b: &Balance<'a>, s: States<'a>) -> Vec<DVec3> {
-    let none = vec![DVec3::ZERO; s.u0.len()];
-    let physics = Physics { gravity: DVec3::ZERO, mass_damping: 0.0, ..b.physics.clone() };
-    let smooth = {
-        let mut p = b.plan.clone();
-        p.solver.ghost = 0.0;
-        p
-    };
-    let inertia = b.inertia.map(|t| Inertia { displacement: 0.0, velocity: 0.0, ..t });
+fn old_forces(c: Context) -> Vec<DVec3> {
+    let none = vec![DVec3::ZERO; c.past.u.len()];
+    let mut still = c.coefficients.clone();
+    (still.physics.gravity, still.physics.mass_damping) = (DVec3::ZERO, 0.0);
+    let mut smooth = c.plan.clone();
+    smooth.solver.ghost = 0.0;
+    let inertia = c.inertia.map(|t| Rates { displacement: 0.0, velocity: 0.0, ..t });
     let at = |plan: &Plan, rate: f64| {
-        let mix = Mix { new: 0.0, rate, ..b.mix };
-        Balance { plan, physics: &physics, planes: &[], effects: &[], inertia, mix, ..*b }.residual(States {
-            u1: &none,
-            u0: s.u0,
-            v0: s.v0,
-        })
+        let weights = Weights { new: 0.0, rate, ..c.weights };
+        let own = Context { plan, coefficients: &still, planes: &[], effects: &[], inertia, weights, ..c };
+        Equation::new(own).residual(&none)
     };
-    let (rate, smooth) = (b.mix.rate, &smooth);
-    let ghosts = at(b.plan, rate).into_iter().zip(at(smooth, rate)).map(|(with, without)| with - without);
-    at(smooth, 0.0).into_iter().zip(ghosts).map(|(a, b)| a + b).collect()
+    let rate = c.weights.rate;
+    let ghosts = at(c.plan, rate).into_iter().zip(at(&smooth, rate)).map(|(with, without)| with - without);
+    at(&smooth, 0.0).into_iter().zip(ghosts).map(|(a, b)| a + b).collect()
 }
 
 /// The solution after three iterations of conjugate gradients with the inverse diagonal blocks.

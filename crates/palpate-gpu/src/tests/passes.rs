@@ -9,16 +9,16 @@ use crate::world::{State, World};
 use crate::{GpuBackend, Product};
 use glam::{DMat3, DVec3};
 use palpate_cpu::linear::matrix::Matrix;
-use palpate_cpu::passes::altered::Altered;
-use palpate_cpu::passes::balance::{Balance, Inertia, States};
-use palpate_cpu::passes::cells::{Mix, corners};
-use palpate_cpu::passes::points::acting;
+use palpate_cpu::terms::altered::Altered;
+use palpate_cpu::terms::elastic_cells::corners;
+use palpate_cpu::terms::{Context, Curvature, Equation, Past, Rates, Weights, acting};
 use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::cutcells::corotation::{CellPose, multiply};
 use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::{self, Effect};
 use palpate_model::mechanics::plane::planes;
 use palpate_model::params::ParamKey;
+use palpate_model::params::coefficients::Coefficients;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::Scene;
 use palpate_model::space::pattern::{Pattern, Places};
@@ -170,90 +170,90 @@ pub(super) struct Exact {
     parts: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// Runs `work` with the CPU's balance of a step, and its states, at given nodes.
-pub(super) fn with_balance<T>(plan: &Plan, given: Given, work: impl for<'a> FnOnce(&Balance<'a>, States<'a>) -> T) -> T {
-    let physics = Physics::new(&plan.layout, &plan.theta);
+/// Runs `work` with what the CPU's terms of a step read, and the new displacement, at given nodes.
+pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOnce(Context<'a>, &'a [DVec3]) -> T) -> T {
+    let coefficients = Coefficients::new(plan, &plan.theta);
+    let physics = &coefficients.physics;
     let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
     let pattern = Pattern::new(&plan.body);
     let places = Places::new(plan, &pattern);
-    let altered = Altered::new(plan, &physics, &elements);
-    let effects = acting(plan, &physics);
-    let planes = planes(plan, &physics);
+    let altered = Altered::new(plan, &coefficients, &elements);
+    let effects = acting(plan, physics);
+    let planes = planes(plan, physics);
     let (dt, theta) = (plan.clock.step, plan.clock.theta);
-    let mix = Mix { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt };
-    let inertia = Inertia { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt };
-    let balance = Balance {
+    let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = plan.body.nodes.iter().map(|x| (given(*x)[0], given(*x)[1])).unzip();
+    let context = Context {
         plan,
         pattern: &pattern,
         places: &places,
         elements: &elements,
-        physics: &physics,
+        coefficients: &coefficients,
         planes: &planes,
         effects: &effects,
         altered: &altered,
-        inertia: Some(inertia),
-        mix,
+        inertia: Some(Rates { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt }),
+        weights: Weights { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt },
         time: physics.start + dt,
+        past: Past { u: &u0, v: &v0, each: &[(1.0, &u0)] },
     };
-    let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = plan.body.nodes.iter().map(|x| (given(*x)[0], given(*x)[1])).unzip();
-    let u1 = placed(&balance, given, 1.0);
-    work(&balance, States { u1: &u1, u0: &u0, v0: &v0 })
+    let u1 = placed(&context, given, 1.0);
+    work(context, &u1)
 }
 
 /// Free flight, and a part of the increment beyond it.
-fn placed(balance: &Balance, given: Given, length: f64) -> Vec<DVec3> {
-    let (plan, dt) = (balance.plan, balance.plan.clock.step);
-    let flight = |[u, v, w]: [DVec3; 3]| u + dt * v + plan.clock.theta * dt * dt * balance.physics.gravity + length * w;
+fn placed(c: &Context, given: Given, length: f64) -> Vec<DVec3> {
+    let (plan, dt) = (c.plan, c.plan.clock.step);
+    let flight = |[u, v, w]: [DVec3; 3]| u + dt * v + plan.clock.theta * dt * dt * c.physics().gravity + length * w;
     plan.body.nodes.iter().map(|x| flight(given(*x))).collect()
 }
 
 impl Exact {
     pub(super) fn new(plan: &Plan, given: Given) -> Exact {
-        with_balance(plan, given, |balance, s| Exact::of(balance, s, given))
+        with_context(plan, given, |c, u1| Exact::of(c, u1, given))
     }
 
-    fn of<'a>(&balance: &Balance<'a>, s: States<'a>, given: Given) -> Exact {
-        let Balance { plan, elements, physics, altered, mix, .. } = balance;
-        let u_half = placed(&balance, given, 0.5);
+    fn of(c: Context, u1: &[DVec3], given: Given) -> Exact {
+        let Context { plan, elements, altered, weights, .. } = c;
+        let physics = c.physics();
+        let u_half = placed(&c, given, 0.5);
         // Supports of the new state: what clamps, planes and effects add to a residual without the old state's forces.
         let bare = Plan { clamps: Vec::new(), ..plan.clone() };
-        let fresh = Balance { mix: Mix { old: 0.0, ..mix }, ..balance };
-        let free = Balance { plan: &bare, planes: &[], effects: &[], ..fresh };
-        let supports: Vec<f64> = fresh.residual(s).iter().zip(free.residual(s)).flat_map(|(a, b)| (*a - b).to_array()).collect();
+        let fresh = Context { weights: Weights { old: 0.0, ..weights }, ..c };
+        let free = Context { plan: &bare, planes: &[], effects: &[], ..fresh };
+        let residual = |c: Context| Equation::new(c).residual(u1);
+        let supports: Vec<f64> = residual(fresh).iter().zip(residual(free)).flat_map(|(a, b)| (*a - b).to_array()).collect();
         let (body, h) = (&plan.body, plan.body.grid.h);
         let mut cells = Vec::new();
         for e in 0..body.cells.len() {
-            let mut poses = [s.u1, s.u0].map(|u| CellPose::new(&corners(body, e, u), h));
+            let mut poses = [u1, c.past.u].map(|u| CellPose::new(&corners(body, e, u), h));
             if let Some(rest) = &altered.rest {
                 poses.iter_mut().for_each(|p| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w));
             }
             let k = &elements.cell(e).k;
             let (a, b) = (multiply(k, &poses[0].q), multiply(k, &poses[1].q));
-            let y = std::array::from_fn(|i| physics.youngs_modulus * ((mix.new + mix.rate) * a[i] - mix.rate * b[i]));
+            let y = std::array::from_fn(|i| physics.youngs_modulus * ((weights.new + weights.rate) * a[i] - weights.rate * b[i]));
             let mut force = flat(&poses[0].force(&y));
             if let Some(guard) = poses[0].guard() {
-                let unit = mix.new * physics.youngs_modulus * body.cells[e].fraction * h.powi(3);
+                let unit = weights.new * physics.youngs_modulus * body.cells[e].fraction * h.powi(3);
                 force.iter_mut().zip(flat(&guard.force())).for_each(|(f, g)| *f += unit * g);
             }
             cells.extend(force);
         }
-        let residual = flat(&balance.residual(s));
-        let half = {
-            let (u1, u0, v0) = (&u_half[..], s.u0, s.v0);
-            balance.potential(States { u1, u0, v0 })
-        };
-        let energy = balance.potential(s) - half;
+        let mut whole = Equation::new(c);
+        let residual = flat(&whole.residual(u1));
+        let energy = whole.potential(u1) - whole.potential(&u_half);
         let (mut light, mut matrix) = (Matrix::default(), Matrix::default());
         // On the device inertia is kept out of the matrix.
-        let weightless = balance.inertia.map(|t| Inertia { displacement: 0.0, ..t });
-        Balance { inertia: weightless, ..balance }.tangent(s, false, &mut light);
-        balance.tangent(s, false, &mut matrix);
+        let mut weightless = Equation::new(Context { inertia: c.inertia.map(|t| Rates { displacement: 0.0, ..t }), ..c });
+        weightless.residual(u1);
+        weightless.tangent(u1, Curvature::Exact, &mut light);
+        whole.tangent(u1, Curvature::Exact, &mut matrix);
         // Rows of blocks, as the device keeps them.
         let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
         let mut exact = Exact { given, pattern: Pattern::new(&plan.body), matrix, parts: Vec::new() };
         let load = exact.scaled(&load(plan));
         exact.parts = vec![
-            ("place_next", flat(s.u1)),
+            ("place_next", flat(u1)),
             ("press_cells", cells),
             ("touch_patches and hold_cells", supports),
             ("gather_residual", residual),

@@ -3,39 +3,28 @@
 //! Rows are cut into parts that are filled side by side. A cell belongs to the part of its first node; blocks in rows of other
 //! parts are set aside and added in a second pass.
 
+use super::ElasticCells;
 use crate::linear::matrix::Matrix;
 use crate::linear::simd::wide;
-use crate::passes::balance::States;
-use crate::passes::cells::{Elasticity, Mix};
-use crate::passes::materials::Materials;
-use crate::passes::posed::{Curvature, Posed};
+use crate::terms::Curvature;
 use glam::{DMat3, DVec3};
 use palpate_model::cutcells::corotation::M24;
-use palpate_model::space::pattern::{Pattern, Places};
+use palpate_model::space::pattern::Pattern;
 use rayon::prelude::*;
 
 /// Blocks of one part's cells in rows of every other part `[part]`: place in the matrix, and block.
 type Spill = Vec<Vec<(u32, DMat3)>>;
 
 /// Overwrites the matrix with the sum of the cells' tangents.
-pub fn cells(
-    elasticity: &Elasticity,
-    materials: Option<&Materials>,
-    pattern: &Pattern,
-    places: &Places,
-    mix: &Mix,
-    s: States,
-    posed: &[Posed],
-    curvature: Curvature,
-    matrix: &mut Matrix,
-) {
+pub(super) fn assemble(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
+    let pattern = term.cells.c.pattern;
     matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
     let spills: Vec<Spill> = slices(pattern, matrix)
         .into_par_iter()
         .map(|(part, values)| {
             wide(
                 #[inline(always)]
-                || fill(elasticity, materials, pattern, places, mix, s, posed, curvature, part, values),
+                || fill(term, u1, curvature, part, values),
             )
         })
         .collect();
@@ -49,34 +38,25 @@ pub fn cells(
 
 /// Overwrites the rows of one part with its own cells' blocks, and returns those in other rows.
 #[inline(always)]
-fn fill(
-    elasticity: &Elasticity,
-    materials: Option<&Materials>,
-    pattern: &Pattern,
-    places: &Places,
-    mix: &Mix,
-    s: States,
-    posed: &[Posed],
-    curvature: Curvature,
-    part: usize,
-    values: &mut [DMat3],
-) -> Spill {
+fn fill(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, part: usize, values: &mut [DMat3]) -> Spill {
+    let c = &term.cells.c;
+    let pattern = c.pattern;
     let rows = pattern.parts[part].clone();
     let base = pattern.blocks.rows[rows.start];
     let mut spill: Spill = vec![Vec::new(); pattern.parts.len()];
     let mut h = [0.0; 576];
     values.fill(DMat3::ZERO);
-    for (e, cell) in elasticity.body.cells.iter().enumerate() {
+    for (e, cell) in c.plan.body.cells.iter().enumerate() {
         if !rows.contains(&(cell.nodes[0] as usize)) {
             continue;
         }
-        elasticity.upper_tangent(mix, posed, e, curvature, &mut h);
-        if let Some(m) = materials {
-            m.add_tangent(e, s.u1, s.u0, curvature == Curvature::Convex, &mut h);
+        term.upper_tangent(e, curvature, &mut h);
+        if let Some(laws) = &term.laws {
+            laws.add_tangent(e, u1, curvature == Curvature::Convex, &mut h);
         }
         // Rows of other parts: which part.
         let others = cell.nodes.map(|n| n as usize).map(|n| (!rows.contains(&n)).then(|| pattern.part_of(n)));
-        let places = &places.cells[e];
+        let places = &c.places.cells[e];
         let mut put = |i: usize, j: usize, block: DMat3| match others[i] {
             None => values[places[8 * i + j] as usize - base] += block,
             Some(other) => spill[other].push((places[8 * i + j], block)),

@@ -1,0 +1,31 @@
+//! What effects make of a member's body beside its coefficients: strained rest cells, clamps, laws of cells.
+
+use super::elastic_cells::laws::{CellActing, cell_laws};
+use palpate_model::cutcells::corotation::CellPose;
+use palpate_model::cutcells::elements::Elements;
+use palpate_model::params::coefficients::Coefficients;
+use palpate_model::params::grips::Grip;
+use palpate_model::plan::Plan;
+
+/// All empty without such effects.
+#[derive(Debug, Default)]
+pub struct Altered {
+    /// Every cell in the stress-free shape.
+    pub rest: Option<Vec<CellPose>>,
+    /// Clamps with compliant layers and moved edges.
+    pub grips: Option<Vec<Grip>>,
+    /// Laws of cells.
+    pub laws: Vec<CellActing>,
+}
+
+impl Altered {
+    /// Of one member.
+    pub fn new(plan: &Plan, coefficients: &Coefficients, elements: &Elements) -> Altered {
+        let (body, h, physics) = (&plan.body, plan.body.grid.h, &coefficients.physics);
+        let rest = coefficients.changes.rest.as_ref().map(|w| {
+            let at = |n: u32| body.nodes[n as usize] + w[n as usize];
+            body.cells.iter().map(|c| CellPose::new(&c.nodes.map(at), h)).collect()
+        });
+        Altered { rest, grips: Grip::all(plan, physics, elements), laws: cell_laws(plan, physics) }
+    }
+}

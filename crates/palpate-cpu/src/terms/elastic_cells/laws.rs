@@ -1,0 +1,521 @@
+//! Effects that are laws of cells: their force, potential and derivatives, from scalar functions of a cell's deformation.
+//!
+//! A law gives ψ(s) and φ(d, a₀) of scalars s = (a, ε) (see [`palpate_model::effects::cell`]). With θ the weight of the new state, the
+//! incremental potential is E V [θ ψ(s₁) + φ] + (1 − θ) f(x₀)·x₁, and all derivatives follow from those of ψ and φ by the chain rule
+//! through q: ∇a = Kq/V, ∇ε constant, and q(x) by [`CellPose`].
+
+use super::{Cells, Corners, dot24 as dot, pick};
+use glam::DVec3;
+use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply};
+use palpate_model::cutcells::grid::SIGNS;
+use palpate_model::effects::Site;
+use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
+use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::plan::{Physics, Plan};
+
+/// A law of cells with its parameters.
+#[derive(Clone)]
+pub struct CellActing {
+    /// Number of the effect in the scene.
+    pub effect: usize,
+    law: &'static dyn Cell,
+    p: Vec<f64>,
+    /// Its amplitudes are zero: it has no energy, only derivatives by them.
+    pub absent: bool,
+}
+
+impl std::fmt::Debug for CellActing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "cell law {} {:?}", self.effect, self.p)
+    }
+}
+
+/// The cell laws of a member.
+pub fn cell_laws(plan: &Plan, physics: &Physics) -> Vec<CellActing> {
+    let all = plan.layout.effects().zip(&physics.effects).enumerate();
+    all.filter_map(|(effect, ((law, _), p))| match law.site {
+        Site::Cells(cell) => Some(CellActing { effect, law: cell, p: p.clone(), absent: law.is_absent(p) }),
+        _ => None,
+    })
+    .collect()
+}
+
+/// The cell laws of one solve.
+#[derive(Clone, Copy)]
+pub(super) struct CellLaws<'a> {
+    cells: Cells<'a>,
+    laws: &'a [CellActing],
+    /// 1/ℓ [1/s]; 0 in a static problem.
+    rate: f64,
+}
+
+/// Derivatives of ψ: first, and second (symmetric).
+#[derive(Clone, Copy, Default)]
+struct Slopes {
+    value: f64,
+    first: [f64; ENERGY],
+    second: [[f64; ENERGY]; ENERGY],
+}
+
+/// One state of a cell: pose, q, Kq, scalars. The past's q is the weighted sum over its states; its pose is that of the newest.
+struct Side {
+    pose: CellPose,
+    q: V24,
+    kq: V24,
+    s: [f64; ENERGY],
+    slopes: Slopes,
+}
+
+/// φ with its derivatives by d and a₀.
+#[derive(Clone, Copy, Default)]
+struct Loss {
+    value: f64,
+    by_d: f64,
+    by_dd: f64,
+    by_da: f64,
+}
+
+/// A cell with all that its laws need.
+struct Local<'a> {
+    k: &'a M24,
+    volume: f64,
+    /// Factor that turns energy densities over E into Pa.
+    young: f64,
+    /// Number of scalars that any law depends on.
+    n: usize,
+    /// 1/(4h): factor of the corner signs in the mean strain.
+    gradient: f64,
+    new: Side,
+    old: Option<Side>,
+    /// K(q₁ − q₀).
+    kd: V24,
+    d: f64,
+    loss: Loss,
+}
+
+fn add(a: &mut V24, factor: f64, b: &V24) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+}
+
+/// Rows and columns of the strain components xx, yy, zz, yz, zx, xy.
+const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [2, 0], [0, 1]];
+
+/// Gradient of mean strain component c by q.
+fn strain_row(c: usize, gradient: f64) -> V24 {
+    let [a, b] = PAIRS[c];
+    let mut row = [0.0; 24];
+    for i in 0..8 {
+        row[3 * i + a] += 0.5 * gradient * SIGNS[i][b];
+        row[3 * i + b] += 0.5 * gradient * SIGNS[i][a];
+    }
+    row
+}
+
+impl Local<'_> {
+    /// V ∇s_k by q at one state.
+    fn row(&self, side: &Side, k: usize) -> V24 {
+        if k == 0 { side.kq } else { strain_row(k - 1, self.gradient).map(|v| self.volume * v) }
+    }
+
+    /// E Σ V ∇s_k c_k: the body-frame force that goes with coefficients c.
+    fn stress(&self, side: &Side, c: &[f64; ENERGY]) -> V24 {
+        let mut y = [0.0; 24];
+        for k in (0..self.n).filter(|&k| c[k] != 0.0) {
+            add(&mut y, self.young * c[k], &self.row(side, k));
+        }
+        y
+    }
+
+    /// Derivative of [`Local::stress`] at its own coefficients, times a change of q.
+    fn stress_rate(&self, side: &Side, dq: &V24) -> V24 {
+        let ds: [f64; ENERGY] = std::array::from_fn(|k| if k < self.n { dot(&self.row(side, k), dq) / self.volume } else { 0.0 });
+        let c = std::array::from_fn(|k| (0..self.n).map(|l| side.slopes.second[k][l] * ds[l]).sum());
+        let mut y = self.stress(side, &c);
+        add(&mut y, self.young * side.slopes.first[0], &multiply(self.k, dq));
+        y
+    }
+
+    /// Body-frame force that goes with the new pose, for a weight of the new state.
+    fn force_new(&self, weight: f64) -> V24 {
+        let mut y = self.stress(&self.new, &self.new.slopes.first.map(|v| weight * v));
+        add(&mut y, self.young * self.loss.by_d, &self.kd);
+        y
+    }
+
+    /// Change of [`Local::force_new`] when the old deformation changes by `dq` (only the loss sees it).
+    fn by_old(&self, dq: &V24) -> V24 {
+        let Some(old) = &self.old else { return [0.0; 24] };
+        let (kd, k0) = (dot(&self.kd, dq) / self.volume, dot(&old.kq, dq) / self.volume);
+        let mut y = multiply(self.k, dq).map(|v| -self.young * self.loss.by_d * v);
+        add(&mut y, self.young * (self.loss.by_da * k0 - self.loss.by_dd * kd), &self.kd);
+        y
+    }
+
+    /// The transpose of [`Local::by_old`].
+    fn by_old_transposed(&self, dq: &V24) -> V24 {
+        let Some(old) = &self.old else { return [0.0; 24] };
+        let kd = self.young * dot(&self.kd, dq) / self.volume;
+        let mut y = multiply(self.k, dq).map(|v| -self.young * self.loss.by_d * v);
+        add(&mut y, -self.loss.by_dd * kd, &self.kd);
+        add(&mut y, self.loss.by_da * kd, &old.kq);
+        y
+    }
+
+    /// World-frame force of body-frame parts `new` and, weighted, `old`.
+    fn world(&self, new: &V24, old: Option<(f64, V24)>) -> Corners {
+        let mut f = self.new.pose.force(new);
+        if let (Some(side), Some((weight, y))) = (&self.old, old) {
+            for (f, g) in f.iter_mut().zip(side.pose.force(&y)) {
+                *f += weight * g;
+            }
+        }
+        f
+    }
+}
+
+/// Input of a law: scalars, then parameters.
+fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
+    let mut z = [0.0; ENERGY + MOST];
+    z[..scalars.len()].copy_from_slice(scalars);
+    z[scalars.len()..scalars.len() + p.len()].copy_from_slice(p);
+    (z, scalars.len() + p.len())
+}
+
+impl<'a> CellLaws<'a> {
+    pub(super) fn new(cells: Cells<'a>) -> CellLaws<'a> {
+        CellLaws { cells, laws: &cells.c.altered.laws, rate: cells.c.inertia.map_or(0.0, |t| t.rate) }
+    }
+
+    fn loss_part(&self) -> Part {
+        Part::Loss { rate: self.rate }
+    }
+
+    /// The laws that are not absent.
+    fn acting(&self) -> impl Iterator<Item = &'a CellActing> {
+        self.laws.iter().filter(|l| !l.absent)
+    }
+
+    /// Number of scalars that the energy of any acting law depends on; the density comes first.
+    fn needs(&self) -> usize {
+        self.acting().map(|l| l.law.needs(Part::Energy)).max().unwrap_or(1)
+    }
+
+    fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: f64) -> Side {
+        let kq = multiply(k, &q);
+        let mut s = [0.0; ENERGY];
+        s[0] = 0.5 * dot(&q, &kq) / volume;
+        for (c, s) in s.iter_mut().skip(1).enumerate().take(n - 1) {
+            *s = dot(&strain_row(c, gradient), &q);
+        }
+        let mut slopes = Slopes::default();
+        for l in self.acting() {
+            let (z, len) = input(&s, &l.p);
+            slopes.value += l.law.value(Part::Energy, &z[..len]);
+            let own = l.law.needs(Part::Energy);
+            for i in 0..own {
+                for j in 0..=i {
+                    let [first, _, second] = l.law.slopes(Part::Energy, &z[..len], i, j);
+                    slopes.second[i][j] += second;
+                    if i == j {
+                        slopes.first[i] += first;
+                    } else {
+                        slopes.second[j][i] += second;
+                    }
+                }
+            }
+        }
+        Side { pose, q, kq, s, slopes }
+    }
+
+    fn local(&self, e: usize, u1: &[DVec3]) -> Local<'a> {
+        self.local_with(self.needs(), e, u1)
+    }
+
+    /// The past's pose and q̃, where anything sees it.
+    fn past(&self, e: usize) -> Option<(CellPose, V24)> {
+        if !self.cells.c.weights.sees_past() && self.rate == 0.0 {
+            return None;
+        }
+        let mut q = [0.0; 24];
+        let mut newest = None;
+        for (weight, u) in self.cells.c.past.each {
+            let pose = self.cells.pose(e, u);
+            add(&mut q, *weight, &pose.q);
+            newest.get_or_insert(pose);
+        }
+        Some((newest?, q))
+    }
+
+    /// The same with at least `n` scalars.
+    fn local_with(&self, n: usize, e: usize, u1: &[DVec3]) -> Local<'a> {
+        let cells = &self.cells;
+        let (h, k) = (cells.body().grid.h, cells.stiffness(e));
+        let (volume, gradient) = (cells.c.elements.fractions[e] * h.powi(3), 0.25 / h);
+        let pose = cells.pose(e, u1);
+        let new = self.side(k, volume, pose, pose.q, n, gradient);
+        let old = self.past(e).map(|(pose, q)| self.side(k, volume, pose, q, n, gradient));
+        let (mut kd, mut d, mut loss) = ([0.0; 24], 0.0, Loss::default());
+        if let (Some(old), true) = (&old, self.rate > 0.0) {
+            kd = std::array::from_fn(|i| new.kq[i] - old.kq[i]);
+            d = 0.5 * (0..24).map(|i| kd[i] * (new.q[i] - old.q[i])).sum::<f64>() / volume;
+            for l in self.acting() {
+                let (z, len) = input(&[d, old.s[0]], &l.p);
+                let [by_d, _, by_dd] = l.law.slopes(self.loss_part(), &z[..len], 0, 0);
+                loss.value += l.law.value(self.loss_part(), &z[..len]);
+                loss.by_d += by_d;
+                loss.by_dd += by_dd;
+                loss.by_da += l.law.slopes(self.loss_part(), &z[..len], 0, 1)[2];
+            }
+        }
+        Local { k, volume, young: cells.young_of(e), n, gradient, new, old, kd, d, loss }
+    }
+
+    /// Adds the laws' force.
+    pub(super) fn force(&self, u1: &[DVec3], out: &mut [DVec3]) {
+        self.cells.gather(
+            |e| {
+                let l = self.local(e, u1);
+                let old = l.old.as_ref().map(|o| (self.cells.c.weights.old, l.stress(o, &o.slopes.first)));
+                l.world(&l.force_new(self.cells.c.weights.new), old)
+            },
+            out,
+        );
+    }
+
+    /// Potential whose gradient by u₁ is [`CellLaws::force`], up to a constant [J].
+    pub(super) fn potential(&self, u1: &[DVec3]) -> f64 {
+        let weights = &self.cells.c.weights;
+        let cell = |e: usize| {
+            let l = self.local(e, u1);
+            let mut w = l.young * l.volume * (weights.new * l.new.slopes.value + l.loss.value);
+            if let (Some(old), true) = (&l.old, weights.old != 0.0) {
+                let f0 = old.pose.force(&l.stress(old, &old.slopes.first));
+                w += weights.old * pick(self.cells.body(), e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
+            }
+            w
+        };
+        (0..self.cells.body().cells.len()).map(cell).sum()
+    }
+
+    /// Adds the derivative of cell e's force by the new state, world frame; with `convex` without the rotation's second derivative.
+    pub(super) fn add_tangent(&self, e: usize, u1: &[DVec3], convex: bool, out: &mut M24) {
+        let l = self.local(e, u1);
+        let weight = self.cells.c.weights.new;
+        let scale = l.young * (weight * l.new.slopes.first[0] + l.loss.by_d);
+        let mut h = [0.0; 576];
+        if convex {
+            l.new.pose.gauss_newton(l.k, scale, &mut h);
+        } else {
+            l.new.pose.hessian(l.k, scale, &l.force_new(weight), &mut h);
+        }
+        // Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ.
+        let rows: Vec<V24> = (0..l.n).map(|k| flatten(&l.new.pose.force(&l.row(&l.new, k)))).collect();
+        let turned = flatten(&l.new.pose.force(&l.kd));
+        let mut rank_one = |c: f64, a: &V24, b: &V24| {
+            for i in 0..24 {
+                for j in 0..24 {
+                    h[24 * i + j] += c * a[i] * b[j];
+                }
+            }
+        };
+        for i in 0..l.n {
+            for j in 0..l.n {
+                let c = weight * l.new.slopes.second[i][j];
+                if c != 0.0 {
+                    rank_one(c * l.young / l.volume, &rows[i], &rows[j]);
+                }
+            }
+        }
+        if l.loss.by_dd != 0.0 {
+            rank_one(l.loss.by_dd * l.young / l.volume, &turned, &turned);
+        }
+        out.iter_mut().zip(&h).for_each(|(o, h)| *o += h);
+    }
+
+    /// Adds the symmetric derivative of the old state's own force by itself, times `d`.
+    fn old_own(&self, l: &Local, d: &Corners, out: &mut Corners) {
+        let weight = self.cells.c.weights.old;
+        let (Some(old), true) = (&l.old, weight != 0.0) else { return };
+        let y = l.stress(old, &old.slopes.first);
+        let first = old.pose.force(&l.stress_rate(old, &old.pose.strain_rate(d)));
+        let second = old.pose.second(&y, d);
+        for i in 0..8 {
+            out[i] += weight * (first[i] + second[i]);
+        }
+    }
+
+    /// Adds the derivative along a change `d` of past state `i`.
+    pub(super) fn along_past(&self, i: usize, u1: &[DVec3], d: &[DVec3], out: &mut [DVec3]) {
+        let (weight, u) = self.cells.c.past.each[i];
+        self.cells.gather(
+            |e| {
+                let (l, d) = (self.local(e, u1), pick(self.cells.body(), e, d));
+                let dq = self.cells.pose(e, u).strain_rate(&d).map(|q| weight * q);
+                let mut f = l.new.pose.force(&l.by_old(&dq));
+                self.old_own(&l, &d, &mut f);
+                f
+            },
+            out,
+        );
+    }
+
+    /// Its transpose.
+    pub(super) fn pull_past(&self, i: usize, u1: &[DVec3], z: &[DVec3], out: &mut [DVec3]) {
+        let (weight, u) = self.cells.c.past.each[i];
+        self.cells.gather(
+            |e| {
+                let (l, z) = (self.local(e, u1), pick(self.cells.body(), e, z));
+                let y = l.by_old_transposed(&l.new.pose.strain_rate(&z)).map(|y| weight * y);
+                let mut f = self.cells.pose(e, u).force(&y);
+                self.old_own(&l, &z, &mut f);
+                f
+            },
+            out,
+        );
+    }
+
+    /// Body-frame forces, of the new pose and, without its weight, of the old one, that number `slot` of an effect changes.
+    fn by_number(&self, l: &Local, acting: &CellActing, slot: usize) -> [V24; 2] {
+        let by = |part: Part, scalars: &[f64], k: usize| {
+            let (z, len) = input(scalars, &acting.p);
+            acting.law.slopes(part, &z[..len], k, scalars.len() + slot)[2]
+        };
+        let energy = |side: &Side| {
+            let c = std::array::from_fn(|k| if k < l.n { by(Part::Energy, &side.s, k) } else { 0.0 });
+            l.stress(side, &c)
+        };
+        let mut new = energy(&l.new).map(|v| self.cells.c.weights.new * v);
+        if let (Some(old), true) = (&l.old, self.rate > 0.0) {
+            let scalars: [f64; LOSS] = [l.d, old.s[0]];
+            add(&mut new, l.young * by(self.loss_part(), &scalars, 0), &l.kd);
+        }
+        [new, l.old.as_ref().map_or([0.0; 24], energy)]
+    }
+
+    /// The same by Poisson's ratio.
+    fn by_poisson(&self, e: usize, l: &Local) -> [V24; 2] {
+        let k_nu = self.cells.by_poisson(e);
+        let energy = |side: &Side| {
+            let kq = multiply(k_nu, &side.q);
+            let a = 0.5 * dot(&side.q, &kq) / l.volume;
+            let c = std::array::from_fn(|k| side.slopes.second[k][0] * a);
+            let mut y = l.stress(side, &c);
+            add(&mut y, l.young * side.slopes.first[0], &kq);
+            (y, a)
+        };
+        let mut new = energy(&l.new).0.map(|v| self.cells.c.weights.new * v);
+        let old = l.old.as_ref().map(|old| (old, energy(old)));
+        if let (Some((old, (_, a0))), true) = (&old, self.rate > 0.0) {
+            let dq: V24 = std::array::from_fn(|i| l.new.q[i] - old.q[i]);
+            let kd = multiply(k_nu, &dq);
+            let d = 0.5 * dot(&dq, &kd) / l.volume;
+            add(&mut new, l.young * l.loss.by_d, &kd);
+            add(&mut new, l.young * (l.loss.by_dd * d + l.loss.by_da * a0), &l.kd);
+        }
+        [new, old.map_or([0.0; 24], |(_, (y, _))| y)]
+    }
+
+    /// Adds the derivative along a change of the coefficients, by absent laws' own numbers as well.
+    pub(super) fn along_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
+        let (d, weights) = (&rates.physics, &self.cells.c.weights);
+        let moved = |l: &&CellActing| d.effects[l.effect].iter().any(|r| *r != 0.0);
+        let own = self.laws.iter().filter(moved).map(|l| l.law.needs(Part::Energy)).max();
+        let ln_young = self.cells.c.ln_young_along(rates);
+        let present = self.acting().next().is_some();
+        let rest = rates.changes.rest.as_deref().filter(|_| self.cells.c.altered.rest.is_some());
+        let through = ln_young != 0.0 || d.poisson_ratio != 0.0 || rest.is_some() || rates.changes.modulus.is_some();
+        if own.is_none() && !(present && through) {
+            return;
+        }
+        let n = self.needs().max(own.unwrap_or(0));
+        self.cells.gather(
+            |e| {
+                let l = self.local_with(n, e, u1);
+                let (mut new, mut old) = ([0.0; 24], [0.0; 24]);
+                let mut sum = |[y, y0]: [V24; 2], scale: f64| {
+                    add(&mut new, scale, &y);
+                    add(&mut old, scale, &y0);
+                };
+                let ln = ln_young + self.cells.c.ln_factor_along(rates, e);
+                let own = |side: &Side| l.stress(side, &side.slopes.first);
+                sum([l.force_new(weights.new), l.old.as_ref().map_or([0.0; 24], own)], ln);
+                if d.poisson_ratio != 0.0 {
+                    sum(self.by_poisson(e, &l), d.poisson_ratio);
+                }
+                for acting in self.laws.iter().filter(moved) {
+                    for (slot, rate) in d.effects[acting.effect].iter().enumerate().filter(|(_, r)| **r != 0.0) {
+                        sum(self.by_number(&l, acting, slot), *rate);
+                    }
+                }
+                if let (Some(dw), Some(shape)) = (rest, &self.cells.c.altered.rest) {
+                    let dq = shape[e].strain_rate(&pick(self.cells.body(), e, dw)).map(|v| -v);
+                    let mut y = l.stress_rate(&l.new, &dq).map(|v| weights.new * v);
+                    let mut y0 = [0.0; 24];
+                    if let Some(old) = &l.old {
+                        add(&mut y, l.young * l.loss.by_da * dot(&old.kq, &dq) / l.volume, &l.kd);
+                        y0 = l.stress_rate(old, &dq);
+                    }
+                    sum([y, y0], 1.0);
+                }
+                l.world(&new, Some((weights.old, old)))
+            },
+            out,
+        );
+    }
+
+    /// Its transpose.
+    pub(super) fn pull_coefficients(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
+        let asked: Vec<&CellActing> = self.laws.iter().filter(|l| sought.effects[l.effect]).collect();
+        let present = self.acting().next().is_some();
+        let through = sought.modulus || sought.poisson || gradient.changes.rest.is_some();
+        if asked.is_empty() && !(present && through) {
+            return;
+        }
+        let n = asked.iter().map(|l| l.law.needs(Part::Energy)).fold(self.needs(), usize::max);
+        let weights = self.cells.c.weights;
+        let shape = self.cells.c.altered.rest.as_ref().filter(|_| gradient.changes.rest.is_some());
+        let parts = self.cells.each_cell(|e| {
+            let (l, z) = (self.local_with(n, e, u1), pick(self.cells.body(), e, z));
+            let (s1, s0) = (l.new.pose.strain_rate(&z), l.old.as_ref().map_or([0.0; 24], |o| o.pose.strain_rate(&z)));
+            let work = |[y, y0]: [V24; 2]| dot(&y, &s1) + weights.old * dot(&y0, &s0);
+            let own = |side: &Side| l.stress(side, &side.slopes.first);
+            let rest = shape.map(|shape| {
+                let mut t = l.stress_rate(&l.new, &s1).map(|v| weights.new * v);
+                if let Some(old) = &l.old {
+                    add(&mut t, weights.old, &l.stress_rate(old, &s0));
+                    add(&mut t, l.young * l.loss.by_da / l.volume * dot(&l.kd, &s1), &old.kq);
+                }
+                shape[e].force(&t.map(|v| -v))
+            });
+            LawPull {
+                ln_young: work([l.force_new(weights.new), l.old.as_ref().map_or([0.0; 24], own)]),
+                poisson: if sought.poisson { work(self.by_poisson(e, &l)) } else { 0.0 },
+                numbers: asked.iter().flat_map(|a| (0..a.p.len()).map(|slot| work(self.by_number(&l, a, slot)))).collect(),
+                rest: rest.unwrap_or_default(),
+            }
+        });
+        for part in &parts {
+            gradient.physics.poisson_ratio += part.poisson;
+            let slots = asked.iter().flat_map(|a| (0..a.p.len()).map(|slot| (a.effect, slot)));
+            part.numbers.iter().zip(slots).for_each(|(g, (effect, slot))| gradient.physics.effects[effect][slot] += g);
+        }
+        if sought.modulus {
+            self.cells.c.pull_modulus(parts.iter().map(|p| p.ln_young).enumerate(), gradient);
+        }
+        if let (Some(out), true) = (&mut gradient.changes.rest, shape.is_some()) {
+            self.cells.sum_corners(|e, i| parts[e].rest[i], out);
+        }
+    }
+}
+
+/// Derivatives of z · force of one cell's laws.
+#[derive(Clone, Default)]
+struct LawPull {
+    /// By the logarithm of its modulus.
+    ln_young: f64,
+    poisson: f64,
+    /// By the numbers of the effects that are asked for, one after another.
+    numbers: Vec<f64>,
+    /// By the stress-free shape at the corners.
+    rest: Corners,
+}

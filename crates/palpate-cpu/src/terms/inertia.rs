@@ -1,0 +1,165 @@
+//! Inertia of nodes and point masses, damping in proportion to mass, and weight.
+
+use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal, zeros};
+use crate::linear::matrix::Matrix;
+use crate::linear::vector::dot;
+use glam::DVec3;
+use palpate_model::params::coefficients::{Coefficients, Sought};
+
+/// The term.
+pub struct Inertia<'a> {
+    /// What it reads.
+    pub c: Context<'a>,
+}
+
+/// Mass of every node [kg], point masses left out.
+pub(crate) fn masses<'a>(c: &Context<'a>) -> impl Iterator<Item = f64> + 'a {
+    let c = *c;
+    c.plan.body.node_volume.iter().enumerate().map(move |(i, v)| density(&c, i) * v)
+}
+
+/// Density [kg/m³] around a node.
+fn density(c: &Context, node: usize) -> f64 {
+    c.physics().density * c.coefficients.changes.density.as_ref().map_or(1.0, |d| d[node])
+}
+
+impl Inertia<'_> {
+    /// Adds M a for accelerations a(node) of the body and of the point masses.
+    fn add(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+            out[i] += density(&self.c, i) * v * body(i);
+        }
+        self.add_points(&self.c.physics().masses, points, out);
+    }
+
+    /// Adds m a of the point masses, for masses `m`.
+    fn add_points(&self, m: &[f64], a: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        for (site, m) in self.c.plan.masses.iter().zip(m) {
+            let mut mean = DVec3::ZERO;
+            for i in 0..8 {
+                mean += site.weights[i] * a(site.nodes[i] as usize);
+            }
+            for i in 0..8 {
+                out[site.nodes[i] as usize] += *m * site.weights[i] * mean;
+            }
+        }
+    }
+
+    /// Acceleration against gravity that forces must bring about at a node [m/s²].
+    fn pull(&self, u1: &[DVec3], i: usize) -> DVec3 {
+        let (g, past) = (self.c.physics().gravity, &self.c.past);
+        self.c.inertia.map_or(-g, |t| t.displacement * (u1[i] - past.u[i]) - t.velocity * past.v[i] - g)
+    }
+
+    /// Mean velocity of the solve [m/s]; zero in a static problem.
+    fn speed(&self, u1: &[DVec3], i: usize) -> DVec3 {
+        self.c.inertia.map_or(DVec3::ZERO, |t| t.rate * (u1[i] - self.c.past.u[i]))
+    }
+
+    /// M a at u₁, weight and damping included.
+    fn at(&self, u1: &[DVec3], out: &mut [DVec3]) {
+        let drag = self.c.physics().mass_damping;
+        match self.c.inertia {
+            None => self.add(|i| self.pull(u1, i), |i| self.pull(u1, i), out),
+            Some(_) => self.add(|i| self.pull(u1, i) + drag * self.speed(u1, i), |i| self.pull(u1, i), out),
+        }
+    }
+}
+
+impl Term for Inertia<'_> {
+    fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
+        self.at(u1, out);
+    }
+
+    fn potential(&self, u1: &[DVec3]) -> f64 {
+        // Quadratic and linear: ½ (r(u₁) + r(0))·u₁.
+        let mut both = zeros(u1.len());
+        self.at(u1, &mut both);
+        self.at(&zeros(u1.len()), &mut both);
+        0.5 * dot(u1, &both)
+    }
+
+    fn tangent(&self, _u1: &[DVec3], _curvature: Curvature, matrix: &mut Matrix) {
+        let Some(t) = self.c.inertia else { return };
+        let factor = t.displacement + self.c.physics().mass_damping * t.rate;
+        for (i, m) in masses(&self.c).enumerate() {
+            add_to_diagonal(&mut matrix.values[self.c.pattern.blocks.diagonal[i]], m * factor);
+        }
+        for (k, (site, m)) in self.c.plan.masses.iter().zip(&self.c.physics().masses).enumerate() {
+            for b in 0..64 {
+                let s = m * t.displacement * site.weights[b / 8] * site.weights[b % 8];
+                add_to_diagonal(&mut matrix.values[self.c.places.masses[k][b] as usize], s);
+            }
+        }
+    }
+
+    fn by_past(&self, _u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
+        let Some(t) = self.c.inertia else { return };
+        let drag = self.c.physics().mass_damping * t.rate;
+        let newton = |i: usize| -t.displacement * change.u[i] - t.velocity * change.v[i];
+        self.add(|i| newton(i) - drag * change.u[i], newton, out);
+    }
+
+    fn by_past_transposed(&self, _u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
+        let Some(t) = self.c.inertia else { return };
+        let drag = self.c.physics().mass_damping * t.rate;
+        self.add(|i| -(t.displacement + drag) * z[i], |i| -t.displacement * z[i], &mut out.u);
+        self.add(|i| -t.velocity * z[i], |i| -t.velocity * z[i], &mut out.v);
+    }
+
+    fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
+        let (p, d) = (self.c.physics(), &rates.physics);
+        let density_rate = |i: usize| {
+            let factor = self.c.coefficients.changes.density.as_ref().map_or(1.0, |f| f[i]);
+            d.density * factor + rates.changes.density.as_ref().map_or(0.0, |f| p.density * f[i])
+        };
+        if d.density != 0.0 || rates.changes.density.is_some() {
+            for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+                out[i] += density_rate(i) * v * (self.pull(u1, i) + p.mass_damping * self.speed(u1, i));
+            }
+        }
+        if d.mass_damping != 0.0 {
+            self.add(|i| d.mass_damping * self.speed(u1, i), |_| DVec3::ZERO, out);
+        }
+        if d.gravity != DVec3::ZERO {
+            self.add(|_| -d.gravity, |_| -d.gravity, out);
+        }
+        if d.masses.iter().any(|m| *m != 0.0) {
+            self.add_points(&d.masses, |i| self.pull(u1, i), out);
+        }
+    }
+
+    fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
+        let p = self.c.physics();
+        for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+            if sought.density {
+                let g = v * z[i].dot(self.pull(u1, i) + p.mass_damping * self.speed(u1, i));
+                gradient.physics.density += self.c.coefficients.changes.density.as_ref().map_or(1.0, |f| f[i]) * g;
+                if let Some(factor) = &mut gradient.changes.density {
+                    factor[i] += p.density * g;
+                }
+            }
+            let m = density(&self.c, i) * v;
+            if sought.damping[0] {
+                gradient.physics.mass_damping += m * z[i].dot(self.speed(u1, i));
+            }
+            gradient.physics.gravity -= m * z[i];
+        }
+        for (k, (site, m)) in self.c.plan.masses.iter().zip(&p.masses).enumerate() {
+            let mean = |v: &dyn Fn(usize) -> DVec3| (0..8).map(|i| site.weights[i] * v(site.nodes[i] as usize)).sum::<DVec3>();
+            let z = mean(&|i| z[i]);
+            gradient.physics.masses[k] += z.dot(mean(&|i| self.pull(u1, i)));
+            gradient.physics.gravity -= *m * z;
+        }
+    }
+
+    fn forces(&self, u1: &[DVec3], out: &mut Forces) {
+        let g = self.c.physics().gravity;
+        self.add(|_| g, |_| g, &mut out.weight);
+        if let Some(t) = self.c.inertia {
+            let v = self.c.past.v;
+            self.add(|i| t.velocity * v[i], |i| t.velocity * v[i], &mut out.momentum);
+        }
+        let _ = u1;
+    }
+}

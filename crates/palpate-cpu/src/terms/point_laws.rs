@@ -1,0 +1,313 @@
+//! Effects that act on points (nodes, surface patches, patches at planes).
+//!
+//! The loop knows no effect by name: a law gives a potential and its derivatives at one point
+//! ([`palpate_model::effects::law`]), this file spreads them over the nodes.
+
+use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
+use crate::linear::matrix::Matrix;
+use glam::{DMat3, DVec3};
+use palpate_model::effects::law::{COMMON, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
+use palpate_model::effects::{Law, Site};
+use palpate_model::mechanics::contact;
+use palpate_model::mechanics::plane::PlaneNow;
+use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::plan::{Physics, Plan};
+
+/// An effect of one member with its parameters, ready to act.
+#[derive(Clone)]
+pub struct Acting {
+    law: &'static Law,
+    /// Parameters `[K]`.
+    values: Vec<f64>,
+    /// Shares of the nodes and their derivatives by the parameters, `[N]` and `[K, N]`, for laws that share one load.
+    shares: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+    /// It does nothing with these parameters; only derivatives by its amplitudes are not zero.
+    absent: bool,
+}
+
+impl std::fmt::Debug for Acting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?}", self.law.kind, self.values)
+    }
+}
+
+/// The effects of a member.
+pub fn acting(plan: &Plan, physics: &Physics) -> Vec<Acting> {
+    let make = |((law, _), values): ((&'static Law, _), &Vec<f64>)| {
+        let shares = match law.site {
+            Site::Nodes(point) => point.shares(&plan.body.nodes, &plan.body.node_volume, values),
+            _ => None,
+        };
+        Acting { law, values: values.clone(), shares, absent: law.is_absent(values) }
+    };
+    plan.layout.effects().zip(&physics.effects).map(make).collect()
+}
+
+/// One point that an effect acts on, at one instant.
+struct At<'a> {
+    point: &'static dyn Point,
+    place: Place,
+    z: &'a [f64],
+    nodes: &'a [u32],
+    weights: &'a [f64],
+    /// Node number for effects of nodes.
+    node: usize,
+    /// Cell of the patch.
+    cell: Option<usize>,
+    /// Number of the plane for effects of contact.
+    plane: Option<usize>,
+}
+
+impl At<'_> {
+    fn mean(&self, v: &[DVec3]) -> DVec3 {
+        self.nodes.iter().zip(self.weights).map(|(n, w)| *w * v[*n as usize]).sum()
+    }
+
+    fn add(&self, f: [f64; 3], out: &mut [DVec3]) {
+        let f = DVec3::from_array(f);
+        for (n, w) in self.nodes.iter().zip(self.weights) {
+            out[*n as usize] += *w * f;
+        }
+    }
+}
+
+fn put(z: &mut [f64], at: usize, v: DVec3) {
+    z[at..at + 3].copy_from_slice(&v.to_array());
+}
+
+/// The term.
+pub struct PointLaws<'a> {
+    /// What it reads.
+    pub c: Context<'a>,
+}
+
+impl<'a> PointLaws<'a> {
+    /// The effects that do something.
+    fn present(&self) -> impl Iterator<Item = &'a Acting> + use<'a> {
+        self.c.effects.iter().filter(|a| !a.absent)
+    }
+
+    /// Visits every point of an effect that is not idle.
+    fn points(&self, acting: &Acting, u1: &[DVec3], mut visit: impl FnMut(&At)) {
+        let (body, k, past) = (&self.c.plan.body, acting.values.len(), &self.c.past);
+        let mut z = [0.0; COMMON + MOST];
+        let z = &mut z[..COMMON + k];
+        z[COMMON..].copy_from_slice(&acting.values);
+        put(z, GRAVITY, self.c.physics().gravity);
+        z[TIME] = self.c.time;
+        z[STIFFNESS] = contact::DEFAULT_STIFFNESS * self.c.physics().youngs_modulus / body.grid.h;
+        let place = Place {
+            rest: DVec3::ZERO,
+            normal: DVec3::ZERO,
+            measure: 0.0,
+            width: contact::WIDTH * body.grid.h,
+            rate: self.c.inertia.map_or(0.0, |t| t.rate),
+            inertia: self.c.inertia.map_or(0.0, |t| t.displacement),
+            momentum: self.c.inertia.map_or(0.0, |t| t.velocity),
+        };
+        let mut patches = |point: &'static dyn Point, plane: Option<(usize, &PlaneNow)>, z: &mut [f64]| {
+            for patch in &body.patches {
+                let nodes = &body.cells[patch.cell as usize].nodes;
+                let at = |v: &[DVec3]| -> DVec3 { (0..8).map(|i| patch.weights[i] * v[nodes[i] as usize]).sum() };
+                put(z, 0, patch.point + at(u1));
+                put(z, OLD, patch.point + at(past.u));
+                put(z, VELOCITY, at(past.v));
+                let place = Place { rest: patch.point, normal: patch.normal, measure: patch.area, ..place };
+                if !point.skips(&place, z) {
+                    let (plane, cell) = (plane.map(|p| p.0), Some(patch.cell as usize));
+                    visit(&At { point, place, z, nodes, weights: &patch.weights, node: 0, cell, plane });
+                }
+            }
+        };
+        match acting.law.site {
+            Site::Surface(point) => patches(point, None, z),
+            Site::Contact(point) => {
+                for (i, plane) in self.c.planes.iter().enumerate() {
+                    put(z, PLANE, plane.normal[0]);
+                    (z[PLANE + 3], z[PLANE + 4]) = (plane.height, plane.stiffness);
+                    patches(point, Some((i, plane)), z);
+                }
+            }
+            Site::Nodes(point) => {
+                for (i, x) in body.nodes.iter().enumerate() {
+                    put(z, 0, *x + u1[i]);
+                    put(z, OLD, *x + past.u[i]);
+                    put(z, VELOCITY, past.v[i]);
+                    let measure = acting.shares.as_ref().map_or(body.node_volume[i], |s| s.0[i]);
+                    let place = Place { rest: *x, measure, ..place };
+                    if !point.skips(&place, z) {
+                        visit(&At { point, place, z, nodes: &[i as u32], weights: &[1.0], node: i, cell: None, plane: None });
+                    }
+                }
+            }
+            // Everything else does not act on points.
+            _ => {}
+        }
+    }
+
+    /// Adds the effects' forces.
+    fn force(&self, u1: &[DVec3], out: &mut [DVec3]) {
+        for a in self.present() {
+            self.points(a, u1, |at| at.add(at.point.gradient(&at.place, at.z), out));
+        }
+    }
+
+    /// Change of a point's input along `rates`, but for the effect's own numbers; false where there is none.
+    fn input_along(&self, rates: &Coefficients, plane: Option<usize>, d: &mut [f64]) -> bool {
+        let p = &rates.physics;
+        put(d, GRAVITY, p.gravity);
+        d[TIME] = p.start;
+        d[STIFFNESS] = self.stiffness_by_young() * p.youngs_modulus;
+        if let Some(i) = plane {
+            let (now, [height, theta, phi]) = (&self.c.planes[i], p.planes[i]);
+            put(d, PLANE, theta * now.normal[1] + phi * now.normal[2]);
+            d[PLANE + 3] = height;
+            d[PLANE + 4] = if now.scales { d[STIFFNESS] } else { 0.0 };
+        }
+        d[GRAVITY..COMMON].iter().any(|v| *v != 0.0)
+    }
+
+    /// Default contact stiffness per Pa of Young's modulus [1/m].
+    fn stiffness_by_young(&self) -> f64 {
+        contact::DEFAULT_STIFFNESS / self.c.plan.body.grid.h
+    }
+
+    /// Adds what derivatives by a point's input, from GRAVITY on, make of the coefficients.
+    fn pull_input(&self, plane: Option<usize>, by: &[f64], gradient: &mut Coefficients) {
+        let (p, at) = (&mut gradient.physics, |k: usize| by[k - GRAVITY]);
+        p.gravity += DVec3::from_slice(&by[..3]);
+        p.start += at(TIME);
+        p.youngs_modulus += self.stiffness_by_young() * at(STIFFNESS);
+        if let Some(i) = plane {
+            let now = &self.c.planes[i];
+            let by_normal = DVec3::new(at(PLANE), at(PLANE + 1), at(PLANE + 2));
+            p.planes[i][0] += at(PLANE + 3);
+            p.planes[i][1] += by_normal.dot(now.normal[1]);
+            p.planes[i][2] += by_normal.dot(now.normal[2]);
+            if now.scales {
+                p.youngs_modulus += self.stiffness_by_young() * at(PLANE + 4);
+            }
+        }
+    }
+}
+
+impl Term for PointLaws<'_> {
+    fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
+        self.force(u1, out);
+    }
+
+    fn potential(&self, u1: &[DVec3]) -> f64 {
+        let mut w = 0.0;
+        for a in self.present() {
+            self.points(a, u1, |at| w += at.point.value(&at.place, at.z));
+        }
+        w
+    }
+
+    fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
+        for a in self.present() {
+            self.points(a, u1, |at| {
+                let h = at.point.hessian(&at.place, at.z);
+                let h = DMat3::from_cols_array_2d(&h);
+                if curvature != Curvature::Exact && !positive(h) {
+                    return;
+                }
+                match at.cell {
+                    None => matrix.values[self.c.pattern.blocks.diagonal[at.node]] += h,
+                    Some(cell) => {
+                        for b in 0..64 {
+                            let place = self.c.places.cells[cell][b] as usize;
+                            matrix.values[place] += h * (at.weights[b / 8] * at.weights[b % 8]);
+                        }
+                    }
+                }
+            });
+        }
+    }
+
+    fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
+        let mut d = [0.0; COMMON + MOST];
+        for a in self.present() {
+            self.points(a, u1, |at| {
+                put(&mut d, OLD, at.mean(change.u));
+                put(&mut d, VELOCITY, at.mean(change.v));
+                at.add(at.point.along(&at.place, at.z, &d), out);
+            });
+        }
+    }
+
+    fn by_past_transposed(&self, u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
+        for a in self.present() {
+            self.points(a, u1, |at| {
+                let mut row = [0.0; 6];
+                at.point.transposed(&at.place, at.z, at.mean(z).to_array(), OLD..OLD + 6, &mut row);
+                at.add([row[0], row[1], row[2]], &mut out.u);
+                at.add([row[3], row[4], row[5]], &mut out.v);
+            });
+        }
+    }
+
+    fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
+        for (a, numbers) in self.c.effects.iter().zip(&rates.physics.effects) {
+            let own = numbers.iter().any(|r| *r != 0.0);
+            if a.absent && !own {
+                continue;
+            }
+            self.points(a, u1, |at| {
+                let mut d = [0.0; COMMON + MOST];
+                d[COMMON..COMMON + numbers.len()].copy_from_slice(numbers);
+                let common = !a.absent && self.input_along(rates, at.plane, &mut d);
+                if !common && !own {
+                    return;
+                }
+                if let (true, Some((_, slopes))) = (own, &a.shares) {
+                    // Potentials are proportional to their measure.
+                    let measure = slopes.iter().zip(numbers).map(|(s, r)| r * s[at.node]).sum();
+                    at.add(at.point.gradient(&Place { measure, ..at.place }, at.z), out);
+                }
+                at.add(at.point.along(&at.place, at.z, &d), out);
+            });
+        }
+    }
+
+    fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
+        let common = sought.gravity || sought.start || sought.planes || sought.modulus;
+        for (e, a) in self.c.effects.iter().enumerate() {
+            let (own, common) = (sought.effects[e], common && !a.absent);
+            if !own && !common {
+                continue;
+            }
+            self.points(a, u1, |at| {
+                let w = at.mean(z).to_array();
+                let mut by = [0.0; COMMON + MOST];
+                if common {
+                    at.point.transposed(&at.place, at.z, w, GRAVITY..COMMON, &mut by[GRAVITY..COMMON]);
+                    self.pull_input(at.plane, &by[GRAVITY..COMMON], gradient);
+                }
+                if !own {
+                    return;
+                }
+                let numbers = &mut gradient.physics.effects[e];
+                at.point.transposed(&at.place, at.z, w, COMMON..COMMON + numbers.len(), &mut by[COMMON..]);
+                numbers.iter_mut().zip(&by[COMMON..]).for_each(|(g, b)| *g += b);
+                if let Some((_, slopes)) = &a.shares {
+                    // Potentials are proportional to their measure.
+                    let unit = at.point.gradient(&Place { measure: 1.0, ..at.place }, at.z);
+                    let work: f64 = w.iter().zip(unit).map(|(w, f)| w * f).sum();
+                    numbers.iter_mut().zip(slopes).for_each(|(g, s)| *g += s[at.node] * work);
+                }
+            });
+        }
+    }
+
+    fn forces(&self, u1: &[DVec3], out: &mut Forces) {
+        self.force(u1, &mut out.supports);
+    }
+}
+
+/// True for a positive semi-definite symmetric matrix (leading minors, with room for rounding).
+fn positive(h: DMat3) -> bool {
+    let size = h.x_axis.x.abs().max(h.y_axis.y.abs()).max(h.z_axis.z.abs());
+    let minor = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.x_axis.y;
+    h.x_axis.x >= -1e-12 * size && minor >= -1e-12 * size * size && h.determinant() >= -1e-12 * size.powi(3)
+}
