@@ -13,7 +13,7 @@ use glam::DVec3;
 use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
 use palpate_engine::{Backend, Request};
 use palpate_model::params::ParamKey;
-use palpate_model::plan::{Physics, Plan};
+use palpate_model::plan::Plan;
 
 /// What was computed by one pass or by several together: name, numbers.
 type Part = (String, Vec<f64>);
