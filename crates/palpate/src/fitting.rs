@@ -7,6 +7,7 @@ pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
+use crate::results::fit::FitStatus;
 use crate::scatter::Excess;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_fit::{
@@ -102,12 +103,12 @@ impl Fitted {
         all.filter(|(n, _)| own(n) && named(n)).map(|(n, p)| (n.path.clone(), p.value)).collect()
     }
 
-    /// How the fit ended: `complete`, `interrupted`, or `broken-off` by a device that failed.
-    pub fn status(&self) -> &'static str {
+    /// How the fit ended.
+    pub fn status(&self) -> FitStatus {
         match (&self.result.broken, self.interrupted) {
-            (Some(_), _) => "broken-off",
-            (None, true) => "interrupted",
-            (None, false) => "complete",
+            (Some(_), _) => FitStatus::BrokenOff,
+            (None, true) => FitStatus::Interrupted,
+            (None, false) => FitStatus::Complete,
         }
     }
 

@@ -6,7 +6,9 @@ use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, out_folder};
-use crate::report::{DiagnosisInput, diagnosis_html, diagnosis_json, diagnosis_summary, pictures};
+use crate::report::{DiagnosisInput, diagnosis_document, diagnosis_html, diagnosis_summary, pictures};
+use crate::results;
+use crate::results::diagnosis::DiagnosisDocument;
 use clap::Args;
 use palpate_io::output::{make_folder, write_file};
 use std::path::{Path, PathBuf};
@@ -63,11 +65,11 @@ fn write_all(
     experiments: &[Experiment],
     done: &Diagnosed,
     backend: Backend,
-) -> Result<serde_json::Value, Error> {
+) -> Result<DiagnosisDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
-    let result = diagnosis_json(done);
+    let result = diagnosis_document(done);
     // Results first: a report that fails must not cost them.
-    text("diagnosis.json", &(serde_json::to_string_pretty(&result).map_err(|e| Error::write(folder, e))? + "\n"))?;
+    results::write(folder.join("diagnosis.json"), &result)?;
     for (s, e) in experiments.iter().enumerate() {
         let changed = palpate_io::append_effects(e.text(), e.scene(), &done.added)?;
         let model = palpate_io::write_scene(&changed, done.experiments[s].scene(), &done.values[s], folder)?;
@@ -123,7 +125,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     track.finish();
     let result = write_all(a, &folder, &experiments, &done, backend)?;
     if console.json() {
-        console.print(&result.to_string());
+        console.print(&results::line(&result));
     } else {
         console.print(&diagnosis_summary(&done, &folder));
     }

@@ -5,6 +5,8 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, count};
 use crate::render::{Pinhole, Sensor};
+use crate::results;
+use crate::results::observation::ObservationDocument;
 use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
@@ -204,17 +206,15 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     palpate_io::write_recording(&a.out, &recording)?;
 
     if console.json() {
-        let json = serde_json::json!({
-            "format": "observation/1",
-            "recording": a.out.display().to_string(),
-            "backend": backend.name(),
-            "cameras": recording.cameras.len(),
-            "frames": observers.times.len(),
-            "images": recording.frames.len(),
-            "depth_readings": readings,
-            "marker_readings": samples,
-        });
-        console.print(&json.to_string());
+        console.print(&results::line(&ObservationDocument {
+            recording: a.out.display().to_string(),
+            backend: backend.name().into(),
+            cameras: recording.cameras.len(),
+            frames: observers.times.len(),
+            images: recording.frames.len(),
+            depth_readings: readings,
+            marker_readings: samples,
+        }));
     } else {
         console.print(&format!(
             "{}: {} times, {} images with {readings} depth readings, {samples} marker readings",
