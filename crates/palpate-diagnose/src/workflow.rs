@@ -154,7 +154,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let readings = one(lab.linearise(&[(baseline.changes.clone(), baseline.values.clone())]))?;
     let mut cells = Cells::new(&readings);
     if cells.is_empty() {
-        return Err(LabError::Failed("no part of the recording meets the simulated body: nothing can be diagnosed".into()));
+        return Err(LabError::failed("no part of the recording meets the simulated body: nothing can be diagnosed"));
     }
     let noise_ratio = noise_over_stated(lab, &readings);
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
@@ -266,7 +266,7 @@ fn met(readings: &Readings) -> usize {
 }
 
 fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
-    answers.into_iter().next().unwrap_or_else(|| Err(LabError::Failed("the laboratory gave no answer".into())))
+    answers.into_iter().next().unwrap_or_else(|| Err(LabError::failed("the laboratory gave no answer")))
 }
 
 impl Session<'_> {

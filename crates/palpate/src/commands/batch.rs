@@ -10,6 +10,7 @@ use crate::results;
 use crate::results::batch::{BatchDocument, BatchRow, RowStatus};
 use crate::results::fit::FitDocument;
 use clap::Args;
+use palpate_io::InputError;
 use palpate_io::output::{make_folder, write_file};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -71,7 +72,11 @@ impl BatchRow {
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))
+    std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))
+}
+
+fn unreadable(path: &Path, cause: &std::io::Error) -> Error {
+    InputError::file(path, format!("cannot be read: {cause}")).into()
 }
 
 /// The scenes that the arguments name: folders in the order of names, lists in the order of lines.
@@ -79,14 +84,14 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let mut out = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let list = std::fs::read_dir(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))?;
+            let list = std::fs::read_dir(path).map_err(|e| unreadable(path, &e))?;
             let files: BTreeSet<PathBuf> = list.filter_map(|f| Some(f.ok()?.path())).collect();
             let toml = files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "toml"));
             // Other TOML files (recordings, settings) may lie beside the scenes; one that cannot be read is reported later.
             let before = out.len();
             out.extend(toml.filter(|f| std::fs::read_to_string(f).map_or(true, |t| t.contains("\"scene/1\""))));
             if out.len() == before {
-                return Err(Error::Input(format!("{}: holds no scene (*.toml with format = \"scene/1\")", path.display())));
+                return Err(InputError::file(path, "holds no scene (*.toml with format = \"scene/1\")").into());
             }
         } else if path.extension().is_some_and(|e| e == "toml") {
             out.push(path.clone());
@@ -97,7 +102,7 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
             let before = out.len();
             out.extend(named.map(|l| folder.join(l)));
             if out.len() == before {
-                return Err(Error::Input(format!("{}: names no scene; one path a line is expected", path.display())));
+                return Err(InputError::file(path, "names no scene; one path a line is expected").into());
             }
         }
     }
@@ -199,7 +204,7 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
             return row;
         }
         Ok(Err(e)) => {
-            row.status = if e == Error::Interrupted {
+            row.status = if matches!(e, Error::Interrupted) {
                 RowStatus::Interrupted
             } else if e.exit_code() == 2 {
                 RowStatus::BadInput

@@ -99,7 +99,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if let Some(b) = a.budget
         && !(b > 0.0 && b < 1e6)
     {
-        return Err(Error::Input(format!("--budget {b}: must be > 0 and below 1000000 (minutes)")));
+        return Err(Error::option("budget", b, "must be > 0 and below 1000000 (minutes)"));
     }
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     let (backend, note) = a.backend.choose(experiments[0].plan(), 1)?;
@@ -130,10 +130,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         console.print(&diagnosis_summary(&done, &folder));
     }
     if let Some(why) = &done.broken {
-        return Err(Error::Failed(format!(
-            "{why}; what was known by then is in {}, --resume goes on from there",
-            folder.display()
-        )));
+        return Err(Error::BrokenOff { why: why.clone(), kept: "what was known by then", folder });
     }
     Ok(if done.diagnosis.interrupted { INTERRUPTED } else { 0 })
 }

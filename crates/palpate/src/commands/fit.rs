@@ -224,7 +224,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
     }
     if let Some(why) = &fitted.result.broken {
-        return Err(Error::Failed(format!("{why}; the best so far is in {}, --resume goes on from there", folder.display())));
+        return Err(Error::BrokenOff { why: why.clone(), kept: "the best so far", folder });
     }
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
 }

@@ -16,7 +16,8 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted, fit};
 use crate::interrupt::Interrupt;
 use lab::Lab;
-use palpate_diagnose::{Change, Diagnosis, LabError, Laboratory, Model};
+use palpate_diagnose::{Change, Diagnosis, Laboratory, Model};
+use palpate_io::InputError;
 use palpate_model::effects::Effect;
 use palpate_model::scene::ObservationSpec;
 use std::path::PathBuf;
@@ -68,8 +69,9 @@ pub struct Diagnosed {
 /// Finds what the model of one or several experiments lacks. `held_out` is a recording of the same body that no fit sees.
 ///
 /// # Errors
-/// [`Error::Input`] when there is nothing to compare with or `held_out` shows another body or nothing new, [`Error::Failed`] when the baseline cannot be computed,
-/// [`Error::Interrupted`] when it was stopped before the baseline was known.
+/// [`Error::Scene`] when there is nothing to compare with or `held_out` shows nothing new, [`Error::File`] when it shows another body,
+/// [`Error::Fit`] or [`Error::Diagnosis`] when the baseline cannot be computed, [`Error::Interrupted`] when it was stopped before the
+/// baseline was known.
 pub fn diagnose(
     experiments: &[Experiment],
     held_out: Option<&Experiment>,
@@ -79,8 +81,8 @@ pub fn diagnose(
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     for e in experiments.iter().chain(held_out) {
         if e.plan().observation.residuals() == 0 {
-            let name = e.scene().path.display();
-            return Err(Error::Input(format!("{name}: observation is missing or has no data to compare with; name a recording")));
+            let message = "is missing or has no data to compare with; name a recording";
+            return Err(Error::scene(&e.scene().path, "observation", message));
         }
     }
     if let Some(other) = held_out {
@@ -123,7 +125,7 @@ pub fn diagnose(
     let (diagnosis, broken) = with_threads(threads, move || {
         let deadline = options.budget.map(|b| clock + b);
         let mut lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
-        let numbers = lab.numbers(&[]).map_err(failed)?;
+        let numbers = lab.numbers(&[])?;
         let errors = numbers.iter().map(|n| {
             let parameters = free.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
             parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
@@ -133,7 +135,7 @@ pub fn diagnose(
         match (found, lab.broken()) {
             (Ok(diagnosis), broken) => Ok((diagnosis, broken)),
             (Err(_), Some(why)) => Err(Error::Failed(why)),
-            (Err(e), None) => Err(failed(e)),
+            (Err(e), None) => Err(e.into()),
         }
     })??;
     let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
@@ -175,30 +177,23 @@ const SAME: f64 = 0.01;
 /// What one body taught says nothing of another.
 fn same_body(experiments: &[Experiment], other: &Experiment) -> Result<(), Error> {
     let volume = |e: &Experiment| e.plan().body.volume;
-    let path = other.scene().path.display();
+    let path = &other.scene().path;
     if experiments.iter().all(|e| (volume(other) / volume(e) - 1.0).abs() > SAME) {
         let cm3 = |e: &Experiment| 1e6 * volume(e);
         let (given, own) = (cm3(&experiments[0]), cm3(other));
         let known = experiments[0].scene().path.display();
-        return Err(Error::Input(format!(
-            "{path}: the body has {own:.3} cm³ and that of {known} {given:.3} cm³; --held-out wants another recording of the same body"
-        )));
+        let message = format!(
+            "the body has {own:.3} cm³ and that of {known} {given:.3} cm³; --held-out wants another recording of the same body"
+        );
+        return Err(InputError::file(path, message).into());
     }
     let absolute = |p: &std::path::Path| p.canonicalize().unwrap_or_else(|_| p.into());
     let used = |e: &Experiment| {
         e.scene().observation.as_ref().map(|o| ObservationSpec { recording: absolute(&o.recording), ..o.clone() })
     };
     if experiments.iter().any(|e| used(e) == used(other)) {
-        return Err(Error::Input(format!(
-            "{path}: observation.recording is the one that is fitted; --held-out wants a recording that no fit sees"
-        )));
+        let message = "is the one that is fitted; --held-out wants a recording that no fit sees";
+        return Err(Error::scene(path, "observation.recording", message));
     }
     Ok(())
-}
-
-fn failed(e: LabError) -> Error {
-    match e {
-        LabError::Interrupted => Error::Interrupted,
-        e => Error::Failed(e.to_string()),
-    }
 }
