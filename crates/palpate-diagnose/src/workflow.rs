@@ -92,10 +92,29 @@ impl State {
     }
 }
 
+/// Which hypothesis: a candidate by its place in the table, or a pair of them. Pairs come after all single ones, in the order of their
+/// parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum CandidateId {
+    Single(usize),
+    /// The smaller number first.
+    Pair(usize, usize),
+}
+
+impl CandidateId {
+    /// Two single candidates as one, whichever comes first.
+    fn pair(a: CandidateId, b: CandidateId) -> CandidateId {
+        let first = |id| match id {
+            CandidateId::Single(n) | CandidateId::Pair(n, _) => n,
+        };
+        let (a, b) = (first(a), first(b));
+        CandidateId::Pair(a.min(b), a.max(b))
+    }
+}
+
 /// A fitted candidate.
 struct Fitted {
-    /// Its number in the table of candidates.
-    candidate: usize,
+    candidate: CandidateId,
     state: State,
     p_value: f64,
     gain: f64,
@@ -255,7 +274,7 @@ fn noise_over_stated(lab: &dyn Laboratory, readings: &Readings) -> f64 {
 }
 
 /// Keeps the first entry of every candidate.
-fn keep_first<T>(entries: &mut Vec<T>, candidate: impl Fn(&T) -> usize) {
+fn keep_first<T>(entries: &mut Vec<T>, candidate: impl Fn(&T) -> CandidateId) {
     let mut seen = std::collections::BTreeSet::new();
     entries.retain(|e| seen.insert(candidate(e)));
 }
