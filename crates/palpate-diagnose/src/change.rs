@@ -52,11 +52,6 @@ impl Change {
         }
     }
 
-    /// True for errors of the measurement: physics predicts the same motion with and without them.
-    pub fn is_measurement(&self) -> bool {
-        matches!(self, Change::Effect(e) if e.law().family == Family::Measurement)
-    }
-
     /// True for two effects of one family of laws: a gradient of the stiffness and a body of two parts describe the same.
     pub fn is_kin(&self, other: &Change) -> bool {
         matches!((self, other), (Change::Effect(a), Change::Effect(b)) if a.law().family == b.law().family)
@@ -147,19 +142,54 @@ impl Candidate {
     }
 }
 
-/// Numbers of a scene that are usually held fixed, by the name of their group.
-const FREED: [(&str, &str, &[&str]); 10] = [
-    ("poisson-ratio", "the material keeps its volume better or worse than assumed", &["material.poisson_ratio"]),
-    ("mass-damping", "slow motion is damped more or less than assumed", &["material.mass_damping"]),
-    ("stiffness-damping", "fast vibration is damped more or less than assumed", &["material.stiffness_damping"]),
-    ("stiffness", "the material is stiffer or softer than assumed", &["material.youngs_modulus"]),
-    ("density", "the body is heavier or lighter than assumed", &["material.density", "material.mass"]),
-    ("gravity", "gravity has another size or direction than assumed", &["world.gravity."]),
-    ("initial-velocity", "the body moves at the start in another way than assumed", &["initial.velocity."]),
-    ("initial-spin", "the body spins at the start in another way than assumed", &["initial.angular_velocity."]),
-    ("release-time", "the motion starts at another time than assumed", &["time.start"]),
-    ("plane-pose", "the ground lies higher, lower or more tilted than assumed", &["plane."]),
+/// Numbers of a scene that are usually held fixed and that a hypothesis may free.
+struct Freeable {
+    /// Names in reports: one of the hypothesis that frees all of them together, or those of the first, second and further ones where each is
+    /// a hypothesis of its own.
+    names: &'static [&'static str],
+    /// What it would mean.
+    sentence: &'static str,
+    /// Their paths; one that ends in a dot stands for all paths below it.
+    paths: &'static [&'static str],
+}
+
+const fn together(name: &'static [&'static str; 1], sentence: &'static str, paths: &'static [&'static str]) -> Freeable {
+    Freeable { names: name, sentence, paths }
+}
+
+const FREEABLE: [Freeable; 11] = [
+    together(&["poisson-ratio"], "the material keeps its volume better or worse than assumed", &["material.poisson_ratio"]),
+    together(&["mass-damping"], "slow motion is damped more or less than assumed", &["material.mass_damping"]),
+    together(&["stiffness-damping"], "fast vibration is damped more or less than assumed", &["material.stiffness_damping"]),
+    together(&["stiffness"], "the material is stiffer or softer than assumed", &["material.youngs_modulus"]),
+    together(&["density"], "the body is heavier or lighter than assumed", &["material.density", "material.mass"]),
+    together(&["gravity"], "gravity has another size or direction than assumed", &["world.gravity."]),
+    together(&["initial-velocity"], "the body moves at the start in another way than assumed", &["initial.velocity."]),
+    together(&["initial-spin"], "the body spins at the start in another way than assumed", &["initial.angular_velocity."]),
+    together(&["release-time"], "the motion starts at another time than assumed", &["time.start"]),
+    together(&["plane-pose"], "the ground lies higher, lower or more tilted than assumed", &["plane."]),
+    Freeable {
+        names: &["point-mass-value", "second-point-mass-value", "further-point-mass-value"],
+        sentence: "a point mass is heavier or lighter than assumed",
+        paths: &["mass."],
+    },
 ];
+
+impl Freeable {
+    /// The hypotheses that free those of these numbers that a scene holds fixed.
+    fn changes(&self, held: &[String]) -> Vec<Change> {
+        let mine: Vec<String> = held.iter().filter(|p| self.paths.iter().any(|x| names(x, p))).cloned().collect();
+        let change = |name, paths| Change::Freed { name, sentence: self.sentence, paths };
+        match self.names {
+            _ if mine.is_empty() => Vec::new(),
+            [name] => vec![change(name, mine)],
+            several => {
+                let name = |i: usize| several[i.min(several.len() - 1)];
+                mine.into_iter().enumerate().map(|(i, path)| change(name(i), vec![path])).collect()
+            }
+        }
+    }
+}
 
 /// True when a path is the one named, up to the scene's name behind it; a name that ends in a dot stands for all paths below it.
 fn names(name: &str, path: &str) -> bool {
@@ -183,8 +213,7 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
                     Unstated::Center | Unstated::Reference | Unstated::OnBody => {
                         *v = Some(setting.center[usize::from(p.axis.unwrap_or(0))])
                     }
-                    // A load at a place acts there as sharply as the grid allows.
-                    Unstated::Fixed(_) if p.key == "radius" => *v = Some(setting.spot),
+                    Unstated::Sharp(_) => *v = Some(setting.spot),
                     _ => {}
                 }
             }
@@ -196,18 +225,8 @@ pub fn candidates(setting: &Setting) -> Vec<Candidate> {
             out.push(Candidate { variants: variants.into_iter().map(Change::Effect).collect() });
         }
     }
-    for (name, sentence, prefixes) in FREED {
-        let paths: Vec<String> = setting.held.iter().filter(|p| prefixes.iter().any(|x| names(x, p))).cloned().collect();
-        if !paths.is_empty() {
-            out.push(Candidate { variants: vec![Change::Freed { name, sentence, paths }] });
-        }
-    }
-    for (i, path) in setting.held.iter().filter(|p| p.starts_with("mass.")).enumerate() {
-        let names = ["point-mass-value", "second-point-mass-value", "further-point-mass-value"];
-        let sentence = "a point mass is heavier or lighter than assumed";
-        let change = Change::Freed { name: names[i.min(2)], sentence, paths: vec![path.clone()] };
-        out.push(Candidate { variants: vec![change] });
-    }
+    let freed = FREEABLE.iter().flat_map(|f| f.changes(&setting.held));
+    out.extend(freed.map(|change| Candidate { variants: vec![change] }));
     out
 }
 
@@ -333,5 +352,26 @@ mod tests {
         // Without such planes it is tried all around.
         setting.walls.clear();
         assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));
+    }
+
+    #[test]
+    fn numbers_that_a_scene_holds_are_freed_together_or_one_by_one() {
+        let mut setting = Bench::new(1, &[], false).setting().clone();
+        let held = ["mass.0.mass", "material.mass", "mass.1.mass", "world.gravity.x", "mass.2.mass", "mass.3.mass [scene 2]"];
+        setting.held = held.map(String::from).to_vec();
+        let freed = |c: Candidate| match &c.variants[..] {
+            [Change::Freed { name, paths, .. }] => Some((*name, paths.join(" + "))),
+            _ => None,
+        };
+        let found: Vec<(&str, String)> = candidates(&setting).into_iter().filter_map(freed).collect();
+        let expected = [
+            ("density", "material.mass"),
+            ("gravity", "world.gravity.x"),
+            ("point-mass-value", "mass.0.mass"),
+            ("second-point-mass-value", "mass.1.mass"),
+            ("further-point-mass-value", "mass.2.mass"),
+            ("further-point-mass-value", "mass.3.mass [scene 2]"),
+        ];
+        assert_eq!(found, expected.map(|(name, paths)| (name, paths.to_string())));
     }
 }

@@ -8,17 +8,24 @@ use palpate_model::params::Transform;
 use std::sync::Arc;
 
 /// Why the laboratory has no answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum LabError {
-    /// This hypothesis cannot be computed; others may.
+    /// This hypothesis cannot be computed, for this reason; others may.
     #[error("{0}")]
-    Failed(String),
+    Failed(#[source] Arc<dyn std::error::Error + Send + Sync>),
     /// Asked to stop.
     #[error("interrupted")]
     Interrupted,
     /// The time that was allowed is over.
     #[error("no time left")]
     NoTime,
+}
+
+impl LabError {
+    /// A hypothesis that cannot be computed, for a reason that is an error or a text.
+    pub fn failed(cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> LabError {
+        LabError::Failed(cause.into().into())
+    }
 }
 
 /// What a scene is like, as far as hypotheses are made from it.

@@ -92,10 +92,29 @@ impl State {
     }
 }
 
+/// Which hypothesis: a candidate by its place in the table, or a pair of them. Pairs come after all single ones, in the order of their
+/// parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum CandidateId {
+    Single(usize),
+    /// The smaller number first.
+    Pair(usize, usize),
+}
+
+impl CandidateId {
+    /// Two single candidates as one, whichever comes first.
+    fn pair(a: CandidateId, b: CandidateId) -> CandidateId {
+        let first = |id| match id {
+            CandidateId::Single(n) | CandidateId::Pair(n, _) => n,
+        };
+        let (a, b) = (first(a), first(b));
+        CandidateId::Pair(a.min(b), a.max(b))
+    }
+}
+
 /// A fitted candidate.
 struct Fitted {
-    /// Its number in the table of candidates.
-    candidate: usize,
+    candidate: CandidateId,
     state: State,
     p_value: f64,
     gain: f64,
@@ -154,7 +173,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     let readings = one(lab.linearise(&[(baseline.changes.clone(), baseline.values.clone())]))?;
     let mut cells = Cells::new(&readings);
     if cells.is_empty() {
-        return Err(LabError::Failed("no part of the recording meets the simulated body: nothing can be diagnosed".into()));
+        return Err(LabError::failed("no part of the recording meets the simulated body: nothing can be diagnosed"));
     }
     let noise_ratio = noise_over_stated(lab, &readings);
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
@@ -255,7 +274,7 @@ fn noise_over_stated(lab: &dyn Laboratory, readings: &Readings) -> f64 {
 }
 
 /// Keeps the first entry of every candidate.
-fn keep_first<T>(entries: &mut Vec<T>, candidate: impl Fn(&T) -> usize) {
+fn keep_first<T>(entries: &mut Vec<T>, candidate: impl Fn(&T) -> CandidateId) {
     let mut seen = std::collections::BTreeSet::new();
     entries.retain(|e| seen.insert(candidate(e)));
 }
@@ -266,7 +285,7 @@ fn met(readings: &Readings) -> usize {
 }
 
 fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
-    answers.into_iter().next().unwrap_or_else(|| Err(LabError::Failed("the laboratory gave no answer".into())))
+    answers.into_iter().next().unwrap_or_else(|| Err(LabError::failed("the laboratory gave no answer")))
 }
 
 impl Session<'_> {

@@ -11,6 +11,7 @@
 //! keeps z from running away when the data push the value into a bound.
 
 use palpate_model::params::Transform;
+use serde::{Deserialize, Serialize};
 
 /// End of the box of a logit: a value within 8e-7 of the range from its bound, where dvalue/dz has lost six digits.
 const LOGIT_END: f64 = 14.0;
@@ -28,7 +29,8 @@ pub struct Chart {
 }
 
 /// Which bound holds a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum AtBound {
     /// The smallest allowed value.
     Lower,

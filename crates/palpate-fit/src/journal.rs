@@ -5,10 +5,9 @@
 //! digits of their bits, so that they come back exactly). A last line without its end is what a crash leaves, and is ignored.
 
 use crate::optimise::Sample;
-use crate::problem::Problem;
+use crate::problem::{FitScene, FreeParameter, Problem};
 use crate::settings::Settings;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
@@ -16,14 +15,49 @@ use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "palpate-journal/1";
 
-/// Keys of line 1 and what is said where they are not those of the fit.
-const HEAD: [(&str, &str); 5] = [
-    ("optimizer", "its optimizer differs"),
-    ("seed", "its seed differs"),
-    ("options", "its steps or tolerances differ"),
-    ("parameters", "its free parameters differ"),
-    ("scenes", "its scenes or recordings differ"),
-];
+/// Beginning of line 1.
+#[derive(Deserialize)]
+struct Tag {
+    format: Option<String>,
+}
+
+/// Line 1: what must be equal for evaluations to be exchangeable. Limits that only end a run earlier or later are left out, so that a fit
+/// can be resumed with more iterations or starts. Numbers that may be infinite are texts.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    format: String,
+    optimizer: String,
+    seed: u64,
+    /// Longest step, longest first step, steps of Rprop, tolerances.
+    options: (f64, String, String, String),
+    parameters: Vec<HeadParameter>,
+    scenes: Vec<HeadScene>,
+}
+
+/// A free parameter, as the head describes it.
+#[derive(PartialEq, Serialize, Deserialize)]
+struct HeadParameter {
+    path: String,
+    transform: String,
+    typical: f64,
+    bounds: [String; 2],
+    start: [f64; 2],
+    /// Scene, place in its θ, and bits of the factor.
+    slots: Vec<(usize, usize, String)>,
+}
+
+/// A scene, as the head describes it.
+#[derive(PartialEq, Serialize, Deserialize)]
+struct HeadScene {
+    fingerprint: String,
+    theta: String,
+}
+
+/// Any further line.
+#[derive(Serialize, Deserialize)]
+struct Round {
+    round: Vec<Entry>,
+}
 
 /// Where a fit keeps its journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,15 +123,15 @@ fn from_hex(text: &str) -> Option<Vec<f64>> {
 pub struct Journal {
     path: PathBuf,
     file: File,
-    entries: BTreeMap<(usize, usize), (Vec<f64>, Sample, usize)>,
+    entries: Entries,
 }
 
 impl Journal {
     /// Opens the journal of a problem: new, or with the evaluations of an earlier run of the same problem.
     pub fn open(place: &JournalFile, problem: &Problem, settings: &Settings) -> Result<Journal, JournalError> {
         let path = place.path.clone();
-        let io = |error| JournalError::Io { path: path.clone(), error };
-        let head = describe(problem, settings);
+        let io = |error: io::Error| JournalError::Io { path: path.clone(), error };
+        let head = Head::new(problem, settings);
         let mut entries = BTreeMap::new();
         let mut keep = 0;
         if place.resume && path.exists() {
@@ -110,7 +144,7 @@ impl Journal {
         let mut journal = Journal { path: path.clone(), file, entries };
         io::Seek::seek(&mut journal.file, io::SeekFrom::End(0)).map_err(io)?;
         if keep == 0 {
-            writeln!(journal.file, "{head}").map_err(io)?;
+            writeln!(journal.file, "{}", text(&head).map_err(io)?).map_err(io)?;
         }
         Ok(journal)
     }
@@ -144,60 +178,84 @@ impl Journal {
                 failure: sample.failure.clone(),
             })
             .collect();
-        let line = json!({ "round": entries }).to_string() + "\n";
-        self.file.write_all(line.as_bytes()).map_err(|error| JournalError::Io { path: self.path.clone(), error })
+        let io = |error| JournalError::Io { path: self.path.clone(), error };
+        let line = text(&Round { round: entries }).map_err(io)? + "\n";
+        self.file.write_all(line.as_bytes()).map_err(io)
     }
 }
 
-/// What must be equal for evaluations to be exchangeable. Limits that only end a run earlier or later are left out, so that
-/// a fit can be resumed with more iterations or starts.
-fn describe(problem: &Problem, settings: &Settings) -> Value {
-    let parameters: Vec<Value> = problem
-        .free()
-        .iter()
-        .map(|f| {
-            let slots: Vec<Value> = f.slots.iter().map(|s| json!([s.scene, s.place, to_hex(&[s.factor])])).collect();
-            json!({
-                "path": f.path,
-                "transform": format!("{:?}", f.transform),
-                "typical": f.typical,
-                "bounds": [f.bounds.0.to_string(), f.bounds.1.to_string()],
-                "start": [f.start.0, f.start.1],
-                "slots": slots,
-            })
-        })
-        .collect();
-    let scenes: Vec<Value> =
-        problem.scenes().iter().map(|s| json!({ "fingerprint": s.fingerprint, "theta": to_hex(&s.base) })).collect();
-    let steps = json!([
-        settings.max_step,
-        settings.first_step.to_string(),
-        format!("{:?}", settings.rprop),
-        format!("{:?}", settings.tolerance)
-    ]);
-    json!({
-        "format": FORMAT,
-        "optimizer": format!("{:?}", settings.optimizer),
-        "seed": settings.seed,
-        "options": steps,
-        "parameters": parameters,
-        "scenes": scenes,
-    })
+fn text(line: &impl Serialize) -> io::Result<String> {
+    Ok(serde_json::to_string(line)?)
 }
 
-type Entries = BTreeMap<(usize, usize), (Vec<f64>, Sample, usize)>;
+impl Head {
+    fn new(problem: &Problem, settings: &Settings) -> Head {
+        let parameter = |f: &FreeParameter| HeadParameter {
+            path: f.path.clone(),
+            transform: format!("{:?}", f.transform),
+            typical: f.typical,
+            bounds: [f.bounds.0.to_string(), f.bounds.1.to_string()],
+            start: [f.start.0, f.start.1],
+            slots: f.slots.iter().map(|s| (s.scene, s.place, to_hex(&[s.factor]))).collect(),
+        };
+        let scene = |s: &FitScene| HeadScene { fingerprint: s.fingerprint.clone(), theta: to_hex(&s.base) };
+        Head {
+            format: FORMAT.into(),
+            optimizer: format!("{:?}", settings.optimizer),
+            seed: settings.seed,
+            options: (
+                settings.max_step,
+                settings.first_step.to_string(),
+                format!("{:?}", settings.rprop),
+                format!("{:?}", settings.tolerance),
+            ),
+            parameters: problem.free().iter().map(parameter).collect(),
+            scenes: problem.scenes().iter().map(scene).collect(),
+        }
+    }
 
-fn read(path: &Path, text: &str, head: &Value, q: usize) -> Result<Entries, JournalError> {
+    /// What is not that of another journal, if anything.
+    fn difference(&self, other: &Head) -> Option<&'static str> {
+        let same = [
+            (self.optimizer == other.optimizer, "its optimizer differs"),
+            (self.seed == other.seed, "its seed differs"),
+            (self.options == other.options, "its steps or tolerances differ"),
+            (self.parameters == other.parameters, "its free parameters differ"),
+            (self.scenes == other.scenes, "its scenes or recordings differ"),
+        ];
+        same.into_iter().find(|(same, _)| !same).map(|(_, what)| what)
+    }
+}
+
+/// Where an evaluation was made, what came out, and in which line it stands.
+type Known = (Vec<f64>, Sample, usize);
+type Entries = BTreeMap<(usize, usize), Known>;
+
+impl Entry {
+    /// The evaluation for q parameters; `None` where it is damaged.
+    fn sample(self, q: usize) -> Option<(Vec<f64>, Sample)> {
+        let (z, cost) = (from_hex(&self.z)?, from_hex(&self.cost)?);
+        let (gradient, curvature) = (from_hex(&self.gradient)?, from_hex(&self.curvature)?);
+        let sizes = z.len() == q && cost.len() == 1 && [0, q].contains(&gradient.len()) && [0, q * q].contains(&curvature.len());
+        let (residuals, failure) = (self.residuals, self.failure);
+        sizes.then(|| (z, Sample { cost: cost[0], gradient, curvature, residuals, failure, broken: false, stopped: false }))
+    }
+}
+
+/// Reads the whole lines of a journal of a problem with this head and q free parameters.
+fn read(path: &Path, text: &str, own: &Head, q: usize) -> Result<Entries, JournalError> {
     let wrong = |line: usize, message: String| JournalError::Content { path: path.to_path_buf(), line, message };
     let mut entries = BTreeMap::new();
     for (k, text) in text.lines().enumerate() {
         let line = k + 1;
-        let value: Value = serde_json::from_str(text).map_err(|e| wrong(line, format!("not a line of a fit's journal ({e})")))?;
+        let not = |what: &str, e: serde_json::Error| wrong(line, format!("not a {what} ({e})"));
         if line == 1 {
-            if value.get("format").and_then(Value::as_str) != Some(FORMAT) {
+            let tag: Tag = serde_json::from_str(text).map_err(|e| not("line of a fit's journal", e))?;
+            if tag.format.as_deref() != Some(FORMAT) {
                 return Err(wrong(line, format!("not a fit's journal; its first line would name the format {FORMAT}")));
             }
-            if let Some((_, what)) = HEAD.into_iter().find(|(key, _)| value.get(key) != head.get(key)) {
+            let head: Head = serde_json::from_str(text).map_err(|e| not("line of a fit's journal", e))?;
+            if let Some(what) = own.difference(&head) {
                 let message = format!(
                     "the journal belongs to another fit ({what}); give the same scene, recording and options, or fit without \
                      resuming"
@@ -206,35 +264,12 @@ fn read(path: &Path, text: &str, head: &Value, q: usize) -> Result<Entries, Jour
             }
             continue;
         }
-        let round = value.get("round").cloned().unwrap_or(Value::Null);
-        let round: Vec<Entry> =
-            serde_json::from_value(round).map_err(|e| wrong(line, format!("not a round of evaluations ({e})")))?;
+        let Round { round } = serde_json::from_str(text).map_err(|e| not("round of evaluations", e))?;
         for e in round {
-            let sample = (|| {
-                let (z, cost) = (from_hex(&e.z)?, from_hex(&e.cost)?);
-                let (gradient, curvature) = (from_hex(&e.gradient)?, from_hex(&e.curvature)?);
-                let sizes =
-                    z.len() == q && cost.len() == 1 && [0, q].contains(&gradient.len()) && [0, q * q].contains(&curvature.len());
-                let residuals = e.residuals;
-                sizes.then(|| {
-                    (
-                        z,
-                        Sample {
-                            cost: cost[0],
-                            gradient,
-                            curvature,
-                            residuals,
-                            failure: e.failure.clone(),
-                            broken: false,
-                            stopped: false,
-                        },
-                    )
-                })
-            })();
-            let Some((z, sample)) = sample else {
-                return Err(wrong(line, format!("evaluation {} of start {} is damaged", e.evaluation, e.start)));
-            };
-            entries.insert((e.start, e.evaluation), (z, sample, line));
+            let (start, evaluation) = (e.start, e.evaluation);
+            let (z, sample) =
+                e.sample(q).ok_or_else(|| wrong(line, format!("evaluation {evaluation} of start {start} is damaged")))?;
+            entries.insert((start, evaluation), (z, sample, line));
         }
     }
     Ok(entries)

@@ -74,28 +74,30 @@ fn lengths(problem: &Problem, inner: &[usize], z: &[f64]) -> Vec<Vec<f64>> {
 
 /// Uncertainty at z `[q]`, from a sample by z there; without curvature there are no standard errors.
 pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel) -> Uncertainty {
-    let q = z.len();
-    let values = problem.values(z);
-    let mut u = Uncertainty {
-        standard_errors: vec![None; q],
-        errors_z: vec![None; q],
-        correlation: (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
-        reduced_chi_square: f64::NAN,
-        independent: f64::NAN,
-        ..Uncertainty::default()
-    };
-    let n = sample.residuals as f64;
-    if n > q as f64 {
-        u.reduced_chi_square = 2.0 * n * sample.cost / (n - q as f64);
-    } else if n > 0.0 {
-        u.warnings.push(format!("there are only {n} residuals for {q} free parameters"));
+    let mut u = Uncertainty::unknown(z.len());
+    u.count(sample, errors);
+    let inner = inside(problem, z, &mut u.warnings);
+    if inner.is_empty() || sample.curvature.is_empty() {
+        return u;
     }
-    if n > 0.0 {
-        u.independent = n / errors.design_effect.max(1.0);
-        u.tau = u.reduced_chi_square.max(1.0) / u.independent + errors.systematic.powi(2) / errors.groups.max(1) as f64;
+    if sample.residuals == 0 {
+        u.warnings.push("no standard errors: the cost counts no residuals".into());
+        return u;
     }
+    match Spread::new(problem, z, sample, u.tau, inner) {
+        Err(why) => u.warnings.push(format!("no standard errors: {why}")),
+        Ok(spread) => {
+            u.state(problem, z, &spread);
+            let told = u.tell_undetermined(problem, z, &spread);
+            u.tell_correlated(problem, &spread, &told);
+        }
+    }
+    u
+}
 
-    // A parameter held by a bound is a known number for the others.
+/// Parameters that no bound holds. One that a bound holds is a known number for the others; each has its sentence.
+fn inside(problem: &Problem, z: &[f64], warnings: &mut Vec<String>) -> Vec<usize> {
+    let values = problem.values(z);
     let mut inner = Vec::new();
     for (i, f) in problem.free().iter().enumerate() {
         let (side, bound) = match problem.charts()[i].at_bound(values[i]) {
@@ -106,92 +108,151 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
             Some(AtBound::Lower) => ("lower", f.bounds.0),
             Some(AtBound::Upper) => ("upper", f.bounds.1),
         };
-        u.warnings.push(format!(
+        warnings.push(format!(
             "{} ended at its {side} bound {bound}: the best value may lie beyond it, and has no standard error",
             f.path
         ));
     }
-    let m = inner.len();
-    if m == 0 || sample.curvature.is_empty() {
-        return u;
+    inner
+}
+
+/// Covariance of the m parameters that no bound holds, by the eigenvectors of the curvature in z.
+struct Spread {
+    /// Which parameters these are `[m]`.
+    inner: Vec<usize>,
+    /// Variance along each eigenvector `[m]`, the least determined first.
+    variances: Vec<f64>,
+    /// Eigenvectors `[m][m]`, one a row.
+    vectors: Vec<Vec<f64>>,
+    /// Standard errors in z `[m]`.
+    sd: Vec<f64>,
+}
+
+impl Spread {
+    fn new(problem: &Problem, z: &[f64], sample: &Sample, tau: f64, inner: Vec<usize>) -> Result<Spread, &'static str> {
+        let (q, m) = (z.len(), inner.len());
+        let mut h: Vec<f64> = inner.iter().flat_map(|&i| inner.iter().map(move |&j| sample.curvature[i * q + j])).collect();
+        let lengths = lengths(problem, &inner, z);
+        // Lengths become eigenvectors that nothing else mixes with.
+        let trace: f64 = (0..m).map(|a| h[a * m + a]).sum();
+        for e in &lengths {
+            (0..m * m).for_each(|k| h[k] += 2.0 * trace * e[k / m] * e[k % m]);
+        }
+        let (values, vectors) = eigen(&h, m).ok_or("the curvature of the cost is not finite")?;
+        let is_length =
+            |k: usize| lengths.iter().any(|e| e.iter().zip(&vectors[k]).map(|(e, v)| e * v).sum::<f64>().powi(2) > 0.5);
+        let largest = (0..m).filter(|k| !is_length(*k)).map(|k| values[k]).fold(0.0, f64::max);
+        if largest <= 0.0 {
+            return Err("no free parameter changes the cost");
+        }
+        let variance = |k: usize| if is_length(k) { 0.0 } else { tau / values[k].max(RANK * largest) };
+        let mut spread = Spread { variances: (0..m).map(variance).collect(), inner, vectors, sd: Vec::new() };
+        spread.sd = (0..m).map(|a| spread.covariance(a, a).sqrt()).collect();
+        Ok(spread)
     }
-    if n == 0.0 {
-        u.warnings.push("no standard errors: the cost counts no residuals".into());
-        return u;
+
+    /// Covariance of two of the m parameters in z.
+    fn covariance(&self, a: usize, b: usize) -> f64 {
+        (0..self.inner.len()).map(|k| self.variances[k] * self.vectors[k][a] * self.vectors[k][b]).sum()
     }
-    let mut h: Vec<f64> = inner.iter().flat_map(|&i| inner.iter().map(move |&j| sample.curvature[i * q + j])).collect();
-    let lengths = lengths(problem, &inner, z);
-    // Lengths become eigenvectors that nothing else mixes with.
-    let trace: f64 = (0..m).map(|a| h[a * m + a]).sum();
-    for e in &lengths {
-        (0..m * m).for_each(|k| h[k] += 2.0 * trace * e[k / m] * e[k % m]);
+
+    /// What is said of two of the m parameters that only act together.
+    fn alike(&self, names: &Names, a: usize, b: usize) -> String {
+        names.alike(self.inner[a], self.inner[b], self.covariance(a, a), self.covariance(b, b), self.covariance(a, b))
     }
-    let Some((values_h, vectors)) = eigen(&h, m) else {
-        u.warnings.push("no standard errors: the curvature of the cost is not finite".into());
-        return u;
-    };
-    let is_length = |k: usize| lengths.iter().any(|e| e.iter().zip(&vectors[k]).map(|(e, v)| e * v).sum::<f64>().powi(2) > 0.5);
-    let largest = (0..m).filter(|k| !is_length(*k)).map(|k| values_h[k]).fold(0.0, f64::max);
-    if largest <= 0.0 {
-        u.warnings.push("no standard errors: no free parameter changes the cost".into());
-        return u;
-    }
-    let variance = |k: usize| if is_length(k) { 0.0 } else { u.tau / values_h[k].max(RANK * largest) };
-    let variances: Vec<f64> = (0..m).map(variance).collect();
-    let covariance = |a: usize, b: usize| -> f64 { (0..m).map(|k| variances[k] * vectors[k][a] * vectors[k][b]).sum() };
-    let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
-    for (a, &i) in inner.iter().enumerate() {
-        u.errors_z[i] = Some(sd[a]);
-        u.standard_errors[i] = Some(sd[a] * problem.charts()[i].slope(z[i]));
-        for (b, &j) in inner.iter().enumerate().filter(|(b, _)| *b != a) {
-            u.correlation[i][j] = (covariance(a, b) / (sd[a] * sd[b])).clamp(-1.0, 1.0);
+}
+
+impl Uncertainty {
+    /// Nothing is known of q parameters.
+    fn unknown(q: usize) -> Uncertainty {
+        Uncertainty {
+            standard_errors: vec![None; q],
+            errors_z: vec![None; q],
+            correlation: (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
+            reduced_chi_square: f64::NAN,
+            independent: f64::NAN,
+            ..Uncertainty::default()
         }
     }
 
-    let names = Names { problem };
-    let mut told: Vec<Vec<usize>> = Vec::new();
-    // The least determined direction first.
-    for k in 0..m {
-        let spread = variances[k].sqrt();
-        if spread <= UNDETERMINED {
-            break;
+    /// Reduced χ², what the residuals are worth, and τ.
+    fn count(&mut self, sample: &Sample, errors: &ErrorModel) {
+        let (n, q) = (sample.residuals as f64, self.standard_errors.len());
+        if n > q as f64 {
+            self.reduced_chi_square = 2.0 * n * sample.cost / (n - q as f64);
+        } else if n > 0.0 {
+            self.warnings.push(format!("there are only {n} residuals for {q} free parameters"));
         }
-        let top = vectors[k].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let members: Vec<usize> = (0..m).filter(|&a| vectors[k][a].abs() > NAMED * top).collect();
-        // Two directions of the same pair say the same of it.
-        if told.contains(&members) {
-            continue;
+        if n > 0.0 {
+            self.independent = n / errors.design_effect.max(1.0);
+            self.tau =
+                self.reduced_chi_square.max(1.0) / self.independent + errors.systematic.powi(2) / errors.groups.max(1) as f64;
         }
-        let sentence = match members.as_slice() {
-            [a] => names.undetermined(inner[*a], spread, values[inner[*a]], z[inner[*a]]),
-            [a, b] => names.alike(inner[*a], inner[*b], covariance(*a, *a), covariance(*b, *b), covariance(*a, *b)),
-            many => {
-                let list: Vec<&str> = many.iter().map(|&a| names.path(inner[a])).collect();
-                let (last, first) = list.split_last().expect("more than two members are here");
-                format!("{} and {last} cannot be told apart: only some of their combinations are determined", first.join(", "))
-            }
-        };
-        u.warnings.push(sentence);
-        told.push(members);
     }
-    for a in 0..m {
-        for b in a + 1..m {
-            let r = u.correlation[inner[a]][inner[b]];
-            let vector = |k: usize| &problem.free()[inner[k]].direction;
-            // Components of a direction turn together.
-            let turn = vector(a).is_some() && vector(a) == vector(b);
-            if turn || r.abs() <= CORRELATED || told.iter().any(|t| t.contains(&a) && t.contains(&b)) {
+
+    /// Standard errors and correlations.
+    fn state(&mut self, problem: &Problem, z: &[f64], spread: &Spread) {
+        let sd = &spread.sd;
+        for (a, &i) in spread.inner.iter().enumerate() {
+            self.errors_z[i] = Some(sd[a]);
+            self.standard_errors[i] = Some(sd[a] * problem.charts()[i].slope(z[i]));
+            for (b, &j) in spread.inner.iter().enumerate().filter(|(b, _)| *b != a) {
+                self.correlation[i][j] = (spread.covariance(a, b) / (sd[a] * sd[b])).clamp(-1.0, 1.0);
+            }
+        }
+    }
+
+    /// Sentences about directions that the data leave open, the least determined first. Returns which of the m parameters each names.
+    fn tell_undetermined(&mut self, problem: &Problem, z: &[f64], spread: &Spread) -> Vec<Vec<usize>> {
+        let (names, values, inner) = (Names { problem }, problem.values(z), &spread.inner);
+        let mut told: Vec<Vec<usize>> = Vec::new();
+        for (vector, variance) in spread.vectors.iter().zip(&spread.variances) {
+            let size = variance.sqrt();
+            if size <= UNDETERMINED {
+                break;
+            }
+            let top = vector.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            let members: Vec<usize> = (0..inner.len()).filter(|&a| vector[a].abs() > NAMED * top).collect();
+            // Two directions of the same pair say the same of it.
+            if told.contains(&members) {
                 continue;
             }
-            u.warnings.push(if sd[a].max(sd[b]) > KNOWN {
-                names.alike(inner[a], inner[b], covariance(a, a), covariance(b, b), covariance(a, b))
-            } else {
-                let (a, b) = (names.path(inner[a]), names.path(inner[b]));
-                format!("{a} and {b} are known, but their errors go together (correlation {r:.3})")
+            self.warnings.push(match members.as_slice() {
+                [a] => names.undetermined(inner[*a], size, values[inner[*a]], z[inner[*a]]),
+                [a, b] => spread.alike(&names, *a, *b),
+                many => {
+                    let list: Vec<&str> = many.iter().map(|&a| names.path(inner[a])).collect();
+                    let (last, first) = list.split_last().expect("more than two members are here");
+                    let first = first.join(", ");
+                    format!("{first} and {last} cannot be told apart: only some of their combinations are determined")
+                }
             });
+            told.push(members);
+        }
+        told
+    }
+
+    /// Sentences about pairs whose errors go together, where `told` does not name them already.
+    fn tell_correlated(&mut self, problem: &Problem, spread: &Spread, told: &[Vec<usize>]) {
+        let (names, inner, sd) = (Names { problem }, &spread.inner, &spread.sd);
+        let direction = |k: usize| &problem.free()[inner[k]].direction;
+        for a in 0..inner.len() {
+            for b in a + 1..inner.len() {
+                let r = self.correlation[inner[a]][inner[b]];
+                // Components of a direction turn together.
+                let turn = direction(a).is_some() && direction(a) == direction(b);
+                if turn || r.abs() <= CORRELATED || told.iter().any(|t| t.contains(&a) && t.contains(&b)) {
+                    continue;
+                }
+                self.warnings.push(if sd[a].max(sd[b]) > KNOWN {
+                    spread.alike(&names, a, b)
+                } else {
+                    let (a, b) = (names.path(inner[a]), names.path(inner[b]));
+                    format!("{a} and {b} are known, but their errors go together (correlation {r:.3})")
+                });
+            }
         }
     }
-    u
 }
 
 /// Sentences about starts that ended elsewhere with a cost that noise alone could explain: `n ΔJ` below half the χ² quantile

@@ -66,13 +66,15 @@ impl std::error::Error for InputError {}
 pub struct OutputError {
     /// The file.
     pub file: PathBuf,
-    /// Why.
-    pub cause: String,
+    /// Why; mostly an error of the operating system.
+    #[source]
+    pub cause: Box<dyn std::error::Error + Send + Sync>,
 }
 
 impl OutputError {
-    pub(crate) fn new(file: impl AsRef<Path>, cause: impl fmt::Display) -> OutputError {
-        OutputError { file: file.as_ref().to_path_buf(), cause: cause.to_string() }
+    /// A file and why it could not be written.
+    pub fn new(file: impl AsRef<Path>, cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> OutputError {
+        OutputError { file: file.as_ref().to_path_buf(), cause: cause.into() }
     }
 }
 

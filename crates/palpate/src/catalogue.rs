@@ -1,7 +1,8 @@
 //! The library of effects as a page: what `palpate inspect --effects` prints, and what `docs/effects.md` is.
 
+use crate::results::effects::{EffectKey, EffectLaw, EffectsDocument};
+use crate::results::finite;
 use palpate_model::effects::{ALL, EffectParam, Family, Law, Trial, Unstated};
-use serde_json::{Value, json};
 
 const HEAD: &str = "\
 # Effects
@@ -96,17 +97,25 @@ pub fn markdown() -> String {
     text
 }
 
-/// The same for programs; bounds that do not exist are `null`.
-pub fn json() -> Value {
-    let finite = |v: f64| v.is_finite().then_some(v);
-    let param = |p: &EffectParam| {
-        json!({ "key": p.key, "components": if p.axis.is_some() { 3 } else { 1 }, "unit": p.unit, "lower": finite(p.lower),
-                "upper": finite(p.upper), "typical": p.typical, "default": p.default.value(),
-                "absent": matches!(p.default, Unstated::Absent(_)), "doc": p.doc })
+/// The same for programs; bounds that do not exist are `None`.
+pub fn document() -> EffectsDocument {
+    let key = |p: &EffectParam| EffectKey {
+        key: p.key.into(),
+        components: if p.axis.is_some() { 3 } else { 1 },
+        unit: p.unit.into(),
+        lower: finite(p.lower),
+        upper: finite(p.upper),
+        typical: p.typical,
+        default: p.default.value(),
+        absent: matches!(p.default, Unstated::Absent(_)),
+        doc: p.doc.into(),
     };
-    let law = |l: &Law| {
-        json!({ "kind": l.kind, "family": title(l.family).0, "sentence": l.sentence, "trial": trial(l),
-                "parameters": keys(l).map(param).collect::<Vec<_>>() })
+    let law = |l: &Law| EffectLaw {
+        kind: l.kind.into(),
+        family: title(l.family).0.into(),
+        sentence: l.sentence.into(),
+        trial: trial(l).into(),
+        parameters: keys(l).map(key).collect(),
     };
-    json!({ "format": "effects/1", "effects": ALL.iter().map(law).collect::<Vec<_>>() })
+    EffectsDocument { effects: ALL.iter().map(law).collect() }
 }

@@ -69,7 +69,7 @@ fn gpu() -> Result<GpuBackend, GpuError> {
 
 /// The device for so many simulations at once.
 fn gpu_for(members: usize) -> Result<GpuBackend, Error> {
-    let device = gpu().map_err(|e| refused(&e))?;
+    let device = gpu().map_err(Error::Device)?;
     Ok(if members == 1 { device.alone() } else { device })
 }
 
@@ -96,11 +96,6 @@ impl Evaluate for InTurn {
         let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         self.0.evaluate(theta, request)
     }
-}
-
-/// What a device refuses that is asked for nothing yet, or for one simulation.
-fn refused(e: &GpuError) -> Error {
-    Error::Failed(format!("--backend gpu: {e} (hint: {})", e.hint_alone()))
 }
 
 /// The first steps of a plan, with as many frames a step as the whole has where they are compared; the first ones, in which the body is
@@ -193,8 +188,8 @@ impl Backend {
     pub(crate) fn members(self, plan: &Plan, demand: &Demand, threads: usize) -> Result<usize, Error> {
         match self {
             Backend::Gpu => {
-                let room = gpu().map_err(|e| refused(&e))?.gpu().largest_buffer();
-                Ok(demand.on_device(plan, room).map_err(|e| refused(&e))?.0)
+                let room = gpu().map_err(Error::Device)?.gpu().largest_buffer();
+                Ok(demand.on_device(plan, room).map_err(Error::Device)?.0)
             }
             _ => Ok(demand.on_cpu(plan, threads).0),
         }
@@ -246,7 +241,7 @@ impl Backend {
 
     /// An error where this backend was asked for and cannot be had.
     pub(crate) fn check(self) -> Result<(), Error> {
-        if self == Backend::Gpu { gpu().map(|_| ()).map_err(|e| refused(&e)) } else { Ok(()) }
+        if self == Backend::Gpu { gpu().map(|_| ()).map_err(Error::Device) } else { Ok(()) }
     }
 }
 

@@ -241,6 +241,6 @@ fn residuals_of_a_result_come_from_the_cpu_where_the_device_has_none() {
     let at = |backend, notes: &mut Vec<String>| crate::fitting::residuals_at(&e, backend, theta, notes).map(|r| r.rms);
     let cpu = at(Backend::Cpu, &mut notes);
     assert!(cpu.as_ref().is_ok_and(|rms| *rms > 0.0) && notes.is_empty(), "{cpu:?} {notes:?}");
-    assert_eq!(at(Backend::Gpu, &mut notes), cpu);
+    assert_eq!(at(Backend::Gpu, &mut notes).ok(), cpu.ok());
     assert!(notes.len() == 1 && notes[0].contains("computed on the CPU: ") && notes[0].contains("hint: "), "{notes:?}");
 }

@@ -59,7 +59,7 @@ impl Experiment {
     /// Reads a scene file and, where it has an `[observation]`, its recording.
     ///
     /// # Errors
-    /// [`Error::Input`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
+    /// [`Error::File`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
     pub fn open(path: impl AsRef<Path>) -> Result<Experiment, Error> {
         Experiment::from_toml(&read_text(&path)?, path)
     }
@@ -67,7 +67,7 @@ impl Experiment {
     /// Reads a scene file and leaves its recording alone, which need not exist: enough to simulate.
     ///
     /// # Errors
-    /// [`Error::Input`] with the first thing that is wrong with a file.
+    /// [`Error::File`] with the first thing that is wrong with a file.
     pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
         let text = read_text(&path)?;
         let loaded = parse_scene(&text, path)?;
@@ -229,7 +229,7 @@ impl Experiment {
     /// Simulates with the scene's own values and keeps every state.
     ///
     /// # Errors
-    /// [`Error::Failed`] when the simulation fails: what happened, when, and what may help.
+    /// [`Error::Simulation`] when it fails: what happened, when, and what may help.
     pub fn simulate(&self, backend: Backend) -> Result<Simulation, Error> {
         let mut snapshots = Vec::new();
         backend.visit(&self.plan, &self.plan.theta, |_, s, _| {
@@ -243,7 +243,7 @@ impl Experiment {
     /// How far the measurement lies from a simulation with parameters θ `[P]`.
     ///
     /// # Errors
-    /// [`Error::Failed`] when the simulation fails.
+    /// [`Error::Simulation`] when that fails.
     pub fn residuals(&self, backend: Backend, theta: &[f64]) -> Result<ResidualSummary, Error> {
         ResidualSummary::new(self, backend, theta)
     }
@@ -251,7 +251,7 @@ impl Experiment {
     /// Finds the free parameters of the scene's `[fit]` table.
     ///
     /// # Errors
-    /// [`Error::Input`] when there is nothing to fit or to compare with, [`Error::Failed`] when no start can be computed.
+    /// [`Error::Scene`] when there is nothing to fit or to compare with, [`Error::Fit`] when no start can be computed.
     pub fn fit(&self, options: FitOptions) -> Result<Fitted, Error> {
         fitting::fit(std::slice::from_ref(self), options)
     }
@@ -259,7 +259,7 @@ impl Experiment {
     /// The same experiment with cells and time step divided by `factor`, and without its recording.
     ///
     /// # Errors
-    /// [`Error::Input`] when the finer grid cannot be built.
+    /// [`Error::File`] when the finer grid cannot be built.
     pub fn refined(&self, factor: f64) -> Result<Experiment, Error> {
         self.with_finer_grid(factor, None)
     }
@@ -267,7 +267,7 @@ impl Experiment {
     /// The same experiment with cells and time step divided by `factor`, compared with its recording in the same band.
     ///
     /// # Errors
-    /// [`Error::Input`] when the finer grid cannot be built or the recording is gone.
+    /// [`Error::File`] when the finer grid cannot be built or the recording is gone.
     pub fn finer(&self, factor: f64) -> Result<Experiment, Error> {
         let observation = self.scene.observation.clone().map(|o| ObservationSpec { band: o.band * factor, ..o });
         self.with_finer_grid(factor, observation)

@@ -7,11 +7,13 @@ pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
+use crate::results::fit::FitStatus;
 use crate::scatter::Excess;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_fit::{
-    ErrorModel, FitError, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
+    ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
 };
+use palpate_io::InputError;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
@@ -102,12 +104,12 @@ impl Fitted {
         all.filter(|(n, _)| own(n) && named(n)).map(|(n, p)| (n.path.clone(), p.value)).collect()
     }
 
-    /// How the fit ended: `complete`, `interrupted`, or `broken-off` by a device that failed.
-    pub fn status(&self) -> &'static str {
+    /// How the fit ended.
+    pub fn status(&self) -> FitStatus {
         match (&self.result.broken, self.interrupted) {
-            (Some(_), _) => "broken-off",
-            (None, true) => "interrupted",
-            (None, false) => "complete",
+            (Some(_), _) => FitStatus::BrokenOff,
+            (None, true) => FitStatus::Interrupted,
+            (None, false) => FitStatus::Complete,
         }
     }
 
@@ -125,15 +127,14 @@ fn specs(experiment: &Experiment) -> Option<&FitSpec> {
 /// Refuses experiments that name nothing to be found or have nothing to compare with.
 pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
     for e in experiments {
-        let name = e.scene().path.display();
+        let file = &e.scene().path;
         if specs(e).is_none_or(|f| f.parameters.is_empty()) {
-            return Err(Error::Input(format!(
-                "{name}: fit.parameter is missing; name at least one number to be found, like [[fit.parameter]] path = \
-                 \"material.youngs_modulus\""
-            )));
+            let message =
+                "is missing; name at least one number to be found, like [[fit.parameter]] path = \"material.youngs_modulus\"";
+            return Err(Error::scene(file, "fit.parameter", message));
         }
         if e.plan().observation.residuals() == 0 {
-            return Err(Error::Input(format!("{name}: observation is missing or has no data to fit to; name a recording")));
+            return Err(Error::scene(file, "observation", "is missing or has no data to fit to; name a recording"));
         }
     }
     Ok(())
@@ -143,8 +144,8 @@ pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
 /// `per_scene = true`; where it is shared, start and bounds must agree.
 ///
 /// # Errors
-/// [`Error::Input`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
-/// [`Error::Failed`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
+/// [`Error::Scene`] when there is nothing to fit or nothing to compare with, or when scenes contradict each other;
+/// [`Error::Fit`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
 /// [`FitResult::broken`].
 pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
@@ -174,7 +175,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
             evaluate: Box::new(Counted { inner, interrupt: options.interrupt.clone(), first: scenes.is_empty() }),
         });
     }
-    let mut problem = Problem::new(scenes, free).map_err(|e| Error::Input(format!("{}: {e}", first.scene().path.display())))?;
+    let mut problem = Problem::new(scenes, free).map_err(|e| InputError::file(&first.scene().path, e))?;
     let interrupt = options.interrupt.clone();
     let mut history = Vec::new();
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
@@ -203,7 +204,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         };
         let hooks =
             Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal, design_effect: Some(&mut worth) };
-        let result = palpate_fit::fit(&mut problem, settings, hooks).map_err(failed)?;
+        let result = palpate_fit::fit(&mut problem, settings, hooks)?;
         if let Some(e) = fault {
             return Err(e);
         }
@@ -252,14 +253,6 @@ pub(crate) fn residuals_at(
     }
 }
 
-fn failed(e: FitError) -> Error {
-    match e {
-        FitError::Journal(palpate_fit::JournalError::Content { .. }) | FitError::Residuals { .. } => Error::Input(e.to_string()),
-        FitError::Interrupted => Error::Interrupted,
-        _ => Error::Failed(e.to_string()),
-    }
-}
-
 fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     let (rms, noise, points) = fitted.residual();
     let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
@@ -303,31 +296,30 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
     let (mut numbers, mut free): (Vec<FreeNumber>, Vec<FreeParameter>) = (Vec::new(), Vec::new());
     let mut warnings = Vec::new();
     for (scene, e) in experiments.iter().enumerate() {
-        let name = |s: usize| experiments[s].scene().path.display();
+        let file = |s: usize| experiments[s].scene().path.as_path();
         for p in specs(e).iter().flat_map(|f| &f.parameters) {
             let (key, slot) = slot(e, scene, &p.path).ok_or_else(|| {
-                Error::Input(format!("{}: fit.parameter \"{}\" is not a number of this scene", name(scene), p.path))
+                Error::scene(file(scene), "fit.parameter", format!("\"{}\" is not a number of this scene", p.path))
             })?;
             let own = p.per_scene && experiments.len() > 1;
             let known = numbers.iter().position(|n| n.path == p.path && n.scene.is_none());
             if let (false, Some(k)) = (own, known) {
                 let f = &mut free[k];
                 if f.bounds != p.bounds || f.start != p.start {
-                    return Err(Error::Input(format!(
-                        "{}: {} has start [{}, {}] and bounds [{}, {}], {} has [{}, {}] and [{}, {}]; a shared parameter has the same \
-                         in both, or say per_scene = true",
-                        name(scene),
-                        p.path,
+                    let message = format!(
+                        "has start [{}, {}] and bounds [{}, {}], {} has [{}, {}] and [{}, {}]; a shared parameter has the same in \
+                         both, or say per_scene = true",
                         p.start.0,
                         p.start.1,
                         p.bounds.0,
                         p.bounds.1,
-                        name(f.slots[0].scene),
+                        file(f.slots[0].scene).display(),
                         f.start.0,
                         f.start.1,
                         f.bounds.0,
                         f.bounds.1
-                    )));
+                    );
+                    return Err(Error::scene(file(scene), &p.path, message));
                 }
                 f.slots.push(slot);
                 continue;

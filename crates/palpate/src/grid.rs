@@ -11,7 +11,7 @@ use palpate_fit::{FitScene, Problem, Want};
 /// change. Where errors fall with the square of the cell size, the whole error at `factor` 2 is four thirds of it.
 ///
 /// # Errors
-/// [`Error::Failed`] when the finer simulation fails or does not determine every parameter.
+/// The finer simulation fails or does not determine every parameter.
 pub fn grid_shift(experiments: &[Experiment], fitted: &Fitted, factor: f64, backend: Backend) -> Result<Vec<f64>, Error> {
     let (_, free, _) = free_parameters(experiments)?;
     let finer = experiments.iter().map(|e| e.finer(factor)).collect::<Result<Vec<_>, _>>()?;

@@ -50,6 +50,7 @@ mod progress;
 pub mod render;
 pub mod report;
 mod residuals;
+pub mod results;
 mod scatter;
 pub mod synthetic;
 

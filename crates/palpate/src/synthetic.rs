@@ -43,7 +43,7 @@ pub struct Observers {
 /// `progress` hears the share of the simulation that is done. The same seed gives the same recording.
 ///
 /// # Errors
-/// [`Error::Input`] when a time is not simulated or nothing is ever seen, [`Error::Failed`] when the simulation fails.
+/// [`Error::Input`] when a time is not simulated or nothing is ever seen, [`Error::Simulation`] when that fails.
 pub fn observe(
     experiment: &Experiment,
     backend: Backend,

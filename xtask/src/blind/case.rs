@@ -172,7 +172,7 @@ impl Case {
                 .and_then(|seen| Ok((seen, self.recorded(setup, &out.amplitudes, folder, true)?)));
             match both {
                 // What the diagnosis' own grid can simulate may be too much for a finer one.
-                Err(Error::Failed(_)) if weaker > 0 => {
+                Err(e) if weaker > 0 && e.exit_code() == 1 => {
                     weaker -= 1;
                     out.amplitudes.iter_mut().for_each(|a| *a *= 0.7);
                 }

@@ -57,7 +57,7 @@ impl Session<'_> {
             .collect();
         let most = solved.iter().map(|s| s.1).fold(0.0, f64::max);
         let plainest = solved.into_iter().find(|s| s.1 >= ENOUGH * most);
-        let (x, gain) = plainest.ok_or_else(|| LabError::Failed("no slack".into()))?;
+        let (x, gain) = plainest.ok_or_else(|| LabError::failed("no slack"))?;
         let m = self.cells.len() as f64;
         let excess = (dot(&y, &y) - m).max(0.02 * m);
         let mut windows: Vec<SlackWindow> = changes

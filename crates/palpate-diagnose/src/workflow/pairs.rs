@@ -2,7 +2,7 @@
 //! ones, neither of which explains much by itself.
 
 use super::variants::{Variant, most_promising};
-use super::{Fitted, Session, State, keep_first};
+use super::{CandidateId, Fitted, Session, State, keep_first};
 use crate::laboratory::{LabError, Model, Number};
 use crate::score::Score;
 use std::rc::Rc;
@@ -21,8 +21,6 @@ const FREE_EACH: usize = 8;
 const HALVES: usize = 3;
 /// Share of the sum of squares that a pair must promise to take away, and how much of it beyond what its better half does alone.
 const PROMISE: (f64, f64) = (0.8, 0.05);
-/// Number of the first pair in the table of candidates; single ones come before.
-const FIRST: usize = 1 << 20;
 
 impl Session<'_> {
     /// Pairs of plain effects with fewer than so many numbers that are worth a fit, each with the state that it starts from.
@@ -128,8 +126,7 @@ fn as_fitted(state: &State, f: &Fitted) -> (State, Variant) {
 /// Both at once, each along its own step; the score is otherwise the second one's.
 fn joined(a: &Variant, b: &Variant) -> Variant {
     Variant {
-        // Whichever of the two came first.
-        candidate: FIRST + 1000 * a.candidate.min(b.candidate) + a.candidate.max(b.candidate),
+        candidate: CandidateId::pair(a.candidate, b.candidate),
         changes: [&a.changes[..], &b.changes].concat(),
         columns: [&a.columns[..], &b.columns].concat(),
         amplitudes: [&a.amplitudes[..], &b.amplitudes].concat(),

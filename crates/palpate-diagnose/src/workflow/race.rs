@@ -145,7 +145,7 @@ impl Session<'_> {
 
     /// Notes that a hypothesis could not be tried.
     pub(super) fn missed(&mut self, kind: &str, why: &LabError) {
-        self.no_time |= *why == LabError::NoTime;
+        self.no_time |= matches!(why, LabError::NoTime);
         let line = format!("{kind}: {why}");
         if !self.not_tried.contains(&line) {
             self.not_tried.push(line);

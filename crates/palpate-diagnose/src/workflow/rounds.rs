@@ -2,7 +2,7 @@
 
 use super::own_errors::MEASURED;
 use super::race::{CAREFUL, LAPS, STARTS};
-use super::{Fitted, Session, State, Variant, keep_first, most_promising};
+use super::{CandidateId, Fitted, Session, State, Variant, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number};
@@ -63,7 +63,7 @@ impl Session<'_> {
         let looks = variants.len();
         let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(most_promising);
-        let mut seen: Vec<usize> = Vec::new();
+        let mut seen: Vec<CandidateId> = Vec::new();
         let mut tries: Vec<(&State, &Variant)> = Vec::new();
         let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
         for v in &variants {
@@ -319,7 +319,7 @@ mod tests {
 
     fn variant(candidate: usize, kind: &str, amplitudes: &[bool], share: f64) -> Variant {
         Variant {
-            candidate,
+            candidate: CandidateId::Single(candidate),
             changes: vec![Change::Effect(Effect::absent(find(kind).unwrap()))],
             columns: Vec::new(),
             amplitudes: amplitudes.to_vec(),
@@ -338,9 +338,9 @@ mod tests {
         let first = std::ptr::from_ref(&all[1]);
         let chosen = elsewhere(&all, |v| std::ptr::eq(v, first));
         // The best one was tried already; three of a kind are enough, and ten in all.
-        let shares: Vec<f64> = chosen.iter().filter(|v| v.candidate == 1).map(|v| v.score.share).collect();
+        let shares: Vec<f64> = chosen.iter().filter(|v| v.candidate == CandidateId::Single(1)).map(|v| v.score.share).collect();
         assert_eq!(shares, [0.79, 0.78, 0.77]);
-        assert!(chosen.len() == ELSEWHERE.0 && chosen.iter().all(|v| v.candidate > 0));
+        assert!(chosen.len() == ELSEWHERE.0 && chosen.iter().all(|v| v.candidate > CandidateId::Single(0)));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Candidates in all their variants, scored by what they promise.
 
-use super::{Session, State};
+use super::{CandidateId, Session, State};
 use crate::change::{Candidate, Change, candidates};
 use crate::laboratory::{LabError, Number};
 use crate::null::extended;
@@ -15,7 +15,7 @@ const REACH: f64 = 0.25;
 /// A variant of a candidate with its columns where it is absent.
 #[derive(Clone)]
 pub(super) struct Variant {
-    pub candidate: usize,
+    pub candidate: CandidateId,
     /// What it adds: one change, or two at once.
     pub changes: Vec<Change>,
     /// Of every free number of the changes, `[k][m]`.
@@ -62,12 +62,12 @@ impl Session<'_> {
         for (n, c) in all.iter().enumerate() {
             let by = stride(c);
             for (i, v) in c.variants.iter().enumerate().filter(|(_, v)| wanted(v)) {
-                if i % by == 0 { &mut first } else { &mut later }.push((n, v.clone()));
+                if i % by == 0 { &mut first } else { &mut later }.push((CandidateId::Single(n), v.clone()));
             }
         }
         let mut scored = self.scored(state, first)?;
         let best = scored.iter().map(|v| v.score.gain).fold(0.0, f64::max);
-        let within = |n: usize| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
+        let within = |n: CandidateId| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
         let more: Vec<_> = later.into_iter().filter(|(n, _)| within(*n)).collect();
         scored.extend(self.scored(state, more)?);
         let saturates = |v: &&Variant| v.changes.iter().all(|c| c.is_tried(Trial::Saturates));
@@ -78,8 +78,8 @@ impl Session<'_> {
         Ok(scored)
     }
 
-    /// These variants (number of their candidate, change), scored where they are absent.
-    pub(super) fn scored(&mut self, state: &State, wanted: Vec<(usize, Change)>) -> Result<Vec<Variant>, LabError> {
+    /// These variants (their candidate, change), scored where they are absent.
+    pub(super) fn scored(&mut self, state: &State, wanted: Vec<(CandidateId, Change)>) -> Result<Vec<Variant>, LabError> {
         let mut tries = Vec::new();
         let mut out: Vec<Variant> = Vec::new();
         let own = state.model.values.len();

@@ -1,8 +1,8 @@
 //! Limited-memory BFGS in a box (two-loop recursion: Nocedal & Wright, Numerical Optimization, 2nd ed., algorithm 7.4,
 //! on the variables that no bound holds; Bertsekas 1982 for why the held ones must stay out of it).
 //!
-//! Own code rather than argmin 0.11's `LBFGS`: that one has no bounds, its Moré–Thuente search ends the run with an error as
-//! soon as a trial cost is infinite (a failed simulation), and it keeps curvature pairs that are not positive.
+//! Own code rather than that of a crate: those looked at have no bounds, their Moré–Thuente search ends the run with an error as
+//! soon as a trial cost is infinite (a failed simulation), and they keep curvature pairs that are not positive.
 
 use super::{Sample, Search, Status, Stop, line};
 use crate::dense::{dot, max_abs};

@@ -199,7 +199,7 @@ pub(super) fn compare_within(plan: &Plan, close: f64) {
     let Some(gpu) = device(None) else { return };
     let own = |k: &ParamKey| match *k {
         ParamKey::Effect { law, slot, .. } => {
-            !matches!(ALL[usize::from(law)].params[usize::from(slot)].default, Unstated::Fixed(_))
+            !matches!(ALL[usize::from(law)].params[usize::from(slot)].default, Unstated::Fixed(_) | Unstated::Sharp(_))
         }
         ParamKey::YoungsModulus | ParamKey::Gravity(_) | ParamKey::Density | ParamKey::PoissonRatio => true,
         ParamKey::PlaneHeight(_) | ParamKey::PlaneTheta(_) | ParamKey::TimeStart | ParamKey::AngularVelocity(0) => true,

@@ -30,11 +30,6 @@ impl Spot {
         (self.rest - self.center).to_array().map(D::from)
     }
 
-    /// Rest position from the place where the body is held [m].
-    pub fn from_anchor<D: Number>(&self) -> [D; 3] {
-        (self.rest - self.anchor).to_array().map(D::from)
-    }
-
     /// Rest position from a place given by three parameters [m].
     pub fn from_place<D: Number>(&self, place: &[D]) -> [D; 3] {
         let x = self.rest.to_array();

@@ -114,6 +114,8 @@ pub enum Unstated {
     Absent(f64),
     /// A number of minor importance that a diagnosis leaves alone.
     Fixed(f64),
+    /// The same, for the size of a place [m]: a diagnosis makes it as small as the grid allows.
+    Sharp(f64),
     /// This component of the body's centre of mass [m].
     Center,
     /// The same, for a point that others are counted from: a diagnosis leaves it there.
@@ -332,7 +334,7 @@ impl Unstated {
     /// The value, unless it is the body's centre.
     pub fn value(self) -> Option<f64> {
         match self {
-            Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Stated(v) => Some(v),
+            Unstated::Absent(v) | Unstated::Fixed(v) | Unstated::Sharp(v) | Unstated::Stated(v) => Some(v),
             Unstated::Choice(_) => Some(0.0),
             Unstated::Center | Unstated::Reference | Unstated::OnBody => None,
         }

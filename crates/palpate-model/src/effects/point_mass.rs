@@ -41,7 +41,7 @@ pub(super) const RADIUS: EffectParam = number(
     "radius",
     "m",
     [1e-6, 1e6, 0.01],
-    Unstated::Fixed(0.01),
+    Unstated::Sharp(0.01),
     "size of the region that carries it; at an edge of the body its middle lies that far inside",
 );
 

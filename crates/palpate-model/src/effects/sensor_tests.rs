@@ -27,7 +27,7 @@ fn effects(laws: &[usize], noise: &mut Noise) -> (Layout, Vec<f64>) {
                 Unstated::Center | Unstated::Reference | Unstated::OnBody => noise.uniform(-0.02, 0.02),
                 // Never the wrong half space.
                 Unstated::Stated(v) => v + 0.5 * noise.uniform(-1.0, 1.0),
-                Unstated::Fixed(v) => v,
+                Unstated::Sharp(v) | Unstated::Fixed(v) => v,
                 Unstated::Absent(_) => p.typical * noise.uniform(-1.0, 1.0),
             }
         }

@@ -6,9 +6,12 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FNV_START, fingerprint, fnv1a};
 use crate::options::stem;
+use crate::results;
+use crate::results::batch::{BatchDocument, BatchRow, RowStatus};
+use crate::results::fit::FitDocument;
 use clap::Args;
+use palpate_io::InputError;
 use palpate_io::output::{make_folder, write_file};
-use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -42,6 +45,9 @@ pub struct Arguments {
     choices: Choices,
 }
 
+/// File that says what became of every scene.
+const SUMMARY: &str = "summary.json";
+
 /// File in a scene's folder that says what its journal belongs to.
 const MARK: &str = "fit.fingerprint";
 
@@ -51,50 +57,26 @@ const TAKEN_OVER: &str = "taken over";
 /// What is said of a scene that was interrupted when it had something to keep.
 const BEST_KEPT: &str = "the best so far is written; --resume goes on from there";
 
-/// What became of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Status {
-    Complete,
-    Interrupted,
-    BadInput,
-    Failed,
-}
-
-impl Status {
-    fn name(self) -> &'static str {
-        match self {
-            Status::Complete => "complete",
-            Status::Interrupted => "interrupted",
-            Status::BadInput => "bad-input",
-            Status::Failed => "failed",
-        }
-    }
-}
-
-/// One row of the summary.
-struct Row {
-    scene: PathBuf,
-    name: String,
-    status: Status,
-    message: String,
-    seconds: f64,
-    /// What computed it; empty where it did not come to that.
-    backend: String,
-    /// What was fitted and how; a later run takes the result over when it is the same.
-    fingerprint: String,
-    /// `result.json`.
-    result: Value,
-}
-
-impl Row {
+impl BatchRow {
     /// What computed it, in brackets behind the time that it took.
     fn by(&self) -> String {
-        if self.backend.is_empty() { String::new() } else { format!(" ({})", self.backend) }
+        self.backend.as_ref().map_or(String::new(), |b| format!(" ({b})"))
+    }
+
+    /// Takes what a fit found.
+    fn take(&mut self, found: FitDocument) {
+        self.parameters = Some(found.parameters);
+        self.cost = found.cost.last;
+        self.residual = Some(found.residual);
     }
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))
+    std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))
+}
+
+fn unreadable(path: &Path, cause: &std::io::Error) -> Error {
+    InputError::file(path, format!("cannot be read: {cause}")).into()
 }
 
 /// The scenes that the arguments name: folders in the order of names, lists in the order of lines.
@@ -102,14 +84,14 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let mut out = Vec::new();
     for path in paths {
         if path.is_dir() {
-            let list = std::fs::read_dir(path).map_err(|e| Error::Input(format!("{}: cannot be read: {e}", path.display())))?;
+            let list = std::fs::read_dir(path).map_err(|e| unreadable(path, &e))?;
             let files: BTreeSet<PathBuf> = list.filter_map(|f| Some(f.ok()?.path())).collect();
             let toml = files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "toml"));
             // Other TOML files (recordings, settings) may lie beside the scenes; one that cannot be read is reported later.
             let before = out.len();
             out.extend(toml.filter(|f| std::fs::read_to_string(f).map_or(true, |t| t.contains("\"scene/1\""))));
             if out.len() == before {
-                return Err(Error::Input(format!("{}: holds no scene (*.toml with format = \"scene/1\")", path.display())));
+                return Err(InputError::file(path, "holds no scene (*.toml with format = \"scene/1\")").into());
             }
         } else if path.extension().is_some_and(|e| e == "toml") {
             out.push(path.clone());
@@ -120,7 +102,7 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
             let before = out.len();
             out.extend(named.map(|l| folder.join(l)));
             if out.len() == before {
-                return Err(Error::Input(format!("{}: names no scene; one path a line is expected", path.display())));
+                return Err(InputError::file(path, "names no scene; one path a line is expected").into());
             }
         }
     }
@@ -139,54 +121,57 @@ fn names(scenes: &[PathBuf]) -> Vec<String> {
 }
 
 /// Rows of an earlier run's summary, of which this run is a continuation; none where there is no such summary.
-fn earlier(out: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(out.join("summary.json")).unwrap_or_default();
-    let summary: Value = serde_json::from_str(&text).unwrap_or(Value::Null);
-    summary["scenes"].as_array().cloned().unwrap_or_default()
+fn earlier(out: &Path) -> Result<Vec<BatchRow>, Error> {
+    let path = out.join(SUMMARY);
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    Ok(results::read::<BatchDocument>(path)?.scenes)
 }
 
 /// A finished scene of an earlier run with the same fingerprint: what is said of it, with the warning that it ended with, and its result.
-fn finished(earlier: &[Value], out: &Path, name: &str, fingerprint: &str) -> Option<(String, Value)> {
-    let row = earlier.iter().find(|r| r["name"] == name && r["fingerprint"] == fingerprint)?;
-    if row["status"] != Status::Complete.name() {
-        return None;
+fn finished(earlier: &[BatchRow], out: &Path, name: &str, fingerprint: &str) -> Result<Option<(String, FitDocument)>, Error> {
+    let Some(row) = earlier.iter().find(|r| r.name == name && r.fingerprint == fingerprint) else { return Ok(None) };
+    let result = out.join(name).join("result.json");
+    if row.status != RowStatus::Complete || !result.exists() {
+        return Ok(None);
     }
-    let result = serde_json::from_str(&std::fs::read_to_string(out.join(name).join("result.json")).ok()?).ok()?;
-    let said = row["message"].as_str().unwrap_or_default();
-    let message = match said {
+    let message = match row.message.as_str() {
         "" => TAKEN_OVER.into(),
         again if again.starts_with(TAKEN_OVER) => again.into(),
         warning => format!("{TAKEN_OVER}: {warning}"),
     };
-    Some((message, result))
+    Ok(Some((message, results::read(result)?)))
 }
 
 /// Fits one scene; whatever goes wrong ends up in the row.
-fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, console: &mut Console) -> Row {
+fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &str, console: &mut Console) -> BatchRow {
     let clock = Instant::now();
-    let mut row = Row {
-        scene: scene.to_path_buf(),
+    let mut row = BatchRow {
         name: name.to_string(),
-        status: Status::Failed,
+        scene: scene.display().to_string(),
+        status: RowStatus::Failed,
         message: String::new(),
         seconds: 0.0,
-        backend: String::new(),
+        backend: None,
         fingerprint: String::new(),
-        result: Value::Null,
+        parameters: None,
+        cost: None,
+        residual: None,
     };
     let folder = a.out.join(name);
     let mut log = Vec::new();
     // A panic is a bug, but not a reason to lose the other scenes.
-    let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<(String, Value)>, Error> {
+    let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<(String, FitDocument)>, Error> {
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
             format!("{} {:016x}", fingerprint(experiment.plan()), fnv1a(FNV_START, (asked + experiment.text()).as_bytes()));
-        if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint) {
+        if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint)? {
             return Ok(Some(done));
         }
         let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment))?;
-        row.backend = backend.name().into();
+        row.backend = Some(backend.name().into());
         let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
@@ -203,28 +188,28 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);
         (row.status, row.message) = match (fitted.result.broken, fitted.interrupted) {
-            (Some(why), _) => (Status::Failed, why),
-            (None, true) => (Status::Interrupted, BEST_KEPT.into()),
-            (None, false) => (Status::Complete, fitted.warnings.into_iter().next().unwrap_or_default()),
+            (Some(why), _) => (RowStatus::Failed, why),
+            (None, true) => (RowStatus::Interrupted, BEST_KEPT.into()),
+            (None, false) => (RowStatus::Complete, fitted.warnings.into_iter().next().unwrap_or_default()),
         };
-        row.result = result;
+        row.take(result);
         Ok(None)
     }));
     match done {
         Ok(Ok(None)) => {}
         Ok(Ok(Some((message, result)))) => {
-            row.seconds = result["seconds"].as_f64().unwrap_or(0.0);
-            row.backend = result["backend"].as_str().unwrap_or_default().into();
-            (row.status, row.message, row.result) = (Status::Complete, message, result);
+            (row.status, row.message, row.seconds) = (RowStatus::Complete, message, result.seconds);
+            row.backend = Some(result.backend.clone());
+            row.take(result);
             return row;
         }
         Ok(Err(e)) => {
-            row.status = if e == Error::Interrupted {
-                Status::Interrupted
+            row.status = if matches!(e, Error::Interrupted) {
+                RowStatus::Interrupted
             } else if e.exit_code() == 2 {
-                Status::BadInput
+                RowStatus::BadInput
             } else {
-                Status::Failed
+                RowStatus::Failed
             };
             row.message = e.to_string();
         }
@@ -234,7 +219,7 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
         }
     }
     row.seconds = clock.elapsed().as_secs_f64();
-    if row.status != Status::Complete {
+    if row.status != RowStatus::Complete {
         log.extend_from_slice(format!("{}: {}\n", row.status.name(), row.message).as_bytes());
     }
     if folder.is_dir()
@@ -245,37 +230,21 @@ fn one(a: &Arguments, earlier: &[Value], scene: &Path, name: &str, label: &str, 
     row
 }
 
-/// A row of `summary.json`.
-fn entry(r: &Row) -> Value {
-    json!({
-        "name": r.name, "scene": r.scene.display().to_string(), "status": r.status.name(), "message": r.message,
-        "seconds": r.seconds, "backend": Some(&r.backend).filter(|b| !b.is_empty()), "fingerprint": r.fingerprint,
-        "parameters": r.result["parameters"], "cost": r.result["cost"]["final"], "residual": r.result["residual"],
-    })
-}
-
-/// `summary.json`: the rows of this run, and those of the earlier one for scenes that this one has not reached yet, so that a run
-/// that ends here can be gone on with.
-fn summary(rows: &[Row], earlier: &[Value], ahead: &[String]) -> Value {
-    let kept = ahead.iter().filter_map(|name| earlier.iter().find(|r| r["name"] == name.as_str()));
-    let scenes: Vec<Value> = rows.iter().map(entry).chain(kept.cloned()).collect();
-    let count = |s: Status| scenes.iter().filter(|r| r["status"] == s.name()).count();
-    json!({
-        "format": "batch/1", "scenes": scenes, "complete": count(Status::Complete),
-        "bad_input": count(Status::BadInput), "failed": count(Status::Failed), "interrupted": count(Status::Interrupted),
-    })
+/// The rows of this run, and those of the earlier one for scenes that this one has not reached yet, so that a run that ends here can be
+/// gone on with.
+fn summary(rows: &[BatchRow], earlier: &[BatchRow], ahead: &[String]) -> BatchDocument {
+    let kept = ahead.iter().filter_map(|name| earlier.iter().find(|r| r.name == *name));
+    BatchDocument::of(rows.iter().chain(kept).cloned().collect())
 }
 
 /// `summary.csv`: one row a scene, two columns a parameter (value and standard error), over the parameters of all scenes.
-fn table(summary: &Value) -> String {
-    let list = |v: &Value| v.as_array().cloned().unwrap_or_default();
-    let text = |v: &Value| v.as_str().map_or_else(|| if v.is_null() { String::new() } else { v.to_string() }, str::to_string);
-    let rows = list(&summary["scenes"]);
+fn table(summary: &BatchDocument) -> String {
+    let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:?}"));
+    let parameters = |r: &BatchRow| r.parameters.clone().unwrap_or_default();
     let mut paths: Vec<String> = Vec::new();
-    for p in rows.iter().flat_map(|r| list(&r["parameters"])) {
-        let path = text(&p["path"]);
-        if !paths.contains(&path) {
-            paths.push(path);
+    for p in summary.scenes.iter().flat_map(parameters) {
+        if !paths.contains(&p.path) {
+            paths.push(p.path);
         }
     }
     let mut csv = csv::Writer::from_writer(Vec::new());
@@ -284,25 +253,17 @@ fn table(summary: &Value) -> String {
     head.extend(paths.iter().flat_map(|p| [p.clone(), format!("{p} standard error")]));
     head.push("message".into());
     csv.write_record(&head).expect("writing to memory cannot fail");
-    for r in &rows {
-        let of = &r["residual"];
-        let fixed = [
-            &r["name"],
-            &r["scene"],
-            &r["status"],
-            &r["seconds"],
-            &r["backend"],
-            &r["cost"],
-            &of["rms"],
-            &of["noise"],
-            &of["points"],
-        ];
-        let mut row: Vec<String> = fixed.into_iter().map(&text).collect();
+    for r in &summary.scenes {
+        let residual = r.residual.as_ref();
+        let mut row = vec![r.name.clone(), r.scene.clone(), r.status.name().into(), number(Some(r.seconds))];
+        row.extend([r.backend.clone().unwrap_or_default(), number(r.cost)]);
+        row.extend([number(residual.and_then(|r| r.rms)), number(residual.and_then(|r| r.noise))]);
+        row.push(residual.map_or(String::new(), |r| r.points.to_string()));
         for path in &paths {
-            let p = list(&r["parameters"]).into_iter().find(|p| p["path"] == path.as_str()).unwrap_or(Value::Null);
-            row.extend([text(&p["value"]), text(&p["standard_error"])]);
+            let found = parameters(r).into_iter().find(|p| p.path == *path).unwrap_or_default();
+            row.extend([number(found.value), number(found.standard_error)]);
         }
-        row.push(text(&r["message"]));
+        row.push(r.message.clone());
         csv.write_record(&row).expect("writing to memory cannot fail");
     }
     String::from_utf8(csv.into_inner().expect("writing to memory cannot fail")).expect("names and numbers are UTF-8")
@@ -312,9 +273,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let scenes = scenes(&a.paths)?;
     make_folder(&a.out)?;
     let names = names(&scenes);
-    let earlier = if a.resume { earlier(&a.out) } else { Vec::new() };
-    let mut rows: Vec<Row> = Vec::new();
-    let mut all = Value::Null;
+    let earlier = if a.resume { earlier(&a.out)? } else { Vec::new() };
+    let mut rows: Vec<BatchRow> = Vec::new();
+    let mut all = BatchDocument::default();
     for (i, (scene, name)) in scenes.iter().zip(&names).enumerate() {
         if console.interrupt.is_raised() {
             break;
@@ -322,25 +283,24 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let label = format!("{}/{} {name}", i + 1, scenes.len());
         let row = one(a, &earlier, scene, name, &label, console);
         console.note(&match row.status {
-            Status::Complete if row.message.starts_with(TAKEN_OVER) => format!("{label}: {TAKEN_OVER}"),
-            Status::Complete => format!("{label}: complete in {:.1} s{}", row.seconds, row.by()),
+            RowStatus::Complete if row.message.starts_with(TAKEN_OVER) => format!("{label}: {TAKEN_OVER}"),
+            RowStatus::Complete => format!("{label}: complete in {:.1} s{}", row.seconds, row.by()),
             other => format!("{label}: {} in {:.1} s{}: {}", other.name(), row.seconds, row.by(), row.message),
         });
         rows.push(row);
         all = summary(&rows, &earlier, &names[i + 1..]);
-        let text = serde_json::to_string_pretty(&all).map_err(|e| Error::write(&a.out, e))? + "\n";
-        write_file(a.out.join("summary.json"), |w| w.write_all(text.as_bytes()))?;
+        results::write(a.out.join(SUMMARY), &all)?;
         write_file(a.out.join("summary.csv"), |w| w.write_all(table(&all).as_bytes()))?;
     }
     if console.json() {
-        console.print(&all.to_string());
+        console.print(&results::line(&all));
     } else {
-        let complete = rows.iter().filter(|r| r.status == Status::Complete).count();
+        let complete = rows.iter().filter(|r| r.status == RowStatus::Complete).count();
         let place = a.out.join("summary.csv");
         console.print(&format!("{complete} of {} scenes complete: {}", scenes.len(), place.display()));
     }
-    let interrupted = console.interrupt.is_raised() || rows.iter().any(|r| r.status == Status::Interrupted);
-    Ok(match rows.iter().all(|r| r.status == Status::Complete) {
+    let interrupted = console.interrupt.is_raised() || rows.iter().any(|r| r.status == RowStatus::Interrupted);
+    Ok(match rows.iter().all(|r| r.status == RowStatus::Complete) {
         _ if interrupted => INTERRUPTED,
         true => 0,
         false => 1,

@@ -1,8 +1,9 @@
 //! `palpate inspect --devices`: the graphics adapters of this machine and what they can run.
 
 use crate::cli::Console;
+use crate::results;
+use crate::results::devices::{Device, DevicesDocument};
 use palpate_gpu::{AdapterReport, adapters};
-use serde_json::{Value, json};
 
 /// Bytes in the largest unit that leaves a number of at least one.
 fn bytes(n: u64) -> String {
@@ -43,20 +44,24 @@ fn verdict(a: &AdapterReport) -> String {
     }
 }
 
-fn entry(a: &AdapterReport) -> Value {
-    let limits: serde_json::Map<String, Value> = limits(a).into_iter().map(|(k, n, _)| (k.to_string(), json!(n))).collect();
-    json!({
-        "name": a.name, "kind": kind(a), "api": format!("{:?}", a.api), "usable": a.refusal.is_none(), "verdict": verdict(a),
-        "subgroups": a.subgroups, "timestamps": a.timestamps, "limits": limits,
-    })
+fn device(a: &AdapterReport) -> Device {
+    Device {
+        name: a.name.clone(),
+        kind: kind(a).into(),
+        api: format!("{:?}", a.api),
+        usable: a.refusal.is_none(),
+        verdict: verdict(a),
+        subgroups: a.subgroups,
+        timestamps: a.timestamps,
+        limits: limits(a).into_iter().map(|(name, number, _)| (name.to_string(), number)).collect(),
+    }
 }
 
 /// Prints the list; an empty one says what to do.
 pub fn run(console: &mut Console) -> i32 {
     let found = adapters();
     if console.json() {
-        let list: Vec<Value> = found.iter().map(entry).collect();
-        console.print(&json!({ "format": "devices/1", "devices": list }).to_string());
+        console.print(&results::line(&DevicesDocument { devices: found.iter().map(device).collect() }));
         return 0;
     }
     if found.is_empty() {

@@ -6,7 +6,9 @@ use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, out_folder};
-use crate::report::{DiagnosisInput, diagnosis_html, diagnosis_json, diagnosis_summary, pictures};
+use crate::report::{DiagnosisInput, diagnosis_document, diagnosis_html, diagnosis_summary, pictures};
+use crate::results;
+use crate::results::diagnosis::DiagnosisDocument;
 use clap::Args;
 use palpate_io::output::{make_folder, write_file};
 use std::path::{Path, PathBuf};
@@ -63,11 +65,11 @@ fn write_all(
     experiments: &[Experiment],
     done: &Diagnosed,
     backend: Backend,
-) -> Result<serde_json::Value, Error> {
+) -> Result<DiagnosisDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
-    let result = diagnosis_json(done);
+    let result = diagnosis_document(done);
     // Results first: a report that fails must not cost them.
-    text("diagnosis.json", &(serde_json::to_string_pretty(&result).map_err(|e| Error::write(folder, e))? + "\n"))?;
+    results::write(folder.join("diagnosis.json"), &result)?;
     for (s, e) in experiments.iter().enumerate() {
         let changed = palpate_io::append_effects(e.text(), e.scene(), &done.added)?;
         let model = palpate_io::write_scene(&changed, done.experiments[s].scene(), &done.values[s], folder)?;
@@ -97,7 +99,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if let Some(b) = a.budget
         && !(b > 0.0 && b < 1e6)
     {
-        return Err(Error::Input(format!("--budget {b}: must be > 0 and below 1000000 (minutes)")));
+        return Err(Error::option("budget", b, "must be > 0 and below 1000000 (minutes)"));
     }
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     let (backend, note) = a.backend.choose(experiments[0].plan(), 1)?;
@@ -123,15 +125,12 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     track.finish();
     let result = write_all(a, &folder, &experiments, &done, backend)?;
     if console.json() {
-        console.print(&result.to_string());
+        console.print(&results::line(&result));
     } else {
         console.print(&diagnosis_summary(&done, &folder));
     }
     if let Some(why) = &done.broken {
-        return Err(Error::Failed(format!(
-            "{why}; what was known by then is in {}, --resume goes on from there",
-            folder.display()
-        )));
+        return Err(Error::BrokenOff { why: why.clone(), kept: "what was known by then", folder });
     }
     Ok(if done.diagnosis.interrupted { INTERRUPTED } else { 0 })
 }

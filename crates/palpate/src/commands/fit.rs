@@ -8,7 +8,9 @@ use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters};
 use crate::grid::grid_shift;
 use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
-use crate::report::{FramePicture, ReportInput, history_csv, html, pictures, result_json, summary};
+use crate::report::{FramePicture, ReportInput, fit_document, fit_html, history_csv, pictures, summary};
+use crate::results;
+use crate::results::fit::{FitDocument, FitStatus};
 use clap::{Args, ValueEnum};
 use palpate_fit::Progress;
 use palpate_io::output::{make_folder, write_file};
@@ -171,11 +173,11 @@ fn write_all(
     experiments: &[Experiment],
     fitted: &Fitted,
     backend: Backend,
-) -> Result<serde_json::Value, Error> {
+) -> Result<FitDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
-    let result = result_json(fitted, experiments);
+    let result = fit_document(fitted, experiments);
     // Results first: a report that fails must not cost them.
-    text("result.json", &(serde_json::to_string_pretty(&result).map_err(|e| Error::write(folder, e))? + "\n"))?;
+    results::write(folder.join("result.json"), &result)?;
     text("history.csv", &history_csv(fitted))?;
     for (s, e) in experiments.iter().enumerate() {
         let values = fitted.values_of(s, e);
@@ -186,13 +188,13 @@ fn write_all(
     let (rms, noise, _) = fitted.residual();
     let scale = if rms.is_finite() { 2.0 * rms.max(noise) } else { noise.max(1e-3) };
     // Whoever interrupts does not want to wait for pictures, and a device that failed would make none.
-    let count = if fitted.status() == "complete" { a.pictures } else { 0 };
+    let count = if fitted.status() == FitStatus::Complete { a.pictures } else { 0 };
     let pictures = experiments.iter().enumerate().map(|(s, e)| match count {
         0 => Ok((Vec::new(), Vec::new())),
         n => scene_pictures(e, fitted, s, backend, n, scale),
     });
     let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
-    let page = html(&ReportInput { fitted, experiments, pictures, scale, command: command(scenes, a, fitted) });
+    let page = fit_html(&ReportInput { fitted, experiments, pictures, scale, command: command(scenes, a, fitted) });
     text("report.html", &page)?;
     Ok(result)
 }
@@ -217,12 +219,12 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     track.finish();
     console.warn(&fitted.warnings);
     if console.json() {
-        console.print(&result.to_string());
+        console.print(&results::line(&result));
     } else {
         console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
     }
     if let Some(why) = &fitted.result.broken {
-        return Err(Error::Failed(format!("{why}; the best so far is in {}, --resume goes on from there", folder.display())));
+        return Err(Error::BrokenOff { why: why.clone(), kept: "the best so far", folder });
     }
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
 }
@@ -260,7 +262,7 @@ pub fn run_in(
     resume: bool,
     track: &mut Track,
     console: &mut Console,
-) -> Result<(Fitted, serde_json::Value), Error> {
+) -> Result<(Fitted, FitDocument), Error> {
     check(experiments)?;
     make_folder(folder)?;
     let journal = folder.join(JOURNAL);
@@ -302,7 +304,7 @@ pub fn run_in(
     if resume {
         make_room(console)?;
     }
-    if a.grid_check && fitted.status() == "complete" {
+    if a.grid_check && fitted.status() == FitStatus::Complete {
         match grid_shift(experiments, &fitted, 2.0, backend) {
             Ok(shift) => fitted.grid_shift = Some(shift),
             // The fit stands without it.

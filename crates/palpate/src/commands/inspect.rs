@@ -7,12 +7,16 @@ use crate::error::Error;
 use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
+use crate::results::inspection::{
+    CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
+    SceneInspection, Time,
+};
+use crate::results::{self, finite};
 use clap::Args;
 use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, read_recording};
 use palpate_model::plan::Physics;
 use palpate_model::scene::{BodySource, Optimizer};
-use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
 const AFTER_HELP: &str = "\
@@ -40,17 +44,8 @@ pub struct Arguments {
     devices: bool,
 }
 
-/// One line of the answer: key in JSON, label and text for people.
-struct Line {
-    key: &'static str,
-    label: &'static str,
-    value: Value,
-    text: String,
-}
-
-fn line(key: &'static str, label: &'static str, value: Value, text: impl Into<String>) -> Line {
-    Line { key, label, value, text: text.into() }
-}
+/// What people read: a label and what stands behind it, line by line.
+type Lines = Vec<(&'static str, String)>;
 
 fn is_recording(path: &Path) -> bool {
     let format = |text: String| text.lines().any(|l| l.trim_start().starts_with("format") && l.contains("recording/"));
@@ -62,32 +57,26 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         return Ok(devices::run(console));
     }
     let Some(path) = &a.path else {
-        console.print(&if console.json() { catalogue::json().to_string() } else { catalogue::markdown() });
+        console.print(&if console.json() { results::line(&catalogue::document()) } else { catalogue::markdown() });
         return Ok(0);
     };
-    let (kind, lines, warnings) = if is_recording(path) {
+    let (kind, content, lines, warnings) = if is_recording(path) {
         let r = read_recording(path)?;
-        ("recording", recording(&r), r.warnings)
+        let (content, lines) = recording(&r);
+        ("recording", Inspected::Recording(content), lines, r.warnings)
     } else {
         let e = Experiment::open(path)?;
-        let mut lines = scene(&e);
-        lines.extend(observed(&e));
-        ("scene", lines, e.warnings().to_vec())
+        let (content, lines) = scene(&e);
+        ("scene", Inspected::Scene(Box::new(content)), lines, e.warnings().to_vec())
     };
     if console.json() {
-        let mut map: Map<String, Value> = lines.into_iter().map(|l| (l.key.to_string(), l.value)).collect();
-        map.insert("format".into(), json!("inspection/1"));
-        map.insert("kind".into(), json!(kind));
-        map.insert("path".into(), json!(path.display().to_string()));
-        map.insert("warnings".into(), json!(warnings));
-        console.print(&Value::Object(map).to_string());
+        console.print(&results::line(&InspectionDocument { path: path.display().to_string(), warnings, content }));
         return Ok(0);
     }
-    let width = lines.iter().map(|l| l.label.len()).max().unwrap_or(0);
+    let width = lines.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
     let mut text = format!("{kind} {}", path.display());
-    // Lines without a label are for programs.
-    for l in lines.iter().filter(|l| !l.label.is_empty()) {
-        text += &format!("\n  {:width$}  {}", l.label, l.text);
+    for (label, said) in &lines {
+        text += &format!("\n  {label:width$}  {said}");
     }
     for w in &warnings {
         text += &format!("\n  warning: {w}");
@@ -119,7 +108,7 @@ fn demand(e: &Experiment) -> (Demand, String) {
 
 /// Memory of a fit on either backend: in all, by its parts, and for how many starts at once; and why the device cannot run it, if it
 /// cannot.
-fn memory(e: &Experiment, device: Option<&AdapterReport>) -> Vec<Line> {
+fn memory(e: &Experiment, device: Option<&AdapterReport>, content: &mut SceneInspection, lines: &mut Lines) {
     let (demand, what) = demand(e);
     let text = |backend: &str, total: u64, members: usize, parts: &[(&str, u64)]| {
         let parts: Vec<String> = parts.iter().map(|(name, bytes)| format!("{name} {}", megabytes(*bytes as f64))).collect();
@@ -135,8 +124,8 @@ fn memory(e: &Experiment, device: Option<&AdapterReport>) -> Vec<Line> {
         ("states", m.states),
         ("derivatives", m.tangents),
     ];
-    let cpu = text("cpu", m.total(), members, &parts);
-    let mut lines = vec![line("memory", "memory", json!(m.total()), cpu), line("batch", "", json!(members), "")];
+    (content.memory, content.batch) = (m.total(), members);
+    lines.push(("memory", text("cpu", m.total(), members, &parts)));
     // Without a device no limit is known.
     let on_device = demand.on_device(e.plan(), device.map_or(u64::MAX, |a| a.largest_buffer()));
     let refusal = match (device, &on_device) {
@@ -146,81 +135,77 @@ fn memory(e: &Experiment, device: Option<&AdapterReport>) -> Vec<Line> {
     };
     if let Ok((members, m)) = on_device {
         let parts = [("body and frames", m.constants), ("work space", m.work), ("states", m.states), ("derivatives", m.tangents)];
-        lines.push(line("device_memory", "device", json!(m.total()), text("gpu", m.total(), members, &parts)));
-        lines.push(line("device_batch", "", json!(members), ""));
+        (content.device_memory, content.device_batch) = (Some(m.total()), Some(members));
+        lines.push(("device", text("gpu", m.total(), members, &parts)));
     }
     if let Some((a, why)) = device.zip(refusal) {
-        let text = format!("by {}: {why} (hint: {})", a.name, why.hint_alone());
-        lines.push(line("device_refusal", "refused", json!(why.to_string()), text));
+        lines.push(("refused", format!("by {}: {why} (hint: {})", a.name, why.hint_alone())));
+        content.device_refusal = Some(why.to_string());
     }
-    lines
 }
 
-fn scene(e: &Experiment) -> Vec<Line> {
+fn title(title: &str) -> Option<String> {
+    (!title.is_empty()).then(|| title.to_string())
+}
+
+fn scene(e: &Experiment) -> (SceneInspection, Lines) {
+    let (mut content, mut lines) = (SceneInspection::default(), Lines::new());
+    body(e, &mut content, &mut lines);
+    world(e, &mut content, &mut lines);
+    memory(e, adapter().as_ref(), &mut content, &mut lines);
+    observed(e, &mut content, &mut lines);
+    free(e, &mut content, &mut lines);
+    (content, lines)
+}
+
+/// The body and its cells.
+fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let (scene, plan) = (e.scene(), e.plan());
     let body = &plan.body;
-    let physics = Physics::new(&plan.layout, &plan.theta);
+    let density = Physics::new(&plan.layout, &plan.theta).density;
     let (min, max) = e.shape().bounds();
     let size = max - min;
     let full = body.cells.iter().filter(|c| c.is_full()).count();
-    let cut = body.cells.len() - full;
-    let nodes = body.nodes.len();
-    let mass = physics.density * body.volume;
-    let (steps, time) = (plan.clock.steps, &scene.time);
-    let mut lines = vec![
-        line("title", "title", json!(scene.title), scene.title.clone()),
-        line("size", "size", json!(size.to_array()), format!("{:.4} × {:.4} × {:.4} m", size.x, size.y, size.z)),
-        line("volume", "volume", json!(body.volume), format!("{:.6e} m³", body.volume)),
-        line("area", "surface", json!(body.area), format!("{:.6e} m²", body.area)),
-        line("mass", "mass", json!(mass), format!("{mass:.6} kg ({:.1} kg/m³)", physics.density)),
-    ];
+    let (all, cut, nodes) = (body.cells.len(), body.cells.len() - full, body.nodes.len());
+    content.title = title(&scene.title);
+    (content.size, content.volume, content.area, content.mass) = (size.to_array(), body.volume, body.area, density * body.volume);
+    lines.extend(content.title.iter().map(|t| ("title", t.clone())));
+    lines.extend([
+        ("size", format!("{:.4} × {:.4} × {:.4} m", size.x, size.y, size.z)),
+        ("volume", format!("{:.6e} m³", body.volume)),
+        ("surface", format!("{:.6e} m²", body.area)),
+        ("mass", format!("{:.6} kg ({density:.1} kg/m³)", content.mass)),
+    ]);
     if let BodySource::Mesh { open_edges: open, .. } = scene.object.source {
+        content.open_edges = Some(open);
         // A mesh that stays open is refused before it comes here.
         let text = if open == 0 { "0 (closed)".to_string() } else { format!("{open} in the file (closed by the repair)") };
-        lines.push(line("open_edges", "open edges", json!(open), text));
+        lines.push(("open edges", text));
     }
+    (content.cell_size, content.cells) = (body.grid.h, Cells { all, full, cut });
+    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band.cells.len());
     lines.extend([
-        line("cell_size", "cell size", json!(body.grid.h), format!("{:.5} m", body.grid.h)),
-        line(
-            "cells",
-            "cells",
-            json!({ "all": body.cells.len(), "full": full, "cut": cut }),
-            format!("{} ({full} full, {cut} cut)", body.cells.len()),
-        ),
-        line("nodes", "nodes", json!(nodes), nodes.to_string()),
-        line("degrees_of_freedom", "degrees of freedom", json!(3 * nodes), (3 * nodes).to_string()),
-        line(
-            "band_cells",
-            "band cells",
-            json!(body.band.cells.len()),
-            format!("{} of {:.4} m", body.band.cells.len(), plan.band),
-        ),
-        line(
-            "constraints",
-            "world",
-            json!({ "clamps": plan.clamps.len(), "planes": plan.planes.len(), "masses": plan.masses.len() }),
-            format!("{} clamps, {} planes, {} point masses", plan.clamps.len(), plan.planes.len(), plan.masses.len()),
-        ),
-        line(
-            "time",
-            "time",
-            json!({ "step": time.step, "steps": steps, "start": time.start, "end": e.end_time() }),
-            if steps == 0 {
-                "static".to_string()
-            } else {
-                format!(
-                    "{steps} steps of {} s, from {} s to {:.4} s{}",
-                    time.step,
-                    time.start,
-                    e.end_time(),
-                    numerical_damping(time)
-                )
-            },
-        ),
+        ("cell size", format!("{:.5} m", body.grid.h)),
+        ("cells", format!("{all} ({full} full, {cut} cut)")),
+        ("nodes", nodes.to_string()),
+        ("degrees of freedom", (3 * nodes).to_string()),
+        ("band cells", format!("{} of {:.4} m", body.band.cells.len(), plan.band)),
     ]);
-    lines.extend(memory(e, adapter().as_ref()));
-    lines.retain(|l| l.key != "title" || !l.text.is_empty());
-    lines
+}
+
+/// What acts on the body, and when.
+fn world(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
+    let plan = e.plan();
+    let [clamps, planes, masses] = [plan.clamps.len(), plan.planes.len(), plan.masses.len()];
+    content.constraints = Constraints { clamps, planes, masses };
+    lines.push(("world", format!("{clamps} clamps, {planes} planes, {masses} point masses")));
+    let (steps, time, end) = (plan.clock.steps, &e.scene().time, e.end_time());
+    content.time = Time { step: time.step, steps, start: time.start, end };
+    let text = match steps {
+        0 => "static".to_string(),
+        _ => format!("{steps} steps of {} s, from {} s to {end:.4} s{}", time.step, time.start, numerical_damping(time)),
+    };
+    lines.push(("time", text));
 }
 
 /// What the θ-scheme damps by itself: ζ = (θ − ½) ω Δt to first order, which a fit takes for the material's.
@@ -232,97 +217,106 @@ fn numerical_damping(time: &palpate_model::scene::Time) -> String {
     format!("; theta = {} damps 1 Hz by {:.2} % of critical, 10 Hz by ten times as much", time.theta, 100.0 * of_one_hertz)
 }
 
-/// What is compared and what is free.
-fn observed(e: &Experiment) -> Vec<Line> {
-    let mut lines = Vec::new();
+/// What the simulation is compared with.
+fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let o = &e.plan().observation;
-    if let (Some(first), Some(last)) = (o.frames.first(), o.frames.last()) {
-        let points: Vec<usize> = o.frames.iter().map(|f| f.points.len()).collect();
-        let markers: usize = o.frames.iter().map(|f| f.markers.len()).sum();
-        let (low, high) = (points.iter().min().copied().unwrap_or(0), points.iter().max().copied().unwrap_or(0));
-        let total: usize = points.iter().sum();
-        let of = |seen: usize, size: f64, what: &str| (seen > 0).then(|| format!("{:.2} mm ({what})", size * 1e3));
-        let noise: Vec<String> =
-            [of(total, o.depth_noise, "depth"), of(markers, o.marker_noise, "markers")].into_iter().flatten().collect();
-        let noise = if noise.is_empty() { "unknown".to_string() } else { noise.join(", ") };
-        lines.push(line(
-            "observation",
-            "observed",
-            json!({ "frames": o.frames.len(), "from": first.time, "to": last.time, "cameras": o.cameras.len(), "points": total,
-                    "points_per_frame": [low, high], "marker_readings": markers, "markers": o.markers.len(),
-                    "depth_noise": o.depth_noise, "marker_noise": o.marker_noise, "overlap": true }),
-            format!(
-                "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({markers} readings); \
-                 noise {noise}; lies around the object",
-                o.frames.len(),
-                short(first.time),
-                short(last.time),
-                o.cameras.len(),
-                o.markers.len(),
-            ),
-        ));
-    }
-    if let Some(fit) = &e.scene().fit {
-        let paths: Vec<&str> = fit.parameters.iter().map(|p| p.path.as_str()).collect();
-        let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
-        lines.push(line("free", "to be found", json!(paths), text));
-    }
-    lines
+    let (Some(first), Some(last)) = (o.frames.first(), o.frames.last()) else { return };
+    let points: Vec<usize> = o.frames.iter().map(|f| f.points.len()).collect();
+    let readings: usize = o.frames.iter().map(|f| f.markers.len()).sum();
+    let [low, high] = extremes(&points);
+    let total: usize = points.iter().sum();
+    let of = |seen: usize, size: f64, what: &str| (seen > 0).then(|| format!("{:.2} mm ({what})", size * 1e3));
+    let noise: Vec<String> =
+        [of(total, o.depth_noise, "depth"), of(readings, o.marker_noise, "markers")].into_iter().flatten().collect();
+    let noise = if noise.is_empty() { "unknown".to_string() } else { noise.join(", ") };
+    lines.push((
+        "observed",
+        format!(
+            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings); \
+             noise {noise}; lies around the object",
+            o.frames.len(),
+            short(first.time),
+            short(last.time),
+            o.cameras.len(),
+            o.markers.len(),
+        ),
+    ));
+    content.observation = Some(Observed {
+        frames: o.frames.len(),
+        from: first.time,
+        to: last.time,
+        cameras: o.cameras.len(),
+        points: total,
+        points_per_frame: [low, high],
+        marker_readings: readings,
+        markers: o.markers.len(),
+        depth_noise: o.depth_noise,
+        marker_noise: o.marker_noise,
+        overlap: true,
+    });
 }
 
-fn recording(r: &Recording) -> Vec<Line> {
-    let mut lines = vec![line("title", "title", json!(r.title), r.title.clone())];
+/// The numbers to be found.
+fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
+    let Some(fit) = &e.scene().fit else { return };
+    let paths: Vec<String> = fit.parameters.iter().map(|p| p.path.clone()).collect();
+    let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
+    lines.push(("to be found", text));
+    content.free = Some(paths);
+}
+
+/// Smallest and largest of some numbers; zeros without any.
+fn extremes(numbers: &[usize]) -> [usize; 2] {
+    [numbers.iter().min().copied().unwrap_or(0), numbers.iter().max().copied().unwrap_or(0)]
+}
+
+fn recording(r: &Recording) -> (RecordingInspection, Lines) {
+    let mut content = RecordingInspection { title: title(&r.title), ..RecordingInspection::default() };
+    let mut lines: Lines = content.title.iter().map(|t| ("title", t.clone())).collect();
+    let stated = |noise: Option<f64>| noise.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
     for c in &r.cameras {
-        let noise = c.noise_sigma.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
-        lines.push(line(
-            "cameras",
-            "camera",
-            json!(
-                r.cameras
-                    .iter()
-                    .map(|c| json!({ "name": c.name, "width": c.width, "height": c.height, "noise": c.noise_sigma,
-                "systematic": c.noise_systematic, "position": c.position().to_array() }))
-                    .collect::<Vec<_>>()
-            ),
-            format!("{} {} × {} pixels, noise {noise}, at {:.3}", c.name, c.width, c.height, c.position()),
-        ));
+        let (noise, at) = (stated(c.noise_sigma), c.position());
+        lines.push(("camera", format!("{} {} × {} pixels, noise {noise}, at {at:.3}", c.name, c.width, c.height)));
+        content.cameras.push(CameraInspection {
+            name: c.name.clone(),
+            width: c.width,
+            height: c.height,
+            noise: c.noise_sigma,
+            systematic: c.noise_systematic,
+            position: at.to_array(),
+        });
     }
     let readings: Vec<usize> = r.frames.iter().map(|f| f.readings().count()).collect();
     if let (Some(first), Some(last)) = (r.frames.first(), r.frames.last()) {
-        let (low, high) = (readings.iter().min().copied().unwrap_or(0), readings.iter().max().copied().unwrap_or(0));
-        lines.push(line(
-            "frames",
-            "images",
-            json!({ "count": r.frames.len(), "from": first.time, "to": last.time, "readings": readings.iter().sum::<usize>(),
-                    "readings_per_image": [low, high] }),
-            format!(
-                "{} from {:.4} s to {:.4} s, {low} to {high} readings of the object each",
-                r.frames.len(),
-                first.time,
-                last.time
-            ),
-        ));
+        let (count, [low, high], from, to) = (r.frames.len(), extremes(&readings), first.time, last.time);
+        lines.push(("images", format!("{count} from {from:.4} s to {to:.4} s, {low} to {high} readings of the object each")));
+        let readings = readings.iter().sum();
+        content.frames = Some(Images { count, from, to, readings, readings_per_image: [low, high] });
     }
     if let Some(m) = &r.markers {
         let (from, to) = (m.samples.first().map_or(f64::NAN, |s| s.time), m.samples.last().map_or(f64::NAN, |s| s.time));
-        let noise = m.noise_sigma.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
-        lines.push(line(
+        lines.push((
             "markers",
-            "markers",
-            json!({ "names": m.names, "readings": m.samples.len(), "from": from, "to": to, "noise": m.noise_sigma,
-                    "rest_places": m.rest.len() }),
             format!(
-                "{} markers, {} readings from {} s to {} s, noise {noise}, {} with a rest place",
+                "{} markers, {} readings from {} s to {} s, noise {}, {} with a rest place",
                 m.names.len(),
                 m.samples.len(),
                 short(from),
                 short(to),
+                stated(m.noise_sigma),
                 m.rest.len()
             ),
         ));
+        content.markers = Some(Markers {
+            names: m.names.clone(),
+            readings: m.samples.len(),
+            from: finite(from),
+            to: finite(to),
+            noise: m.noise_sigma,
+            rest_places: m.rest.len(),
+        });
     }
-    lines.retain(|l| l.key != "title" || !l.text.is_empty());
-    lines
+    (content, lines)
 }
 
 #[cfg(test)]
@@ -332,18 +326,22 @@ mod tests {
     #[test]
     fn a_device_that_is_too_small_is_named_with_its_limit_and_the_way_out() {
         let e = Experiment::from_toml(include_str!("../../tests/block.toml"), "block.toml").unwrap_or_else(|e| panic!("{e}"));
-        let said = |device: Option<&AdapterReport>| {
-            memory(&e, device).into_iter().filter(|l| l.key.starts_with("device")).map(|l| (l.key, l.text)).collect::<Vec<_>>()
+        let said = |e: &Experiment, device: Option<&AdapterReport>| {
+            let (mut content, mut lines) = (SceneInspection::default(), Lines::new());
+            memory(e, device, &mut content, &mut lines);
+            assert!(content.device_memory.is_some() == content.device_batch.is_some());
+            assert_eq!(content.device_refusal.is_some(), lines.iter().any(|l| l.0 == "refused"));
+            lines
         };
-        let keys = |lines: &[(&'static str, String)]| lines.iter().map(|l| l.0).collect::<Vec<_>>();
-        assert_eq!(keys(&said(None)), ["device_memory", "device_batch"]);
+        let labels = |lines: &Lines| lines.iter().map(|l| l.0).collect::<Vec<_>>();
+        assert_eq!(labels(&said(&e, None)), ["memory", "device"]);
         let Some(mut device) = adapter() else {
             return assert!(std::env::var("PALPATE_GPU").as_deref() != Ok("require"), "there is no adapter");
         };
-        assert_eq!(said(Some(&device)), said(None));
+        assert_eq!(said(&e, Some(&device)), said(&e, None));
         device.limits.max_storage_buffer_binding_size = 2000;
-        let lines = said(Some(&device));
-        assert_eq!(keys(&lines), ["device_memory", "device_batch", "device_refusal"]);
+        let lines = said(&e, Some(&device));
+        assert_eq!(labels(&lines), ["memory", "device", "refused"]);
         let text = &lines[2].1;
         for words in [&device.name, "max_storage_buffer_binding_size", "2000 bytes", "coarser cells, or --backend cpu"] {
             assert!(text.contains(words), "{words} is not in: {text}");
@@ -351,8 +349,8 @@ mod tests {
         // What no device runs is refused by the one that is there.
         let laws = "[[effect]]\nkind = \"strain-stiffening\"\ncoefficient = 0.1\n".repeat(17);
         let e = Experiment::from_toml(&(include_str!("../../tests/block.toml").to_string() + &laws), "laws.toml");
-        let lines = memory(&e.unwrap_or_else(|e| panic!("{e}")), Some(&device));
-        let last = lines.last().map(|l| (l.key, l.text.contains("more than 16 laws of cells")));
-        assert_eq!(last, Some(("device_refusal", true)));
+        let lines = said(&e.unwrap_or_else(|e| panic!("{e}")), Some(&device));
+        let last = lines.last().map(|l| (l.0, l.1.contains("more than 16 laws of cells")));
+        assert_eq!(last, Some(("refused", true)));
     }
 }

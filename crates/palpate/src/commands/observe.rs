@@ -4,7 +4,9 @@ use crate::cli::Console;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, count};
-use crate::render::{Pinhole, Sensor};
+use crate::render::{CameraError, Pinhole, Sensor};
+use crate::results;
+use crate::results::observation::ObservationDocument;
 use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
@@ -70,7 +72,7 @@ pub struct Arguments {
 }
 
 fn check(a: &Arguments) -> Result<(), Error> {
-    let wrong = |option: &str, value: f64, allowed: &str| Err(Error::Input(format!("--{option} {value}: must be {allowed}")));
+    let wrong = |option, value: f64, allowed: &str| Err(Error::option(option, value, format!("must be {allowed}")));
     if a.camera.is_empty() && a.markers.is_none() {
         return Err(Error::Input("nothing observes: give --camera \"eye=x,y,z target=x,y,z\" or --markers FILE".into()));
     }
@@ -97,12 +99,14 @@ fn check(a: &Arguments) -> Result<(), Error> {
 fn cameras(texts: &[String]) -> Result<Vec<Pinhole>, Error> {
     let mut cameras: Vec<Pinhole> = Vec::new();
     for (i, text) in texts.iter().enumerate() {
-        let mut camera: Pinhole = text.parse().map_err(|e| Error::Input(format!("--camera \"{text}\": {e}")))?;
+        let mut camera: Pinhole =
+            text.parse().map_err(|e: CameraError| Error::option("camera", format!("\"{text}\""), e.to_string()))?;
         if !text.split_whitespace().any(|w| w.starts_with("name=")) {
             camera.name = format!("cam{i}");
         }
         if cameras.iter().any(|c| c.name == camera.name) {
-            return Err(Error::Input(format!("--camera \"{text}\": another camera is already named {}", camera.name)));
+            let message = format!("another camera is already named {}", camera.name);
+            return Err(Error::option("camera", format!("\"{text}\""), message));
         }
         cameras.push(camera);
     }
@@ -115,7 +119,7 @@ fn times(a: &Arguments, experiment: &Experiment) -> Result<Vec<f64>, Error> {
     let evenly = |step: f64| (0..=count(step)).map(|k| time.start + k as f64 * step).collect();
     if let Some(times) = &a.times {
         if times.is_empty() || !times.windows(2).all(|w| w[0] < w[1]) || times.iter().any(|t| !t.is_finite()) {
-            return Err(Error::Input("--times: give increasing times in seconds, separated by commas".into()));
+            return Err(Error::option("times", "", "give increasing times in seconds, separated by commas"));
         }
         return Ok(times.clone());
     }
@@ -166,7 +170,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     check(a)?;
     let cameras = cameras(&a.camera)?;
     if a.out.join("recording.toml").exists() && !a.force {
-        return Err(Error::Input(format!("--out {}: a recording is already there; add --force to replace it", a.out.display())));
+        return Err(Error::option("out", a.out.display(), "a recording is already there; add --force to replace it"));
     }
     let coarse = Experiment::open_without_recording(&a.scene)?;
     let (backend, note) = a.backend.choose(coarse.plan(), 1)?;
@@ -193,28 +197,27 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let samples = recording.markers.as_ref().map_or(0, |m| m.samples.len());
     if !recording.cameras.is_empty() && readings == 0 {
         let (scale, far) = (a.depth_scale, 65535.0 * a.depth_scale);
-        return Err(Error::Input(format!(
-            "--depth-scale {scale:?}: no pixel has a reading; 1 to 65535 counts reach from {scale:?} m to {far:?} m (--dropout {} loses more)",
+        let message = format!(
+            "no pixel has a reading; 1 to 65535 counts reach from {scale:?} m to {far:?} m (--dropout {} loses more)",
             a.dropout
-        )));
+        );
+        return Err(Error::option("depth-scale", format!("{scale:?}"), message));
     }
     if recording.markers.is_some() && samples == 0 {
-        return Err(Error::Input(format!("--dropout {}: no marker is ever seen; make it smaller", a.dropout)));
+        return Err(Error::option("dropout", a.dropout, "no marker is ever seen; make it smaller"));
     }
     palpate_io::write_recording(&a.out, &recording)?;
 
     if console.json() {
-        let json = serde_json::json!({
-            "format": "observation/1",
-            "recording": a.out.display().to_string(),
-            "backend": backend.name(),
-            "cameras": recording.cameras.len(),
-            "frames": observers.times.len(),
-            "images": recording.frames.len(),
-            "depth_readings": readings,
-            "marker_readings": samples,
-        });
-        console.print(&json.to_string());
+        console.print(&results::line(&ObservationDocument {
+            recording: a.out.display().to_string(),
+            backend: backend.name().into(),
+            cameras: recording.cameras.len(),
+            frames: observers.times.len(),
+            images: recording.frames.len(),
+            depth_readings: readings,
+            marker_readings: samples,
+        }));
     } else {
         console.print(&format!(
             "{}: {} times, {} images with {readings} depth readings, {samples} marker readings",

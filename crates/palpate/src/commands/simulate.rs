@@ -6,6 +6,8 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::{BackendName, count, out_folder};
 use crate::render::{Pinhole, shade};
+use crate::results::simulation::SimulationDocument;
+use crate::results::{self, finite};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_engine::Snapshot;
@@ -226,19 +228,17 @@ fn report(
 ) {
     let plan = experiment.plan();
     if console.json() {
-        let json = serde_json::json!({
-            "format": "simulation/1",
-            "scene": experiment.scene().path.display().to_string(),
-            "backend": backend,
-            "steps": plan.clock.steps,
-            "nodes": plan.body.nodes.len(),
-            "frames": frames,
-            "files": files,
-            "out": folder.display().to_string(),
-            "largest_displacement": farthest,
-            "seconds": seconds,
-        });
-        console.print(&json.to_string());
+        console.print(&results::line(&SimulationDocument {
+            scene: experiment.scene().path.display().to_string(),
+            backend: backend.into(),
+            steps: plan.clock.steps,
+            nodes: plan.body.nodes.len(),
+            frames,
+            files,
+            out: folder.display().to_string(),
+            largest_displacement: finite(farthest),
+            seconds,
+        }));
     } else {
         console.print(&format!(
             "{}: {} steps of {} nodes in {seconds:.2} s ({backend}), largest displacement {:.4} m; {files} files in {}",

@@ -186,6 +186,6 @@ impl Prepared {
 pub(super) fn lab_error(e: Error) -> LabError {
     match e {
         Error::Interrupted => LabError::Interrupted,
-        other => LabError::Failed(other.to_string()),
+        other => LabError::failed(other),
     }
 }

@@ -158,7 +158,7 @@ fn problem(
             evaluate: backend.evaluator_until(&e.plan, 1, limits.interrupt.at_once()).map_err(lab_error)?,
         });
     }
-    Ok((Problem::new(scenes, ready.free).map_err(LabError::Failed)?, numbers))
+    Ok((Problem::new(scenes, ready.free).map_err(LabError::failed)?, numbers))
 }
 
 /// Cost of one hypothesis at these values.
@@ -201,7 +201,7 @@ fn fit(
     let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
         palpate_fit::FitError::Interrupted => LabError::Interrupted,
-        e => LabError::Failed(e.to_string()),
+        e => LabError::failed(e),
     })?;
     if let Some(why) = result.broken {
         return Err(limits.break_off(why));
@@ -276,7 +276,7 @@ fn together(base: &[Experiment], tries: &[Try], from: usize) -> Result<Vec<Readi
     }
     let ready = prepare(base, &changes).map_err(lab_error)?;
     if ready.free.len() != all.len() {
-        return Err(LabError::Failed("hypotheses share a number".into()));
+        return Err(LabError::failed("hypotheses share a number"));
     }
     let r = linearise_some(&ready, &all, from, |k| wanted.get(k).copied().unwrap_or(true))?;
     let mut at = 0;

@@ -16,8 +16,10 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted, fit};
 use crate::interrupt::Interrupt;
 use lab::Lab;
-use palpate_diagnose::{Change, Diagnosis, LabError, Laboratory, Model};
+use palpate_diagnose::{Change, Diagnosis, Laboratory, Model};
+use palpate_io::InputError;
 use palpate_model::effects::Effect;
+use palpate_model::params::ParamKey;
 use palpate_model::scene::ObservationSpec;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -68,8 +70,9 @@ pub struct Diagnosed {
 /// Finds what the model of one or several experiments lacks. `held_out` is a recording of the same body that no fit sees.
 ///
 /// # Errors
-/// [`Error::Input`] when there is nothing to compare with or `held_out` shows another body or nothing new, [`Error::Failed`] when the baseline cannot be computed,
-/// [`Error::Interrupted`] when it was stopped before the baseline was known.
+/// [`Error::Scene`] when there is nothing to compare with or `held_out` shows nothing new, [`Error::File`] when it shows another body,
+/// [`Error::Fit`] or [`Error::Diagnosis`] when the baseline cannot be computed, [`Error::Interrupted`] when it was stopped before the
+/// baseline was known.
 pub fn diagnose(
     experiments: &[Experiment],
     held_out: Option<&Experiment>,
@@ -77,96 +80,118 @@ pub fn diagnose(
 ) -> Result<Diagnosed, Error> {
     let clock = Instant::now();
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
-    for e in experiments.iter().chain(held_out) {
-        if e.plan().observation.residuals() == 0 {
-            let name = e.scene().path.display();
-            return Err(Error::Input(format!("{name}: observation is missing or has no data to compare with; name a recording")));
-        }
-    }
-    if let Some(other) = held_out {
-        same_body(experiments, other)?;
-    }
+    check(experiments, held_out)?;
     let mut told = options.on_progress.take();
     let mut say = |what: &str| {
         if let Some(f) = &mut told {
             f(what);
         }
     };
-    let is_free = |e: &Experiment| e.scene().fit.as_ref().is_some_and(|f| !f.parameters.is_empty());
-    let mut base = experiments.to_vec();
-    let mut fitted = None;
-    if experiments.iter().any(is_free) {
-        say("baseline fit");
-        let journal = options.checkpoints.as_ref().map(|(folder, resume)| (folder.join("journal.jsonl"), *resume));
-        let f = fit(
-            experiments,
-            FitOptions {
-                backend: options.backend,
-                tolerance: Some(BASELINE),
-                interrupt: options.interrupt.clone(),
-                journal,
-                ..FitOptions::default()
-            },
-        )?;
-        if let Some(why) = &f.result.broken {
-            return Err(Error::Failed(format!("the baseline's fit: {why}")));
-        }
-        for (e, theta) in base.iter_mut().zip(&f.result.theta) {
-            e.plan.theta.clone_from(theta);
-        }
-        fitted = Some(f);
-    }
-    let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
-    let (backend, known, free) = (options.backend, &base, &fitted);
+    let (base, fitted) = baseline(experiments, &options, &mut say)?;
     let plain = hypothesis::prepare(&base, &[])?;
-    let values = plain.own_values();
+    let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
+    let (backend, known, free, values) = (options.backend, &base, fitted.as_ref(), plain.own_values());
     let (diagnosis, broken) = with_threads(threads, move || {
         let deadline = options.budget.map(|b| clock + b);
-        let mut lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
-        let numbers = lab.numbers(&[]).map_err(failed)?;
-        let errors = numbers.iter().map(|n| {
-            let parameters = free.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
-            parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
-        });
-        let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
-        let found = palpate_diagnose::diagnose(&mut lab, model, &options.statistics);
-        match (found, lab.broken()) {
-            (Ok(diagnosis), broken) => Ok((diagnosis, broken)),
-            (Err(_), Some(why)) => Err(Error::Failed(why)),
-            (Err(e), None) => Err(failed(e)),
-        }
+        let lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
+        search(lab, free, values, &options.statistics)
     })??;
     let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
-    let model = &diagnosis.model;
-    let ready = hypothesis::prepare(&base, &model.changes)?;
-    let mut corrected = ready.experiments.clone();
-    let mut values = vec![Vec::new(); base.len()];
-    for (s, e) in corrected.iter_mut().enumerate() {
-        e.plan.theta = ready.theta(s, &model.values);
-        e.scene.effects.iter_mut().enumerate().for_each(|(i, effect)| {
-            for (slot, v) in effect.values.iter_mut().enumerate() {
-                let key = |k: &palpate_model::params::ParamKey| {
-                    matches!(k, palpate_model::params::ParamKey::Effect { effect: e, slot: s, .. }
-                        if usize::from(*e) == i && usize::from(*s) == slot)
-                };
-                *v = e.plan.layout.keys.iter().position(key).map(|p| e.plan.theta[p]);
-            }
-        });
-        values[s] = ready.values_of(s, &model.values);
-    }
-    let added = model.changes.iter().filter_map(|c| if let Change::Effect(_) = c { Some(()) } else { None }).count();
-    let all = &corrected[0].scene.effects;
+    let (experiments, values) = corrected(&base, &diagnosis.model)?;
+    let added = diagnosis.model.changes.iter().filter(|c| matches!(c, Change::Effect(_))).count();
+    let all = &experiments[0].scene.effects;
     Ok(Diagnosed {
         added: all[all.len() - added..].to_vec(),
         backend: backend.name(),
         fit: fitted,
         theta_before,
-        experiments: corrected,
+        experiments,
         values,
         broken,
         seconds: clock.elapsed().as_secs_f64(),
         diagnosis,
     })
+}
+
+/// Refuses experiments that have nothing to compare with, and a second recording of another body or of nothing new.
+fn check(experiments: &[Experiment], held_out: Option<&Experiment>) -> Result<(), Error> {
+    for e in experiments.iter().chain(held_out) {
+        if e.plan().observation.residuals() == 0 {
+            let message = "is missing or has no data to compare with; name a recording";
+            return Err(Error::scene(&e.scene().path, "observation", message));
+        }
+    }
+    held_out.map_or(Ok(()), |other| same_body(experiments, other))
+}
+
+/// The experiments with the values that fit best as they are, and that fit; `None` where they leave nothing free.
+fn baseline(
+    experiments: &[Experiment],
+    options: &DiagnoseOptions,
+    say: &mut dyn FnMut(&str),
+) -> Result<(Vec<Experiment>, Option<Fitted>), Error> {
+    let is_free = |e: &Experiment| e.scene().fit.as_ref().is_some_and(|f| !f.parameters.is_empty());
+    let mut base = experiments.to_vec();
+    if !experiments.iter().any(is_free) {
+        return Ok((base, None));
+    }
+    say("baseline fit");
+    let fitted = fit(
+        experiments,
+        FitOptions {
+            backend: options.backend,
+            tolerance: Some(BASELINE),
+            interrupt: options.interrupt.clone(),
+            journal: options.checkpoints.as_ref().map(|(folder, resume)| (folder.join("journal.jsonl"), *resume)),
+            ..FitOptions::default()
+        },
+    )?;
+    if let Some(why) = &fitted.result.broken {
+        return Err(Error::Failed(format!("the baseline's fit: {why}")));
+    }
+    for (e, theta) in base.iter_mut().zip(&fitted.result.theta) {
+        e.plan.theta.clone_from(theta);
+    }
+    Ok((base, Some(fitted)))
+}
+
+/// The answer, from the baseline's values and their errors; and why the device failed on the way, if it did.
+fn search(
+    mut lab: Lab,
+    fitted: Option<&Fitted>,
+    values: Vec<f64>,
+    statistics: &palpate_diagnose::Options,
+) -> Result<(Diagnosis, Option<String>), Error> {
+    let numbers = lab.numbers(&[])?;
+    let errors = numbers.iter().map(|n| {
+        let parameters = fitted.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
+        parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
+    });
+    let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
+    let found = palpate_diagnose::diagnose(&mut lab, model, statistics);
+    match (found, lab.broken()) {
+        (Ok(diagnosis), broken) => Ok((diagnosis, broken)),
+        (Err(_), Some(why)) => Err(Error::Failed(why)),
+        (Err(e), None) => Err(e.into()),
+    }
+}
+
+/// Experiments with the effects and values of a model, and the values of every scene's free numbers by path.
+type Corrected = (Vec<Experiment>, Vec<Vec<(String, f64)>>);
+
+fn corrected(base: &[Experiment], model: &Model) -> Result<Corrected, Error> {
+    let ready = hypothesis::prepare(base, &model.changes)?;
+    let mut experiments = ready.experiments.clone();
+    for (s, e) in experiments.iter_mut().enumerate() {
+        e.plan.theta = ready.theta(s, &model.values);
+        for (place, key) in e.plan.layout.keys.iter().enumerate() {
+            if let ParamKey::Effect { effect, slot, .. } = *key {
+                e.scene.effects[usize::from(effect)].values[usize::from(slot)] = Some(e.plan.theta[place]);
+            }
+        }
+    }
+    let values = (0..base.len()).map(|s| ready.values_of(s, &model.values)).collect();
+    Ok((experiments, values))
 }
 
 /// Share of its volume by which a second recording's body may differ: grids cut the same body a little differently.
@@ -175,30 +200,23 @@ const SAME: f64 = 0.01;
 /// What one body taught says nothing of another.
 fn same_body(experiments: &[Experiment], other: &Experiment) -> Result<(), Error> {
     let volume = |e: &Experiment| e.plan().body.volume;
-    let path = other.scene().path.display();
+    let path = &other.scene().path;
     if experiments.iter().all(|e| (volume(other) / volume(e) - 1.0).abs() > SAME) {
         let cm3 = |e: &Experiment| 1e6 * volume(e);
         let (given, own) = (cm3(&experiments[0]), cm3(other));
         let known = experiments[0].scene().path.display();
-        return Err(Error::Input(format!(
-            "{path}: the body has {own:.3} cm³ and that of {known} {given:.3} cm³; --held-out wants another recording of the same body"
-        )));
+        let message = format!(
+            "the body has {own:.3} cm³ and that of {known} {given:.3} cm³; --held-out wants another recording of the same body"
+        );
+        return Err(InputError::file(path, message).into());
     }
     let absolute = |p: &std::path::Path| p.canonicalize().unwrap_or_else(|_| p.into());
     let used = |e: &Experiment| {
         e.scene().observation.as_ref().map(|o| ObservationSpec { recording: absolute(&o.recording), ..o.clone() })
     };
     if experiments.iter().any(|e| used(e) == used(other)) {
-        return Err(Error::Input(format!(
-            "{path}: observation.recording is the one that is fitted; --held-out wants a recording that no fit sees"
-        )));
+        let message = "is the one that is fitted; --held-out wants a recording that no fit sees";
+        return Err(Error::scene(path, "observation.recording", message));
     }
     Ok(())
-}
-
-fn failed(e: LabError) -> Error {
-    match e {
-        LabError::Interrupted => Error::Interrupted,
-        e => Error::Failed(e.to_string()),
-    }
 }

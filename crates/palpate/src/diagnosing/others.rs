@@ -125,9 +125,9 @@ pub(super) fn held_out(
             f.start = (v, v);
             f
         });
-        let mut problem = Problem::new(vec![scene], free.collect()).map_err(LabError::Failed)?;
+        let mut problem = Problem::new(vec![scene], free.collect()).map_err(LabError::failed)?;
         let settings = Settings { iterations: 12, ..Settings::new(Optimizer::GaussNewton) };
-        let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(|e| LabError::Failed(e.to_string()))?;
+        let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(LabError::failed)?;
         if let Some(why) = found.broken {
             return Err(limits.break_off(why));
         }

@@ -1,12 +1,12 @@
-//! What a fit leaves behind: `result.json`, `history.csv`, `model.toml`, `report.html`.
+//! What a fit or a diagnosis leaves behind for people and programs: result files, tables, pages with pictures.
 
 mod diagnosis;
+mod fit;
 mod html;
 mod pictures;
 mod plots;
-mod result;
 
-pub use diagnosis::{DiagnosisInput, diagnosis_html, diagnosis_json, diagnosis_summary};
-pub use html::{ReportInput, html};
+pub use diagnosis::{diagnosis_document, diagnosis_summary};
+pub use fit::{fit_document, history_csv, number, summary};
+pub use html::{DiagnosisInput, ReportInput, diagnosis_html, fit_html};
 pub use pictures::{FramePicture, pictures};
-pub use result::{history_csv, number, result_json, summary};

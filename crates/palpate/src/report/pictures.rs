@@ -25,7 +25,7 @@ pub struct FramePicture {
 /// the simulated one's place in the same colours.
 ///
 /// # Errors
-/// [`Error::Failed`] when the simulation fails.
+/// [`Error::Simulation`] when that fails.
 pub fn pictures(
     experiment: &Experiment,
     backend: Backend,

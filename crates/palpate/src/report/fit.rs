@@ -1,20 +1,16 @@
-//! The numbers of a fit as JSON (`fit/1`), CSV and a short table.
+//! The numbers of a fit for its result file, as CSV and as a short table.
 
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
+use crate::results::finite;
+use crate::results::fit::{Cost, FitDocument, Parameter, Residual, ResidualBefore, Run};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
-use serde_json::{Map, Value, json};
 
-/// A number for JSON; infinite and undefined ones become null.
-fn finite(x: f64) -> Value {
-    if x.is_finite() { json!(x) } else { Value::Null }
-}
-
-fn residual(r: &ResidualSummary) -> Value {
-    json!({ "rms": finite(r.rms), "noise": finite(r.noise), "points": r.points, "unmatched": r.unmatched })
+fn residual(r: &ResidualSummary) -> Residual {
+    Residual { rms: finite(r.rms), noise: finite(r.noise), points: r.points, unmatched: r.unmatched, scenes: Vec::new() }
 }
 
 /// A plain word where the result rests on the smaller part of what was observed; `None` where it does not.
@@ -41,79 +37,64 @@ fn unmatched(fitted: &Fitted) -> usize {
     fitted.after.iter().map(|r| r.unmatched).sum()
 }
 
-/// `result.json`. Beyond the format's keys it holds `status`, `error` (why the fit broke off), `warnings`, per-scene residuals, `residual_before`, the
-/// reduced χ² and how many independent readings the data are worth; a parameter that is not shared by several scenes says which scene (from 0) it belongs to.
-pub fn result_json(fitted: &Fitted, experiments: &[Experiment]) -> Value {
+fn parameter(fitted: &Fitted, i: usize) -> Parameter {
+    let (number, found) = (&fitted.free[i], &fitted.result.parameters[i]);
+    Parameter {
+        path: number.path.clone(),
+        value: finite(found.value),
+        standard_error: found.standard_error.and_then(finite),
+        unit: found.unit.clone(),
+        finer_grid_shift: fitted.grid_shift.as_ref().and_then(|s| finite(s[i])),
+        scene: number.scene,
+        at_bound: found.at_bound,
+    }
+}
+
+fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
+    let labelled = |values: &[f64]| fitted.free.iter().zip(values).map(|(n, v)| (n.label(), finite(*v))).collect();
+    Run {
+        start: labelled(&run.start),
+        end: labelled(&run.end),
+        start_cost: finite(run.start_cost),
+        cost: finite(run.cost),
+        iterations: run.iterations,
+        evaluations: run.evaluations,
+        status: run.status.name().into(),
+    }
+}
+
+/// What `result.json` says of a fit of these experiments.
+pub fn fit_document(fitted: &Fitted, experiments: &[Experiment]) -> FitDocument {
     let r = &fitted.result;
-    let named = |values: &[f64]| -> Value {
-        let map: Map<String, Value> = fitted.free.iter().zip(values).map(|(n, v)| (n.label(), finite(*v))).collect();
-        Value::Object(map)
-    };
-    let parameters: Vec<Value> = fitted
-        .free
-        .iter()
-        .zip(&r.parameters)
-        .enumerate()
-        .map(|(i, (n, p))| {
-            let mut v = json!({
-                "path": n.path,
-                "value": finite(p.value),
-                "standard_error": p.standard_error.map_or(Value::Null, finite),
-                "unit": p.unit,
-            });
-            if let Some(shift) = &fitted.grid_shift {
-                v["finer_grid_shift"] = finite(shift[i]);
-            }
-            if let Some(s) = n.scene {
-                v["scene"] = json!(s);
-            }
-            if let Some(side) = p.at_bound {
-                v["at_bound"] = json!(format!("{side:?}").to_lowercase());
-            }
-            v
-        })
-        .collect();
-    let runs: Vec<Value> = r
-        .runs
-        .iter()
-        .map(|run| {
-            json!({
-                "start": named(&run.start),
-                "end": named(&run.end),
-                "start_cost": finite(run.start_cost),
-                "cost": finite(run.cost),
-                "iterations": run.iterations,
-                "evaluations": run.evaluations,
-                "status": run.status.name(),
-            })
-        })
-        .collect();
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
-    let warnings: Vec<String> = mostly_unmatched(fitted).into_iter().chain(fitted.warnings.iter().cloned()).collect();
     let scenes: Vec<String> = experiments.iter().map(|e| e.scene().path.display().to_string()).collect();
-    json!({
-        "format": "fit/1",
-        "version": env!("CARGO_PKG_VERSION"),
-        "backend": fitted.backend,
-        "scene": scenes.first(),
-        "scenes": scenes,
-        "status": fitted.status(),
-        "error": r.broken,
-        "parameters": parameters,
-        "correlation": r.correlation,
-        "cost": { "initial": finite(r.initial_cost), "final": finite(r.cost) },
-        "reduced_chi_square": finite(r.reduced_chi_square),
-        "independent_readings": finite(r.independent),
-        "residual": { "rms": finite(rms), "noise": finite(noise), "points": points, "unmatched": unmatched(fitted),
-                      "scenes": fitted.after.iter().map(residual).collect::<Vec<_>>() },
-        "residual_before": before.map_or(Value::Null, |b| json!({ "rms": finite(total(&b, |r| r.rms)) })),
-        "best": r.best,
-        "runs": runs,
-        "warnings": warnings,
-        "evaluations": r.evaluations,
-        "seconds": r.seconds,
-    })
+    FitDocument {
+        version: env!("CARGO_PKG_VERSION").into(),
+        backend: fitted.backend.into(),
+        scene: scenes.first().cloned(),
+        scenes,
+        status: fitted.status(),
+        error: r.broken.clone(),
+        parameters: (0..fitted.free.len()).map(|i| parameter(fitted, i)).collect(),
+        correlation: r.correlation.iter().map(|row| row.iter().map(|c| finite(*c)).collect()).collect(),
+        cost: Cost { initial: finite(r.initial_cost), last: finite(r.cost) },
+        reduced_chi_square: finite(r.reduced_chi_square),
+        independent_readings: finite(r.independent),
+        residual: Residual {
+            rms: finite(rms),
+            noise: finite(noise),
+            points,
+            unmatched: unmatched(fitted),
+            scenes: fitted.after.iter().map(residual).collect(),
+        },
+        residual_before: before.map(|b| ResidualBefore { rms: finite(total(&b, |r| r.rms)) }),
+        best: r.best,
+        runs: r.runs.iter().map(|r| run(fitted, r)).collect(),
+        warnings: mostly_unmatched(fitted).into_iter().chain(fitted.warnings.iter().cloned()).collect(),
+        evaluations: r.evaluations,
+        seconds: r.seconds,
+    }
 }
 
 /// One row per run and iteration: `run,iteration,cost,<one column per parameter>`; full precision.

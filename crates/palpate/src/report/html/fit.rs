@@ -1,0 +1,203 @@
+//! The report of a fit.
+
+use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
+use crate::experiment::Experiment;
+use crate::fitting::{Fitted, total};
+use crate::report::fit::{number, worth};
+use crate::report::pictures::FramePicture;
+use crate::report::plots::Curve;
+use crate::residuals::ResidualSummary;
+use maud::{Markup, html};
+
+/// What a report is made of.
+pub struct ReportInput<'a> {
+    /// The fit.
+    pub fitted: &'a Fitted,
+    /// Its scenes.
+    pub experiments: &'a [Experiment],
+    /// Pictures scene by scene: at the first start, and with the values found.
+    pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
+    /// Residual at which colours are saturated [m].
+    pub scale: f64,
+    /// The command that reproduces the fit.
+    pub command: String,
+}
+
+/// The whole page.
+pub fn fit_html(input: &ReportInput) -> String {
+    let (fitted, experiments) = (input.fitted, input.experiments);
+    let titles: Vec<&str> = experiments.iter().map(|e| e.scene().title.as_str()).filter(|t| !t.is_empty()).collect();
+    let title = if titles.is_empty() { "Fit".to_string() } else { titles.join(" + ") };
+    let effort = format!("{} evaluations in {:.1} s", fitted.result.evaluations, fitted.result.seconds);
+    let body = html! {
+        (ending(fitted))
+        (distances(fitted))
+        (parameters(fitted))
+        (warnings(fitted))
+        (correlation(fitted))
+        (progress(fitted))
+        @for (s, e) in experiments.iter().enumerate() {
+            (scene(input, s, e))
+        }
+        (runs(fitted))
+        (reproduce(&input.command, fitted.backend, &effort))
+    };
+    page(&title, &body)
+}
+
+/// A word where the fit did not come to its end.
+fn ending(fitted: &Fitted) -> Markup {
+    html! {
+        @if fitted.interrupted {
+            p.w { "The fit was interrupted; these are the best values found until then." }
+        }
+        @if let Some(why) = &fitted.result.broken {
+            p.w { "The fit broke off; these are the best values found until then. " (why) }
+        }
+    }
+}
+
+/// How far measurement and model are apart, before and after, and what noise would leave.
+fn distances(fitted: &Fitted) -> Markup {
+    let (rms, noise, points) = fitted.residual();
+    let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
+    let mm = |x: f64| format!("{:.3} mm", x * 1e3);
+    let before = before.map_or("not computable".to_string(), |b| mm(total(&b, |r| r.rms)));
+    html! {
+        p {
+            "Root mean square distance between measurement and model: " b { (before) } " at the first start, " b { (mm(rms)) }
+            " with the values found; measurement noise, and the shape's rounding by cells, would leave " (mm(noise)) " (" (points)
+            " points); what cells and time step change, " code { "--grid-check" } " tells."
+        }
+        @if let Some(worth) = worth(fitted) {
+            p { (worth) "." }
+        }
+    }
+}
+
+fn parameters(fitted: &Fitted) -> Markup {
+    use Column::{Number, Text};
+    html! {
+        h2 { "Parameters" }
+        table {
+            (heads(&[("parameter", Text), ("value", Number), ("± standard error", Number), ("unit", Text)]))
+            @for (n, f) in fitted.free.iter().zip(&fitted.result.parameters) {
+                tr {
+                    td { code { (n.label()) } }
+                    td.n { (number(f.value)) @if f.at_bound.is_some() { " (at its bound)" } }
+                    td.n { (f.standard_error.map_or("–".to_string(), number)) }
+                    td { (unit(&f.unit)) }
+                }
+            }
+        }
+        @if let Some(shift) = &fitted.grid_shift {
+            p {
+                "The standard errors hold noise only. Cells and time step half as large would move "
+                @for (k, (n, f)) in fitted.free.iter().zip(&fitted.result.parameters).enumerate() {
+                    @if k > 0 { ", " }
+                    code { (n.label()) } " by " (format!("{:+.1} %", 100.0 * shift[k] / f.value.abs()))
+                }
+                "."
+            }
+        }
+    }
+}
+
+fn warnings(fitted: &Fitted) -> Markup {
+    html! {
+        h2 { "Warnings" }
+        @if fitted.warnings.is_empty() {
+            p { "None." }
+        }
+        @for w in &fitted.warnings {
+            p.w { (w) }
+        }
+    }
+}
+
+fn correlation(fitted: &Fitted) -> Markup {
+    if fitted.free.len() < 2 {
+        return Markup::default();
+    }
+    // The stronger, the darker.
+    let colour = |c: f64| format!("background:rgba(178,24,43,{:.2})", 0.4 * c.abs().powi(2));
+    html! {
+        h2 { "Correlation of the errors" }
+        table {
+            tr {
+                th {}
+                @for k in 0..fitted.free.len() { th.n { (k + 1) } }
+            }
+            @for (k, (n, row)) in fitted.free.iter().zip(&fitted.result.correlation).enumerate() {
+                tr {
+                    td { (k + 1) ". " code { (n.label()) } }
+                    @for c in row { td.n style=(colour(*c)) { (format!("{c:.2}")) } }
+                }
+            }
+        }
+    }
+}
+
+fn progress(fitted: &Fitted) -> Markup {
+    let many = fitted.result.runs.len() > 8;
+    let line = |run: usize| {
+        let mine = fitted.history.iter().filter(|h| h.start == run);
+        Curve {
+            label: if many { String::new() } else { format!("run {run}") },
+            points: mine.map(|h| (h.iteration as f64, h.cost)).collect(),
+        }
+    };
+    let lines: Vec<Curve> = (0..fitted.result.runs.len()).map(line).collect();
+    html! {
+        @if let Some(drawing) = plot(&lines, "iteration", "cost", true) {
+            h2 { "Cost of every run" }
+            (drawing)
+        }
+    }
+}
+
+fn scene(input: &ReportInput, s: usize, e: &Experiment) -> Markup {
+    let after = &input.fitted.after[s];
+    let mut lines = vec![over_time("after", after)];
+    lines.extend(input.fitted.before[s].iter().map(|b| over_time("before", b)));
+    if let Some((a, b)) = after.frames.first().zip(after.frames.last()) {
+        let mm = after.noise * 1e3;
+        lines.push(Curve { label: "noise".into(), points: vec![(a.time, mm), (b.time, mm)] });
+    }
+    html! {
+        h2 { "Residual: " (e.scene().path.display()) }
+        @if let Some(drawing) = plot(&lines, "time [s]", "rms distance [mm]", false) { (drawing) }
+        @if let Some((before, found)) = input.pictures.get(s).filter(|p| !p.1.is_empty()) {
+            p {
+                "Model in grey; measured points blue where they lie inside it, white on it, red outside (full colour at "
+                (format!("{:.2}", input.scale * 1e3)) " mm), black where they met nothing. Left of each pair: first start; right: "
+                "values found."
+            }
+            @for (k, f) in found.iter().enumerate() {
+                (figure(before.get(k).into_iter().chain([f]), &format!("t = {:.4} s", f.time)))
+            }
+        }
+    }
+}
+
+fn runs(fitted: &Fitted) -> Markup {
+    use Column::{Number, Text};
+    let list = |v: &[f64]| v.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+    let columns = [("run", Text), ("start", Text), ("end", Text), ("cost", Number), ("iterations", Number), ("status", Text)];
+    html! {
+        h2 { "Runs" }
+        table {
+            (heads(&columns))
+            @for (k, r) in fitted.result.runs.iter().enumerate() {
+                tr {
+                    td { (k) @if k == fitted.result.best { " (best)" } }
+                    td { (list(&r.start)) }
+                    td { (list(&r.end)) }
+                    td.n { (number(r.cost)) }
+                    td.n { (r.iterations) }
+                    td { (r.status.name()) }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! `result.json` of a fit.
+
+use super::Document;
+use palpate_fit::AtBound;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a fit found (`fit/1`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitDocument {
+    /// Version of the program.
+    pub version: String,
+    /// What computed: `cpu` or `gpu`.
+    pub backend: String,
+    /// The first scene's file.
+    pub scene: Option<String>,
+    /// Files of all scenes.
+    pub scenes: Vec<String>,
+    /// How it ended.
+    pub status: FitStatus,
+    /// Why it broke off, if it did.
+    pub error: Option<String>,
+    /// The numbers found.
+    pub parameters: Vec<Parameter>,
+    /// Correlation matrix of their errors `[q][q]`, of the logarithms where these are fitted.
+    pub correlation: Vec<Vec<Option<f64>>>,
+    /// Cost per scalar residual at the first start and at the best point.
+    pub cost: Cost,
+    /// Mean square residual over the squared noise: 1 where the model is right and the noise as stated.
+    pub reduced_chi_square: Option<f64>,
+    /// How many independent readings the data are worth.
+    pub independent_readings: Option<f64>,
+    /// Distance between measurement and model with the numbers found.
+    pub residual: Residual,
+    /// The same at the first start; `None` where that cannot be computed.
+    pub residual_before: Option<ResidualBefore>,
+    /// Place in `runs` of the best.
+    pub best: usize,
+    /// One search per start.
+    pub runs: Vec<Run>,
+    /// What deserves attention, in sentences.
+    pub warnings: Vec<String>,
+    /// Simulations of all searches together.
+    pub evaluations: usize,
+    /// Wall-clock time [s].
+    pub seconds: f64,
+}
+
+impl Document for FitDocument {
+    const FORMAT: &'static str = "fit/1";
+}
+
+/// How a fit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitStatus {
+    /// All searches came to their end.
+    Complete,
+    /// It was interrupted; the best until then is kept.
+    Interrupted,
+    /// The device failed; the best until then is kept.
+    BrokenOff,
+}
+
+/// One fitted number.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Path in the scene file.
+    pub path: String,
+    /// Its value, in `unit`.
+    pub value: Option<f64>,
+    /// Standard error in the same unit, from noise alone; `None` at a bound or where the data do not say.
+    pub standard_error: Option<f64>,
+    /// SI unit, `1` for none.
+    pub unit: String,
+    /// How far cells and time step half as large would move it, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer_grid_shift: Option<f64>,
+    /// The scene that it belongs to, from 0; absent where all scenes share it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<usize>,
+    /// The bound that holds it, if one does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<AtBound>,
+}
+
+/// Cost per scalar residual, half a mean square in units of noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// At the first start.
+    pub initial: Option<f64>,
+    /// At the best point.
+    #[serde(rename = "final")]
+    pub last: Option<f64>,
+}
+
+/// Distances between measurement and model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Residual {
+    /// Root mean square distance of matched points [m].
+    pub rms: Option<f64>,
+    /// What noise and the shape's rounding by cells would leave [m].
+    pub noise: Option<f64>,
+    /// Matched points and markers.
+    pub points: usize,
+    /// Points that met no part of the body.
+    pub unmatched: usize,
+    /// The same scene by scene; only of the whole.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scenes: Vec<Residual>,
+}
+
+/// Distance between measurement and model before the fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResidualBefore {
+    /// Root mean square distance [m].
+    pub rms: Option<f64>,
+}
+
+/// The search from one start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Where it began: values by label (path, and scene where it is not shared).
+    pub start: BTreeMap<String, Option<f64>>,
+    /// The best point that it found.
+    pub end: BTreeMap<String, Option<f64>>,
+    /// Cost where it began.
+    pub start_cost: Option<f64>,
+    /// Cost of the best point.
+    pub cost: Option<f64>,
+    /// Iterations done.
+    pub iterations: usize,
+    /// Simulations used.
+    pub evaluations: usize,
+    /// How it ended: `converged`, `iteration-limit`, `stalled`, `failed`, `interrupted` or `broken-off`.
+    pub status: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{keys, round_trip};
+    use super::*;
+
+    pub fn residual() -> Residual {
+        Residual { rms: Some(1e-3), noise: Some(1.0 / 3e3), points: 70, unmatched: 2, scenes: Vec::new() }
+    }
+
+    #[test]
+    fn a_fit_is_what_it_was_when_it_is_read_again() {
+        let plain = Parameter { path: "material.density".into(), unit: "kg/m³".into(), ..Parameter::default() };
+        let held = Parameter {
+            value: Some(1.0 / 3.0),
+            standard_error: Some(0.1 + 0.2),
+            finer_grid_shift: Some(-1e-300),
+            scene: Some(1),
+            at_bound: Some(AtBound::Upper),
+            ..plain.clone()
+        };
+        let values: BTreeMap<String, Option<f64>> = [("a".to_string(), Some(0.1)), ("b [scene 2]".to_string(), None)].into();
+        let fit = FitDocument {
+            version: "0.1.0".into(),
+            backend: "cpu".into(),
+            scene: Some("a.toml".into()),
+            scenes: vec!["a.toml".into(), "b.toml".into()],
+            status: FitStatus::BrokenOff,
+            error: Some("the device was \"lost\"".into()),
+            parameters: vec![plain, held],
+            correlation: vec![vec![Some(1.0), None], vec![None, Some(1.0)]],
+            cost: Cost { initial: None, last: Some(0.5) },
+            reduced_chi_square: Some(1.1),
+            independent_readings: None,
+            residual: Residual { scenes: vec![residual(), residual()], ..residual() },
+            residual_before: Some(ResidualBefore { rms: Some(0.02) }),
+            best: 0,
+            runs: vec![Run {
+                start: values.clone(),
+                end: values,
+                start_cost: None,
+                cost: Some(0.5),
+                iterations: 3,
+                evaluations: 7,
+                status: "stalled".into(),
+            }],
+            warnings: vec!["mind the ±".into()],
+            evaluations: 7,
+            seconds: 0.125,
+        };
+        let file = round_trip(&fit);
+        assert_eq!((&file["status"], &file["parameters"][1]["at_bound"]), (&"broken-off".into(), &"upper".into()));
+        assert!(file["parameters"][0]["value"].is_null() && file["cost"]["initial"].is_null() && file["cost"]["final"] == 0.5);
+        assert_eq!(keys(&file["parameters"][0]), ["path", "standard_error", "unit", "value"]);
+        let all = [
+            "backend",
+            "best",
+            "correlation",
+            "cost",
+            "error",
+            "evaluations",
+            "format",
+            "independent_readings",
+            "parameters",
+            "reduced_chi_square",
+            "residual",
+            "residual_before",
+            "runs",
+            "scene",
+            "scenes",
+            "seconds",
+            "status",
+            "version",
+            "warnings",
+        ];
+        assert_eq!(keys(&file), all);
+        assert_eq!(keys(&file["residual"]["scenes"][0]), ["noise", "points", "rms", "unmatched"]);
+    }
+}
