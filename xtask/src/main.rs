@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, blind, paper, real, table, test, tidy};
+use studies::{bench, blind, paper, real, same, table, test, tidy};
 
 /// Counts what the benchmarks allocate.
 #[global_allocator]
@@ -80,6 +80,21 @@ enum Verb {
         #[arg(long, conflicts_with_all = ["scene", "quick", "strengths"])]
         independent: bool,
     },
+    /// Compare states, costs, derivatives and a fit of small scenes, bit by bit, with bench/same.json
+    Same {
+        /// Only cases whose name holds this
+        #[arg(long, value_name = "NAME")]
+        only: Option<String>,
+        /// Only this backend
+        #[arg(long, value_name = "NAME", value_parser = ["cpu", "gpu"])]
+        backend: Option<String>,
+        /// Store what is computed instead
+        #[arg(long, requires = "why")]
+        bless: bool,
+        /// Why bits had to change, and how far they did
+        #[arg(long, value_name = "TEXT", requires = "bless", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+        why: Option<String>,
+    },
     /// Fit every measured recording and print what docs/real-data.md says of them
     Real,
     /// Run all tests, installing Mesa's software graphics adapter first where there is none and it may be installed
@@ -131,6 +146,7 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent } => {
             blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent })?;
         }
+        Verb::Same { only, backend, why, .. } => same::run(&same::Options { only, backend, why })?,
         Verb::Real => println!("\nwritten to {}", real::run()?.display()),
         Verb::Test { more } => test::run(&table::root(), &more)?,
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
