@@ -1,11 +1,9 @@
 //! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits.
 
-use crate::device::{Choice, Gpu};
-use crate::effort::{Effort, Level};
-use crate::error::GpuError;
-use crate::tuning::Tuning;
-use crate::world::{Adjoint, State, Tally, Tangent, World};
-use crate::{backward, forward, observe, read};
+use crate::device::{Choice, Gpu, GpuError};
+use crate::solve::{backward, forward};
+use crate::world::{Adjoint, Effort, Level, State, Tally, Tangent, Tuning, World};
+use crate::{observe, read, solve};
 use glam::DVec3;
 use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::plan::Plan;
@@ -52,7 +50,7 @@ impl GpuBackend {
     }
 
     fn world(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
-        let mut world = World::new(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
+        let mut world = solve::world(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
         world.alone = self.alone;
         if let Some(levels) = self.levels {
             world.effort = Level::of(levels);

@@ -1,36 +1,12 @@
 //! How much device memory an evaluation takes, known before a device is asked for it: the same code that makes buffers counts them.
 
-use crate::device::whole;
-use crate::error::GpuError;
-use crate::geometry::{Geometry, columns};
+use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::observe;
-use crate::tuning::MANY;
-use crate::world::{COLUMN_VECTORS, VECTOR, tally_sizes, work};
+use crate::world::{COLUMN_VECTORS, Geometry, MANY, VECTOR, columns, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
-
-/// Makes buffers, or counts them.
-pub(crate) trait Maker {
-    /// What is made.
-    type Buffer;
-
-    /// A zeroed storage buffer.
-    ///
-    /// # Errors
-    /// It is larger than a limit of the device.
-    fn buffer(&self, label: &str, bytes: u64) -> Result<Self::Buffer, GpuError>;
-
-    /// A storage buffer that holds `data`.
-    ///
-    /// # Errors
-    /// As [`Maker::buffer`].
-    fn upload<T: bytemuck::NoUninit>(&self, label: &str, data: &[T]) -> Result<Self::Buffer, GpuError>;
-
-    /// Largest buffer that a kernel can bind [B].
-    fn largest(&self) -> u64;
-}
 
 /// Counts bytes, on a device with such a largest buffer [B].
 struct Counter(u64);

@@ -25,14 +25,11 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use crate::device::Gpu;
-use crate::error::GpuError;
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::{directions::DIRECTION, reduce};
+use crate::device::recorder::{Args, Buffers, Named, Recorder, Size};
+use crate::device::{Gpu, GpuError, Maker};
 use crate::layout::{Carried, Found, Look, Sight};
-use crate::memory::Maker;
-use crate::pipelines::pass;
-use crate::pipelines::shared::{directions::DIRECTION, reduce};
-use crate::recorder::{Args, Named, Recorder, Size};
-use crate::world::Buffers;
 #[cfg(test)]
 pub(crate) use bounds::MOST_DIRECTIONS;
 pub(crate) use bounds::Seen;

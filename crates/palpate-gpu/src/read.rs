@@ -1,8 +1,8 @@
 //! What comes back to the host: states, and the tally as evaluations.
 
-use crate::error::GpuError;
+use crate::device::GpuError;
+use crate::device::pipelines::shared::structs as code;
 use crate::layout::Health;
-use crate::pipelines::shared::structs as code;
 use crate::world::{State, Tally, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, Failure, FailureKind, number};

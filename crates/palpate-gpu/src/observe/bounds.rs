@@ -3,7 +3,7 @@
 use super::shots::Shots;
 use super::tables::{BandTables, SiteTables};
 use super::{MOST_LOOPS, PARTS};
-use crate::error::GpuError;
+use crate::device::GpuError;
 use crate::layout::Sight;
 use palpate_model::cutcells::pullback::ITERATIONS;
 

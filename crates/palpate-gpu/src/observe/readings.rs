@@ -3,9 +3,9 @@
 //! Fronts are looked for along lines of sight as the recording has them (`shared/front.wgsl`), which effects do not move.
 
 use super::shots::{Shots, split};
-use crate::error::GpuError;
-use crate::memory::Maker;
-use crate::pipelines::shared::directions::READING;
+use crate::device::GpuError;
+use crate::device::Maker;
+use crate::device::pipelines::shared::directions::READING;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::effects::{Site, Unstated};
 use palpate_model::params::ParamKey;

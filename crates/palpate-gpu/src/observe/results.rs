@@ -2,11 +2,12 @@
 
 use super::readings::shifts;
 use super::{FOUND, Observer, VECTOR, look};
-use crate::error::GpuError;
+use crate::device::GpuError;
+use crate::device::Maker as _;
+use crate::device::pipelines::shared::structs::NONE;
+use crate::device::recorder::Buffers;
 use crate::layout::{Found, Health};
-use crate::memory::Maker as _;
-use crate::pipelines::shared::structs::NONE;
-use crate::world::{Buffers, World};
+use crate::world::World;
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, Source};
 use palpate_model::observation::kernel;

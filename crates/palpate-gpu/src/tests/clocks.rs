@@ -3,11 +3,11 @@
 use super::effects::with;
 use super::products::crowded;
 use super::scenes::{ball, device, own_device, plan, spread};
-use crate::effort::FULL;
-use crate::memory::Maker as _;
+use crate::device::Maker as _;
+use crate::device::pipelines::{PASSES, pass};
+use crate::device::recorder::{Args, QUERIES, Recorder, Size};
 use crate::observe::rollout_tests::{seen, watched};
-use crate::pipelines::{PASSES, pass};
-use crate::recorder::{Args, QUERIES, Recorder, Size};
+use crate::world::FULL;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::scene::Scene;

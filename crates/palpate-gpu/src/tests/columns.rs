@@ -2,11 +2,11 @@
 
 use super::products::crowded;
 use super::scenes::{device, own_device, plan, spread};
-use crate::geometry::columns;
+use crate::device::Maker as _;
+use crate::device::pipelines::{pass, shared::structs};
+use crate::device::recorder::{Args, Recorder, Size};
 use crate::layout::{Health, Newton, Shape};
-use crate::memory::Maker as _;
-use crate::pipelines::{pass, shared::structs};
-use crate::recorder::{Args, Recorder, Size};
+use crate::world::columns;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Backend, Direction, ParamBatch, Request};
 use palpate_model::plan::Plan;

@@ -4,10 +4,10 @@
 use super::faults::{BALANCE, Fault};
 use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, three, vectors, with_context};
 use super::scenes::{device, plan};
-use crate::effects::{BACK, BY_OLD};
-use crate::pipelines::pass;
-use crate::pipelines::shared::asks;
-use crate::solve::{ALL, Per, Solve};
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::points::{BACK, BY_OLD};
+use crate::passes::{ALL, Passes, Per};
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
@@ -41,7 +41,7 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
     let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
     backend.clear_adjoint(&mut adj);
     backend.clear_adjoint(&mut adj_now);
-    let run = |work: &dyn Fn(&mut Solve)| world.record(|r| work(&mut Solve::new(world, r, Some(0), &now, &next, &tally)));
+    let run = |work: &dyn Fn(&mut Passes)| world.record(|r| work(&mut Passes::new(world, r, Some(0), &now, &next, &tally)));
     let write = |buffer: &wgpu::Buffer, v: &[DVec3]| {
         let v: Vec<[f32; 4]> = v.iter().map(single).collect();
         world.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&v));

@@ -3,11 +3,11 @@
 use super::scenes::{ball, device, held};
 use crate::GpuBackend;
 use crate::device::Gpu;
-use crate::memory::Maker as _;
+use crate::device::Maker as _;
+use crate::device::pipelines::pass;
+use crate::device::recorder::{Args, Recorder, Size};
 use crate::observe::rollout_tests::{assert_agreement, seen, watched};
 use crate::observe::rows_tests::apart as apart_by_row;
-use crate::pipelines::pass;
-use crate::recorder::{Args, Recorder, Size};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate, ParamBatch, Request, Rollout, Wanted};

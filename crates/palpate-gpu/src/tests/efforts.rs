@@ -2,7 +2,7 @@
 
 use super::products::crowded;
 use super::scenes::{own_device, plan, spread};
-use crate::effort::{Effort, FULL};
+use crate::world::{Effort, FULL};
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use std::ops::ControlFlow;

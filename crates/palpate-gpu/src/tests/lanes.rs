@@ -3,8 +3,8 @@
 use super::effects::with;
 use super::products::crowded;
 use super::scenes::device;
+use crate::device::GpuError;
 use crate::device::{Lanes, lanes_for};
-use crate::error::GpuError;
 use crate::observe::rollout_tests::{seen, watched};
 use crate::{GpuBackend, Tuning};
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};

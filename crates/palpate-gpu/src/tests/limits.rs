@@ -1,18 +1,19 @@
 //! What is too large, lost or out of memory is an error with a name, a size and a way out.
 
 use super::scenes::{ball, device, held, own_device, plan, spread};
+use crate::device::GpuError;
+use crate::device::Maker as _;
+use crate::device::pipelines::shared::structs;
+use crate::device::pipelines::{PASSES, PassSource, Pipelines, compile, constant, pass};
+use crate::device::recorder::{Args, Recorder, Size};
 use crate::device::{Lanes, STORAGE_BUFFERS, WIDTH, WORKGROUP_BYTES, fits, no_room, refusal};
-use crate::error::GpuError;
-use crate::geometry::LOOPS;
 use crate::layout::{Health, Newton, Shape};
-use crate::memory::Maker as _;
 use crate::observe::MOST_DIRECTIONS;
-use crate::pipelines::shared::structs;
-use crate::pipelines::{PASSES, PassSource, Pipelines, compile, constant, pass};
-use crate::recorder::{Args, Recorder, Size};
-use crate::solve::{ALL, MATRIX, Per, SOLVE, Solve, TRIAL};
-use crate::tuning::Tuning;
-use crate::world::{KINDS, SECTIONS, World};
+use crate::passes::{ALL, MATRIX, Passes, Per, SOLVE, TRIAL};
+use crate::solve;
+use crate::world::LOOPS;
+use crate::world::Tuning;
+use crate::world::{KINDS, SECTIONS};
 use crate::{GpuBackend, device::Gpu};
 use palpate_engine::{Backend, Evaluate, FailureKind, ParamBatch, Request, Rollout, Wanted};
 use std::collections::HashMap;
@@ -25,7 +26,7 @@ fn a_batch_beyond_a_buffer_names_limit_and_size() {
     let available = gpu.device.limits().max_storage_buffer_binding_size;
     // A matrix has at least one number for each node: this many members need more than one binding.
     let members = (available / (36 * plan.body.nodes.len() as u64) + 1) as usize;
-    match World::new(gpu.clone(), &plan, members, Tuning::default()) {
+    match solve::world(gpu.clone(), &plan, members, Tuning::default()) {
         Err(GpuError::Limit { needed, available, .. }) => assert!(needed > available),
         other => panic!("{:?}", other.map(|w| w.bytes())),
     }
@@ -38,7 +39,7 @@ fn a_body_beyond_a_binding_names_limit_and_size() {
     let Some(mut gpu) = own_device() else { return };
     let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
     own.largest = 20_000;
-    let e = World::new(gpu, &plan(&ball(0.02)), 1, Tuning::default()).map(|w| w.bytes()).unwrap_err();
+    let e = solve::world(gpu, &plan(&ball(0.02)), 1, Tuning::default()).map(|w| w.bytes()).unwrap_err();
     let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
     assert_eq!((*limit, *available), ("max_storage_buffer_binding_size", 20_000));
     assert!(*needed > 20_000 && what.contains('`'), "{e}");
@@ -217,7 +218,7 @@ fn a_kernel_that_does_not_compile_is_named() {
     {
         let source =
             PassSource { name: "broken", sources: [text; 2], lanes: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
-        let e = compile(&gpu, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
+        let e = compile(&gpu.device, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
         assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
         assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");
         // The device is none the worse.
@@ -279,7 +280,7 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
     let wave: Vec<[f32; 4]> = (0..plan.body.nodes.len()).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), 1.0, 0.0]).collect();
     gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));
     let world = &world;
-    let run = |work: fn(&mut Solve)| world.record(|r| work(&mut Solve::new(world, r, None, &now, &next, &tally)));
+    let run = |work: fn(&mut Passes)| world.record(|r| work(&mut Passes::new(world, r, None, &now, &next, &tally)));
     let newton = || gpu.download::<Newton>(&world.buffers["newton"], 1).unwrap_or_else(|e| panic!("{e}"))[0];
     run(|s| {
         s.linearise();
@@ -303,7 +304,7 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
 #[test]
 fn more_members_than_an_invocation_may_visit_are_refused() {
     let Some(gpu) = own_device() else { return };
-    let e = World::new(gpu, &plan(&ball(0.05)), LOOPS as usize, Tuning::default()).map(|w| w.bytes()).unwrap_err();
+    let e = solve::world(gpu, &plan(&ball(0.05)), LOOPS as usize, Tuning::default()).map(|w| w.bytes()).unwrap_err();
     let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
     assert!(limit.contains("loop iterations") && needed > available && what.contains("list_members"), "{e}");
 }

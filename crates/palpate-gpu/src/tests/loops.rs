@@ -1,11 +1,11 @@
 //! No invocation loops longer than adapters allow: bounds are read off the shaders' own loops and evaluated at the largest sizes
 //! that a build accepts. A loop whose header is not known here fails the test.
 
-use crate::geometry::{LOOPS, Most, columns};
+use crate::device::pipelines::PASSES;
+use crate::device::pipelines::shared::laws;
 use crate::observe::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
-use crate::pipelines::PASSES;
-use crate::pipelines::shared::laws;
 use crate::world::KINDS;
+use crate::world::{LOOPS, Most, columns};
 use palpate_model::cutcells::{front, pullback};
 use std::collections::HashMap;
 

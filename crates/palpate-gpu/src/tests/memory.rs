@@ -2,7 +2,7 @@
 
 use super::scenes::{ball, held, own_device, plan};
 use crate::observe::rollout_tests::{seen, watched};
-use crate::{Gpu, GpuBackend, Load, Product, Tuning, memory, tuning};
+use crate::{Gpu, GpuBackend, Load, Product, Tuning, memory, world};
 use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, Effect};
 use palpate_model::params::ParamKey;
@@ -119,7 +119,7 @@ fn large_bodies_and_batches_are_foreseen() {
     let mut scene = ball(0.005);
     scene.time.steps = 2;
     let large = plan(&scene);
-    assert!(large.body.nodes.len() >= tuning::MANY, "{}", large.body.nodes.len());
+    assert!(large.body.nodes.len() >= world::MANY, "{}", large.body.nodes.len());
     check_unused(&gpu, &large, 1, &Request { gradient: Wanted::All, sensitivities: vec![0] });
     let mut scene = ball(0.02);
     scene.time.steps = 4;

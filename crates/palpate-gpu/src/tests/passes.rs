@@ -2,9 +2,9 @@
 
 use super::products::crowded;
 use super::scenes::{device, plan};
-use crate::effects::FORCE;
-use crate::pipelines::pass;
-use crate::solve::{ALL, Per, Solve};
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::points::FORCE;
+use crate::passes::{ALL, Passes, Per};
 use crate::world::{State, World};
 use crate::{GpuBackend, Product};
 use glam::{DMat3, DVec3};
@@ -158,8 +158,8 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
     parts.into_iter().chain(free).collect()
 }
 
-fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: impl FnOnce(&mut Solve)) {
-    world.record(|r| work(&mut Solve::new(world, r, Some(0), now, next, tally)));
+fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: impl FnOnce(&mut Passes)) {
+    world.record(|r| work(&mut Passes::new(world, r, Some(0), now, next, tally)));
 }
 
 /// The CPU's numbers, and its matrix.

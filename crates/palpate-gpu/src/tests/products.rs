@@ -3,10 +3,10 @@
 use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, spread};
-use crate::choices::Choices;
 use crate::observe::rollout_tests::{differences, seen, watched};
-use crate::solve::Solve;
-use crate::tuning;
+use crate::passes::Passes;
+use crate::solve;
+use crate::solve::Choices;
 use crate::world::World;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_cpu::CpuBackend;
@@ -46,7 +46,7 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
     world.gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));
     let world = &*world;
     world.record(|r| {
-        let mut s = Solve::new(world, r, Some(0), &now, &next, &tally);
+        let mut s = Passes::new(world, r, Some(0), &now, &next, &tally);
         s.linearise();
         s.begin_column(0);
         s.list();
@@ -161,14 +161,14 @@ fn a_measurement_chooses_a_product_for_large_bodies_and_keeps_it() {
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
     let choices = Choices::at(folder.path().join("products.txt"));
     let mut world = World::new(gpu.clone(), &plan, 1, many(Product::Matrix)).unwrap_or_else(|e| panic!("{e}"));
-    let chosen = tuning::faster(&mut world, &choices).unwrap_or_else(|e| panic!("{e}"));
+    let chosen = solve::faster(&mut world, &choices).unwrap_or_else(|e| panic!("{e}"));
     // Another process finds what was measured, and does not measure: it would not come to the opposite.
     let line = std::fs::read_to_string(folder.path().join("products.txt")).unwrap_or_else(|e| panic!("{e}"));
     assert!(line.starts_with(chosen.name()) && line.contains(&gpu.name) && line.contains(&gpu.driver), "{line}");
     let other = BOTH[usize::from(chosen == Product::Matrix)];
     let swapped = line.replacen(chosen.name(), other.name(), 1);
     std::fs::write(folder.path().join("products.txt"), swapped).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(tuning::faster(&mut world, &choices), Ok(other));
+    assert_eq!(solve::faster(&mut world, &choices), Ok(other));
     let small = GpuBackend::on(gpu).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     assert!(world.many && !small.many);
 }

@@ -1,7 +1,7 @@
 //! Small scenes that hold every term of the balance, and the device that tests run on.
 
+use crate::device::GpuError;
 use crate::device::{Choice, Gpu, Lanes};
-use crate::error::GpuError;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;

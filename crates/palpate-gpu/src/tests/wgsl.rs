@@ -4,7 +4,7 @@
 mod validate;
 
 use crate::device::Lanes;
-use crate::pipelines::PASSES;
+use crate::device::pipelines::PASSES;
 use validate::validate;
 
 const VARIANTS: [Lanes; 2] = [Lanes::Subgroup, Lanes::Memory];

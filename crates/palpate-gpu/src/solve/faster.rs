@@ -1,21 +1,16 @@
-//! Ways to solve of which one is faster: one or many workgroups a member, with an assembled matrix or without.
+//! Asks a device which of two ways to solve is faster.
 
-use crate::choices::Choices;
-use crate::device::Gpu;
-use crate::error::GpuError;
+use super::choices::Choices;
+use crate::device::{Gpu, GpuError};
 use crate::layout::Newton;
-use crate::solve::{SOLVE, Solve};
-use crate::world::{State, Tally, World};
+use crate::passes::{Passes, SOLVE};
+use crate::world::{MANY, Product, State, Tally, Tuning, World};
 use palpate_engine::ParamBatch;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// From so many nodes on, many workgroups share the conjugate gradients of a member: one workgroup alone then cannot draw a
-/// device's memory bandwidth. Below, a graphics processor is asked which is faster, down to [`FEW`] nodes; on a software adapter three
-/// dispatches an iteration cost more than they save.
-pub const MANY: usize = 4096;
 /// Bodies of fewer nodes are left to one workgroup.
 const FEW: usize = 256;
 /// What is not the plain way must be this much faster, so that chance does not decide between equals: which one runs decides the last
@@ -23,72 +18,6 @@ const FEW: usize = 256;
 const CLEARLY: f64 = 0.8;
 /// Products that are timed.
 const REPEATS: usize = 8;
-
-/// How A p is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Product {
-    /// With the assembled, blocked matrix.
-    Matrix,
-    /// From the element matrices, cell by cell.
-    Free,
-}
-
-impl Product {
-    /// As `PALPATE_GPU_PRODUCT` has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Product::Matrix => "csr",
-            Product::Free => "free",
-        }
-    }
-
-    /// The one of a name.
-    pub(crate) fn named(name: &str) -> Option<Product> {
-        [Product::Matrix, Product::Free].into_iter().find(|p| p.name() == name)
-    }
-}
-
-/// What is given instead of chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tuning {
-    /// Nodes from which on many workgroups share a solve.
-    pub many_from: usize,
-    /// `None` = whichever is faster on the device.
-    pub product: Option<Product>,
-}
-
-impl Default for Tuning {
-    fn default() -> Tuning {
-        Tuning { many_from: MANY, product: None }
-    }
-}
-
-impl Tuning {
-    /// As `PALPATE_GPU_CG` (one, many) and `PALPATE_GPU_PRODUCT` (csr, free) say.
-    ///
-    /// # Errors
-    /// They say something else.
-    pub fn from_env() -> Result<Tuning, GpuError> {
-        let get = |name| std::env::var(name).unwrap_or_default();
-        Tuning::parse(&get("PALPATE_GPU_CG"), &get("PALPATE_GPU_PRODUCT"))
-    }
-
-    fn parse(cg: &str, product: &str) -> Result<Tuning, GpuError> {
-        let wrong = |name, value: &str, allowed| GpuError::Setting { name, value: value.into(), allowed };
-        Ok(Tuning {
-            many_from: match cg {
-                "" => MANY,
-                "one" => usize::MAX,
-                "many" => 0,
-                _ => return Err(wrong("PALPATE_GPU_CG", cg, "one, many")),
-            },
-            product: match product {
-                "" => None,
-                name => Some(Product::named(name).ok_or_else(|| wrong("PALPATE_GPU_PRODUCT", name, "csr, free"))?),
-            },
-        })
-    }
-}
 
 /// Names of the choice between one and many workgroups.
 const WORKGROUPS: [&str; 2] = ["one", "many"];
@@ -117,6 +46,19 @@ impl Tuning {
         })?;
         Ok(ways[chosen])
     }
+}
+
+/// A plan made ready on a device, with the ways to solve that are stated, or else faster.
+///
+/// # Errors
+/// The plan needs something this backend lacks, or more than the device has.
+pub(crate) fn world(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
+    let tuning = tuning.on_device(&gpu, plan)?;
+    let mut world = World::new(gpu, plan, members, tuning)?;
+    if world.many && tuning.product.is_none() && !world.needs_matrix() {
+        world.product = faster(&mut world, &Choices::of_user())?;
+    }
+    Ok(world)
 }
 
 /// Choices of this process.
@@ -179,7 +121,7 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
         world.record(|r| {
             // Solves that have ended, as an earlier one may have, multiply nothing.
             r.clear(&world.buffers["cg_scalars"]);
-            let mut s = Solve::new(world, r, Some(0), &blank, &blank, &tally);
+            let mut s = Passes::new(world, r, Some(0), &blank, &blank, &tally);
             s.list();
             for _ in 0..repeats {
                 s.multiply(product, 0);

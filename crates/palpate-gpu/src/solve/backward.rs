@@ -1,25 +1,25 @@
 //! Adjoint and tangent of start and step, with the exact tangent at the converged state.
 
-use crate::effects;
-use crate::geometry::columns;
-use crate::pipelines::pass;
-use crate::pipelines::shared::asks;
-use crate::solve::{ALL, Per, Solve};
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::points::{BACK, BY_OLD};
+use crate::passes::{ALL, Passes, Per};
+use crate::world::columns;
 use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
 use palpate_model::scene::InitialShape;
 
 /// Adjoint of step k: adds to dJ/d(now) and to dJ/dθ.
 pub(crate) fn step_adjoint(world: &World, k: usize, now: &State, next: &State, adj: &Adjoint, adj_now: &Adjoint, tally: &Tally) {
     world.record(|r| {
-        let mut s = Solve::new(world, r, Some(k), now, next, tally);
+        let mut s = Passes::new(world, r, Some(k), now, next, tally);
         s.linearise();
         s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
         s.solve();
         s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
-        s.couple_patches(effects::BACK, &[]);
+        s.couple_patches(BACK, &[]);
         s.couple_cells(asks::TRANSPOSED, &[]);
         s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
-        s.press_nodes(ALL, effects::BACK, None, &adj_now.0.buffer, &[]);
+        s.press_nodes(ALL, BACK, None, &adj_now.0.buffer, &[]);
         s.add_columns();
     });
 }
@@ -29,7 +29,7 @@ pub(crate) fn start_adjoint(world: &World, first: &State, adj: &Adjoint, tally: 
     let blank = State(world.lend(3));
     world.record(|r| {
         r.clear(&blank.0.buffer);
-        let mut s = Solve::new(world, r, None, &blank, first, tally);
+        let mut s = Passes::new(world, r, None, &blank, first, tally);
         s.list();
         s.add_start_columns(&adj.0.buffer);
         if world.plan.initial == InitialShape::StaticEquilibrium {
@@ -50,7 +50,7 @@ pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tal
     world.record(|r| {
         r.clear(&blank.0.buffer);
         tangent.parts.iter().for_each(|part| r.clear(&part.buffer));
-        let mut s = Solve::new(world, r, None, &blank, first, tally);
+        let mut s = Passes::new(world, r, None, &blank, first, tally);
         room.lend_to(&mut s);
         s.list();
         for (part, p) in tangent.parts.iter().zip(&tangent.directions) {
@@ -90,7 +90,7 @@ pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, o
     let flight = &world.buffers["trial"];
     let all: Vec<_> = old.parts.iter().zip(&new.parts).zip(&old.directions).collect();
     world.record(|r| {
-        let mut s = Solve::new(world, r, Some(k), now, next, tally);
+        let mut s = Passes::new(world, r, Some(k), now, next, tally);
         room.lend_to(&mut s);
         s.linearise();
         for together in all.chunks(room.columns) {
@@ -101,10 +101,10 @@ pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, o
                 s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
                 s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
                 s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &[("probe", from)]);
-                s.couple_patches(effects::BY_OLD, &[("probe", from)]);
+                s.couple_patches(BY_OLD, &[("probe", from)]);
                 s.couple_cells(asks::ALONG, &[("probe", from)]);
                 s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
-                s.press_nodes(ALL, effects::BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
+                s.press_nodes(ALL, BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
                 s.begin_column(q);
             }
             s.solve_columns(together.len());
@@ -131,7 +131,7 @@ impl ColumnRoom {
         ColumnRoom { columns, loans: (0..count).map(|_| world.lend(columns as u64)).collect() }
     }
 
-    fn lend_to<'a>(&'a self, s: &mut Solve<'a, '_>) {
+    fn lend_to<'a>(&'a self, s: &mut Passes<'a, '_>) {
         s.own.extend(COLUMN_VECTORS.iter().zip(&self.loans).map(|(name, loan)| (*name, &loan.buffer)));
     }
 

@@ -5,29 +5,19 @@
 mod grips;
 mod rests;
 
-use crate::error::GpuError;
-use crate::layout::EffectSite;
-use crate::memory::Maker;
-use crate::pipelines::pass;
-use crate::pipelines::shared::laws;
-use crate::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE, COLUMN, INDEX_AT, KIND_AT, QUESTION_AT};
-pub(crate) use crate::pipelines::shared::points::{BACK, BY_OLD, FORCE, STIFFNESS};
-use crate::pipelines::shared::structs::{
+use crate::device::pipelines::shared::laws;
+use crate::device::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE};
+use crate::device::pipelines::shared::structs::{
     FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, NONE, SCALARS_AT,
 };
-use crate::recorder::Named;
-use crate::solve::{Per, Solve};
+use crate::device::{GpuError, Maker};
+use crate::layout::EffectSite;
 use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
-
-/// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
-pub(crate) fn column(kind: u32, index: u32) -> u32 {
-    COLUMN + (kind << (KIND_AT - QUESTION_AT)) + (index << (INDEX_AT - QUESTION_AT))
-}
 
 /// Most laws of cells of a plan.
 const MOST_LAWS: usize = laws::MOST_LAWS as usize;
@@ -282,26 +272,4 @@ fn scalars(plan: &Plan) -> u32 {
 fn shares(plan: &Plan, law: &Law, p: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
     let Site::Nodes(point) = law.site else { return None };
     point.shares(&plan.body.nodes, &plan.body.node_volume, p)
-}
-
-impl Solve<'_, '_> {
-    /// Asks every effect on nodes (or the one of number `only`) and adds its answer to `forces`, or to the matrix.
-    pub(crate) fn press_nodes(&mut self, section: u32, question: u32, only: Option<usize>, forces: &wgpu::Buffer, more: &Named) {
-        let named: Vec<_> = more.iter().copied().chain([("forces", forces)]).collect();
-        self.press(pass::PRESS_NODES, Per::Node, [section, question], only, &named);
-    }
-
-    /// Asks every effect on patches (or the one of number `only`) and adds its answer to what the planes' pass left.
-    pub(crate) fn press_patches(&mut self, section: u32, question: u32, only: Option<usize>, more: &Named) {
-        self.press(pass::PRESS_PATCHES, Per::Patch, [section, question], only, more);
-    }
-
-    fn press(&mut self, pass: usize, per: Per, [section, question]: [u32; 2], only: Option<usize>, more: &Named) {
-        let world = self.world;
-        for (k, (number, site)) in world.geometry.effects.points.iter().enumerate() {
-            if (site.site == AT_NODES) == matches!(per, Per::Node) && only.is_none_or(|o| o == *number) {
-                self.run_with(pass, section, per, k as u32 + (question << QUESTION_AT), more);
-            }
-        }
-    }
 }

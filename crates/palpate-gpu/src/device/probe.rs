@@ -1,10 +1,10 @@
 //! Asks a kernel whether eight neighbouring invocations sit side by side in a subgroup, which no API promises.
 
-use crate::device::Gpu;
-use crate::error::GpuError;
-use crate::memory::Maker as _;
-use crate::pipelines::{PASSES, pass};
-use crate::recorder::{Args, Recorder, Size};
+use super::buffers::Maker as _;
+use super::error::GpuError;
+use super::gpu::Gpu;
+use super::pipelines::{PASSES, pass};
+use super::recorder::{Args, Recorder, Size};
 use std::collections::HashMap;
 
 /// True when sums over groups of eight lanes come out right.

@@ -1,13 +1,16 @@
 //! Records dispatches: a pass by its number, buffers by their names, sizes in members and items.
 
-use crate::device::Gpu;
-use crate::error::GpuError;
+use super::error::GpuError;
+use super::gpu::Gpu;
+use super::pipelines::{PASSES, shared::roster};
 use crate::layout::Call;
-use crate::pipelines::{PASSES, shared::roster};
 use std::collections::HashMap;
 
 /// Named buffers: what a pass finds under the names in its WGSL.
 pub type Named<'a> = [(&'static str, &'a wgpu::Buffer)];
+
+/// Buffers by the names that kernels know them by.
+pub type Buffers = HashMap<&'static str, wgpu::Buffer>;
 
 /// Most workgroups along one axis of a dispatch (the WebGPU limit; every device has at least this).
 pub const MOST_GROUPS: u64 = roster::WIDEST as u64;
@@ -43,7 +46,7 @@ pub struct PassTime {
 /// A command buffer in the making, over a set of buffers that all its passes can name.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
-    world: &'a HashMap<&'static str, wgpu::Buffer>,
+    world: &'a Buffers,
     encoder: wgpu::CommandEncoder,
     groups: &'a mut Groups,
     timer: Option<Timer>,
@@ -92,12 +95,7 @@ pub struct Args {
 
 impl<'a> Recorder<'a> {
     /// Starts recording.
-    pub fn new(
-        gpu: &'a Gpu,
-        world: &'a HashMap<&'static str, wgpu::Buffer>,
-        groups: &'a mut Groups,
-        timed: bool,
-    ) -> Recorder<'a> {
+    pub fn new(gpu: &'a Gpu, world: &'a Buffers, groups: &'a mut Groups, timed: bool) -> Recorder<'a> {
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("palpate") });
         let timer = (timed && gpu.tick().is_some()).then(|| Timer { sets: Vec::new(), passes: Vec::new() });
         Recorder { gpu, world, encoder, groups, timer, open: None }
@@ -112,7 +110,7 @@ impl<'a> Recorder<'a> {
 
     fn try_run(&mut self, pass: usize, own: &Named, size: Size, args: Args) -> Result<(), GpuError> {
         let source = &PASSES[pass];
-        let kernel = self.gpu.pipelines.get(self.gpu, pass).map_err(Clone::clone)?;
+        let kernel = self.gpu.pipelines.get(&self.gpu.device, pass).map_err(Clone::clone)?;
         let mut buffers = Vec::with_capacity(source.bindings.len());
         for (name, ..) in source.bindings {
             let found = own.iter().find(|b| b.0 == *name).map(|b| b.1).or_else(|| self.world.get(name));

@@ -1,10 +1,8 @@
 //! What members differ in: θ decoded, planes, clamp poses over time, element matrices per Poisson's ratio.
 
-use crate::device::Gpu;
-use crate::error::GpuError;
-use crate::geometry::Geometry;
+use super::geometry::Geometry;
+use crate::device::{Gpu, GpuError, Maker as _};
 use crate::layout::{ClampPose, Member, Plane};
-use crate::memory::Maker as _;
 use glam::DVec3;
 use palpate_engine::ParamBatch;
 use palpate_model::cutcells::corotation::M24;

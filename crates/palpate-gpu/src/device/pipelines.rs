@@ -1,8 +1,16 @@
 //! Kernels as the build script found them, compiled when they are first used.
 
-use crate::device::{Gpu, Lanes, translate};
-use crate::error::GpuError;
+use super::error::{GpuError, translate};
 use std::sync::OnceLock;
+
+/// How the eight lanes of a cell talk to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lanes {
+    /// Subgroup shuffles.
+    Subgroup,
+    /// Workgroup memory.
+    Memory,
+}
 
 /// A buffer of a kernel: name, number, whether it is written, whether it is a uniform.
 pub type Binding = (&'static str, u32, bool, bool);
@@ -75,13 +83,16 @@ impl Pipelines {
     }
 
     /// The kernel of a pass.
-    pub(crate) fn get(&self, gpu: &Gpu, pass: usize) -> Result<&Kernel, &GpuError> {
-        self.kernels[pass].get_or_init(|| compile(gpu, &PASSES[pass], self)).as_ref()
+    pub(crate) fn get(&self, device: &wgpu::Device, pass: usize) -> Result<&Kernel, &GpuError> {
+        self.kernels[pass].get_or_init(|| compile(device, &PASSES[pass], self)).as_ref()
     }
 }
 
-pub(crate) fn compile(gpu: &Gpu, source: &PassSource, pipelines: &Pipelines) -> Result<Kernel, GpuError> {
-    let device = &gpu.device;
+/// Hands a kernel to the driver.
+///
+/// # Errors
+/// It refuses.
+pub(crate) fn compile(device: &wgpu::Device, source: &PassSource, pipelines: &Pipelines) -> Result<Kernel, GpuError> {
     let entries: Vec<wgpu::BindGroupLayoutEntry> = source
         .bindings
         .iter()

@@ -1,13 +1,13 @@
 //! What benchmarks ask a device: how long passes take, how fast it copies, what an iteration of conjugate gradients takes and moves.
 
-use crate::device::Gpu;
-use crate::error::GpuError;
+use super::faster;
+use crate::device::Maker as _;
+use crate::device::pipelines::shared::asks;
+use crate::device::recorder::PassTime;
+use crate::device::{Gpu, GpuError};
 use crate::layout::Newton;
-use crate::memory::Maker as _;
-use crate::pipelines::shared::asks;
-use crate::recorder::PassTime;
-use crate::solve::Solve;
-use crate::tuning::{self, Product};
+use crate::passes::Passes;
+use crate::world::Product;
 use crate::world::{State, Tally, VECTOR, World};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -103,7 +103,7 @@ impl World {
 
     fn time_cg(&self) -> Result<CgSpeed, GpuError> {
         let products = if self.many { vec![Product::Matrix, Product::Free] } else { Vec::new() };
-        let alone = |p: Product| Ok((p, Traffic { seconds: tuning::time(self, p)?, bytes: self.bytes_of(p) }));
+        let alone = |p: Product| Ok((p, Traffic { seconds: faster::time(self, p)?, bytes: self.bytes_of(p) }));
         let products = products.into_iter().map(alone).collect::<Result<Vec<_>, GpuError>>()?;
         let rest = Rest { tally: Tally::new(self, &[]), blank: State(self.lend(3)) };
         self.record(|r| r.clear(&rest.blank.0.buffer));
@@ -120,7 +120,7 @@ impl World {
         let repeats = if self.many { ITERATIONS } else { 1 };
         // The first run compiles the kernels.
         run(repeats)?;
-        let seconds = (tuning::shortest(|| run(repeats))? - tuning::shortest(|| run(0))?).max(1e-6);
+        let seconds = (faster::shortest(|| run(repeats))? - faster::shortest(|| run(0))?).max(1e-6);
         run(repeats)?;
         let iterations = self.iterations_done()?;
         // Directions and rests are turned and advanced: 13 vectors a node.
@@ -130,8 +130,8 @@ impl World {
         Ok(CgSpeed { many: self.many, product: self.product, iteration, iterations, products })
     }
 
-    fn work(&self, rest: &Rest, record: impl FnOnce(&mut Solve)) {
-        self.record(|r| record(&mut Solve::new(self, r, Some(0), &rest.blank, &rest.blank, &rest.tally)));
+    fn work(&self, rest: &Rest, record: impl FnOnce(&mut Passes)) {
+        self.record(|r| record(&mut Passes::new(self, r, Some(0), &rest.blank, &rest.blank, &rest.tally)));
     }
 
     /// Makes a solve ready that does not end by itself.

@@ -2,7 +2,7 @@
 //! (`shared/unstrained.wgsl`).
 
 use super::Effects;
-use crate::pipelines::shared::structs::FIELD_REST;
+use crate::device::pipelines::shared::structs::FIELD_REST;
 use glam::DVec3;
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::effects::Site;

@@ -1,9 +1,9 @@
 //! What effects make of clamps, computed on the host: poses over time, matrices, and the derivatives of both.
 
 use super::Effects;
-use crate::error::GpuError;
+use crate::device::GpuError;
+use crate::device::pipelines::shared::structs::FIELD_GRIPS;
 use crate::layout::{ClampPose, HoldSlope};
-use crate::pipelines::shared::structs::FIELD_GRIPS;
 use glam::{DMat3, DVec3};
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::effects::field::Spot;

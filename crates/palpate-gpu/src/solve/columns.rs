@@ -1,17 +1,17 @@
 //! ∂r/∂p on the device: which passes make the column of each parameter, for the adjoint (dotted with z) and for tangents.
 
-use crate::effects;
-use crate::pipelines::pass;
-use crate::pipelines::shared::asks::{
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::asks::{
     HOLD_AGING, HOLD_GRIP, HOLD_MATRIX, HOLD_POISSON, HOLD_REST, HOLD_ROW, HOLD_SLOPE, HOLD_TIME, HOLD_YOUNG, NO_HOLD, NO_TOUCH,
     OF_SHAPE, OF_VELOCITY, PLANE_ASKS, PLANE_HEIGHT, PLANE_PHI, PLANE_THETA, TOUCH_YOUNG,
 };
-use crate::pipelines::shared::keys::{
+use crate::device::pipelines::shared::keys::{
     AGING_SLOPE, ANGULAR_VELOCITY, DENSITY, DENSITY_SLOPE, EFFECT, GRAVITY, KEYS, MASS_DAMPING, MODULUS_SLOPE, NOTHING, OF_CELLS,
     PLANE, POINT_MASS, POISSON_RATIO, REST_SLOPE, SLOTS, START_SHAPE, START_SPIN, STIFFNESS_DAMPING, TIME_START, VELOCITY,
     YOUNGS_MODULUS,
 };
-use crate::solve::{ALL, Per, Solve};
+use crate::passes::{ALL, Passes, Per};
+use crate::terms::point_laws;
 use palpate_model::effects::Site;
 use palpate_model::params::ParamKey;
 
@@ -26,18 +26,19 @@ pub(crate) struct Column {
     press: Option<(u32, Option<usize>)>,
 }
 
-impl Solve<'_, '_> {
+impl Passes<'_, '_> {
     /// How a parameter enters this balance, or `None`.
     pub(crate) fn column_of(&self, key: ParamKey) -> Option<Column> {
         let dynamic = self.step.is_some();
         let column = |kind, index: u32, cells| Some(Column { kind, index, cells, press: None });
         let plane = |what: u32, i: u16| {
             let index = PLANE_ASKS * u32::from(i) + what;
-            let press = Some((effects::column(PLANE, index), None));
+            let press = Some((point_laws::question(PLANE, index), None));
             Some(Column { kind: PLANE, index: 0, cells: Some([index, NO_HOLD]), press })
         };
         // Effects on points answer to these as well.
-        let pressed = |kind, index, cells| Some(Column { kind, index, cells, press: Some((effects::column(kind, index), None)) });
+        let pressed =
+            |kind, index, cells| Some(Column { kind, index, cells, press: Some((point_laws::question(kind, index), None)) });
         match key {
             ParamKey::YoungsModulus => pressed(YOUNGS_MODULUS, 0, Some([TOUCH_YOUNG, HOLD_YOUNG])),
             ParamKey::PoissonRatio => column(POISSON_RATIO, 0, Some([NO_TOUCH, HOLD_POISSON])),
@@ -89,7 +90,7 @@ impl Solve<'_, '_> {
             return None;
         }
         let cells = known.on_patches().then_some([NO_TOUCH, NO_HOLD]);
-        Some(Column { kind: NOTHING, index: 0, cells, press: Some((effects::column(EFFECT, slot), Some(effect))) })
+        Some(Column { kind: NOTHING, index: 0, cells, press: Some((point_laws::question(EFFECT, slot), Some(effect))) })
     }
 
     /// ∂r/∂p → `column`.

@@ -1,8 +1,8 @@
 //! Start and step: what one call of the backend puts on the device's list.
 
-use crate::pipelines::pass;
-use crate::recorder::{Args, Size};
-use crate::solve::{ALL, Per, Solve};
+use crate::device::pipelines::pass;
+use crate::device::recorder::{Args, Size};
+use crate::passes::{ALL, Passes, Per};
 use crate::world::{State, Tally, World};
 use palpate_model::plan::STATIC_ITERATIONS;
 use palpate_model::scene::InitialShape;
@@ -22,7 +22,7 @@ pub(crate) fn start(world: &mut World, first: &mut State, tally: &mut Tally) {
         r.clear(&first.0.buffer);
         r.clear(&blank.0.buffer);
         let steps = world.plan.initial == InitialShape::StaticEquilibrium;
-        let mut s = Solve::new(world, r, None, &blank, first, tally);
+        let mut s = Passes::new(world, r, None, &blank, first, tally);
         s.recorder.run(
             pass::CHECK_MEMBERS,
             &s.own.clone(),
@@ -50,5 +50,5 @@ fn world_steps(world: &World) {
 
 /// Step k.
 pub(crate) fn step(world: &World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
-    world.record(|r| Solve::new(world, r, Some(k), now, next, tally).newton(world.plan.solver.newton_iterations));
+    world.record(|r| Passes::new(world, r, Some(k), now, next, tally).newton(world.plan.solver.newton_iterations));
 }

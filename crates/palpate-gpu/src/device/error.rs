@@ -151,6 +151,22 @@ impl GpuError {
     }
 }
 
+/// wgpu's error as ours.
+pub(crate) fn translate(e: wgpu::Error) -> GpuError {
+    // Its words are spread over indented lines.
+    let flat = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match e {
+        wgpu::Error::OutOfMemory { source } => GpuError::OutOfMemory { what: flat(source.to_string()) },
+        // Whatever is asked of a device that is gone is refused so.
+        wgpu::Error::Validation { description, .. } if description.contains("device is lost") => {
+            GpuError::Lost { reason: flat(description) }
+        }
+        wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
+            GpuError::refused(flat(description))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

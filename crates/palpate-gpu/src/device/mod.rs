@@ -1,0 +1,24 @@
+//! A graphics device: adapters, errors, buffers, kernels, and lists of dispatches. Nothing here knows what is simulated.
+
+mod adapters;
+mod buffers;
+mod error;
+mod gpu;
+mod open;
+pub mod pipelines;
+mod probe;
+pub mod recorder;
+
+pub use adapters::{AdapterReport, Choice, adapters};
+pub(crate) use buffers::{Maker, whole};
+pub use error::GpuError;
+pub use gpu::Gpu;
+pub use pipelines::Lanes;
+
+#[cfg(test)]
+pub(crate) use {
+    adapters::{STORAGE_BUFFERS, WIDTH, WORKGROUP_BYTES, refusal},
+    buffers::{fits, no_room},
+    error::translate,
+    open::lanes_for,
+};

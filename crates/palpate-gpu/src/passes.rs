@@ -1,0 +1,98 @@
+//! One balance of forces on the way to the device: its passes, each over the members that take part. The device decides who does.
+
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::{roster, structs};
+use crate::device::recorder::{Args, Named, Recorder, Size};
+use crate::world::{KINDS, State, Tally, World};
+
+/// Sections of the roster: all, or those at one stage.
+pub(crate) const ALL: u32 = structs::IDLE;
+pub(crate) const MATRIX: u32 = structs::WANTS_MATRIX;
+pub(crate) const SOLVE: u32 = structs::WANTS_SOLVE;
+pub(crate) const TRIAL: u32 = structs::WANTS_TRIAL;
+
+/// What the items of a dispatch are: the kinds of `list_members`.
+#[derive(Clone, Copy, Debug)]
+#[repr(u32)]
+pub(crate) enum Per {
+    Member = roster::PER_MEMBER,
+    Node = roster::PER_NODE,
+    Cell = roster::PER_CELL,
+    Block = roster::PER_BLOCK,
+    Patch = roster::PER_PATCH,
+    Hold = roster::PER_HOLD,
+    /// Nodes, in workgroups of 256.
+    Wide = roster::PER_WIDE,
+    /// Nodes with eight lanes each, in workgroups of 256.
+    Row = roster::PER_ROW,
+}
+
+/// One balance on the way to the device: a step, or the static problem.
+pub(crate) struct Passes<'a, 'r> {
+    pub(crate) world: &'a World,
+    pub(crate) recorder: &'a mut Recorder<'r>,
+    /// Step number; `None` = static.
+    pub(crate) step: Option<usize>,
+    /// Names of this balance's own buffers.
+    pub(crate) own: Vec<(&'static str, &'a wgpu::Buffer)>,
+    /// Columns of each member that the roster lists: more than one while several are solved for at the same time.
+    pub(crate) columns: u32,
+}
+
+impl<'a, 'r> Passes<'a, 'r> {
+    pub(crate) fn new(
+        world: &'a World,
+        recorder: &'a mut Recorder<'r>,
+        step: Option<usize>,
+        now: &'a State,
+        next: &'a State,
+        tally: &'a Tally,
+    ) -> Passes<'a, 'r> {
+        let own = vec![
+            ("now", &now.0.buffer),
+            ("next", &next.0.buffer),
+            ("health", tally.get("health")),
+            ("gradient", tally.get("gradient")),
+            // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
+            ("probe", &world.buffers["direction"]),
+        ];
+        Passes { world, recorder, step, own, columns: 1 }
+    }
+
+    /// One dispatch over the members of a section of the roster.
+    pub(crate) fn run(&mut self, pass: usize, section: u32, per: Per, extra: u32) {
+        self.run_with(pass, section, per, extra, &[]);
+    }
+
+    /// The same with more buffers.
+    pub(crate) fn run_with(&mut self, pass: usize, section: u32, per: Per, extra: u32, more: &Named) {
+        let shape = &self.world.geometry.shape;
+        let empty = match per {
+            Per::Patch => shape.patches == 0,
+            Per::Hold => shape.holds == 0,
+            _ => false,
+        };
+        if empty {
+            return;
+        }
+        let roster = section * (self.columns * shape.members + 1);
+        let args = Args { step: self.step.unwrap_or(0) as u32, mode: u32::from(self.step.is_some()), roster, extra };
+        let offset = 12 * (section as usize * KINDS + per as usize) as u64;
+        let named: Vec<_> = more.iter().chain(&self.own).copied().collect();
+        self.recorder.run(pass, &named, Size::Indirect(offset), args);
+    }
+
+    /// Lists anew who takes part in what, and whether [`Passes::relist`] has anything to do from here on.
+    pub(crate) fn list(&mut self) {
+        let own = self.own.clone();
+        let args = Args { extra: self.columns, ..Args::default() };
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::All { members: 1, groups: 1 }, args);
+    }
+
+    /// Lists anew, unless the last [`Passes::list`] found nobody who wants anything. (A dispatch may not write its own size, so
+    /// these leave the gate as it is.)
+    pub(crate) fn relist(&mut self) {
+        let own: Vec<_> = [("gate", &self.world.buffers["no_gate"])].into_iter().chain(self.own.iter().copied()).collect();
+        self.recorder.run(pass::LIST_MEMBERS, &own, Size::Gate, Args { extra: self.columns, ..Args::default() });
+    }
+}

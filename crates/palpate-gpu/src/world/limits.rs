@@ -1,0 +1,75 @@
+//! How long the loops of one invocation may be, and how many columns are solved for at the same time.
+
+use crate::device::GpuError;
+
+/// Loop iterations that one invocation may use up in one dispatch: lavapipe silently stops at 65,535.
+pub(crate) const LOOPS: u64 = 32_000;
+/// Most columns of a member (derivatives by so many parameters) that are solved for at the same time.
+const COLUMNS: u64 = 8;
+
+/// Columns that a batch of so many members is solved for at the same time: one invocation lists them all.
+pub(crate) fn columns(members: u64) -> u64 {
+    ((LOOPS - LISTING) / members.max(1)).clamp(1, COLUMNS)
+}
+
+/// Loop iterations of a listing beside those over members and columns.
+const LISTING: u64 = 16;
+
+/// What the loops of the kernels of a step run over, at most.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Most {
+    pub(crate) members: u64,
+    pub(crate) nodes: u64,
+    /// Blocks of a row of the matrix.
+    pub(crate) row: u64,
+    /// Patches and clamp cells of a cell.
+    pub(crate) supports: u64,
+    pub(crate) planes: u64,
+    /// Planes at which effects on contact are asked.
+    pub(crate) pressed: u64,
+    pub(crate) masses: u64,
+    /// Iterations of conjugate gradients in one dispatch.
+    pub(crate) chunk: u64,
+    /// Many workgroups share the solve of a member.
+    pub(crate) many: bool,
+}
+
+impl Most {
+    /// Nodes that a lane of a workgroup of 256 goes through.
+    pub(crate) fn share(&self) -> u64 {
+        self.nodes.div_ceil(256)
+    }
+
+    /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums.
+    pub(super) fn of_iteration(&self) -> u64 {
+        1 + self.share() * (self.row + 4 + 17 * self.masses) + 20
+    }
+
+    /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 8] {
+        // 600: rotations by Jacobi's method, and sums over the corners of a cell.
+        let cell = 600 + self.supports;
+        [
+            ("list_members", columns(self.members) * self.members + LISTING),
+            ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
+            ("begin_solve", 4 * self.share() + 300),
+            ("step_back", 2 * self.row + 20),
+            // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
+            ("press_patches", 380 * self.pressed.max(1) + 100),
+            ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
+            ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
+            ("gather_column", cell + self.row + 20 * self.masses + self.planes),
+        ]
+    }
+}
+
+/// Refuses sizes at which an invocation of some kernel could loop longer than every adapter allows.
+pub(super) fn check_loops(most: &Most) -> Result<(), GpuError> {
+    match most.loops().into_iter().find(|l| l.1 > LOOPS) {
+        None => Ok(()),
+        Some((what, needed)) => {
+            let limit = "loop iterations of one invocation";
+            Err(GpuError::Limit { limit, available: LOOPS, needed, what: format!("the kernel `{what}`") })
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What the backend holds: a plan's buffers and a batch's, states on loan from a pool, and what is read at the end.
+
+mod effects;
+mod effort;
+mod geometry;
+mod limits;
+mod members;
+mod room;
+mod states;
+mod tally;
+mod tuning;
+
+pub(crate) use effort::{Effort, FULL, Level};
+pub(crate) use geometry::Geometry;
+pub(crate) use limits::columns;
+pub(crate) use room::{COLUMN_VECTORS, KINDS, VECTOR, work};
+pub(crate) use states::Loan;
+pub use states::{Adjoint, State, Tangent};
+pub use tally::Tally;
+pub(crate) use tally::tally_sizes;
+pub(crate) use tuning::MANY;
+pub use tuning::{Product, Tuning};
+#[cfg(test)]
+pub(crate) use {
+    limits::{LOOPS, Most},
+    room::SECTIONS,
+};
+
+use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
+use crate::device::{Gpu, GpuError, Maker as _};
+use crate::observe::Observer;
+use members::Batch;
+use palpate_engine::ParamBatch;
+use palpate_model::effects::sensors::Sensors;
+use palpate_model::plan::Plan;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A plan made ready on a device, and the current batch.
+#[derive(Debug)]
+pub struct World {
+    pub(crate) gpu: Arc<Gpu>,
+    pub(crate) plan: Plan,
+    pub(crate) geometry: Geometry,
+    pub(crate) batch: Batch,
+    pub(crate) observer: Observer,
+    pub(crate) capacity: usize,
+    pub(crate) buffers: Buffers,
+    pool: Arc<Mutex<Vec<wgpu::Buffer>>>,
+    groups: RefCell<Groups>,
+    /// Time on the device per pass, when asked for.
+    pub(crate) times: RefCell<HashMap<&'static str, PassTime>>,
+    pub(crate) timed: bool,
+    /// True when many workgroups share the solve of a member.
+    pub(crate) many: bool,
+    pub(crate) product: Product,
+    pub(crate) effort: Level,
+    /// True where its owner runs one simulation at a time.
+    pub(crate) alone: bool,
+}
+
+impl World {
+    pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
+        let mut buffers = Buffers::new();
+        let capacity = members.max(1);
+        let many = plan.body.nodes.len() >= tuning.many_from;
+        let geometry = Geometry::new(&*gpu, plan, capacity, many, &mut buffers)?;
+        for (name, bytes) in work(&geometry.shape, capacity) {
+            buffers.insert(name, gpu.buffer(name, bytes)?);
+        }
+        let observer = Observer::new(&gpu, plan, capacity)?;
+        let effort = Level::new(!gpu.is_software());
+        let mut world = World {
+            gpu,
+            plan: plan.clone(),
+            geometry,
+            batch: Batch::default(),
+            observer,
+            capacity,
+            buffers,
+            pool: Arc::default(),
+            groups: RefCell::default(),
+            times: RefCell::default(),
+            timed: false,
+            many,
+            product: tuning.product.unwrap_or(Product::Matrix),
+            effort,
+            alone: false,
+        };
+        if world.needs_matrix() {
+            world.product = Product::Matrix;
+        }
+        Ok(world)
+    }
+
+    /// True where effects add to blocks, which only the matrix holds.
+    pub(crate) fn needs_matrix(&self) -> bool {
+        self.geometry.effects.on_nodes() || self.geometry.effects.on_cells()
+    }
+
+    /// Members of the current batch.
+    pub fn members(&self) -> usize {
+        self.batch.physics.len()
+    }
+
+    /// Device memory that the world's own buffers take [B]; states come on top.
+    pub fn bytes(&self) -> u64 {
+        self.buffers.values().map(wgpu::Buffer::size).sum::<u64>() + self.observer.bytes()
+    }
+
+    pub(crate) fn set_params(&mut self, theta: &ParamBatch) {
+        let before = self.members();
+        // Buffers of the batch before are replaced: bind groups that hold them must go.
+        self.groups.borrow_mut().clear();
+        let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, theta, &mut self.buffers);
+        if let Err(e) = set {
+            self.gpu.keep(e);
+        }
+        if self.members() > self.capacity {
+            let (what, limit) = ("a batch larger than it was built for".into(), "members");
+            let (available, needed) = (self.capacity as u64, self.members() as u64);
+            self.gpu.keep(GpuError::Limit { limit, available, needed, what });
+        }
+        if before != self.members() {
+            self.pool.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        }
+        self.geometry.shape.members = self.members() as u32;
+        // Frames are stamped by a clock that may be ahead.
+        let sensors: Vec<Sensors> = self.batch.theta.iter().map(|row| Sensors::new(&self.plan.layout, row)).collect();
+        let starts: Vec<f64> = self.batch.physics.iter().zip(&sensors).map(|(p, s)| p.start + s.ahead()).collect();
+        self.observer.set(&self.gpu, &starts, &sensors);
+    }
+
+    /// Tells the kernels how many Newton iterations they have.
+    pub(crate) fn set_iterations(&mut self, iterations: usize) {
+        self.geometry.shape.iterations = iterations as u32;
+        if let Some(buffer) = self.buffers.get("shape") {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&self.geometry.shape));
+        }
+    }
+
+    /// Runs `record` and hands what it recorded to the device.
+    pub(crate) fn record(&self, record: impl FnOnce(&mut Recorder)) {
+        let mut groups = self.groups.borrow_mut();
+        let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut groups, self.timed);
+        record(&mut recorder);
+        recorder.submit(&mut self.times.borrow_mut());
+    }
+
+    /// A buffer of `vectors` per node and member, from the pool.
+    pub(crate) fn lend(&self, vectors: u64) -> Loan {
+        let size = (vectors * VECTOR * u64::from(self.geometry.shape.nodes) * self.members() as u64).max(VECTOR);
+        let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = pool.iter().rposition(|b| b.size() == size).map(|k| pool.remove(k));
+        let made = known.map_or_else(|| self.gpu.buffer("state", size), Ok);
+        let buffer = made.unwrap_or_else(|e| {
+            self.gpu.keep(e);
+            // Something to bind; the error is read before any number.
+            self.gpu.small()
+        });
+        Loan { buffer, pool: self.pool.clone() }
+    }
+}

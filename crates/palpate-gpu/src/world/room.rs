@@ -1,0 +1,74 @@
+//! Work space of the solves: which buffers there are, and how large they are.
+
+use super::limits::columns;
+use crate::device::pipelines::shared::{roster, structs};
+use crate::layout::{Health, Newton, Shape};
+
+/// Bytes of a node's vector.
+pub(crate) const VECTOR: u64 = 16;
+
+/// One work buffer: name, items per member as a function of the shape, bytes per item.
+type Work = (&'static str, fn(&Shape) -> u32, u64);
+
+/// Work space per member.
+const WORK: [Work; 20] = [
+    ("increment", |s| s.nodes, VECTOR),
+    ("direction", |s| s.nodes, VECTOR),
+    ("trial", |s| s.nodes, VECTOR),
+    ("residual", |s| s.nodes, VECTOR),
+    ("sizes", |s| 2 * s.nodes, VECTOR),
+    ("old_force", |s| s.nodes, VECTOR),
+    ("rhs", |s| s.nodes, VECTOR),
+    ("column", |s| s.nodes, VECTOR),
+    ("cg_rest", |s| s.nodes, VECTOR),
+    ("cg_along", |s| s.nodes, VECTOR),
+    ("cg_image", |s| s.nodes, VECTOR),
+    ("inverses", |s| 2 * s.nodes, VECTOR),
+    ("values", |s| 9 * s.blocks, 4),
+    ("tangents", |s| structs::TANGENT_VECTORS * s.cells, VECTOR),
+    ("cell_force", |s| 8 * s.cells, VECTOR),
+    ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
+    ("cell_support", |s| 8 * s.cells, VECTOR),
+    ("old_stress", |s| 8 * s.cells, VECTOR),
+    ("touches", |s| 3 * s.patches, VECTOR),
+    ("hold_forces", |s| 8 * s.holds, VECTOR),
+];
+
+/// The same per column of a member that is solved for at the same time as others.
+const OF_COLUMN: [Work; 4] = [
+    ("cg_scalars", |_| 4, VECTOR),
+    ("cg_parts", |s| 2 * s.nodes.div_ceil(roster::NARROW), 4),
+    ("newton", |_| 1, size_of::<Newton>() as u64),
+    ("column_health", |_| 1, size_of::<Health>() as u64),
+];
+
+/// Vectors that such a column has of its own while several are solved for; one alone uses those of the work space.
+pub(crate) const COLUMN_VECTORS: [&str; 4] = ["direction", "cg_rest", "cg_along", "cg_image"];
+
+/// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
+fn modes(fields: u32) -> u32 {
+    match (fields >> structs::SCALARS_AT) & structs::MOST_SCALARS {
+        0 => 0,
+        n => 1 + 8 * (n + 1) + 2 * n,
+    }
+}
+
+/// Sections of the roster, and kinds of items, of `list_members`.
+pub(crate) const SECTIONS: usize = roster::SECTIONS as usize;
+pub(crate) const KINDS: usize = roster::KINDS as usize;
+
+/// Work buffers of a batch, with their bytes.
+pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
+    let systems = columns(members as u64) * members as u64;
+    let each = WORK.iter().map(|w| (w, members as u64)).chain(OF_COLUMN.iter().map(|w| (w, systems)));
+    let own = each.map(|((name, items, bytes), count)| (*name, u64::from(items(shape)) * bytes * count));
+    let shared: [(&'static str, u64); 5] = [
+        ("shape", size_of::<Shape>() as u64),
+        ("roster", 4 * SECTIONS as u64 * (systems + 1)),
+        ("arguments", 12 * (SECTIONS * KINDS) as u64),
+        ("gate", 12),
+        // Where listings that may not change `gate` write instead.
+        ("no_gate", 12),
+    ];
+    own.chain(shared).collect()
+}
