@@ -28,6 +28,7 @@ pub fn body(shape: Analytic, cell_size: f64) -> Scene {
         planes: Vec::new(),
         masses: Vec::new(),
         effects: Vec::new(),
+        fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.005, steps: 10, start: 0.0, theta: 0.5, ..Time::default() },
         solver: Solver::default(),

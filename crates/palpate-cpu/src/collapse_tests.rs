@@ -45,6 +45,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, stiffness: None }],
         masses: Vec::new(),
         effects: Vec::new(),
+        fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6, ..Time::default() },
         solver: Solver::default(),

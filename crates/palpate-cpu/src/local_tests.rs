@@ -68,6 +68,7 @@ fn plan(effects: Vec<Effect>) -> Plan {
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
         masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
         effects,
+        fields: Vec::new(),
         initial: Initial {
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn details_name_values_with_units_that_are_units() {
-        let layout = Layout::new(0, 0, &[]);
+        let layout = Layout::new(0, 0, &[], &[]);
         let theta: Vec<f64> = layout.keys.iter().map(|k| if k.spec().path.contains("velocity") { 0.0 } else { 0.4 }).collect();
         let f = Failure::new(FailureKind::NotFinite, 0.1 + 0.2, "a node").with_values(&layout, &theta);
         let text = f.to_string();

@@ -5,6 +5,7 @@ use crate::effects::Effect;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::MarkerRest;
 use crate::params::Layout;
+use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
 use glam::{DAffine3, DVec3};
@@ -31,6 +32,8 @@ pub struct Scene {
     pub masses: Vec<PointMass>,
     /// Laws beyond the material, in the order of the file.
     pub effects: Vec<Effect>,
+    /// What varies over the body.
+    pub fields: Vec<FieldSpec>,
     /// State at the start.
     pub initial: Initial,
     /// Time steps.
@@ -44,10 +47,15 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The parameters of this scene.
+    /// The parameters of this scene but for the values of fields, of which only a body knows how many there are.
     pub fn layout(&self) -> Layout {
+        self.layout_with(&[])
+    }
+
+    /// The parameters of this scene with fields of so many values.
+    pub fn layout_with(&self, fields: &[usize]) -> Layout {
         let laws: Vec<usize> = self.effects.iter().map(|e| e.law).collect();
-        Layout::new(self.planes.len(), self.masses.len(), &laws)
+        Layout::new(self.planes.len(), self.masses.len(), &laws, fields)
     }
 }
 

@@ -75,7 +75,7 @@ mod tests {
         let mut known = vec![fingerprint(&plain)];
         for (number, law) in ALL.iter().enumerate() {
             let mut plan = plain.clone();
-            plan.layout = palpate_model::params::Layout::new(plain.planes.len(), plain.masses.len(), &[number]);
+            plan.layout = palpate_model::params::Layout::new(plain.planes.len(), plain.masses.len(), &[number], &[]);
             let found = fingerprint(&plan);
             assert!(!known.contains(&found), "{} goes unnoticed", law.kind);
             known.push(found);

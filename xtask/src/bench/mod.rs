@@ -111,7 +111,7 @@ fn effects() -> Vec<usize> {
 
 /// A body that is dropped from just above the ground and watched in every step, with effects of these laws, all of them absent.
 pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
-    let layout = Layout::new(1, 0, laws);
+    let layout = Layout::new(1, 0, laws, &[]);
     let steps = STEPS[usize::from(body.nodes.len() > BIG)];
     let lowest = body.nodes.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let value = |k: &ParamKey| match k {
@@ -143,6 +143,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
         ..Observation::default()
     };
     Plan {
+        fields: Vec::new(),
         theta,
         layout,
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],

@@ -30,6 +30,7 @@ fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
         planes: Vec::new(),
         masses: Vec::new(),
         effects: Vec::new(),
+        fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 20, start: 0.0, theta: 0.6, ..Time::default() },
         solver: Solver::default(),

@@ -72,6 +72,7 @@ pub fn ball(h: f64) -> Scene {
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
         masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
         effects: Vec::new(),
+        fields: Vec::new(),
         initial: Initial {
             velocity: DVec3::new(0.2, 0.0, -0.5),
             angular_velocity: DVec3::new(0.0, 3.0, 1.0),

@@ -60,6 +60,8 @@ fn value(scene: &Scene, key: ParamKey) -> f64 {
         ParamKey::PlaneTheta(i) => plane(i).1.0,
         ParamKey::PlanePhi(i) => plane(i).1.1,
         ParamKey::PointMass(i) => scene.masses[usize::from(i)].mass,
+        // A scene without its body has no place of a field; a field that states nothing changes nothing.
+        ParamKey::Field { .. } => 1.0,
         // Not stated and not known before the body is cut: the fit must say where to start.
         ParamKey::Effect { effect, slot, .. } => scene.effects[usize::from(effect)].values[usize::from(slot)].unwrap_or(f64::NAN),
     }

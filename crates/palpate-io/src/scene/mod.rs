@@ -80,6 +80,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         planes: planes(&root)?,
         masses: masses(&root)?,
         effects: effects::effects(&root)?,
+        fields: Vec::new(),
         time: time(&root, initial.state)?,
         initial,
         solver: solver(&root)?,

@@ -18,7 +18,7 @@ fn camera() -> Camera {
 
 /// A layout with these effects, and random values for their parameters.
 fn effects(laws: &[usize], noise: &mut Noise) -> (Layout, Vec<f64>) {
-    let layout = Layout::new(0, 0, laws);
+    let layout = Layout::new(0, 0, laws, &[]);
     let value = |key: &ParamKey| match *key {
         ParamKey::Effect { law, slot, .. } => {
             let p = &ALL[usize::from(law)].params[usize::from(slot)];
@@ -116,7 +116,7 @@ fn slopes_match_central_differences() {
 
 fn alone(kind: &str, values: &[(usize, f64)]) -> Sensors {
     let law = super::find(kind).expect("the law is in the table");
-    let layout = Layout::new(0, 0, &[law]);
+    let layout = Layout::new(0, 0, &[law], &[]);
     let first = layout.len() - ALL[law].params.len();
     let mut theta = vec![0.0; layout.len()];
     for (slot, p) in ALL[law].params.iter().enumerate() {

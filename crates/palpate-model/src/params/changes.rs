@@ -3,6 +3,7 @@
 use crate::effects::field::{Field, Spot};
 use crate::effects::{Law, Site};
 use crate::params::Layout;
+use crate::params::fields::Varied;
 use crate::plan::{Physics, Plan};
 use glam::DVec3;
 
@@ -38,11 +39,6 @@ impl Spot {
         });
         Spot { rest: body.center, center: body.center, anchor, size, cell: body.grid.h, elapsed: 0.0 }
     }
-}
-
-/// Rest position of the middle of every cell [m].
-fn middles(plan: &Plan) -> impl Iterator<Item = DVec3> {
-    plan.body.cells.iter().map(|c| plan.body.grid.position(c.lattice) + 0.5 * plan.body.grid.h)
 }
 
 fn modulus_law(law: &Law) -> Option<&'static dyn Field<1>> {
@@ -83,9 +79,6 @@ fn product(
 impl Changes {
     /// The fields of one member.
     pub fn new(plan: &Plan, physics: &Physics) -> Changes {
-        if plan.layout.effects().next().is_none() {
-            return Changes::default();
-        }
         let mut rest: Option<Vec<DVec3>> = None;
         let spot = Spot::of(plan);
         for (field, p) in effects(&plan.layout, physics).filter_map(|(_, law, p)| Some((rest_law(law)?, p))) {
@@ -94,17 +87,41 @@ impl Changes {
                 *w += DVec3::from_array(field.at(&Spot { rest: *x, ..spot }, p));
             }
         }
-        Changes {
-            modulus: product(plan, physics, modulus_law, || middles(plan).collect()),
+        let mut out = Changes {
+            modulus: product(plan, physics, modulus_law, || plan.body.middles().collect()),
             density: product(plan, physics, density_law, || plan.body.nodes.clone()),
             rest,
+        };
+        for (field, values) in plan.fields.iter().zip(&physics.fields) {
+            let factors = field.factors(values);
+            match out.varied(field.varied) {
+                Some(all) => all.iter_mut().zip(factors).for_each(|(a, f)| *a *= f),
+                none => *none = Some(factors),
+            }
+        }
+        out
+    }
+
+    /// The factors that a field varies.
+    pub fn varied(&mut self, varied: Varied) -> &mut Option<Vec<f64>> {
+        match varied {
+            Varied::Modulus => &mut self.modulus,
+            Varied::Density => &mut self.density,
+        }
+    }
+
+    /// The same to be read.
+    pub fn of(&self, varied: Varied) -> Option<&[f64]> {
+        match varied {
+            Varied::Modulus => self.modulus.as_deref(),
+            Varied::Density => self.density.as_deref(),
         }
     }
 
     /// Derivative of the modulus factor of every cell by number `slot` of effect `effect`; `None` for other effects.
     pub fn modulus_slope(&self, plan: &Plan, physics: &Physics, effect: usize, slot: usize) -> Option<Vec<f64>> {
         let (_, law, p) = effects(&plan.layout, physics).nth(effect)?;
-        slope(plan, modulus_law(law)?, p, slot, self.modulus.as_deref()?, middles(plan))
+        slope(plan, modulus_law(law)?, p, slot, self.modulus.as_deref()?, plan.body.middles())
     }
 
     /// Derivative of the density factor of every node.

@@ -8,6 +8,7 @@
 use super::changes::{self, Changes};
 use crate::effects::Site;
 use crate::params::ParamKey;
+use crate::params::fields::Varied;
 use crate::plan::{Physics, Plan};
 use glam::DVec3;
 
@@ -70,6 +71,10 @@ impl Sought {
                         _ => {}
                     }
                 }
+                ParamKey::Field { field, .. } => match plan.fields[usize::from(field)].varied {
+                    Varied::Modulus => s.modulus = true,
+                    Varied::Density => s.density = true,
+                },
             }
         }
         s
@@ -101,6 +106,13 @@ impl Coefficients {
                 }
             }
         }
+        for (field, (values, rates)) in plan.fields.iter().zip(self.physics.fields.iter().zip(&physics.fields)) {
+            if rates.iter().any(|r| *r != 0.0) {
+                let factors = self.changes.of(field.varied).unwrap_or_default();
+                let ln = field.ln_along(values, rates);
+                add(out.varied(field.varied), 1.0, &ln.iter().zip(factors).map(|(l, f)| l * f).collect::<Vec<_>>());
+            }
+        }
         Coefficients { physics, changes: out }
     }
 
@@ -121,7 +133,19 @@ impl Coefficients {
         for ((o, g), _) in out.iter_mut().zip(flat).zip(wanted).filter(|(_, w)| **w) {
             *o += g;
         }
-        for (p, key) in plan.layout.keys.iter().enumerate().filter(|(p, _)| wanted[*p]) {
+        for (places, (field, values)) in plan.layout.fields().zip(plan.fields.iter().zip(&self.physics.fields)) {
+            let by_factor = gradient.changes.of(field.varied).zip(self.changes.of(field.varied));
+            if let (Some((g, factors)), true) = (by_factor, wanted[places.clone()].iter().any(|w| *w)) {
+                let by_ln: Vec<f64> = g.iter().zip(factors).map(|(g, f)| g * f).collect();
+                let mut pulled = vec![0.0; field.count];
+                field.pull(values, &by_ln, &mut pulled);
+                let all = places.zip(pulled).filter(|(p, _)| wanted[*p]);
+                all.for_each(|(p, g)| out[p] += g);
+            }
+        }
+        let effects = self.physics.effects.iter().map(Vec::len).sum::<usize>();
+        let first = plan.layout.effects().next().map_or(0, |(_, range)| range.start);
+        for (p, key) in plan.layout.keys.iter().enumerate().skip(first).take(effects).filter(|(p, _)| wanted[*p]) {
             let ParamKey::Effect { effect, slot, .. } = *key else { continue };
             let (effect, slot) = (usize::from(effect), usize::from(slot));
             if let (Some(g), Some(slope)) =

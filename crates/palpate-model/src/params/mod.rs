@@ -5,6 +5,7 @@
 
 pub mod changes;
 pub mod coefficients;
+pub mod fields;
 pub mod grips;
 
 use crate::effects;
@@ -61,6 +62,28 @@ pub enum ParamKey {
         /// Place in the law's parameters.
         slot: u16,
     },
+    /// Value `index` of field `field` of the scene.
+    Field {
+        /// Number of the field in the scene.
+        field: u16,
+        /// Number of the cell, node or region.
+        index: u32,
+    },
+}
+
+/// What a parameter lives on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum On {
+    /// The whole scene.
+    Scene,
+    /// Plane i.
+    Plane(u16),
+    /// Point mass i.
+    Mass(u16),
+    /// Effect i.
+    Effect(u16),
+    /// The cells, nodes or regions of field i.
+    Field(u16),
 }
 
 /// A unit as it stands behind a number: with a space, and nothing for plain numbers.
@@ -127,8 +150,24 @@ impl ParamKey {
                 let axis = p.axis.map_or_else(String::new, |a| format!(".{}", AXES[usize::from(a)]));
                 (format!("effect.{effect}.{}{axis}", p.key), p.unit, p.transform, p.lower, p.upper, p.typical, p.doc)
             }
+            // Beyond a factor of a million the matrix loses its digits.
+            Field { field, index } => {
+                (format!("field.{field}.{index}"), "1", Log, 1e-6, 1e6, 1.0, "factor of a field at one of its places")
+            }
         };
         ParamSpec { key: self, path, unit, transform, lower, upper, typical, doc }
+    }
+
+    /// What it lives on.
+    pub fn on(self) -> On {
+        use ParamKey::*;
+        match self {
+            PlaneHeight(i) | PlaneTheta(i) | PlanePhi(i) => On::Plane(i),
+            PointMass(i) => On::Mass(i),
+            Effect { effect, .. } => On::Effect(effect),
+            Field { field, .. } => On::Field(field),
+            _ => On::Scene,
+        }
     }
 
     /// Path of the vector that this is a component of, if only the direction of that counts.
@@ -148,37 +187,67 @@ impl ParamKey {
 pub struct Layout {
     /// Keys in the order of θ, shape `[P]`.
     pub keys: Vec<ParamKey>,
+    /// Where planes, point masses, effects and fields begin; the last entry of each is its end.
+    planes: usize,
+    masses: usize,
+    effects: Vec<usize>,
+    fields: Vec<usize>,
 }
 
+/// Places of the numbers that every scene has, in their order.
+const OF_EVERY_SCENE: usize = 15;
+
 impl Layout {
-    /// The layout of a scene with so many planes, point masses, and effects of these laws.
-    pub fn new(planes: usize, masses: usize, laws: &[usize]) -> Layout {
+    /// The layout of a scene with so many planes, point masses, effects of these laws, and fields of so many values.
+    pub fn new(planes: usize, masses: usize, laws: &[usize], fields: &[usize]) -> Layout {
         use ParamKey::*;
         let mut keys = vec![YoungsModulus, PoissonRatio, Density, MassDamping, StiffnessDamping];
         keys.extend((0..3).map(Gravity));
         keys.extend((0..3).map(Velocity));
         keys.extend((0..3).map(AngularVelocity));
         keys.push(TimeStart);
+        debug_assert_eq!(keys.len(), OF_EVERY_SCENE);
+        let first_plane = keys.len();
         for i in 0..planes as u16 {
             keys.extend([PlaneHeight(i), PlaneTheta(i), PlanePhi(i)]);
         }
+        let first_mass = keys.len();
         keys.extend((0..masses as u16).map(PointMass));
+        let mut effects = vec![keys.len()];
         for (i, &law) in laws.iter().enumerate() {
             let key = |slot: usize| Effect { effect: i as u16, law: law as u16, slot: slot as u16 };
             keys.extend((0..effects::ALL[law].params.len()).map(key));
+            effects.push(keys.len());
         }
-        Layout { keys }
+        let mut starts = vec![keys.len()];
+        for (i, &count) in fields.iter().enumerate() {
+            keys.extend((0..count as u32).map(|index| Field { field: i as u16, index }));
+            starts.push(keys.len());
+        }
+        Layout { keys, planes: first_plane, masses: first_mass, effects, fields: starts }
     }
 
     /// The effects in their order: law, and the places of its numbers in θ.
     pub fn effects(&self) -> impl Iterator<Item = (&'static effects::Law, std::ops::Range<usize>)> + '_ {
-        self.keys.iter().enumerate().filter_map(|(p, key)| match *key {
-            ParamKey::Effect { law, slot: 0, .. } => {
-                let law = &effects::ALL[usize::from(law)];
-                Some((law, p..p + law.params.len()))
-            }
+        self.effects.windows(2).filter_map(|w| match self.keys.get(w[0]) {
+            Some(ParamKey::Effect { law, .. }) => Some((&effects::ALL[usize::from(*law)], w[0]..w[1])),
             _ => None,
         })
+    }
+
+    /// Places in θ of the values of every field.
+    pub fn fields(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+        self.fields.windows(2).map(|w| w[0]..w[1])
+    }
+
+    /// Number of planes.
+    pub fn planes(&self) -> usize {
+        (self.masses - self.planes) / 3
+    }
+
+    /// Number of point masses.
+    pub fn masses(&self) -> usize {
+        self.effects[0] - self.masses
     }
 
     /// Number of parameters P.
@@ -193,12 +262,63 @@ impl Layout {
 
     /// Place of a key in θ; panics if this scene does not have it (a broken invariant of the caller).
     pub fn index(&self, key: ParamKey) -> usize {
-        self.keys.iter().position(|k| *k == key).expect("parameter key belongs to this scene's layout")
+        use ParamKey::*;
+        let place = match key {
+            YoungsModulus => 0,
+            PoissonRatio => 1,
+            Density => 2,
+            MassDamping => 3,
+            StiffnessDamping => 4,
+            Gravity(a) => 5 + usize::from(a),
+            Velocity(a) => 8 + usize::from(a),
+            AngularVelocity(a) => 11 + usize::from(a),
+            TimeStart => OF_EVERY_SCENE - 1,
+            PlaneHeight(i) => self.planes + 3 * usize::from(i),
+            PlaneTheta(i) => self.planes + 3 * usize::from(i) + 1,
+            PlanePhi(i) => self.planes + 3 * usize::from(i) + 2,
+            PointMass(i) => self.masses + usize::from(i),
+            Effect { effect, slot, .. } => self.effects[usize::from(effect)] + usize::from(slot),
+            Field { field, index } => self.fields[usize::from(field)] + index as usize,
+        };
+        assert!(self.keys.get(place) == Some(&key), "parameter key {key:?} belongs to this scene's layout");
+        place
     }
 
-    /// Places in θ of a path: one for a number, three for a vector (`world.gravity`), none if unknown.
-    pub fn resolve(&self, path: &str) -> Vec<usize> {
+    /// Places in θ of a path: one for a number, three for a vector (`world.gravity`), all of a field (`field.0`), none if unknown.
+    pub fn resolve(&self, path: &str) -> std::ops::Range<usize> {
+        if let Some(rest) = path.strip_prefix("field.") {
+            let mut parts = rest.split('.').map(str::parse::<usize>);
+            let (Some(Ok(field)), index) = (parts.next(), parts.next()) else { return 0..0 };
+            let Some(all) = self.fields().nth(field) else { return 0..0 };
+            return match index {
+                None => all,
+                Some(Ok(k)) if k < all.len() && parts.next().is_none() => all.start + k..all.start + k + 1,
+                Some(_) => 0..0,
+            };
+        }
         let matches = |spec: &str| spec == path || spec.strip_prefix(path).is_some_and(|r| matches!(r, ".x" | ".y" | ".z"));
-        (0..self.len()).filter(|&p| matches(&self.keys[p].spec().path)).collect()
+        let mut found = (0..self.fields[0]).filter(|&p| matches(&self.keys[p].spec().path));
+        found.next().map_or(0..0, |first| first..found.last().unwrap_or(first) + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_has_its_place_and_every_path_finds_it() {
+        let layout = Layout::new(2, 1, &[0, 5, 1], &[4, 1]);
+        assert_eq!((layout.planes(), layout.masses()), (2, 1));
+        for (p, key) in layout.keys.iter().enumerate() {
+            assert_eq!(layout.index(*key), p);
+            assert_eq!(layout.resolve(&key.spec().path), p..p + 1, "{}", key.spec().path);
+        }
+        assert_eq!(layout.resolve("world.gravity"), 5..8);
+        let end = layout.len();
+        assert_eq!((layout.resolve("field.0"), layout.resolve("field.1")), (end - 5..end - 1, end - 1..end));
+        for unknown in ["field.2", "field.0.4", "field.x", "material", "plane.2.height", "field.0.1.2"] {
+            assert!(layout.resolve(unknown).is_empty(), "{unknown}");
+        }
     }
 }

@@ -8,7 +8,9 @@ use crate::cutcells::held::Pins;
 use crate::effects::check_choices;
 use crate::mechanics::contact;
 use crate::observation::{MarkerRest, MarkerSite, Observation};
+use crate::params::Layout;
 use crate::params::ParamKey;
+use crate::params::fields::Field;
 use crate::plan::{ClampCell, ClampSite, Clock, MassSite, Plan, PlaneSite};
 use crate::scene::{Clamp, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
@@ -87,9 +89,17 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         .iter()
         .map(|p| PlaneSite { polar_axis: PlaneSite::polar_axis_for(p.normal), stiffness: p.stiffness })
         .collect::<Vec<_>>();
+    let (mut fields, mut starts) = (Vec::new(), Vec::new());
+    for (i, spec) in scene.fields.iter().enumerate() {
+        let wrong = |m: String| error(format!("field.{i}"), m);
+        fields.push(Field::new(spec, &body).map_err(wrong)?);
+        starts.push(spec.start(&body).map_err(wrong)?);
+    }
+    let layout = scene.layout_with(&fields.iter().map(|f| f.count).collect::<Vec<_>>());
     Ok(Plan {
-        theta: theta(scene, &planes, &body),
-        layout: scene.layout(),
+        theta: theta(scene, &layout, &planes, &starts, &body),
+        layout,
+        fields,
         planes,
         clamps,
         masses,
@@ -104,7 +114,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
 }
 
 /// The scene's parameter values in the order of its layout.
-fn theta(scene: &Scene, planes: &[PlaneSite], body: &Body) -> Vec<f64> {
+fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64>], body: &Body) -> Vec<f64> {
     let m = &scene.material;
     let plane = |i: u16| (&scene.planes[i as usize], &planes[i as usize]);
     let value = |key: &ParamKey| match *key {
@@ -125,8 +135,9 @@ fn theta(scene: &Scene, planes: &[PlaneSite], body: &Body) -> Vec<f64> {
         ParamKey::PlanePhi(i) => plane(i).1.angles(plane(i).0.normal).1,
         ParamKey::PointMass(i) => scene.masses[i as usize].mass,
         ParamKey::Effect { effect, slot, .. } => scene.effects[effect as usize].value(slot as usize, body.center),
+        ParamKey::Field { field, index } => fields[usize::from(field)][index as usize],
     };
-    scene.layout().keys.iter().map(value).collect()
+    layout.keys.iter().map(value).collect()
 }
 
 fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {

@@ -29,6 +29,7 @@ fn scene() -> Scene {
         planes: vec![],
         masses: vec![],
         effects: Vec::new(),
+        fields: Vec::new(),
         initial: Initial { velocity: DVec3::X, angular_velocity: DVec3::Y, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 10, start: 0.5, theta: 0.6, ..Time::default() },
         solver: Solver::default(),

@@ -8,6 +8,7 @@ use crate::cutcells::cut::HeldMoments;
 use crate::cutcells::held::FreePart;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::Observation;
+use crate::params::fields::Field;
 use crate::params::{Layout, ParamKey};
 use crate::scene::{InitialShape, Solver};
 use crate::space::body::Body;
@@ -35,6 +36,8 @@ pub struct Plan {
     pub clamps: Vec<ClampSite>,
     /// Point masses.
     pub masses: Vec<MassSite>,
+    /// Fields on the body.
+    pub fields: Vec<Field>,
     /// Time steps.
     pub clock: Clock,
     /// Shape at the start.
@@ -180,6 +183,8 @@ pub struct Physics {
     pub masses: Vec<f64>,
     /// Parameters of every effect.
     pub effects: Vec<Vec<f64>>,
+    /// Values of every field.
+    pub fields: Vec<Vec<f64>>,
 }
 
 impl Physics {
@@ -187,7 +192,6 @@ impl Physics {
     pub fn new(layout: &Layout, theta: &[f64]) -> Physics {
         let get = |k| theta[layout.index(k)];
         let vec = |k: fn(u8) -> ParamKey| DVec3::new(get(k(0)), get(k(1)), get(k(2)));
-        let count = |f: fn(&ParamKey) -> bool| layout.keys.iter().filter(|k| f(k)).count() as u16;
         Physics {
             youngs_modulus: get(ParamKey::YoungsModulus),
             poisson_ratio: get(ParamKey::PoissonRatio),
@@ -198,11 +202,12 @@ impl Physics {
             velocity: vec(ParamKey::Velocity),
             angular_velocity: vec(ParamKey::AngularVelocity),
             start: get(ParamKey::TimeStart),
-            planes: (0..count(|k| matches!(k, ParamKey::PlaneHeight(_))))
+            planes: (0..layout.planes() as u16)
                 .map(|i| [get(ParamKey::PlaneHeight(i)), get(ParamKey::PlaneTheta(i)), get(ParamKey::PlanePhi(i))])
                 .collect(),
-            masses: (0..count(|k| matches!(k, ParamKey::PointMass(_)))).map(|i| get(ParamKey::PointMass(i))).collect(),
+            masses: (0..layout.masses() as u16).map(|i| get(ParamKey::PointMass(i))).collect(),
             effects: layout.effects().map(|(_, range)| theta[range].to_vec()).collect(),
+            fields: layout.fields().map(|range| theta[range].to_vec()).collect(),
         }
     }
 
@@ -223,6 +228,7 @@ impl Physics {
             ParamKey::PlanePhi(i) => self.planes[usize::from(i)][2],
             ParamKey::PointMass(i) => self.masses[usize::from(i)],
             ParamKey::Effect { effect, slot, .. } => self.effects[usize::from(effect)][usize::from(slot)],
+            ParamKey::Field { field, index } => self.fields[usize::from(field)][index as usize],
         };
         layout.keys.iter().map(value).collect()
     }

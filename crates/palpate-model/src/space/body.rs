@@ -38,6 +38,13 @@ pub struct Body {
     pub corners: (DVec3, DVec3),
 }
 
+impl Body {
+    /// Rest position of the middle of every cell [m].
+    pub fn middles(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.cells.iter().map(|c| self.grid.position(c.lattice) + 0.5 * self.grid.h)
+    }
+}
+
 /// A cell that holds some of the body.
 #[derive(Clone, Debug)]
 pub struct Cell {
