@@ -17,6 +17,7 @@ pub fn body(shape: Analytic, cell_size: f64) -> Scene {
             resolution: Resolution::CellSize(cell_size),
         },
         material: Material {
+            model: &palpate_model::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
             youngs_modulus: 5000.0,
             poisson_ratio: 0.4,

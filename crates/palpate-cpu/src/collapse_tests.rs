@@ -34,6 +34,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
             resolution: Resolution::CellSize(0.02),
         },
         material: Material {
+            model: &palpate_model::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
             youngs_modulus,
             poisson_ratio: 0.45,

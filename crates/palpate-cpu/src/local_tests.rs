@@ -10,6 +10,7 @@ use glam::{DAffine3, DVec3};
 use palpate_engine::{Direction, ParamBatch};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::effects::{ALL, Effect, Site};
+use palpate_model::materials;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::params::ParamKey;
@@ -51,6 +52,7 @@ fn plan(effects: Vec<Effect>) -> Plan {
             resolution: Resolution::CellSize(0.03),
         },
         material: Material {
+            model: &palpate_model::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
             youngs_modulus: 5000.0,
             poisson_ratio: 0.4,
@@ -151,14 +153,18 @@ impl At<'_> {
 /// Runs a check for the static problem, for a step of the θ-scheme and for one from two past states, without effects and with all that
 /// change the body, at three states each.
 fn everywhere(check: impl Fn(&At)) {
-    for effects in [Vec::new(), altering()] {
-        let p = plan(effects);
+    let models = materials::ALL.iter().map(|model| (model, Vec::new()));
+    for (model, effects) in models.chain([(&materials::ALL[0], altering()), (&materials::ALL[1], altering())]) {
+        let p = Plan { model, ..plan(effects) };
         let n = p.body.nodes.len();
         let theta = p.clock.stages().swap_remove(1);
         let two = scheme::find("bdf2").unwrap().stages(p.clock.step, 3, p.clock.theta).swap_remove(2);
         for stage in [None, Some(&theta), Some(&two)] {
             // Strains of some 10 % or cells turned inside out, contact active, the old states elsewhere, fast.
-            for (seed, u) in [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))] {
+            let states = [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))];
+            // Materials with a barrier do not exist inside out.
+            let exist = if model.name.starts_with("neo-hookean") { 2 } else { 3 };
+            for (seed, u) in states.into_iter().take(exist) {
                 let state = |s| MemberState { u: random(n, 0.003, seed + s), v: random(n, 0.3, seed + s + 10) };
                 let past = stage.map_or(Vec::new(), |s| (0..s.from.len() as u64).map(|i| state(10 + 40 * i)).collect());
                 check(&At { plan: &p, stage, u1: &u, past });

@@ -36,6 +36,9 @@ const CLOSE: f64 = 0.01;
 /// Share of the tolerance that steps with a factor from before must reach.
 const STRICT: f64 = 0.01;
 
+/// Times that a guess is halved: from a whole step to a millionth of it.
+const RETREATS: usize = 20;
+
 /// Attaches the time of the simulation to a reason.
 pub fn at(time: f64) -> impl Fn(Reason) -> Failure {
     move |(kind, detail)| Failure::new(kind, time, detail)
@@ -97,6 +100,14 @@ pub fn solve(
     effort: &mut Effort,
 ) -> Result<(), Reason> {
     let mut residual = equation.residual(u1);
+    // A guess at which the material does not exist is drawn back towards the past.
+    for _ in 0..RETREATS {
+        if is_finite(&residual) {
+            break;
+        }
+        u1.iter_mut().zip(equation.context.past.u).for_each(|(u, old)| *u = 0.5 * (*u + *old));
+        residual = equation.residual(u1);
+    }
     let (mut scale, mut level) = (None, None);
     let mut history: Vec<f64> = Vec::new();
     let mut forcing = FIRST;

@@ -6,6 +6,7 @@
 
 pub mod cutcells;
 pub mod effects;
+pub mod materials;
 pub mod mechanics;
 pub mod observation;
 pub mod params;

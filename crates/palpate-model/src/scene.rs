@@ -2,6 +2,7 @@
 //! Reading and writing the TOML is `palpate-io`'s business.
 
 use crate::effects::Effect;
+use crate::materials::Model;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::MarkerRest;
 use crate::params::Layout;
@@ -136,9 +137,11 @@ pub enum Resolution {
     Cells(u32),
 }
 
-/// Homogeneous corotated linear material with Rayleigh damping.
+/// An isotropic material with Rayleigh damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
+    /// Its law.
+    pub model: &'static Model,
     /// How heavy.
     pub inertia: Inertia,
     /// Young's modulus [Pa].

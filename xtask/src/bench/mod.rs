@@ -144,6 +144,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     };
     Plan {
         fields: Vec::new(),
+        model: &palpate_model::materials::ALL[0],
         theta,
         layout,
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],

@@ -18,6 +18,7 @@ fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
         title: String::new(),
         object: Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) },
         material: Material {
+            model: &palpate_model::materials::ALL[0],
             // A foam: weight over stiffness ρ g L / E is 0.05 for the torus, like the paper's (there 80 · 3 / 5000 in its own units).
             inertia: Inertia::Density(100.0),
             youngs_modulus,

@@ -55,12 +55,12 @@ impl<'a> Clamped<'a> {
         }
     }
 
-    /// Pose of clamp `index` at a time on the recording's clock.
-    fn pose(&self, index: usize, time: f64) -> Pose {
+    /// Pose of clamp `index` at a time on the recording's clock, its prescribed motion `shift` later.
+    fn pose(&self, index: usize, time: f64, shift: f64) -> Pose {
         if self.c.altered.grips.is_none() {
-            return clamp_pose(self.c.plan.clamps[index].motion.as_ref(), time);
+            return clamp_pose(self.c.plan.clamps[index].motion.as_ref(), time + shift);
         }
-        Grips::new(self.c.plan, self.c.physics(), self.c.time - self.c.physics().start).pose(index, time)
+        Grips::new(self.c.plan, self.c.physics(), time - self.c.physics().start).pose(index, time + shift)
     }
 
     /// Every clamp at the instants that it acts at, its motion shifted in time by `shift`.
@@ -72,7 +72,7 @@ impl<'a> Clamped<'a> {
         let states = [(w.new, self.c.time, u1), (w.old, self.c.time - self.c.length(), self.c.past.u)];
         let acting = states.into_iter().filter(|s| s.0 != 0.0);
         let all = acting.flat_map(|(weight, time, u)| (0..self.c.plan.clamps.len()).map(move |index| (index, weight, time, u)));
-        all.map(|(index, weight, time, u)| Instant { index, weight, time, pose: self.pose(index, time + shift), u }).collect()
+        all.map(|(index, weight, time, u)| Instant { index, weight, time, pose: self.pose(index, time, shift), u }).collect()
     }
 
     /// Displacement of a held cell's corners from where the clamp wants them, in the clamp's frame: Aᵀ(x − b) − X − W.
@@ -194,7 +194,7 @@ impl Term for Clamped<'_> {
     fn tangent(&self, _u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
         let young = self.c.young();
         for index in 0..self.c.plan.clamps.len() {
-            let (a, _) = self.pose(index, self.c.time);
+            let (a, _) = self.pose(index, self.c.time, 0.0);
             let fallback = self.c.altered.grips.as_ref().filter(|_| curvature == Curvature::Convex);
             let convex = fallback.and_then(|grips| grips[index].convex.as_ref());
             for (m, cell) in self.cells(index).iter().enumerate() {

@@ -61,6 +61,7 @@ pub fn ball(h: f64) -> Scene {
             resolution: Resolution::CellSize(h),
         },
         material: Material {
+            model: &palpate_model::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
             youngs_modulus: 5000.0,
             poisson_ratio: 0.4,

@@ -15,6 +15,7 @@ use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
+use palpate_model::materials::{self, Model};
 use palpate_model::observation::MarkerRest;
 use palpate_model::plan::scheme::{self, Scheme};
 use palpate_model::scene::*;
@@ -110,7 +111,8 @@ pub(crate) fn check_format(root: &Table, format: &str) -> Result<(), InputError>
 
 fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputError> {
     let t = root.optional_table("material")?.ok_or_else(|| root.missing("material", "a table [material]"))?;
-    t.optional_choice("model", &[("corotated-linear", ())])?;
+    let models: Vec<(&str, &'static Model)> = materials::ALL.iter().map(|m| (m.name, m)).collect();
+    let model = t.optional_choice("model", &models)?.unwrap_or(&materials::ALL[0]);
     let positive = |key: &str| t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0");
     let zero_up = |key: &str| t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0");
     let inertia = match (positive("density")?, positive("mass")?) {
@@ -137,6 +139,7 @@ fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputE
         warnings.push(e.to_string());
     }
     Ok(Material {
+        model,
         inertia,
         youngs_modulus,
         poisson_ratio,

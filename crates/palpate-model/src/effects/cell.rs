@@ -40,6 +40,8 @@ pub struct Increment<D> {
 pub trait CellLaw: Sync {
     /// True when the energy depends on the mean strain.
     const STRAINED: bool = false;
+    /// True when there is a dissipation.
+    const LOSSY: bool = false;
 
     /// ψ: energy density over E.
     fn energy<D: Number>(&self, _s: &Strain<D>, _p: &[D]) -> D {
@@ -97,7 +99,8 @@ impl<L: CellLaw> Cell for L {
         match part {
             Part::Energy if L::STRAINED => ENERGY,
             Part::Energy => 1,
-            Part::Loss { .. } => LOSS,
+            Part::Loss { .. } if L::LOSSY => LOSS,
+            Part::Loss { .. } => 0,
         }
     }
 

@@ -28,6 +28,8 @@ const PARAMS: [EffectParam; 2] = [
 struct Viscosity;
 
 impl CellLaw for Viscosity {
+    const LOSSY: bool = true;
+
     fn loss<D: Number>(&self, s: &Increment<D>, p: &[D]) -> D {
         let squared = s.density * (2.0 * s.rate * s.rate) + SLOW * SLOW;
         let power = p[1] + 1.0;

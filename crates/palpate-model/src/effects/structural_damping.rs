@@ -33,6 +33,8 @@ const PARAMS: [EffectParam; 1] = [number(
 struct Damping;
 
 impl CellLaw for Damping {
+    const LOSSY: bool = true;
+
     fn loss<D: Number>(&self, s: &Increment<D>, p: &[D]) -> D {
         let slow = SLOW / s.rate;
         p[0] * (s.old * 2.0 + SMALL * SMALL).sqrt() * (s.density * 2.0 + slow * slow).sqrt()

@@ -99,6 +99,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     Ok(Plan {
         theta: theta(scene, &layout, &planes, &starts, &body),
         layout,
+        model: scene.material.model,
         fields,
         planes,
         clamps,

@@ -18,6 +18,7 @@ fn scene() -> Scene {
             resolution: Resolution::CellSize(0.01),
         },
         material: Material {
+            model: &crate::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
             youngs_modulus: 1e5,
             poisson_ratio: 0.4,

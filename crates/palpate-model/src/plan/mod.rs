@@ -6,6 +6,7 @@ pub mod scheme;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::HeldMoments;
 use crate::cutcells::held::FreePart;
+use crate::materials::Model;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::Observation;
 use crate::params::fields::Field;
@@ -26,6 +27,8 @@ pub const STATIC_ITERATIONS: usize = 200;
 pub struct Plan {
     /// The body on its grid.
     pub body: Arc<Body>,
+    /// Material model.
+    pub model: &'static Model,
     /// Order of θ.
     pub layout: Layout,
     /// The scene's own parameter values [P].

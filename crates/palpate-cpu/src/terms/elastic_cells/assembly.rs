@@ -16,7 +16,7 @@ use rayon::prelude::*;
 type Spill = Vec<Vec<(u32, DMat3)>>;
 
 /// Overwrites the matrix with the sum of the cells' tangents.
-pub(super) fn assemble(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
+pub(super) fn assemble(term: &ElasticCells, curvature: Curvature, matrix: &mut Matrix) {
     let pattern = term.cells.c.pattern;
     matrix.values.resize(pattern.blocks.columns.len(), DMat3::ZERO);
     let spills: Vec<Spill> = slices(pattern, matrix)
@@ -24,7 +24,7 @@ pub(super) fn assemble(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, 
         .map(|(part, values)| {
             wide(
                 #[inline(always)]
-                || fill(term, u1, curvature, part, values),
+                || fill(term, curvature, part, values),
             )
         })
         .collect();
@@ -38,7 +38,7 @@ pub(super) fn assemble(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, 
 
 /// Overwrites the rows of one part with its own cells' blocks, and returns those in other rows.
 #[inline(always)]
-fn fill(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, part: usize, values: &mut [DMat3]) -> Spill {
+fn fill(term: &ElasticCells, curvature: Curvature, part: usize, values: &mut [DMat3]) -> Spill {
     let c = &term.cells.c;
     let pattern = c.pattern;
     let rows = pattern.parts[part].clone();
@@ -51,9 +51,6 @@ fn fill(term: &ElasticCells, u1: &[DVec3], curvature: Curvature, part: usize, va
             continue;
         }
         term.upper_tangent(e, curvature, &mut h);
-        if let Some(laws) = &term.laws {
-            laws.add_tangent(e, u1, curvature == Curvature::Convex, &mut h);
-        }
         // Rows of other parts: which part.
         let others = cell.nodes.map(|n| n as usize).map(|n| (!rows.contains(&n)).then(|| pattern.part_of(n)));
         let places = &c.places.cells[e];

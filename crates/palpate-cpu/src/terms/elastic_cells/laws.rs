@@ -1,4 +1,5 @@
-//! Effects that are laws of cells: their force, potential and derivatives, from scalar functions of a cell's deformation.
+//! What cells do beyond linear elasticity: effects that are laws of cells, and the material where it is not linear. Force, potential and
+//! derivatives follow from scalar functions of a cell's deformation.
 //!
 //! A law gives ψ(s) and φ(d, a₀) of scalars s = (a, ε) (see [`palpate_model::effects::cell`]). With θ the weight of the new state, the
 //! incremental potential is E V [θ ψ(s₁) + φ] + (1 − θ) f(x₀)·x₁, and all derivatives follow from those of ψ and φ by the chain rule
@@ -10,6 +11,8 @@ use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply}
 use palpate_model::cutcells::grid::SIGNS;
 use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
+use palpate_model::materials::{Gradient, Solid};
+use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
 
@@ -45,8 +48,31 @@ pub fn cell_laws(plan: &Plan, physics: &Physics) -> Vec<CellActing> {
 pub(super) struct CellLaws<'a> {
     cells: Cells<'a>,
     laws: &'a [CellActing],
+    /// The material where it is not linear.
+    material: Option<&'static dyn Solid>,
+    /// λ and μ over E, and their derivatives by Poisson's ratio.
+    lame: [(f64, f64); 2],
     /// 1/ℓ [1/s]; 0 in a static problem.
     rate: f64,
+}
+
+/// What the tangent needs of a cell's laws at the displacement of the last residual.
+#[derive(Clone, Copy)]
+pub(super) struct LawState {
+    /// Body-frame forces that go with the new pose [N].
+    pub stress: V24,
+    /// Factor on the cell's matrix for E = 1 Pa [Pa].
+    pub scale: f64,
+    /// Second derivatives by the scalars, times E and the weight of the new state, over the volume.
+    second: [[f64; ENERGY]; ENERGY],
+    /// K(q₁ − q̃) and the factor of its square.
+    loss: (V24, f64),
+}
+
+impl Default for LawState {
+    fn default() -> LawState {
+        LawState { stress: [0.0; 24], scale: 0.0, second: [[0.0; ENERGY]; ENERGY], loss: ([0.0; 24], 0.0) }
+    }
 }
 
 /// Derivatives of ψ: first, and second (symmetric).
@@ -109,6 +135,22 @@ fn strain_row(c: usize, gradient: f64) -> V24 {
         row[3 * i + b] += 0.5 * gradient * SIGNS[i][a];
     }
     row
+}
+
+/// The mean strain as a displacement gradient.
+fn strain(s: &[f64; ENERGY]) -> Gradient<f64> {
+    let [_, xx, yy, zz, yz, zx, xy] = *s;
+    [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]
+}
+
+/// Entries of a flattened matrix that one component of the strain stands in.
+fn entries([a, b]: [usize; 2]) -> impl Iterator<Item = usize> + Clone {
+    std::iter::once(3 * a + b).chain((a != b).then_some(3 * b + a))
+}
+
+/// Derivative of the linear material's energy by a component of the strain.
+fn linear_stress([a, b]: [usize; 2], strain: f64, trace: f64, (lambda, mu): (f64, f64)) -> f64 {
+    if a == b { lambda * trace + 2.0 * mu * strain } else { 4.0 * mu * strain }
 }
 
 impl Local<'_> {
@@ -183,7 +225,19 @@ fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
 
 impl<'a> CellLaws<'a> {
     pub(super) fn new(cells: Cells<'a>) -> CellLaws<'a> {
-        CellLaws { cells, laws: &cells.c.altered.laws, rate: cells.c.inertia.map_or(0.0, |t| t.rate) }
+        let (model, nu) = (cells.c.plan.model, cells.c.physics().poisson_ratio);
+        CellLaws {
+            cells,
+            laws: &cells.c.altered.laws,
+            material: (!model.is_linear).then_some(model.law),
+            lame: [lame(1.0, nu), lame_by_nu(1.0, nu)],
+            rate: cells.c.inertia.map_or(0.0, |t| t.rate),
+        }
+    }
+
+    /// True where something acts.
+    pub(super) fn act(&self) -> bool {
+        self.material.is_some() || self.acting().next().is_some()
     }
 
     fn loss_part(&self) -> Part {
@@ -197,7 +251,49 @@ impl<'a> CellLaws<'a> {
 
     /// Number of scalars that the energy of any acting law depends on; the density comes first.
     fn needs(&self) -> usize {
-        self.acting().map(|l| l.law.needs(Part::Energy)).max().unwrap_or(1)
+        let of_laws = self.acting().map(|l| l.law.needs(Part::Energy)).max().unwrap_or(1);
+        if self.material.is_some() { ENERGY } else { of_laws }
+    }
+
+    /// True where something dissipates.
+    fn lossy(&self) -> bool {
+        self.rate > 0.0 && self.laws.iter().any(|l| l.law.needs(self.loss_part()) > 0)
+    }
+
+    /// Adds the material's energy density over E beyond the linear one's, with its derivatives, by the mean strain in `s`.
+    fn add_material(&self, law: &dyn Solid, s: &[f64; ENERGY], slopes: &mut Slopes) {
+        let (lambda, mu) = self.lame[0];
+        let h = strain(s);
+        let (stress, tangent) = law.stress(&h, lambda, mu);
+        let trace = h[0][0] + h[1][1] + h[2][2];
+        slopes.value += law.value(&h, lambda, mu) - palpate_model::materials::linear(&h, lambda, mu);
+        for (c, pair) in PAIRS.iter().enumerate() {
+            let (own, linear) = (entries(*pair), linear_stress(*pair, s[1 + c], trace, (lambda, mu)));
+            slopes.first[1 + c] += own.clone().map(|k| stress[k]).sum::<f64>() - linear;
+            for (d, other) in PAIRS.iter().enumerate() {
+                let of_linear = match (pair[0] == pair[1], other[0] == other[1]) {
+                    (true, true) => lambda + if c == d { 2.0 * mu } else { 0.0 },
+                    _ if c == d => 4.0 * mu,
+                    _ => 0.0,
+                };
+                let both = own.clone().flat_map(|a| entries(*other).map(move |b| (a, b)));
+                slopes.second[1 + c][1 + d] += both.map(|(a, b)| tangent[a][b]).sum::<f64>() - of_linear;
+            }
+        }
+    }
+
+    /// Derivative of the material's first derivatives by Poisson's ratio.
+    fn material_by_poisson(&self, s: &[f64; ENERGY]) -> [f64; ENERGY] {
+        let Some(law) = self.material else { return [0.0; ENERGY] };
+        let ((lambda, mu), by_nu) = (self.lame[0], self.lame[1]);
+        let h = strain(s);
+        let [by_lambda, by_mu] = law.by_moduli(&h, lambda, mu);
+        let trace = h[0][0] + h[1][1] + h[2][2];
+        let of = |c: usize| {
+            let own: f64 = entries(PAIRS[c]).map(|k| by_nu.0 * by_lambda[k] + by_nu.1 * by_mu[k]).sum();
+            own - linear_stress(PAIRS[c], s[1 + c], trace, by_nu)
+        };
+        std::array::from_fn(|k| if k == 0 { 0.0 } else { of(k - 1) })
     }
 
     fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: f64) -> Side {
@@ -208,6 +304,9 @@ impl<'a> CellLaws<'a> {
             *s = dot(&strain_row(c, gradient), &q);
         }
         let mut slopes = Slopes::default();
+        if let Some(law) = self.material {
+            self.add_material(law, &s, &mut slopes);
+        }
         for l in self.acting() {
             let (z, len) = input(&s, &l.p);
             slopes.value += l.law.value(Part::Energy, &z[..len]);
@@ -231,9 +330,19 @@ impl<'a> CellLaws<'a> {
         self.local_with(self.needs(), e, u1)
     }
 
+    /// Volume of a cell that deforms [m³].
+    fn volume(&self, e: usize) -> f64 {
+        self.cells.c.elements.fractions[e] * self.cells.body().grid.h.powi(3)
+    }
+
+    /// Factor of the corner signs in the mean strain [1/m].
+    fn gradient(&self) -> f64 {
+        0.25 / self.cells.body().grid.h
+    }
+
     /// The past's pose and q̃, where anything sees it.
     fn past(&self, e: usize) -> Option<(CellPose, V24)> {
-        if !self.cells.c.weights.sees_past() && self.rate == 0.0 {
+        if self.cells.c.weights.old == 0.0 && !self.lossy() {
             return None;
         }
         let mut q = [0.0; 24];
@@ -249,16 +358,15 @@ impl<'a> CellLaws<'a> {
     /// The same with at least `n` scalars.
     fn local_with(&self, n: usize, e: usize, u1: &[DVec3]) -> Local<'a> {
         let cells = &self.cells;
-        let (h, k) = (cells.body().grid.h, cells.stiffness(e));
-        let (volume, gradient) = (cells.c.elements.fractions[e] * h.powi(3), 0.25 / h);
+        let (k, volume, gradient) = (cells.stiffness(e), self.volume(e), self.gradient());
         let pose = cells.pose(e, u1);
         let new = self.side(k, volume, pose, pose.q, n, gradient);
         let old = self.past(e).map(|(pose, q)| self.side(k, volume, pose, q, n, gradient));
         let (mut kd, mut d, mut loss) = ([0.0; 24], 0.0, Loss::default());
-        if let (Some(old), true) = (&old, self.rate > 0.0) {
+        if let (Some(old), true) = (&old, self.lossy()) {
             kd = std::array::from_fn(|i| new.kq[i] - old.kq[i]);
             d = 0.5 * (0..24).map(|i| kd[i] * (new.q[i] - old.q[i])).sum::<f64>() / volume;
-            for l in self.acting() {
+            for l in self.acting().filter(|l| l.law.needs(self.loss_part()) > 0) {
                 let (z, len) = input(&[d, old.s[0]], &l.p);
                 let [by_d, _, by_dd] = l.law.slopes(self.loss_part(), &z[..len], 0, 0);
                 loss.value += l.law.value(self.loss_part(), &z[..len]);
@@ -270,19 +378,37 @@ impl<'a> CellLaws<'a> {
         Local { k, volume, young: cells.young_of(e), n, gradient, new, old, kd, d, loss }
     }
 
-    /// Adds the laws' force.
-    pub(super) fn force(&self, u1: &[DVec3], out: &mut [DVec3]) {
+    /// The laws at `u1`, and their forces on the corners that go with the new pose.
+    pub(super) fn state(&self, e: usize, u1: &[DVec3]) -> (LawState, Corners) {
+        // The old state's own force is computed once a solve.
+        let l = self.local(e, u1);
+        let weight = self.cells.c.weights.new;
+        let stress = l.force_new(weight);
+        let state = LawState {
+            stress,
+            scale: l.young * (weight * l.new.slopes.first[0] + l.loss.by_d),
+            second: l.new.slopes.second.map(|row| row.map(|v| v * weight * l.young / l.volume)),
+            loss: (l.kd, l.loss.by_dd * l.young / l.volume),
+        };
+        (state, l.new.pose.force(&stress))
+    }
+
+    /// Adds (1 − θ) times the laws' force at the old state.
+    pub(super) fn add_old_force(&self, out: &mut [DVec3]) {
+        let weight = self.cells.c.weights.old;
+        if weight == 0.0 {
+            return;
+        }
         self.cells.gather(
             |e| {
-                let l = self.local(e, u1);
-                let old = l.old.as_ref().map(|o| (self.cells.c.weights.old, l.stress(o, &o.slopes.first)));
-                l.world(&l.force_new(self.cells.c.weights.new), old)
+                let l = self.local(e, self.cells.c.past.u);
+                l.new.pose.force(&l.stress(&l.new, &l.new.slopes.first)).map(|f| weight * f)
             },
             out,
         );
     }
 
-    /// Potential whose gradient by u₁ is [`CellLaws::force`], up to a constant [J].
+    /// Potential whose gradient by u₁ is the laws' force, up to a constant [J].
     pub(super) fn potential(&self, u1: &[DVec3]) -> f64 {
         let weights = &self.cells.c.weights;
         let cell = |e: usize| {
@@ -297,39 +423,34 @@ impl<'a> CellLaws<'a> {
         (0..self.cells.body().cells.len()).map(cell).sum()
     }
 
-    /// Adds the derivative of cell e's force by the new state, world frame; with `convex` without the rotation's second derivative.
-    pub(super) fn add_tangent(&self, e: usize, u1: &[DVec3], convex: bool, out: &mut M24) {
-        let l = self.local(e, u1);
-        let weight = self.cells.c.weights.new;
-        let scale = l.young * (weight * l.new.slopes.first[0] + l.loss.by_d);
-        let mut h = [0.0; 576];
-        if convex {
-            l.new.pose.gauss_newton(l.k, scale, &mut h);
-        } else {
-            l.new.pose.hessian(l.k, scale, &l.force_new(weight), &mut h);
-        }
-        // Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ.
-        let rows: Vec<V24> = (0..l.n).map(|k| flatten(&l.new.pose.force(&l.row(&l.new, k)))).collect();
-        let turned = flatten(&l.new.pose.force(&l.kd));
+    /// Adds the part of the tangent of cell e that no matrix K has: Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ, world frame, blocks
+    /// (i, j ≥ i) of the symmetric 24 × 24 matrix.
+    pub(super) fn add_upper_tangent(&self, e: usize, pose: &CellPose, state: &LawState, out: &mut M24) {
+        let (volume, gradient) = (self.volume(e), self.gradient());
         let mut rank_one = |c: f64, a: &V24, b: &V24| {
             for i in 0..24 {
-                for j in 0..24 {
-                    h[24 * i + j] += c * a[i] * b[j];
+                let s = c * a[i];
+                for j in 3 * (i / 3)..24 {
+                    out[24 * i + j] += s * b[j];
                 }
             }
         };
-        for i in 0..l.n {
-            for j in 0..l.n {
-                let c = weight * l.new.slopes.second[i][j];
-                if c != 0.0 {
-                    rank_one(c * l.young / l.volume, &rows[i], &rows[j]);
-                }
-            }
+        let n = self.needs();
+        let row = |k: usize| match k {
+            0 => multiply(self.cells.stiffness(e), &pose.q),
+            _ => strain_row(k - 1, gradient).map(|v| volume * v),
+        };
+        let first = if state.second[0].iter().any(|v| *v != 0.0) { 0 } else { 1 };
+        let rows: Vec<V24> = (first..n).map(|k| flatten(&pose.force(&row(k)))).collect();
+        for (k, a) in rows.iter().enumerate() {
+            let mut b = [0.0; 24];
+            rows.iter().enumerate().for_each(|(l, other)| add(&mut b, state.second[first + k][first + l], other));
+            rank_one(1.0, a, &b);
         }
-        if l.loss.by_dd != 0.0 {
-            rank_one(l.loss.by_dd * l.young / l.volume, &turned, &turned);
+        if state.loss.1 != 0.0 {
+            let turned = flatten(&pose.force(&state.loss.0));
+            rank_one(state.loss.1, &turned, &turned);
         }
-        out.iter_mut().zip(&h).for_each(|(o, h)| *o += h);
     }
 
     /// Adds the symmetric derivative of the old state's own force by itself, times `d`.
@@ -398,14 +519,15 @@ impl<'a> CellLaws<'a> {
         let energy = |side: &Side| {
             let kq = multiply(k_nu, &side.q);
             let a = 0.5 * dot(&side.q, &kq) / l.volume;
-            let c = std::array::from_fn(|k| side.slopes.second[k][0] * a);
+            let by_material = self.material_by_poisson(&side.s);
+            let c = std::array::from_fn(|k| side.slopes.second[k][0] * a + by_material[k]);
             let mut y = l.stress(side, &c);
             add(&mut y, l.young * side.slopes.first[0], &kq);
             (y, a)
         };
         let mut new = energy(&l.new).0.map(|v| self.cells.c.weights.new * v);
         let old = l.old.as_ref().map(|old| (old, energy(old)));
-        if let (Some((old, (_, a0))), true) = (&old, self.rate > 0.0) {
+        if let (Some((old, (_, a0))), true) = (&old, self.lossy()) {
             let dq: V24 = std::array::from_fn(|i| l.new.q[i] - old.q[i]);
             let kd = multiply(k_nu, &dq);
             let d = 0.5 * dot(&dq, &kd) / l.volume;
@@ -421,7 +543,7 @@ impl<'a> CellLaws<'a> {
         let moved = |l: &&CellActing| d.effects[l.effect].iter().any(|r| *r != 0.0);
         let own = self.laws.iter().filter(moved).map(|l| l.law.needs(Part::Energy)).max();
         let ln_young = self.cells.c.ln_young_along(rates);
-        let present = self.acting().next().is_some();
+        let present = self.act();
         let rest = rates.changes.rest.as_deref().filter(|_| self.cells.c.altered.rest.is_some());
         let through = ln_young != 0.0 || d.poisson_ratio != 0.0 || rest.is_some() || rates.changes.modulus.is_some();
         if own.is_none() && !(present && through) {
@@ -466,7 +588,7 @@ impl<'a> CellLaws<'a> {
     /// Its transpose.
     pub(super) fn pull_coefficients(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
         let asked: Vec<&CellActing> = self.laws.iter().filter(|l| sought.effects[l.effect]).collect();
-        let present = self.acting().next().is_some();
+        let present = self.act();
         let through = sought.modulus || sought.poisson || gradient.changes.rest.is_some();
         if asked.is_empty() && !(present && through) {
             return;

@@ -10,13 +10,14 @@ mod before;
 mod derivatives;
 pub mod laws;
 
-use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, Weights};
+use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, Weights, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::simd::wide;
+use crate::linear::vector::Nodes;
 use before::Before;
 use faer::{Mat, Side};
 use glam::DVec3;
-use laws::CellLaws;
+use laws::{CellLaws, LawState};
 use palpate_model::cutcells::corotation::{CellPose, M24, V24, multiply};
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::body::Body;
@@ -162,16 +163,23 @@ pub struct ElasticCells<'a> {
     before: Before,
     /// Of the displacement that the last residual was computed at.
     posed: Vec<Posed>,
-    /// Laws of cells, where some are not absent.
+    /// What acts beyond linear elasticity, its state at that displacement, and its force at the old state.
     laws: Option<CellLaws<'a>>,
+    lawful: Vec<LawState>,
+    old_laws: Nodes,
 }
 
 impl<'a> ElasticCells<'a> {
     /// Computes the past's share.
     pub fn new(c: Context<'a>) -> ElasticCells<'a> {
         let cells = Cells::new(c);
-        let laws = c.altered.laws.iter().any(|l| !l.absent).then(|| CellLaws::new(cells));
-        ElasticCells { cells, before: Before::new(&cells), posed: Vec::new(), laws }
+        let laws = Some(CellLaws::new(cells)).filter(CellLaws::act);
+        let mut old_laws = Vec::new();
+        if let Some(laws) = laws.filter(|_| c.weights.old != 0.0) {
+            old_laws = zeros(c.past.u.len());
+            laws.add_old_force(&mut old_laws);
+        }
+        ElasticCells { cells, before: Before::new(&cells), posed: Vec::new(), laws, lawful: Vec::new(), old_laws }
     }
 
     #[inline(always)]
@@ -200,7 +208,14 @@ impl<'a> ElasticCells<'a> {
         let Posed { pose, stress, .. } = &self.posed[e];
         let convex = curvature == Curvature::Convex;
         let scale = self.cells.young_of(e) * self.cells.c.weights.factors().0;
-        pose.upper_hessian(self.cells.stiffness(e), scale, (!convex).then_some(stress), out);
+        match (&self.laws, self.lawful.get(e)) {
+            (Some(laws), Some(state)) => {
+                let both = std::array::from_fn(|i| stress[i] + state.stress[i]);
+                pose.upper_hessian(self.cells.stiffness(e), scale + state.scale, (!convex).then_some(&both), out);
+                laws.add_upper_tangent(e, pose, state, out);
+            }
+            _ => pose.upper_hessian(self.cells.stiffness(e), scale, (!convex).then_some(stress), out),
+        }
         if let Some(guard) = pose.guard() {
             guard.add_hessian(self.cells.guard_scale(e), convex, out);
         }
@@ -237,7 +252,10 @@ impl Term for ElasticCells<'_> {
         self.posed = posed;
         self.add_forces(out);
         if let Some(laws) = &self.laws {
-            laws.force(u1, out);
+            let (lawful, forces): (Vec<LawState>, Vec<Corners>) = self.cells.each_cell(|e| laws.state(e, u1)).into_iter().unzip();
+            self.cells.sum_corners(|e, i| forces[e][i], out);
+            out.iter_mut().zip(&self.old_laws).for_each(|(v, f)| *v += *f);
+            self.lawful = lawful;
         }
     }
 
@@ -257,8 +275,8 @@ impl Term for ElasticCells<'_> {
         parts.iter().sum::<f64>() + own + self.laws.as_ref().map_or(0.0, |l| l.potential(u1))
     }
 
-    fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
-        assembly::assemble(self, u1, curvature, matrix);
+    fn tangent(&self, _u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
+        assembly::assemble(self, curvature, matrix);
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
