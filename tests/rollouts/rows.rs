@@ -20,6 +20,8 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
     let q = directions.len();
     let mut rollout = Rollout::new(CpuBackend, &plan, 1).unwrap();
     let lin = rollout.linearise(&plan.theta, &directions).unwrap();
+    let along_nothing = rollout.linearise(&plan.theta, &[]).unwrap().rows;
+    assert!(along_nothing.residuals == lin.rows.residuals && along_nothing.sensitivity.is_empty());
     let request = Request { gradient: Wanted::Nothing, sensitivities: directions.clone() };
     let e = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
     let rows = &lin.rows.residuals;

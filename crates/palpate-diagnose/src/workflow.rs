@@ -1,6 +1,7 @@
 //! The order of questions: is something missing, where, what is it called, how sure, what else, how much of the gap closes; and again.
 
 mod bound;
+mod candidate;
 mod choose;
 mod conclude;
 mod needed;
@@ -22,6 +23,7 @@ use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Adequacy, Block, Frame, extended, test};
 use crate::score::Score;
 use crate::still::still_ratio;
+use candidate::CandidateId;
 use palpate_engine::Source;
 use variants::{Variant, most_promising};
 
@@ -89,26 +91,6 @@ impl State {
     /// Sum of squares that the model leaves, but for what its free numbers and the discretisation explain.
     fn squares(&self) -> f64 {
         self.frame.squares()
-    }
-}
-
-/// Which hypothesis: a candidate by its place in the table, or a pair of them. Pairs come after all single ones, in the order of their
-/// parts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum CandidateId {
-    Single(usize),
-    /// The smaller number first.
-    Pair(usize, usize),
-}
-
-impl CandidateId {
-    /// Two single candidates as one, whichever comes first.
-    fn pair(a: CandidateId, b: CandidateId) -> CandidateId {
-        let first = |id| match id {
-            CandidateId::Single(n) | CandidateId::Pair(n, _) => n,
-        };
-        let (a, b) = (first(a), first(b));
-        CandidateId::Pair(a.min(b), a.max(b))
     }
 }
 

@@ -51,7 +51,8 @@ struct Forward<'a, B: Backend> {
     backend: &'a B,
     stages: &'a [Stage],
     stop: &'a AtomicBool,
-    directions: &'a [Direction],
+    /// What tangents are taken along, if they are wanted: single residuals are read beside them, also where there are none.
+    directions: Option<&'a [Direction]>,
     /// Every state is kept, for the way back.
     keep: bool,
 }
@@ -68,7 +69,7 @@ impl<B: Backend> Forward<'_, B> {
         let (b, directions) = (self.backend, self.directions);
         let mut first = b.new_state(w);
         b.start(w, &mut first, tally);
-        let mut tangents = (!directions.is_empty()).then(|| {
+        let mut tangents = directions.map(|directions| {
             let mut t = b.new_tangent(w, directions);
             b.start_tangent(w, &first, &mut t, tally);
             Tape::new(self.stages, t, false)
@@ -101,7 +102,7 @@ impl<B: Backend> Forward<'_, B> {
             if let Some(now) = s.completes {
                 b.observe(w, s.step, states.get(now), &next, tally);
             }
-            if let Some(tape) = &mut tangents {
+            if let Some((tape, directions)) = tangents.as_mut().zip(directions) {
                 let mut t = tape.forget(s.number).unwrap_or_else(|| b.new_tangent(w, directions));
                 b.step_tangent(w, s, &states.past(s), &next, &tape.past(s), &mut t, tally);
                 tape.push(t);
@@ -181,7 +182,8 @@ impl<B: Backend> Rollout<B> {
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
         let (b, stop, stages) = (&self.backend, &*self.stop, &self.stages);
         let directions = Direction::parameters(&request.sensitivities);
-        let forward = Forward { backend: b, stages, stop, directions: &directions, keep: request.gradient.any() };
+        let wanted = Some(directions.as_slice()).filter(|d| !d.is_empty());
+        let forward = Forward { backend: b, stages, stop, directions: wanted, keep: request.gradient.any() };
         let attempt = |w: &mut B::World| {
             if stop.load(Ordering::SeqCst) {
                 return None;
@@ -216,7 +218,7 @@ impl<B: Backend> Rollout<B> {
     ) -> Result<Evaluation, Failure> {
         let (b, dt) = (&self.backend, self.plan.clock.step);
         let (stages, stop) = (&self.stages, &*self.stop);
-        let forward = Forward { backend: b, stages, stop, directions: &[], keep: false };
+        let forward = Forward { backend: b, stages, stop, directions: None, keep: false };
         b.rollout(&mut self.world, true, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
             let mut tally = b.new_tally(w, &Request::default());
@@ -243,7 +245,7 @@ impl<B: Backend> Rollout<B> {
         let b = &self.backend;
         let along = Direction::parameters(directions);
         let (stages, stop) = (&self.stages, &*self.stop);
-        let forward = Forward { backend: b, stages, stop, directions: &along, keep: false };
+        let forward = Forward { backend: b, stages, stop, directions: Some(&along), keep: false };
         b.rollout(&mut self.world, true, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
             let request = Request { sensitivities: directions.to_vec(), ..Request::default() };
