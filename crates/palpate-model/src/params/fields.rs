@@ -358,7 +358,8 @@ mod tests {
                     let at = places(spec.varied, &body);
                     let near = (0..at.len()).min_by(|a, b| (at[*a] - r.center).length().total_cmp(&(at[*b] - r.center).length()));
                     let factor = factors[near.unwrap()];
-                    assert!((factor / r.value - 1.0).abs() < 0.15, "{spec:?}: {factor} for {}", r.value);
+                    // The nearest place may lie half a cell off the centre, an eighth of the way to the next region.
+                    assert!((factor / r.value).ln().abs() < 0.126 * 4f64.ln(), "{spec:?}: {factor} for {}", r.value);
                 }
             }
         }
