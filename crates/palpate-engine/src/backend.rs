@@ -1,6 +1,7 @@
 //! What a backend does: whole time steps, observations, and the adjoint and tangent of each, for a batch.
 
 use crate::evaluate::{Direction, Evaluation, ParamBatch, Request};
+use crate::residuals::FrameResiduals;
 use crate::rows::Rows;
 use glam::DVec3;
 use palpate_model::plan::Plan;
@@ -142,8 +143,7 @@ pub trait Backend: Send {
     fn read(&self, world: &Self::World, tally: &Self::Tally) -> Vec<Evaluation>;
     /// Displacements [m] and velocities [m/s] of one member `[N]` each, for reports and tests.
     fn read_state(&self, world: &Self::World, state: &Self::State, member: usize) -> (Vec<DVec3>, Vec<DVec3>);
-    /// Residual of every observed point and marker of the frames in step k (order of [`Backend::observe`]) of one member:
-    /// frame number and signed distance [m] per depth point (`None` = unmatched), vector [m] per marker.
+    /// Residual of every reading of the frames in step k (order of [`Backend::observe`]) of one member, in the order of [`Rows`].
     fn residuals(
         &self,
         world: &Self::World,
@@ -152,15 +152,4 @@ pub trait Backend: Send {
         next: &Self::State,
         member: usize,
     ) -> Vec<FrameResiduals>;
-}
-
-/// Residuals of one frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FrameResiduals {
-    /// Number of the frame in the plan's observation.
-    pub frame: usize,
-    /// Signed distance of each point [m].
-    pub points: Vec<Option<f64>>,
-    /// Simulated minus measured position of each marker [m].
-    pub markers: Vec<DVec3>,
 }

@@ -1,8 +1,9 @@
 //! The driver: forward with tape, back with the adjoint, or forward with tangents. Written once for all backends.
 
-use crate::backend::{Backend, BuildError, FrameResiduals};
+use crate::backend::{Backend, BuildError};
 use crate::evaluate::{Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request};
 use crate::failure::{Failure, FailureKind};
+use crate::residuals::FrameResiduals;
 use crate::rows::{Linearised, Rows};
 use crate::tape::{Adjoints, Tape};
 use glam::DVec3;

@@ -2,9 +2,8 @@
 
 use super::{RecordedFrame, RecordedMarkers, Recording};
 use crate::error::{InputError, number};
-use palpate_model::observation::Observation;
-use palpate_model::observation::{Camera, Frame, MarkerRest, ObservedMarker, ObservedPoint};
-use palpate_model::scene::{CostKind, ObservationSpec};
+use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint, ReadingKind};
+use palpate_model::scene::ObservationSpec;
 
 /// Noise of a depth reading where the recording states none [m]: that of common depth cameras at half a metre.
 const DEPTH_NOISE: f64 = 0.002;
@@ -51,17 +50,14 @@ impl Recording {
     ) -> Result<(Observation, Vec<MarkerRest>), ObservationError> {
         let mut o = Observation {
             cameras: self.cameras.iter().map(|c| Camera { center: c.position(), axis: c.axis() }).collect(),
-            depth_noise: DEPTH_NOISE,
-            marker_noise: MARKER_NOISE,
-            // Displacements come from other simulators, not from recordings; one metre keeps the weight neutral.
-            displacement_noise: 1.0,
+            camera_names: self.cameras.iter().map(|c| c.name.clone()).collect(),
             ..Observation::default()
         };
-        if spec.costs.contains(&CostKind::SparseSurface) {
+        if spec.costs.contains(&ReadingKind::Depth) {
             self.add_depth(spec, &mut o, warnings)?;
         }
         let mut rest = Vec::new();
-        if spec.costs.contains(&CostKind::Markers) {
+        if spec.costs.contains(&ReadingKind::Marker) {
             rest = self.add_markers(spec, &mut o, warnings)?;
         }
         o.frames.sort_by(|a, b| a.time.total_cmp(&b.time));
@@ -144,8 +140,9 @@ impl Recording {
                 c.name
             ));
         }
-        o.depth_noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
-        o.depth_systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        let noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
+        let systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        o.channels.push(Channel { kind: ReadingKind::Depth, noise, systematic });
         Ok(())
     }
 
@@ -208,8 +205,8 @@ impl Recording {
         if m.noise_sigma.is_none() {
             warnings.push(format!("{}: markers state no noise_sigma; {MARKER_NOISE} m is assumed", self.path.display()));
         }
-        o.marker_noise = m.noise_sigma.unwrap_or(MARKER_NOISE);
-        o.marker_systematic = m.noise_systematic;
+        let noise = m.noise_sigma.unwrap_or(MARKER_NOISE);
+        o.channels.push(Channel { kind: ReadingKind::Marker, noise, systematic: m.noise_systematic });
         Ok(rest)
     }
 

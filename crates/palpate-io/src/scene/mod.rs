@@ -16,6 +16,7 @@ use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
+use palpate_model::observation::ReadingKind;
 use palpate_model::plan::scheme::{self, Scheme};
 use palpate_model::scene::*;
 use std::path::Path;
@@ -274,7 +275,7 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     if t.optional_str("cost").is_ok_and(|c| c == Some("silhouette")) {
         return Err(t.error("cost", "\"silhouette\" is not available in this version; allowed: \"sparse-surface\", \"markers\""));
     }
-    let kinds = [("sparse-surface", CostKind::SparseSurface), ("markers", CostKind::Markers)];
+    let kinds = [("sparse-surface", ReadingKind::Depth), ("markers", ReadingKind::Marker)];
     let costs = t
         .optional_choices("cost", &kinds)?
         .ok_or_else(|| t.missing("cost", "\"sparse-surface\", \"markers\", or an array of these"))?;

@@ -15,6 +15,7 @@ use crate::results::{self, finite};
 use clap::Args;
 use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, read_recording};
+use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
 use palpate_model::scene::{BodySource, Optimizer};
 use std::path::{Path, PathBuf};
@@ -222,36 +223,45 @@ fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let o = &e.plan().observation;
     let (Some(first), Some(last)) = (o.frames.first(), o.frames.last()) else { return };
     let points: Vec<usize> = o.frames.iter().map(|f| f.points.len()).collect();
-    let readings: usize = o.frames.iter().map(|f| f.markers.len()).sum();
     let [low, high] = extremes(&points);
-    let total: usize = points.iter().sum();
-    let of = |seen: usize, size: f64, what: &str| (seen > 0).then(|| format!("{:.2} mm ({what})", size * 1e3));
-    let noise: Vec<String> =
-        [of(total, o.depth_noise, "depth"), of(readings, o.marker_noise, "markers")].into_iter().flatten().collect();
+    let of = |c: &Channel| (o.readings(c.kind) > 0).then(|| format!("{:.2} mm ({})", c.noise * 1e3, c.kind.name()));
+    let noise: Vec<String> = o.channels.iter().filter_map(of).collect();
     let noise = if noise.is_empty() { "unknown".to_string() } else { noise.join(", ") };
+    let [readings, tracks, displacements] =
+        [ReadingKind::Marker, ReadingKind::Track, ReadingKind::Displacement].map(|kind| o.readings(kind));
+    let tracked = o.markers.len() - o.marker_count();
+    let more = |count: usize, text: String| if count == 0 { String::new() } else { text };
     lines.push((
         "observed",
         format!(
-            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings); \
+            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings){}{}; \
              noise {noise}; lies around the object",
             o.frames.len(),
             short(first.time),
             short(last.time),
             o.cameras.len(),
-            o.markers.len(),
+            o.marker_count(),
+            more(tracks, format!(", {tracked} tracked points ({tracks} readings)")),
+            more(displacements, format!(", {displacements} displacements of nodes")),
         ),
     ));
+    let noise_of = |kind| o.channel(kind).map(|c| c.noise);
     content.observation = Some(Observed {
         frames: o.frames.len(),
         from: first.time,
         to: last.time,
         cameras: o.cameras.len(),
-        points: total,
+        points: points.iter().sum(),
         points_per_frame: [low, high],
         marker_readings: readings,
-        markers: o.markers.len(),
-        depth_noise: o.depth_noise,
-        marker_noise: o.marker_noise,
+        markers: o.marker_count(),
+        tracked_readings: tracks,
+        tracked_points: tracked,
+        displacements,
+        depth_noise: noise_of(ReadingKind::Depth),
+        marker_noise: noise_of(ReadingKind::Marker),
+        tracked_noise: noise_of(ReadingKind::Track),
+        displacement_noise: noise_of(ReadingKind::Displacement),
         overlap: true,
     });
 }

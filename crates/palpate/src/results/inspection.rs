@@ -135,10 +135,25 @@ pub struct Observed {
     pub marker_readings: usize,
     /// Number of markers.
     pub markers: usize,
-    /// Standard deviation of a depth reading [m].
-    pub depth_noise: f64,
-    /// Standard deviation of a marker's coordinate [m].
-    pub marker_noise: f64,
+    /// Readings of tracked points.
+    #[serde(default)]
+    pub tracked_readings: usize,
+    /// Number of tracked points.
+    #[serde(default)]
+    pub tracked_points: usize,
+    /// Displacements of nodes in all frames.
+    #[serde(default)]
+    pub displacements: usize,
+    /// Standard deviation of a depth reading [m]; `None` where no depth is compared.
+    pub depth_noise: Option<f64>,
+    /// Standard deviation of a marker's coordinate [m]; `None` where no marker is compared.
+    pub marker_noise: Option<f64>,
+    /// Standard deviation of a tracked point's coordinate [m]; `None` where none is compared.
+    #[serde(default)]
+    pub tracked_noise: Option<f64>,
+    /// Standard deviation of a displacement's component [m]; `None` where none is compared.
+    #[serde(default)]
+    pub displacement_noise: Option<f64>,
     /// True where it lies around the object; a scene of which it does not is refused.
     pub overlap: bool,
 }
