@@ -319,6 +319,39 @@ impl Backend for CpuBackend {
             });
     }
 
+    fn observe_product(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &Tangent,
+        adj: &mut Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        let (shared, directions) = (&world.shared, &tangent.directions[..]);
+        let states = (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members);
+        let added = (&mut adj.members, &mut adj_now.members, &mut tally.members);
+        (states, added).into_par_iter().for_each(|((m, a, b, d0, d1), (to_next, to_now, t))| {
+            if t.failed() {
+                return;
+            }
+            let shifts = shifts(&shared.plan, m);
+            for at in instants(&shared.plan, m.first_stamp(), k) {
+                let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
+                let MemberTally { evaluation, compared } = &mut *t;
+                let found = MemberTally::find(compared, at.frame);
+                let along = Along { directions, du: &du };
+                let g = found.product(m.look(shared, at.frame), along, shared.scale, &mut evaluation.gradient);
+                let later = vector::dot(&g, &velocity(&at, [a, b]));
+                shifts.iter().for_each(|p| evaluation.gradient[*p] -= later);
+                pull_back(&at, &g, to_now, to_next);
+            }
+        });
+    }
+
     fn rows(
         &self,
         world: &World,

@@ -11,6 +11,8 @@ pub mod linear;
 mod local_tests;
 mod memory;
 mod newton;
+#[cfg(test)]
+mod product_tests;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;

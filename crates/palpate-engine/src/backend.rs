@@ -122,6 +122,22 @@ pub trait Backend: Send {
         tally: &mut Self::Tally,
     );
 
+    /// Product with the Gauss–Newton matrix of [`Backend::observe`]: adds Jᵀ W J v to dJ/d(next) in `adj`, to dJ/d(now) in `adj_now` and
+    /// to dJ/dθ, where the tangents at both ends have the single direction v. Residuals depend on θ also beside the states: by effects on
+    /// the measurement, and by where on the curve between the states a frame is.
+    fn observe_product(
+        &self,
+        world: &Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        tangent: &Self::Tangent,
+        tangent_next: &Self::Tangent,
+        adj: &mut Self::Adjoint,
+        adj_now: &mut Self::Adjoint,
+        tally: &mut Self::Tally,
+    );
+
     /// Every residual of the frames in step k of one member with its sensitivities, from what [`Backend::observe`] found; `None`
     /// from a backend that only sums.
     fn rows(

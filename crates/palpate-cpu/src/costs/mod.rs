@@ -7,6 +7,8 @@ pub mod depth;
 pub mod displacements;
 pub mod markers;
 pub mod matching;
+#[cfg(test)]
+pub(crate) mod tests;
 
 use crate::linear::vector::Nodes;
 use glam::DVec3;
