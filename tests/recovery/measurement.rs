@@ -73,7 +73,7 @@ fn record(scene: &Scene, markers: Vec<(String, DVec3)>, times: Vec<f64>) -> Reco
 fn record_with(sensor: Sensor, scene: &Scene, markers: Vec<(String, DVec3)>, times: Vec<f64>) -> Recording {
     let experiment = Experiment::new(scene.clone(), String::new(), Vec::new()).unwrap();
     let cameras = if markers.is_empty() { cameras() } else { Vec::new() };
-    let observers = Observers { cameras, markers, times, sensor };
+    let observers = Observers { cameras, markers, points: Vec::new(), displacements: false, times, sensor };
     observe(&experiment, Backend::Cpu, &observers, |_| std::ops::ControlFlow::Continue(())).unwrap()
 }
 
@@ -209,7 +209,14 @@ fn a_camera_or_marker_that_does_not_exist_is_named() {
     let none = with(bar(), "camera-pose", &[("camera", &[2.0])]);
     let seen = record(&bar(), Vec::new(), vec![0.0]);
     let error = |e: &dyn std::fmt::Display| e.to_string();
-    let observers = Observers { cameras: cameras(), markers: Vec::new(), times: vec![0.0], sensor: SENSOR };
+    let observers = Observers {
+        cameras: cameras(),
+        markers: Vec::new(),
+        points: Vec::new(),
+        displacements: false,
+        times: vec![0.0],
+        sensor: SENSOR,
+    };
     let experiment =
         Experiment::new(none.clone(), String::new(), Vec::new()).expect("a scene that is only simulated has no camera");
     let observed = observe(&experiment, Backend::Cpu, &observers, |_| std::ops::ControlFlow::Continue(())).map(|_| ());

@@ -341,7 +341,7 @@ impl Backend for CpuBackend {
             let shifts = shifts(&shared.plan, m);
             for at in instants(&shared.plan, m.first_stamp(), k) {
                 let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
-                let MemberTally { evaluation, compared } = &mut *t;
+                let MemberTally { evaluation, compared, .. } = &mut *t;
                 let found = MemberTally::find(compared, at.frame);
                 let along = Along { directions, du: &du };
                 let g = found.product(m.look(shared, at.frame), along, shared.scale, &mut evaluation.gradient);

@@ -41,6 +41,8 @@ pub fn record(truth: &Scene, watch: &Watch) -> Result<Recording, Error> {
     let observers = Observers {
         cameras: watch.cameras.clone(),
         markers: Vec::new(),
+        points: Vec::new(),
+        displacements: false,
         times: (1..=t.steps).filter(|k| k.is_multiple_of(watch.every)).map(|k| t.start + k as f64 * t.step).collect(),
         sensor: Sensor { noise: watch.noise, dropout: 0.0, depth_scale: DEPTH_SCALE, seed: watch.seed },
     };

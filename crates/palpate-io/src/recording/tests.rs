@@ -49,6 +49,8 @@ fn sample() -> Recording {
                 MarkerRest { name: "b".into(), position: DVec3::Z, surface: None },
             ],
         }),
+        points: None,
+        displacements: None,
         warnings: Vec::new(),
     }
 }

@@ -9,12 +9,12 @@ use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
 use crate::results::inspection::{
     CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
-    SceneInspection, Time,
+    SceneInspection, SequenceInspection, Time,
 };
 use crate::results::{self, finite};
 use clap::Args;
 use palpate_gpu::AdapterReport;
-use palpate_io::recording::{Recording, read_recording};
+use palpate_io::recording::{Recording, Sequence, read_recording};
 use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
 use palpate_model::scene::{BodySource, Optimizer};
@@ -326,7 +326,38 @@ fn recording(r: &Recording) -> (RecordingInspection, Lines) {
             rest_places: m.rest.len(),
         });
     }
+    let mut of_array = |label: &'static str, s: &Sequence, things: &str| {
+        let found = sequence(s);
+        let text = format!(
+            "{} {things}, {} of {} readings seen in {} frames from {} s to {} s, noise {}",
+            found.count,
+            found.readings,
+            found.readings + found.unseen,
+            found.frames,
+            short(found.from),
+            short(found.to),
+            stated(s.noise_sigma)
+        );
+        lines.push((label, text));
+        found
+    };
+    content.points = r.points.as_ref().map(|p| of_array("tracked points", &p.track, "points"));
+    content.displacements = r.displacements.as_ref().map(|d| of_array("displacements", &d.track, "nodes"));
     (content, lines)
+}
+
+/// What an array holds.
+fn sequence(s: &Sequence) -> SequenceInspection {
+    let (count, readings) = (s.count(), s.readings());
+    SequenceInspection {
+        count,
+        frames: s.times.len(),
+        readings,
+        unseen: s.vectors.len() - readings,
+        from: s.times.first().copied().unwrap_or_default(),
+        to: s.times.last().copied().unwrap_or_default(),
+        noise: s.noise_sigma,
+    }
 }
 
 #[cfg(test)]

@@ -299,6 +299,8 @@ mod tests {
         let observers = Observers {
             cameras: vec![camera],
             markers: vec![("low".into(), DVec3::new(0.01, 0.01, 0.0))],
+            points: Vec::new(),
+            displacements: false,
             times: vec![0.0],
             sensor: Sensor { noise: 5e-4, dropout: 0.0, depth_scale: 1e-4, seed: 1 },
         };

@@ -173,6 +173,31 @@ pub struct RecordingInspection {
     /// Its markers; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub markers: Option<Markers>,
+    /// Its tracked points; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<SequenceInspection>,
+    /// Its displacements of nodes; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displacements: Option<SequenceInspection>,
+}
+
+/// Things that are seen again and again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SequenceInspection {
+    /// How many there are.
+    pub count: usize,
+    /// Number of times.
+    pub frames: usize,
+    /// Readings of all.
+    pub readings: usize,
+    /// How often one was not seen.
+    pub unseen: usize,
+    /// First time [s].
+    pub from: f64,
+    /// Last time [s].
+    pub to: f64,
+    /// Standard deviation of a coordinate [m]; `None` where it is not stated.
+    pub noise: Option<f64>,
 }
 
 /// A camera.
@@ -275,6 +300,8 @@ mod tests {
                 noise: Some(1e-3),
                 rest_places: 1,
             }),
+            points: Some(SequenceInspection { count: 5, frames: 3, readings: 14, unseen: 1, from: 0.0, to: 0.2, noise: None }),
+            displacements: None,
         };
         let file = round_trip(&document(Inspected::Recording(whole)));
         assert_eq!((&file["kind"], &file["frames"]["count"]), (&"recording".into(), &17.into()));
