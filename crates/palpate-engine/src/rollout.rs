@@ -251,9 +251,12 @@ impl<B: Backend> Rollout<B> {
             let mut tally = b.new_tally(w, &request);
             let (mut rows, mut without_rows) = (Rows::default(), false);
             let each = |m: Moment<B>| {
-                let Some(tangents) = m.tangents.filter(|_| m.step.is_some() || stages.is_empty()) else {
+                if m.step.is_none() && !stages.is_empty() {
                     return ControlFlow::Continue(());
-                };
+                }
+                // Without directions there are residuals alone.
+                let none = b.new_tangent(m.world, &[]);
+                let tangents = m.tangents.unwrap_or([&none; 2]);
                 match b.rows(m.world, m.step.unwrap_or(0), m.ends, tangents, m.tally, 0) {
                     Some(more) => {
                         rows.residuals.extend(more.residuals);
