@@ -1,11 +1,13 @@
 //! Markers: carried rigidly by the surface point that they are attached to, also on a stalk. Twin of
-//! palpate-cpu/src/passes/markers.rs.
+//! palpate-cpu/src/costs/markers.rs.
 // use shared/seen
 // use shared/rotation
 
 struct Site { // mirrored
     // From the attachment point to the marker's centre at rest [m].
-    stalk: vec4<f32>,
+    stalk: vec3<f32>,
+    // 1/(n σ²) of its readings [1/m²].
+    weight: f32,
     // Deformation gradient at rest, minus the identity.
     excess: mat3x3<f32>,
 }
@@ -41,7 +43,7 @@ var<storage, read_write> carried: array<Carried>;
 
 // From the attachment point to the centre of a member's marker, at rest.
 fn stalk_of(member: u32, site: u32) -> vec3<f32> {
-    return sites[site].stalk.xyz + offsets[member * sight.sites + site].xyz;
+    return sites[site].stalk + offsets[member * sight.sites + site].xyz;
 }
 
 // d ⊗ g, by columns.

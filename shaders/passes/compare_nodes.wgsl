@@ -2,7 +2,7 @@
 // use shared/seen
 // use shared/found
 
-// Measured displacements of frames that have them: a float [m], and what it leaves.
+// Measured displacements of frames that have them: a float [m] with 1 where the node was seen and 0 where not, and what the float leaves.
 var<storage, read> measured: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -15,9 +15,11 @@ fn compare_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let k = 2u * (shot.node_start + s.item);
     let at = seen_at(s.slot, s.item);
-    let r = (seen[at].xyz - measured[k].xyz) + (seen[rest_part() + at].xyz - measured[k + 1u].xyz);
+    let known = measured[k].w;
+    let weight = sight.displacement * known;
+    let r = known * ((seen[at].xyz - measured[k].xyz) + (seen[rest_part() + at].xyz - measured[k + 1u].xyz));
     let row = s.slot * sight.rows + shot.point_count + 3u * (shot.marker_count + s.item);
-    rows[row] = vec2(r.x, sight.displacement);
-    rows[row + 1u] = vec2(r.y, sight.displacement);
-    rows[row + 2u] = vec2(r.z, sight.displacement);
+    rows[row] = vec2(r.x, weight);
+    rows[row + 1u] = vec2(r.y, weight);
+    rows[row + 2u] = vec2(r.z, weight);
 }

@@ -42,7 +42,7 @@ fn pull_of(s: Seat, shot: Shot, node: u32) -> vec3<f32> {
     }
     if node < shot.node_count {
         let row = s.slot * sight.rows + shot.point_count + 3u * (shot.marker_count + node);
-        g += vec3(rows[row].x, rows[row + 1u].x, rows[row + 2u].x) * sight.displacement;
+        g += vec3(rows[row].x, rows[row + 1u].x, rows[row + 2u].x) * rows[row].y;
     }
     return g;
 }

@@ -17,7 +17,7 @@ fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         let row = rows[s.slot * sight.rows + i];
         let r = row.x;
         if i >= shot.point_count {
-            sum += vec4(0.5 * row.y * r * r, 1.0, r * r, 0.0);
+            sum += vec4(0.5 * row.y * r * r, select(0.0, 1.0, row.y > 0.0), r * r, 0.0);
         } else if row.y < 0.0 {
             // A point without a match costs what one at the edge of the band costs.
             sum.x += sight.depth * depth_unmatched(sight.band);

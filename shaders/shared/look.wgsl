@@ -34,9 +34,8 @@ struct Sight { // mirrored
     reach: f32,
     // Cosine beyond which a side is turned away.
     turned_away: f32,
-    // 1/(n σ²) of depth points, markers, displacements [1/m²].
+    // 1/(n σ²) of depth points and displacements [1/m²].
     depth: f32,
-    marker: f32,
     displacement: f32,
     // Numbers that move depth readings.
     readings: u32,

@@ -40,6 +40,8 @@ fn wall() -> Recording {
         cameras: vec![camera],
         frames: vec![frame(0.0), frame(0.05)],
         markers: None,
+        points: None,
+        displacements: None,
         warnings: Vec::new(),
     }
 }

@@ -81,6 +81,8 @@ fn marker(folder: &Path, places: [glam::DVec3; 2]) -> PathBuf {
         cameras: vec![],
         frames: vec![],
         markers: Some(markers),
+        points: None,
+        displacements: None,
         warnings: vec![],
     };
     let seen = folder.join("seen");

@@ -2,7 +2,8 @@
 
 use palpate_io::{Recording, check_overlap, read_mesh, read_recording, read_sdf};
 use palpate_model::observation::MarkerRest;
-use palpate_model::scene::CostKind;
+use palpate_model::observation::ReadingKind;
+
 use palpate_model::shape::Shape;
 use std::path::Path;
 use support::data::data_dir;
@@ -29,9 +30,9 @@ fn motion_capture_of_a_beam() {
     for (name, times) in [("beam-mocap-gravity-a", 429), ("beam-mocap-load52-a", 556)] {
         let r = read(&data, name);
         let mut warnings = Vec::new();
-        let (o, rest) = r.observation(&compared(CostKind::Markers), &mut warnings).unwrap();
+        let (o, rest) = r.observation(&compared(ReadingKind::Marker), &mut warnings).unwrap();
         assert_eq!((o.frames.len(), rest.len(), warnings.len()), (times, 3, 0), "{name}");
-        assert_eq!((o.marker_noise, o.marker_systematic), (0.0003, 0.0008));
+        assert_eq!((o.noise(ReadingKind::Marker), o.systematic(ReadingKind::Marker)), (0.0003, 0.0008));
         let (min, max) = check_mesh(&data, name, 9e-5, 1e-9);
         check_overlap(&o, min, max).unwrap();
     }
@@ -43,8 +44,8 @@ fn depth_of_hanging_cantilevers() {
     for name in ["cantilever-ecoflex-hanging", "cantilever-two-materials-hanging"] {
         for file in ["recording.toml", "recording-corrected.toml"] {
             let r = read(&data, &format!("{name}/{file}"));
-            let (o, _) = r.observation(&compared(CostKind::SparseSurface), &mut Vec::new()).unwrap();
-            assert_eq!((o.frames.len(), o.depth_noise), (1, 0.001));
+            let (o, _) = r.observation(&compared(ReadingKind::Depth), &mut Vec::new()).unwrap();
+            assert_eq!((o.frames.len(), o.noise(ReadingKind::Depth)), (1, 0.001));
             assert!(o.frames[0].points.len() > 5000, "{name}: {} points", o.frames[0].points.len());
             // The stated 234 cm³.
             let (min, max) = check_mesh(&data, name, 234e-6, 5e-3);
@@ -60,10 +61,10 @@ fn silhouettes_and_derived_points_of_an_oscillating_cantilever() {
     let silhouettes = read(&data, &format!("{name}/silhouettes.toml"));
     assert_eq!(silhouettes.frames.len(), 18);
     assert!(silhouettes.frames.iter().all(|f| f.depth.is_none() && f.mask.is_some()));
-    assert!(silhouettes.observation(&compared(CostKind::SparseSurface), &mut Vec::new()).is_err(), "a silhouette has no points");
+    assert!(silhouettes.observation(&compared(ReadingKind::Depth), &mut Vec::new()).is_err(), "a silhouette has no points");
 
     let r = read(&data, name);
-    let mut spec = compared(CostKind::Markers);
+    let mut spec = compared(ReadingKind::Marker);
     let e = r.observation(&spec, &mut Vec::new()).unwrap_err().to_string();
     assert!(e.contains("no rest position for head_outer_top") && e.contains("[[observation.marker]]"), "{e}");
     // The recording's description places them on the front face z = 15 mm.

@@ -9,6 +9,7 @@ use palpate::render::{Pinhole, Sensor};
 use palpate::synthetic::{Observers, observe};
 use palpate_io::recording::Recording;
 use palpate_model::effects::{self, Effect, Unstated};
+use palpate_model::observation::ReadingKind;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
@@ -72,12 +73,12 @@ fn record(scene: &Scene, markers: Vec<(String, DVec3)>, times: Vec<f64>) -> Reco
 fn record_with(sensor: Sensor, scene: &Scene, markers: Vec<(String, DVec3)>, times: Vec<f64>) -> Recording {
     let experiment = Experiment::new(scene.clone(), String::new(), Vec::new()).unwrap();
     let cameras = if markers.is_empty() { cameras() } else { Vec::new() };
-    let observers = Observers { cameras, markers, times, sensor };
+    let observers = Observers { cameras, markers, points: Vec::new(), displacements: false, times, sensor };
     observe(&experiment, Backend::Cpu, &observers, |_| std::ops::ControlFlow::Continue(())).unwrap()
 }
 
 /// Plan of a scene compared with a recording.
-fn plan(scene: &Scene, recording: &Recording, cost: CostKind) -> Result<Plan, PlanError> {
+fn plan(scene: &Scene, recording: &Recording, cost: ReadingKind) -> Result<Plan, PlanError> {
     let spec = ObservationSpec {
         recording: "recording".into(),
         file: "recording.toml".into(),
@@ -96,7 +97,7 @@ fn plan(scene: &Scene, recording: &Recording, cost: CostKind) -> Result<Plan, Pl
 
 /// Fits the effect's amplitudes (from absent) and, where asked, the stiffness (from 1.3 of the truth) to the recording; prints and
 /// checks every value against the truth: within three standard errors or 5 %.
-fn recovers(truth: &Scene, recording: &Recording, cost: CostKind, stiffness: bool) -> palpate_fit::FitResult {
+fn recovers(truth: &Scene, recording: &Recording, cost: ReadingKind, stiffness: bool) -> palpate_fit::FitResult {
     let plan = plan(truth, recording, cost).unwrap();
     let mut unknowns: Vec<Unknown> = Vec::new();
     for key in &plan.layout.keys {
@@ -130,7 +131,7 @@ fn recovers(truth: &Scene, recording: &Recording, cost: CostKind, stiffness: boo
 /// A static recording of the bar.
 fn bar_recovers(kind: &str, values: &[(&str, &[f64])]) {
     let truth = with(bar(), kind, values);
-    recovers(&truth, &record(&truth, Vec::new(), vec![0.0]), CostKind::SparseSurface, true);
+    recovers(&truth, &record(&truth, Vec::new(), vec![0.0]), ReadingKind::Depth, true);
 }
 
 #[test]
@@ -165,7 +166,7 @@ fn the_second_cameras_pose() {
 fn two_effects_at_once() {
     let truth = with(bar(), "depth-bias", &[("bias", &[-0.015])]);
     let truth = with(truth, "camera-pose", &[("translation", &[0.01, 0.008, -0.012]), ("rotation", &[0.03, 0.02, -0.03])]);
-    recovers(&truth, &record(&truth, Vec::new(), vec![0.0]), CostKind::SparseSurface, true);
+    recovers(&truth, &record(&truth, Vec::new(), vec![0.0]), ReadingKind::Depth, true);
 }
 
 #[test]
@@ -173,7 +174,7 @@ fn a_time_offset() {
     let truth = with(falling_ball(), "time-offset", &[("offset", &[0.013])]);
     let recording = record(&truth, Vec::new(), vec![0.013, 0.0255, 0.037, 0.048]);
     assert!((recording.frames[0].time - 0.026).abs() < 1e-12, "a clock that runs ahead stamps later");
-    recovers(&truth, &recording, CostKind::SparseSurface, false);
+    recovers(&truth, &recording, ReadingKind::Depth, false);
 }
 
 #[test]
@@ -182,7 +183,7 @@ fn a_marker_offset() {
     let markers: Vec<(String, DVec3)> = [0.05, 0.09, 0.14].iter().map(|x| (format!("m{x}"), DVec3::new(*x, 0.0, 0.02))).collect();
     // Offsets are told to the noise of one reading: several readings of the same instant, as a static problem has them.
     let recording = record(&truth, markers, (0..40).map(|k| 0.01 * f64::from(k)).collect());
-    recovers(&truth, &recording, CostKind::Markers, true);
+    recovers(&truth, &recording, ReadingKind::Marker, true);
 }
 
 #[test]
@@ -208,15 +209,22 @@ fn a_camera_or_marker_that_does_not_exist_is_named() {
     let none = with(bar(), "camera-pose", &[("camera", &[2.0])]);
     let seen = record(&bar(), Vec::new(), vec![0.0]);
     let error = |e: &dyn std::fmt::Display| e.to_string();
-    let observers = Observers { cameras: cameras(), markers: Vec::new(), times: vec![0.0], sensor: SENSOR };
+    let observers = Observers {
+        cameras: cameras(),
+        markers: Vec::new(),
+        points: Vec::new(),
+        displacements: false,
+        times: vec![0.0],
+        sensor: SENSOR,
+    };
     let experiment =
         Experiment::new(none.clone(), String::new(), Vec::new()).expect("a scene that is only simulated has no camera");
     let observed = observe(&experiment, Backend::Cpu, &observers, |_| std::ops::ControlFlow::Continue(())).map(|_| ());
     let observed = error(&observed.expect_err("there are two cameras"));
     assert!(observed.contains("effect.0.camera: there is no camera number 2; they are 0 to 1"), "{observed}");
-    let planned = error(&plan(&none, &seen, CostKind::SparseSurface).expect_err("the recording has two cameras"));
+    let planned = error(&plan(&none, &seen, ReadingKind::Depth).expect_err("the recording has two cameras"));
     assert!(planned.contains("effect.0.camera: there is no camera number 2"), "{planned}");
     let marker = with(bar(), "marker-offset", &[]);
-    let planned = error(&plan(&marker, &seen, CostKind::SparseSurface).expect_err("the recording has no markers"));
+    let planned = error(&plan(&marker, &seen, ReadingKind::Depth).expect_err("the recording has no markers"));
     assert!(planned.contains("effect.0.marker: there is no marker"), "{planned}");
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
-use palpate_model::observation::{Frame, Observation};
+use palpate_model::observation::{Channel, Frame, Observation, ObservedDisplacement, ReadingKind};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
@@ -20,9 +20,12 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
     s.solver.linear = linear;
     s.solver.tolerance = 1e-10;
     let nodes = scenes::plan(&s).body.nodes.len();
-    let frames =
-        [0.043, 0.08].map(|time| Frame { time, displacements: vec![DVec3::new(0.0, 0.0, -0.01); nodes], ..Frame::default() });
-    let noise = Observation { depth_noise: 1.0, marker_noise: 1.0, displacement_noise: 1e-3, ..Observation::default() };
+    let frames = [0.043, 0.08].map(|time| Frame {
+        time,
+        displacements: ObservedDisplacement::of_all(vec![DVec3::new(0.0, 0.0, -0.01); nodes]),
+        ..Frame::default()
+    });
+    let noise = Observation { channels: vec![Channel::new(ReadingKind::Displacement, 1e-3)], ..Observation::default() };
     build_plan(&s, Observation { frames: frames.to_vec(), ..noise }, &[]).unwrap()
 }
 

@@ -4,9 +4,11 @@
 
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Source, Wanted};
+use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Wanted};
 use palpate_model::mechanics::motion::RigidMotion;
-use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
+use palpate_model::observation::{
+    Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker, ObservedPoint, ReadingKind,
+};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
@@ -35,7 +37,7 @@ pub(super) fn ball() -> Scene {
 pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
     let marker =
         MarkerRest { name: "m".into(), position: DVec3::new(0.0, 0.01, 0.118), surface: Some(DVec3::new(0.0, 0.005, 0.11)) };
-    let plain = build_plan(scene, Observation { depth_noise: 1e-3, marker_noise: 1e-3, ..Observation::default() }, &[]).unwrap();
+    let plain = build_plan(scene, Observation::default(), &[]).unwrap();
     let mut theta = plain.theta.clone();
     theta[0] *= 1.15;
     let mut states = Vec::new();
@@ -73,19 +75,19 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
                 time,
                 points,
                 markers: vec![ObservedMarker { site: 0, position: DVec3::new(0.001, 0.012, 0.11) }],
-                displacements: u.iter().map(|u| *u + DVec3::new(1e-4, -2e-4, 3e-4)).collect(),
+                displacements: ObservedDisplacement::of_all(u.iter().map(|u| *u + DVec3::new(1e-4, -2e-4, 3e-4))),
             }
         })
         .collect();
     let observation = Observation {
         cameras,
         frames,
-        markers: Vec::new(),
-        depth_noise: 1e-3,
-        marker_noise: 2e-3,
-        displacement_noise: 5e-3,
-        depth_systematic: 0.0,
-        marker_systematic: 0.0,
+        channels: vec![
+            Channel::new(ReadingKind::Depth, 1e-3),
+            Channel::new(ReadingKind::Marker, 2e-3),
+            Channel::new(ReadingKind::Displacement, 5e-3),
+        ],
+        ..Observation::default()
     };
     let plan = build_plan(scene, observation, &[marker]).unwrap();
     away_from_kinks(plan)
@@ -103,10 +105,7 @@ fn away_from_kinks(plan: Plan) -> Plan {
     let mut observation = (*plan.observation).clone();
     for (k, f) in observation.frames.iter_mut().enumerate() {
         let kept = |r: &&ResidualRow| r.frame == k && r.value.is_some() && far(r.rest);
-        let numbers = rows.iter().filter(kept).filter_map(|r| match r.source {
-            Source::Point { point, .. } => Some(point as usize),
-            _ => None,
-        });
+        let numbers = rows.iter().filter(kept).filter(|r| r.source.is_depth()).map(|r| r.source.item as usize);
         let points: Vec<ObservedPoint> = numbers.map(|n| f.points[n]).collect();
         assert!(2 * points.len() > f.points.len(), "{} of {} points are left", points.len(), f.points.len());
         f.points = points;

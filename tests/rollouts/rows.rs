@@ -27,9 +27,9 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
     let rows = &lin.rows.residuals;
     assert_eq!((rows.len(), lin.rows.sensitivity.len()), (e.residuals, e.residuals * q));
     let missing: Vec<_> = rows.iter().filter(|r| r.value.is_none()).collect();
-    assert!(missing.iter().any(|r| r.frame == 1 && r.source == Source::Point { point: 1, camera: 0 }), "{missing:?}");
+    assert!(missing.iter().any(|r| r.frame == 1 && r.source == Source::point(1, 0)), "{missing:?}");
     assert_eq!(rows.iter().filter(|r| r.value.is_some()).count(), e.matched);
-    let points = rows.iter().filter(|r| matches!(r.source, Source::Point { .. }) && r.value.is_some()).count();
+    let points = rows.iter().filter(|r| r.source.is_depth() && r.value.is_some()).count();
     assert!(points > 800, "{points} points meet something");
     let (mut gradient, mut matrix) = (vec![0.0; q], vec![0.0; q * q]);
     for (r, d) in rows.iter().zip(lin.rows.sensitivity.chunks(q)) {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::Rollout;
 use palpate_model::effects::{ALL, Effect};
-use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
+use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
@@ -17,7 +17,7 @@ use support::scenes;
 fn plate() -> Scene {
     let mut s = scenes::body(Analytic::Box { min: DVec3::new(-0.04, -0.04, -0.015), max: DVec3::new(0.04, 0.04, 0.0) }, 0.01);
     s.time.steps = 1;
-    s.observation = Some(compared(CostKind::SparseSurface));
+    s.observation = Some(compared(ReadingKind::Depth));
     s
 }
 
@@ -30,9 +30,7 @@ fn seen(points: &[DVec3], center: DVec3, time: f64) -> Observation {
             points: points.iter().map(|&position| ObservedPoint { position, camera: 0 }).collect(),
             ..Frame::default()
         }],
-        depth_noise: 2e-4,
-        marker_noise: 1e-3,
-        displacement_noise: 1e-3,
+        channels: vec![Channel::new(ReadingKind::Depth, 2e-4)],
         ..Observation::default()
     }
 }
@@ -45,7 +43,7 @@ fn distances(points: &[DVec3]) -> Vec<Option<f64>> {
     Rollout::new(CpuBackend, &plan, 1)
         .unwrap()
         .visit(&theta, |_, _, r| {
-            found.extend(r.into_iter().flat_map(|r| r.points));
+            found.extend(r.into_iter().flat_map(|r| r.distances().collect::<Vec<_>>()));
             ControlFlow::Continue(())
         })
         .unwrap();
@@ -104,7 +102,7 @@ fn derivatives_of_points_that_belong_to_the_front_agree() {
         .unwrap()
         .visit(&plan.theta, |_, _, r| {
             // Nothing else is further than half the plate's thickness inside.
-            behind = r.into_iter().flat_map(|r| r.points).flatten().filter(|d| *d < -0.008).count();
+            behind = r.into_iter().flat_map(|r| r.distances().collect::<Vec<_>>()).flatten().filter(|d| *d < -0.008).count();
             ControlFlow::Continue(())
         })
         .unwrap();

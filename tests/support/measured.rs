@@ -1,14 +1,15 @@
 //! Measured recordings: how they are compared, and the fits of their scenes, which must succeed.
 
 use palpate::{Experiment, Fitted};
-use palpate_model::scene::{CostKind, ObservationSpec};
+use palpate_model::observation::ReadingKind;
+use palpate_model::scene::ObservationSpec;
 use std::path::Path;
 use studies::real;
 use studies::real::swing::Swing;
 use studies::real::tracks::Sighting;
 
 /// All frames of a recording compared by one cost, in the default band.
-pub fn compared(cost: CostKind) -> ObservationSpec {
+pub fn compared(cost: ReadingKind) -> ObservationSpec {
     ObservationSpec {
         recording: "recording".into(),
         file: "recording.toml".into(),

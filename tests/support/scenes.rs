@@ -50,10 +50,5 @@ pub fn plane(point: DVec3, normal: DVec3) -> Plane {
 
 /// A plan without observations.
 pub fn plan(scene: &Scene) -> Plan {
-    build_plan(
-        scene,
-        Observation { depth_noise: 1e-3, marker_noise: 1e-3, displacement_noise: 1e-3, ..Observation::default() },
-        &[],
-    )
-    .unwrap_or_else(|e| panic!("{e}"))
+    build_plan(scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
 }

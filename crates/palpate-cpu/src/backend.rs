@@ -1,8 +1,8 @@
 //! [`Backend`] on the CPU: every pass over all members of the batch, side by side.
 
-use crate::linear::vector::Nodes;
+use crate::costs::{Along, Instant, blend, instants};
+use crate::linear::vector::{self, Nodes};
 use crate::newton;
-use crate::passes::frames::{self, Along, Instant};
 use crate::simulate;
 use crate::terms::zeros;
 use crate::world::{Adjoint, Gradient, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
@@ -40,7 +40,7 @@ fn blank(world: &World) -> Vec<MemberState> {
 }
 
 fn displacement(at: &Instant, now: &MemberState, next: &MemberState) -> Vec<DVec3> {
-    frames::blend(&at.value, [&now.u, &now.v, &next.u, &next.v])
+    blend(&at.value, [&now.u, &now.v, &next.u, &next.v])
 }
 
 /// Derivatives of a frame's displacement along the tangent directions, `[Q][N]`.
@@ -53,16 +53,30 @@ fn derivatives(
 ) -> Vec<Nodes> {
     (0..directions.len())
         .map(|q| {
-            let mut du = frames::blend(&at.value, [&d[0].du[q], &d[0].dv[q], &d[1].du[q], &d[1].dv[q]]);
-            let later: f64 = shifts.iter().map(|p| directions[q].component(*p)).sum();
-            if later != 0.0 {
+            let mut du = blend(&at.value, [&d[0].du[q], &d[0].dv[q], &d[1].du[q], &d[1].dv[q]]);
+            let shift: f64 = shifts.iter().map(|p| directions[q].component(*p)).sum();
+            if shift != 0.0 {
                 // A later start, or stamps that are further ahead, mean an earlier place on the curve.
-                let rate = frames::blend(&at.rate, [&s[0].u, &s[0].v, &s[1].u, &s[1].v]);
-                crate::linear::vector::add_scaled(&mut du, -later, &rate);
+                vector::add_scaled(&mut du, -shift, &velocity(at, s));
             }
             du
         })
         .collect()
+}
+
+/// Velocity of the curve at a frame [m/s].
+fn velocity(at: &Instant, s: [&MemberState; 2]) -> Nodes {
+    blend(&at.rate, [&s[0].u, &s[0].v, &s[1].u, &s[1].v])
+}
+
+/// Adds dJ/du at a frame to both ends of its step.
+fn pull_back(at: &Instant, g: &[DVec3], to_now: &mut MemberState, to_next: &mut MemberState) {
+    for i in 0..g.len() {
+        to_now.u[i] += at.value[0] * g[i];
+        to_now.v[i] += at.value[1] * g[i];
+        to_next.u[i] += at.value[2] * g[i];
+        to_next.v[i] += at.value[3] * g[i];
+    }
 }
 
 /// Places in θ of numbers that shift the simulation against the frames.
@@ -148,15 +162,14 @@ impl Backend for CpuBackend {
             if t.failed() {
                 return;
             }
-            for at in frames::instants(&shared.plan, m.first_stamp(), k) {
-                let u = displacement(&at, a, b);
-                let compared = frames::compare(m.look(shared, at.frame), &shared.lookup, &shared.hashes[at.frame], &u);
-                let e = &mut t.evaluation;
-                e.cost += shared.scale * compared.cost;
-                e.matched += compared.matched;
-                e.sum_squares += compared.sum_squares;
-                e.sum_signed += compared.sum_signed;
-                t.compared.push((at.frame, u, compared));
+            for at in instants(&shared.plan, m.first_stamp(), k) {
+                let compared = shared.costs.compare(m.look(shared, at.frame), displacement(&at, a, b));
+                let (e, sums) = (&mut t.evaluation, compared.sums);
+                e.cost += shared.scale * sums.cost;
+                e.matched += sums.matched;
+                e.sum_squares += sums.squares;
+                e.sum_signed += sums.signed;
+                t.compared.push(compared);
             }
         });
     }
@@ -179,19 +192,13 @@ impl Backend for CpuBackend {
                     return;
                 }
                 let shifts = shifts(&shared.plan, m);
-                for at in frames::instants(&shared.plan, m.first_stamp(), k) {
-                    let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
-                    let look = m.look(shared, at.frame);
-                    let g = frames::gradient(look, &found.2, &found.1, shared.scale, &mut t.evaluation.gradient);
-                    let rate = frames::blend(&at.rate, [&a.u, &a.v, &b.u, &b.v]);
-                    let later = crate::linear::vector::dot(&g, &rate);
-                    shifts.iter().for_each(|p| t.evaluation.gradient[*p] -= later);
-                    for i in 0..g.len() {
-                        to_now.u[i] += at.value[0] * g[i];
-                        to_now.v[i] += at.value[1] * g[i];
-                        to_next.u[i] += at.value[2] * g[i];
-                        to_next.v[i] += at.value[3] * g[i];
-                    }
+                for at in instants(&shared.plan, m.first_stamp(), k) {
+                    let MemberTally { evaluation, compared, .. } = &mut *t;
+                    let found = MemberTally::find(compared, at.frame);
+                    let g = found.gradient(m.look(shared, at.frame), shared.scale, &mut evaluation.gradient);
+                    let later = vector::dot(&g, &velocity(&at, [a, b]));
+                    shifts.iter().for_each(|p| evaluation.gradient[*p] -= later);
+                    pull_back(&at, &g, to_now, to_next);
                 }
             });
     }
@@ -293,6 +300,7 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
+        let directions = &tangent.directions[..];
         (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, d0, d1, t)| {
@@ -300,22 +308,48 @@ impl Backend for CpuBackend {
                     return;
                 }
                 let shifts = shifts(&shared.plan, m);
-                for at in frames::instants(&shared.plan, m.first_stamp(), k) {
-                    let directions = &tangent.directions[..];
+                for at in instants(&shared.plan, m.first_stamp(), k) {
                     let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
-                    let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
-                    let c = t.evaluation.curvature.as_mut().expect("tangents go with a curvature");
-                    frames::gauss_newton(
-                        m.look(shared, at.frame),
-                        &found.2,
-                        &found.1,
-                        Along { directions, du: &du },
-                        shared.scale,
-                        &mut c.gradient,
-                        &mut c.matrix,
-                    );
+                    let MemberTally { evaluation, compared, .. } = &mut *t;
+                    let c = evaluation.curvature.as_mut().expect("tangents go with a curvature");
+                    let along = Along { directions, du: &du };
+                    let found = MemberTally::find(compared, at.frame);
+                    found.gauss_newton(m.look(shared, at.frame), along, shared.scale, &mut c.gradient, &mut c.matrix);
                 }
             });
+    }
+
+    fn observe_product(
+        &self,
+        world: &World,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &Tangent,
+        adj: &mut Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
+    ) {
+        let (shared, directions) = (&world.shared, &tangent.directions[..]);
+        let states = (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members);
+        let added = (&mut adj.members, &mut adj_now.members, &mut tally.members);
+        (states, added).into_par_iter().for_each(|((m, a, b, d0, d1), (to_next, to_now, t))| {
+            if t.failed() {
+                return;
+            }
+            let shifts = shifts(&shared.plan, m);
+            for at in instants(&shared.plan, m.first_stamp(), k) {
+                let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
+                let MemberTally { evaluation, compared, .. } = &mut *t;
+                let found = MemberTally::find(compared, at.frame);
+                let along = Along { directions, du: &du };
+                let g = found.product(m.look(shared, at.frame), along, shared.scale, &mut evaluation.gradient);
+                let later = vector::dot(&g, &velocity(&at, [a, b]));
+                shifts.iter().for_each(|p| evaluation.gradient[*p] -= later);
+                pull_back(&at, &g, to_now, to_next);
+            }
+        });
     }
 
     fn rows(
@@ -331,11 +365,11 @@ impl Backend for CpuBackend {
         let (m, t) = (&world.members[member], &tally.members[member]);
         let (directions, shifts) = (&tangents[0].directions[..], shifts(&shared.plan, m));
         let mut out = Rows::default();
-        for at in frames::instants(&shared.plan, m.first_stamp(), k) {
+        for at in instants(&shared.plan, m.first_stamp(), k) {
             let s = states.map(|s| &s.members[member]);
             let du = derivatives(&at, &shifts, directions, s, tangents.map(|t| &t.members[member]));
-            let found = t.compared.iter().find(|c| c.0 == at.frame).expect("every frame was observed on the way forward");
-            let rows = frames::all_rows(m.look(shared, at.frame), &found.2, &found.1, Along { directions, du: &du });
+            let along = Along { directions, du: &du };
+            let rows = MemberTally::find(&t.compared, at.frame).rows(m.look(shared, at.frame), along);
             out.residuals.extend(rows.residuals);
             out.sensitivity.extend(rows.sensitivity);
         }
@@ -368,12 +402,11 @@ impl Backend for CpuBackend {
     fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
         let shared = &world.shared;
         let (m, a, b) = (&world.members[member], &now.members[member], &next.members[member]);
-        frames::instants(&shared.plan, m.first_stamp(), k)
+        instants(&shared.plan, m.first_stamp(), k)
             .iter()
             .map(|at| {
-                let u = displacement(at, a, b);
-                let compared = frames::compare(m.look(shared, at.frame), &shared.lookup, &shared.hashes[at.frame], &u);
-                frames::residuals(m.look(shared, at.frame), &compared, &u)
+                let look = m.look(shared, at.frame);
+                shared.costs.compare(look, displacement(at, a, b)).residuals(look)
             })
             .collect()
     }

@@ -5,12 +5,14 @@
 mod backend;
 #[cfg(test)]
 mod collapse_tests;
+pub mod costs;
 pub mod linear;
 #[cfg(test)]
 mod local_tests;
 mod memory;
 mod newton;
-pub mod passes;
+#[cfg(test)]
+mod product_tests;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;

@@ -1,11 +1,10 @@
 //! What the backend holds: a world of members, their states, adjoints, tangents and tallies.
 
+use crate::costs::{Compared, Costs, Look};
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::newton::Effort;
-use crate::passes::frames::{Compared, Look};
-use crate::passes::matching::{BandLookup, PointHash};
 use crate::terms::altered::Altered;
 use crate::terms::{Acting, Equation, acting};
 use glam::DVec3;
@@ -33,8 +32,7 @@ pub struct Shared {
     pub(crate) places: Places,
     pub(crate) classes: Classes,
     pub(crate) solvers: Solvers,
-    pub(crate) hashes: Vec<PointHash>,
-    pub(crate) lookup: BandLookup,
+    pub(crate) costs: Costs,
     /// 1/n: one over the number of scalar residuals of the whole recording.
     pub(crate) scale: f64,
 }
@@ -77,12 +75,11 @@ impl World {
         let pattern = Pattern::new(&plan.body);
         let places = Places::new(&plan, &pattern);
         let classes = Classes::new(&plan);
-        let hashes = plan.observation.frames.iter().map(|f| PointHash::new(&f.points, plan.body.grid.h)).collect();
+        let costs = Costs::new(&plan);
         let residuals = plan.observation.residuals();
         let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
         let solvers = Solvers::new(plan.solver.linear);
-        let lookup = BandLookup::new(&plan.body);
-        World { shared: Shared { plan, pattern, places, classes, solvers, hashes, lookup, scale }, members: Vec::new() }
+        World { shared: Shared { plan, pattern, places, classes, solvers, costs, scale }, members: Vec::new() }
     }
 
     pub(crate) fn set_params(&mut self, theta: &ParamBatch) {
@@ -164,8 +161,8 @@ pub struct MemberTally {
     pub(crate) evaluation: Evaluation,
     /// Derivatives by the coefficients, where a gradient is wanted.
     pub(crate) gradient: Option<Box<Gradient>>,
-    /// Frames already compared at the state that they were observed in: number, displacement, result.
-    pub(crate) compared: Vec<(usize, Nodes, Compared)>,
+    /// Frames already compared at the state that they were observed in.
+    pub(crate) compared: Vec<Compared>,
 }
 
 /// dJ/d(coefficients) of one member, and which of them are wanted.
@@ -192,6 +189,11 @@ impl Gradient {
 }
 
 impl MemberTally {
+    /// A frame as it was compared on the way forward.
+    pub(crate) fn find(compared: &[Compared], frame: usize) -> &Compared {
+        compared.iter().find(|c| c.frame == frame).expect("every frame was observed on the way forward")
+    }
+
     pub(crate) fn failed(&self) -> bool {
         self.evaluation.failure.is_some()
     }

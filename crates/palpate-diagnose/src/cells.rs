@@ -1,11 +1,11 @@
-//! Residuals gathered into cells (body region × frame × camera, or one marker coordinate in one frame), in units of their noise.
+//! Residuals gathered into cells (body region × frame × sensor, or one marker coordinate in one frame), in units of their noise.
 //!
 //! Pixels of one frame are many and correlated; the mean of a region is few and Gaussian. All statistics run on these means: their
 //! noise is estimated as a whole (see `noise`), so that correlation between pixels needs no model.
 
 use crate::laboratory::Readings;
 use glam::DVec3;
-use palpate_engine::Source;
+use palpate_engine::{Source, Stream};
 use std::collections::BTreeMap;
 
 /// Frames below which regions are made smaller.
@@ -20,8 +20,8 @@ const PER_REGION: f64 = 25.0;
 pub struct CellKey {
     /// Scene.
     pub scene: usize,
-    /// Camera, or 1000 + 3 × marker + axis.
-    pub sensor: u32,
+    /// What was read: a camera's distances, or a coordinate.
+    pub stream: Stream,
     /// Region of the rest surface.
     pub region: usize,
     /// Frame.
@@ -74,16 +74,6 @@ impl Regions {
     }
 }
 
-/// Number of the sensor that a reading came from: its camera, or 1000 + 3 × marker + axis.
-pub fn sensor(source: Source) -> u32 {
-    match source {
-        Source::Point { camera, .. } => camera,
-        Source::Marker { site, axis } => 1000 + 3 * site + u32::from(axis),
-        // Directly observed nodes: one sensor per region and coordinate.
-        Source::Node { axis, .. } => 999 - u32::from(axis),
-    }
-}
-
 /// Which cell every reading belongs to, and what its noise is. Made once, from the baseline, and kept for every model.
 #[derive(Clone, Debug, Default)]
 pub struct Cells {
@@ -111,9 +101,10 @@ impl Cells {
     /// Cells of a baseline; `sd` is that of independent readings with the stated noise.
     pub fn new(readings: &Readings) -> Cells {
         let rows = &readings.rows;
-        let is_point = |s: Source| matches!(s, Source::Point { .. });
+        let is_point = |s: Source| s.sensor.is_spread();
+        let is_first = |s: Source| is_point(s) && s.axis == 0;
         let points: Vec<DVec3> =
-            rows.iter().filter(|r| r.row.value.is_some() && is_point(r.row.source)).map(|r| r.row.rest).collect();
+            rows.iter().filter(|r| r.row.value.is_some() && is_first(r.row.source)).map(|r| r.row.rest).collect();
         let others: Vec<DVec3> = rows.iter().filter(|r| !is_point(r.row.source)).map(|r| r.row.rest).collect();
         let frames = rows.iter().map(|r| (r.scene, r.row.frame)).collect::<std::collections::BTreeSet<_>>().len().max(1);
         let (sample, depth) = if points.is_empty() {
@@ -126,7 +117,7 @@ impl Cells {
         let regions = Regions::new(sample, depth);
         let key = |r: &crate::laboratory::Reading| CellKey {
             scene: r.scene,
-            sensor: sensor(r.row.source),
+            stream: r.row.source.stream(),
             region: regions.of(r.row.rest),
             frame: r.row.frame,
         };
@@ -224,9 +215,9 @@ impl Cells {
 
     /// Cells of the same sensor and region in the order of their frames.
     pub fn sequences(&self) -> Vec<Vec<usize>> {
-        let mut groups: BTreeMap<(usize, u32, usize), Vec<usize>> = BTreeMap::new();
+        let mut groups: BTreeMap<(usize, Stream, usize), Vec<usize>> = BTreeMap::new();
         for (i, k) in self.keys.iter().enumerate() {
-            groups.entry((k.scene, k.sensor, k.region)).or_default().push(i);
+            groups.entry((k.scene, k.stream, k.region)).or_default().push(i);
         }
         groups.into_values().collect()
     }

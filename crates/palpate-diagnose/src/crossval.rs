@@ -8,6 +8,7 @@ use crate::laboratory::Readings;
 use crate::linear::{dot, least_squares};
 use crate::null::extended;
 use palpate_engine::Source;
+use palpate_model::observation::Sensor;
 
 /// Blocks of time.
 const FOLDS: usize = 5;
@@ -43,8 +44,7 @@ pub fn foldings(cells: &Cells) -> Vec<Vec<usize>> {
     if out[0].iter().all(|f| *f == out[0][0]) {
         out[0] = cells.keys.iter().map(|k| k.region % FOLDS).collect();
     }
-    let mut sensors: Vec<u32> =
-        cells.keys.iter().map(|k| if k.sensor >= 1000 { (k.sensor - 1000) / 3 + 1000 } else { k.sensor }).collect();
+    let mut sensors: Vec<Sensor> = cells.keys.iter().map(|k| k.stream.sensor).collect();
     let all = sensors.clone();
     sensors.sort_unstable();
     sensors.dedup();
@@ -100,7 +100,7 @@ pub fn rms(values: impl Iterator<Item = (Source, Option<f64>)>) -> f64 {
         if let Some(v) = v {
             sum += v * v;
             // A marker is one distance of three coordinates.
-            n += if matches!(source, Source::Point { .. }) { 1.0 } else { 1.0 / 3.0 };
+            n += source.share();
         }
     }
     (sum / f64::max(n, 1.0)).sqrt()

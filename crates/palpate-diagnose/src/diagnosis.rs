@@ -5,6 +5,7 @@ use crate::locate::{Place, direction};
 use crate::quantity::{millimetres as mm, stated};
 use crate::separation::Separated;
 use glam::DVec3;
+use palpate_engine::Stream;
 use palpate_model::params::unit_behind;
 
 /// What a diagnosis says.
@@ -147,8 +148,8 @@ impl Slack {
 pub struct MapEntry {
     /// Scene.
     pub scene: usize,
-    /// Camera, or 1000 + 3 × marker + axis.
-    pub sensor: u32,
+    /// What was read: a camera's distances, or a coordinate.
+    pub stream: Stream,
     /// Number of the region.
     pub region: usize,
     /// Its middle on the rest shape [m].

@@ -18,7 +18,7 @@ mod separation;
 mod still;
 mod workflow;
 
-pub use cells::{Regions, sensor};
+pub use cells::Regions;
 pub use change::{Candidate, Change, can_be_freed, candidates};
 pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};

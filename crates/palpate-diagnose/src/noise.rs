@@ -6,7 +6,7 @@
 use crate::cells::Cells;
 use crate::laboratory::Readings;
 use crate::linear::quantile;
-use palpate_engine::Source;
+use palpate_model::observation::Sensor;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -26,8 +26,8 @@ pub fn neighbour_ratio(readings: &Readings) -> f64 {
     let mut images: BTreeMap<(usize, usize, u32), Vec<(f64, f64)>> = BTreeMap::new();
     for w in readings.rows.windows(3) {
         let [a, b, c] = w else { continue };
-        let place = |r: &crate::laboratory::Reading| match r.row.source {
-            Source::Point { point, camera } => Some((r.scene, r.row.frame, camera, point)),
+        let place = |r: &crate::laboratory::Reading| match r.row.source.sensor {
+            Sensor::Camera(camera) => Some((r.scene, r.row.frame, camera, r.row.source.item)),
             _ => None,
         };
         let (Some(p), Some(q), Some(r)) = (place(a), place(b), place(c)) else { continue };

@@ -10,6 +10,7 @@
 use crate::cells::{Cells, Table};
 use crate::linear::{Basis, dot};
 use crate::noise::Shapes;
+use palpate_engine::Stream;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -107,7 +108,7 @@ pub struct Block {
     /// Scene.
     pub scene: usize,
     /// Sensor as in the cells' keys.
-    pub sensor: u32,
+    pub stream: Stream,
     /// Region.
     pub region: usize,
     /// Number of its stretch of time.
@@ -132,11 +133,11 @@ pub struct Adequacy {
 /// Blocks of cells: `bins` stretches of time.
 pub fn blocks(cells: &Cells, bins: usize) -> Vec<Block> {
     let bin = cells.time_blocks(bins);
-    let mut groups: BTreeMap<(usize, u32, usize, usize), Vec<usize>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, Stream, usize, usize), Vec<usize>> = BTreeMap::new();
     for (i, k) in cells.keys.iter().enumerate() {
-        groups.entry((k.scene, k.sensor, k.region, bin[i])).or_default().push(i);
+        groups.entry((k.scene, k.stream, k.region, bin[i])).or_default().push(i);
     }
-    let block = |((scene, sensor, region, time), cells)| Block { scene, sensor, region, time, cells, z: 0.0 };
+    let block = |((scene, stream, region, time), cells)| Block { scene, stream, region, time, cells, z: 0.0 };
     groups.into_iter().map(block).collect()
 }
 

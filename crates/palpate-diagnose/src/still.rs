@@ -6,7 +6,7 @@
 use crate::laboratory::{Reading, Readings};
 use crate::linear::quantile;
 use crate::noise::MEDIAN;
-use palpate_engine::Source;
+use palpate_model::observation::Sensor;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ const COMMON: f64 = 0.4;
 pub fn still_ratio(readings: &Readings, still: &[Vec<usize>]) -> f64 {
     let mut images: BTreeMap<(usize, u32, usize), Range<usize>> = BTreeMap::new();
     for (i, r) in readings.rows.iter().enumerate() {
-        if let Source::Point { camera, .. } = r.row.source {
+        if let Sensor::Camera(camera) = r.row.source.sensor {
             images.entry((r.scene, camera, r.row.frame)).or_insert(i..i).end = i + 1;
         }
     }

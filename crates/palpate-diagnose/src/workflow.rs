@@ -24,7 +24,6 @@ use crate::null::{Adequacy, Block, Frame, extended, test};
 use crate::score::Score;
 use crate::still::still_ratio;
 use candidate::CandidateId;
-use palpate_engine::Source;
 use variants::{Variant, most_promising};
 
 /// How to diagnose.
@@ -159,7 +158,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     }
     let noise_ratio = noise_over_stated(lab, &readings);
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
-        *sd *= if k.sensor < 1000 { noise_ratio } else { 1.0 };
+        *sd *= if k.stream.sensor.is_camera() { noise_ratio } else { 1.0 };
     }
     let folds = foldings(&cells);
     let mut s = Session {
@@ -337,7 +336,7 @@ impl Session<'_> {
 
     /// Variance of a residual by noise alone [m²].
     fn variance(&self, r: &Reading) -> f64 {
-        let ratio = if matches!(r.row.source, Source::Point { .. }) { self.noise_ratio } else { 1.0 };
+        let ratio = if r.row.source.is_depth() { self.noise_ratio } else { 1.0 };
         (ratio * r.row.noise * r.row.along_sight).powi(2)
     }
 
@@ -413,7 +412,7 @@ impl Session<'_> {
         let ratio = noise_over_stated(self.lab, &state.readings).min(self.noise_ratio);
         let old = self.design_effect.sqrt();
         for (sd, k) in self.cells.sd.iter_mut().zip(&self.cells.keys) {
-            *sd *= if k.sensor < 1000 { ratio / self.noise_ratio } else { 1.0 } / old;
+            *sd *= if k.stream.sensor.is_camera() { ratio / self.noise_ratio } else { 1.0 } / old;
         }
         self.noise_ratio = ratio;
         let frame = self.frame(&self.cells.table(&state.readings, None), &state.fields);

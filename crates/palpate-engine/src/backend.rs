@@ -1,6 +1,7 @@
 //! What a backend does: whole time steps, observations, and the adjoint and tangent of each, for a batch.
 
 use crate::evaluate::{Direction, Evaluation, ParamBatch, Request};
+use crate::residuals::FrameResiduals;
 use crate::rows::Rows;
 use glam::DVec3;
 use palpate_model::plan::Plan;
@@ -121,6 +122,22 @@ pub trait Backend: Send {
         tally: &mut Self::Tally,
     );
 
+    /// Product with the Gauss–Newton matrix of [`Backend::observe`]: adds Jᵀ W J v to dJ/d(next) in `adj`, to dJ/d(now) in `adj_now` and
+    /// to dJ/dθ, where the tangents at both ends have the single direction v. Residuals depend on θ also beside the states: by effects on
+    /// the measurement, and by where on the curve between the states a frame is.
+    fn observe_product(
+        &self,
+        world: &Self::World,
+        k: usize,
+        now: &Self::State,
+        next: &Self::State,
+        tangent: &Self::Tangent,
+        tangent_next: &Self::Tangent,
+        adj: &mut Self::Adjoint,
+        adj_now: &mut Self::Adjoint,
+        tally: &mut Self::Tally,
+    );
+
     /// Every residual of the frames in step k of one member with its sensitivities, from what [`Backend::observe`] found; `None`
     /// from a backend that only sums.
     fn rows(
@@ -142,8 +159,7 @@ pub trait Backend: Send {
     fn read(&self, world: &Self::World, tally: &Self::Tally) -> Vec<Evaluation>;
     /// Displacements [m] and velocities [m/s] of one member `[N]` each, for reports and tests.
     fn read_state(&self, world: &Self::World, state: &Self::State, member: usize) -> (Vec<DVec3>, Vec<DVec3>);
-    /// Residual of every observed point and marker of the frames in step k (order of [`Backend::observe`]) of one member:
-    /// frame number and signed distance [m] per depth point (`None` = unmatched), vector [m] per marker.
+    /// Residual of every reading of the frames in step k (order of [`Backend::observe`]) of one member, in the order of [`Rows`].
     fn residuals(
         &self,
         world: &Self::World,
@@ -152,15 +168,4 @@ pub trait Backend: Send {
         next: &Self::State,
         member: usize,
     ) -> Vec<FrameResiduals>;
-}
-
-/// Residuals of one frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FrameResiduals {
-    /// Number of the frame in the plan's observation.
-    pub frame: usize,
-    /// Signed distance of each point [m].
-    pub points: Vec<Option<f64>>,
-    /// Simulated minus measured position of each marker [m].
-    pub markers: Vec<DVec3>,
 }

@@ -7,12 +7,14 @@
 mod backend;
 mod evaluate;
 mod failure;
+mod residuals;
 mod rollout;
 mod rows;
 mod tape;
 
-pub use backend::{Backend, BuildError, FrameResiduals};
+pub use backend::{Backend, BuildError};
 pub use evaluate::{Curvature, Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 pub use failure::{Failure, FailureKind, number};
+pub use residuals::{FrameResiduals, Misfit, ReadingResidual};
 pub use rollout::{Rollout, Snapshot};
-pub use rows::{Linearised, ResidualRow, Rows, Source};
+pub use rows::{Linearised, ResidualRow, Rows, Source, Stream};

@@ -1,8 +1,9 @@
 //! The driver: forward with tape, back with the adjoint, or forward with tangents. Written once for all backends.
 
-use crate::backend::{Backend, BuildError, FrameResiduals};
+use crate::backend::{Backend, BuildError};
 use crate::evaluate::{Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request};
 use crate::failure::{Failure, FailureKind};
+use crate::residuals::FrameResiduals;
 use crate::rows::{Linearised, Rows};
 use crate::tape::{Adjoints, Tape};
 use glam::DVec3;
@@ -252,9 +253,12 @@ impl<B: Backend> Rollout<B> {
             let mut tally = b.new_tally(w, &request);
             let (mut rows, mut without_rows) = (Rows::default(), false);
             let each = |m: Moment<B>| {
-                let Some(tangents) = m.tangents.filter(|_| m.step.is_some() || stages.is_empty()) else {
+                if m.step.is_none() && !stages.is_empty() {
                     return ControlFlow::Continue(());
-                };
+                }
+                // Without directions there are residuals alone.
+                let none = b.new_tangent(m.world, &[]);
+                let tangents = m.tangents.unwrap_or([&none; 2]);
                 match b.rows(m.world, m.step.unwrap_or(0), m.ends, tangents, m.tally, 0) {
                     Some(more) => {
                         rows.residuals.extend(more.residuals);

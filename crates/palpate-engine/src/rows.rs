@@ -2,31 +2,48 @@
 
 use crate::evaluate::Evaluation;
 use glam::DVec3;
+use palpate_model::observation::{ReadingKind, Sensor};
 
 /// Where a scalar residual comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Source {
-    /// A point of a depth image.
-    Point {
-        /// Its number in the frame.
-        point: u32,
-        /// Its camera.
-        camera: u32,
-    },
-    /// One coordinate of a marker.
-    Marker {
-        /// The marker's site in the observation.
-        site: u32,
-        /// Coordinate, 0 to 2.
-        axis: u8,
-    },
-    /// One coordinate of a directly observed node.
-    Node {
-        /// The node.
-        node: u32,
-        /// Coordinate, 0 to 2.
-        axis: u8,
-    },
+pub struct Source {
+    /// What took the reading.
+    pub sensor: Sensor,
+    /// Which of its readings: number of the depth point in its frame, of the marker's or tracked point's site, of the node.
+    pub item: u32,
+    /// Coordinate, 0 to 2; 0 of a distance.
+    pub axis: u8,
+}
+
+impl Source {
+    /// A point of a depth image: its number in the frame, and its camera.
+    pub fn point(point: u32, camera: u32) -> Source {
+        Source { sensor: Sensor::Camera(camera), item: point, axis: 0 }
+    }
+
+    /// True of a point of a depth image.
+    pub fn is_depth(&self) -> bool {
+        self.sensor.kind() == ReadingKind::Depth
+    }
+
+    /// What part of a reading the residual is: 1 of a distance, a third of a position or displacement.
+    pub fn share(&self) -> f64 {
+        1.0 / self.sensor.kind().components() as f64
+    }
+
+    /// The sensor's output that the residual belongs to.
+    pub fn stream(&self) -> Stream {
+        Stream { sensor: self.sensor, axis: self.axis }
+    }
+}
+
+/// Distances of a sensor, or one coordinate of what it sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Stream {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Coordinate, 0 to 2; 0 of a distance.
+    pub axis: u8,
 }
 
 /// One scalar residual r.
@@ -49,6 +66,14 @@ pub struct ResidualRow {
     pub along_sight: f64,
     /// ∂r by the measured place in the world; zero for a point that met nothing.
     pub by_place: DVec3,
+}
+
+impl ResidualRow {
+    /// A coordinate of something whose place on the rest shape is known, simulated minus measured: all of it counts.
+    pub fn coordinate(frame: usize, source: Source, value: f64, noise: f64, rest: DVec3) -> ResidualRow {
+        let by_place = -DVec3::AXES[usize::from(source.axis)];
+        ResidualRow { frame, source, value: Some(value), noise, weight: 1.0, rest, along_sight: 1.0, by_place }
+    }
 }
 
 /// Residuals of one or several frames with their sensitivities.

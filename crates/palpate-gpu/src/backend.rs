@@ -207,6 +207,21 @@ impl Backend for GpuBackend {
         world.record(|r| world.observer.observe_tangent(r, k, ends, &tangents, &tally.buffers));
     }
 
+    fn observe_product(
+        &self,
+        world: &World,
+        _k: usize,
+        _now: &State,
+        _next: &State,
+        _tangent: &Tangent,
+        _tangent_next: &Tangent,
+        _adj: &mut Adjoint,
+        _adj_now: &mut Adjoint,
+        _tally: &mut Tally,
+    ) {
+        world.gpu.keep(GpuError::Plan { what: "products with the Gauss-Newton matrix".into() });
+    }
+
     fn rows(
         &self,
         world: &World,

@@ -36,9 +36,10 @@ pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
 use palpate_model::cutcells::pullback::{NOISE_REACH, TURNED_AWAY};
 use palpate_model::effects::sensors::Sensors;
+use palpate_model::observation::ReadingKind;
 use palpate_model::plan::Plan;
 pub(crate) use results::{residuals, rows};
-use shots::Shots;
+use shots::{Shots, row_count};
 use std::collections::HashMap;
 use tables::{BandTables, SiteTables};
 
@@ -297,18 +298,15 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
     let shots = Shots::of(plan, &sensors);
     let band = BandTables::new(plan);
     let sites = SiteTables::new(plan);
-    let most = |f: fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
-    let residuals = obs.residuals();
-    let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
-    let per = |noise: f64| (scale / (noise * noise)) as f32;
-    let points = most(|f| f.points.len());
+    let most = |f: &dyn Fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
+    let points = most(&|f| f.points.len());
     let mut sight = Sight {
         nodes: body.nodes.len() as u32,
         extended: (body.nodes.len() + body.band.nodes.len()) as u32,
         cells: band.cells.len() as u32,
         points: points as u32,
-        rows: most(|f| f.residuals()) as u32,
-        markers: most(|f| f.markers.len()) as u32,
+        rows: most(&|f| row_count(plan, f)) as u32,
+        markers: most(&|f| f.markers.len()) as u32,
         stripes: points.div_ceil(room.points).max(1) as u32,
         sites: sites.sites.len() as u32,
         parameters: plan.layout.len() as u32,
@@ -318,11 +316,10 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         lattice: body.grid.size.map(|n| n as u32),
         h: body.grid.h as f32,
         band: plan.band as f32,
-        reach: (NOISE_REACH * obs.depth_noise) as f32,
+        reach: (NOISE_REACH * obs.channel(ReadingKind::Depth).map_or(0.0, |c| c.noise)) as f32,
         turned_away: TURNED_AWAY as f32,
-        depth: per(obs.depth_noise),
-        marker: per(obs.marker_noise),
-        displacement: per(obs.displacement_noise),
+        depth: tables::weight(obs, ReadingKind::Depth),
+        displacement: tables::weight(obs, ReadingKind::Displacement),
         ..Sight::default()
     };
     Seen::new(&sight, &shots, &band, &sites).check()?;

@@ -111,6 +111,26 @@ pub(crate) const RECORDING: Schema = Schema {
         ),
         ("frame", table(&["camera", "time", "depth", "mask"])),
         (
+            "points",
+            table(&[
+                "file",
+                "array",
+                "times",
+                "rate",
+                "start",
+                "rest",
+                "unit",
+                "transform",
+                "tolerance",
+                "noise_sigma",
+                "noise_systematic",
+            ]),
+        ),
+        (
+            "displacements",
+            table(&["file", "array", "times", "rate", "start", "nodes", "unit", "transform", "noise_sigma", "noise_systematic"]),
+        ),
+        (
             "markers",
             Schema {
                 keys: &["file", "noise_sigma", "noise_systematic"],

@@ -10,6 +10,7 @@ mod keys;
 mod rigid;
 
 pub mod mesh;
+pub mod npy;
 pub mod output;
 pub mod recording;
 pub mod scene;

@@ -4,7 +4,7 @@
 use crate::effects::Effect;
 use crate::materials::Model;
 use crate::mechanics::motion::RigidMotion;
-use crate::observation::MarkerRest;
+use crate::observation::{MarkerRest, ReadingKind};
 use crate::params::Layout;
 use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
@@ -292,8 +292,8 @@ pub struct ObservationSpec {
     pub recording: PathBuf,
     /// File in the folder, normally `recording.toml`.
     pub file: String,
-    /// Costs in use.
-    pub costs: Vec<CostKind>,
+    /// Kinds of readings that are compared.
+    pub costs: Vec<ReadingKind>,
     /// Half width of the narrow band, in cells.
     pub band: f64,
     /// First time used [s].
@@ -306,15 +306,6 @@ pub struct ObservationSpec {
     pub pixel_stride: usize,
     /// Rest places of markers that the recording itself does not state.
     pub markers: Vec<MarkerRest>,
-}
-
-/// Kinds of misfit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CostKind {
-    /// Depth points against the deformed signed distance.
-    SparseSurface,
-    /// Tracked markers.
-    Markers,
 }
 
 /// What is to be found out.

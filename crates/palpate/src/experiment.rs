@@ -92,7 +92,7 @@ impl Experiment {
         let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
         let shape = shape_of(&scene.object);
         let mut recording = None;
-        let (mut observation, mut rest) = (nothing_observed(), Vec::new());
+        let (mut observation, mut rest) = (Observation::default(), Vec::new());
         if let Some(spec) = &scene.observation {
             let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
             if !place.exists() {
@@ -290,23 +290,25 @@ impl Experiment {
     }
 }
 
-/// A fault found while the plan is built, where its key stands: in the scene, or in the recording for the rest place of a marker that
-/// the scene does not give.
+/// A fault found while the plan is built, where its key stands: in the scene, or in the recording for what only that states.
 fn plan_fault(scene: &Scene, text: &str, recording: Option<&Recording>, e: PlanError) -> Error {
-    let marker = e.key.strip_prefix("markers.rest \"").and_then(|k| k.rsplit_once("\"."));
-    let (Some((name, part)), Some(spec), Some(recording)) = (marker, &scene.observation, recording) else {
+    let (Some(spec), Some(recording)) = (&scene.observation, recording) else {
+        return scene_error(&scene.path, text, &e.key, e.message).into();
+    };
+    let in_recording = |key: &str| {
+        // It was read a moment ago; without it the line is missing and nothing else.
+        let text = read_text(&recording.path).unwrap_or_default();
+        scene_error(&recording.path, &text, key, e.message.clone()).into()
+    };
+    if e.key.starts_with("points.") || e.key.starts_with("displacements.") {
+        return in_recording(&e.key);
+    }
+    let Some((name, part)) = e.key.strip_prefix("markers.rest \"").and_then(|k| k.rsplit_once("\".")) else {
         return scene_error(&scene.path, text, &e.key, e.message).into();
     };
     if let Some(i) = spec.markers.iter().position(|m| m.name == name) {
         return scene_error(&scene.path, text, &format!("observation.marker.{i}.{part}"), e.message).into();
     }
     let place = recording.markers.iter().flat_map(|m| &m.rest).position(|m| m.name == name).unwrap_or(0);
-    // It was read a moment ago; without it the line is missing and nothing else.
-    let text = read_text(&recording.path).unwrap_or_default();
-    scene_error(&recording.path, &text, &format!("markers.rest.{place}.{part}"), e.message).into()
-}
-
-/// An observation without frames; the noises are never used and only keep divisions harmless.
-fn nothing_observed() -> Observation {
-    Observation { depth_noise: 1e-3, marker_noise: 1e-3, displacement_noise: 1e-3, ..Observation::default() }
+    in_recording(&format!("markers.rest.{place}.{part}"))
 }

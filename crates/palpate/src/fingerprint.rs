@@ -15,7 +15,7 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
     let mut hash = FNV_START;
     let mut eat = |x: u64| hash = fnv1a(hash, &x.to_le_bytes());
     let o = &plan.observation;
-    let noise = [o.depth_noise, o.marker_noise, o.displacement_noise, o.depth_systematic, o.marker_systematic];
+    let noise: Vec<f64> = o.channels.iter().flat_map(|c| [c.kind as usize as f64, c.noise, c.systematic]).collect();
     let numbers = [plan.band, plan.clock.step, plan.clock.theta, plan.body.grid.h, plan.body.volume];
     noise.iter().chain(&numbers).for_each(|x| eat(x.to_bits()));
     [plan.clock.steps, plan.body.nodes.len(), plan.clamps.len(), plan.masses.len()].iter().for_each(|n| eat(*n as u64));
@@ -38,7 +38,10 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
             m.position.to_array().iter().for_each(|x| eat(x.to_bits()));
             eat(u64::from(m.site));
         }
-        f.displacements.iter().for_each(|u| u.to_array().iter().for_each(|x| eat(x.to_bits())));
+        for d in &f.displacements {
+            d.value.to_array().iter().for_each(|x| eat(x.to_bits()));
+            eat(u64::from(d.node));
+        }
     }
     format!("{hash:016x}")
 }

@@ -14,6 +14,7 @@ use palpate_fit::{
     ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
 };
 use palpate_io::InputError;
+use palpate_model::observation::ReadingKind;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
@@ -355,23 +356,16 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
     Ok((numbers, free, warnings))
 }
 
-/// What the recordings say of errors that do not average out. Every camera, and every marker, has its own.
+/// What the recordings say of errors that do not average out. Every camera, and every marker, has its own; tracked points share one.
 pub(crate) fn errors(experiments: &[Experiment]) -> ErrorModel {
     let mut model = ErrorModel { groups: 0, ..ErrorModel::default() };
     for e in experiments {
         let o = &e.plan().observation;
-        let points: usize = o.frames.iter().map(|f| f.points.len()).sum();
-        let coordinates: usize = o.frames.iter().map(|f| 3 * f.markers.len()).sum();
-        let (depth, marker) = (o.depth_systematic / o.depth_noise, o.marker_systematic / o.marker_noise);
-        // The part of the data with more residuals decides how many independent errors there are.
-        if points >= coordinates {
-            model.systematic = model.systematic.max(depth);
-            let used = |c: usize| o.frames.iter().flat_map(|f| &f.points).any(|p| p.camera as usize == c);
-            model.groups += (0..o.cameras.len()).filter(|c| used(*c)).count();
-        } else {
-            model.systematic = model.systematic.max(marker);
-            model.groups += o.markers.len();
-        }
+        // The kind of data with the most residuals decides how many independent errors there are.
+        let residuals = |kind: &ReadingKind| kind.components() * o.readings(*kind);
+        let Some(kind) = ReadingKind::ALL.into_iter().rev().max_by_key(residuals) else { continue };
+        model.systematic = model.systematic.max(o.systematic(kind) / o.noise(kind));
+        model.groups += o.sensors(kind);
     }
     ErrorModel { groups: model.groups.max(1), ..model }
 }

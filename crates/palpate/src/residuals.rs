@@ -1,11 +1,11 @@
 //! How far a measurement lies from a simulation, and how far noise alone would put it.
 //!
-//! - `rms` is the root mean square *distance*: of every matched depth point to the simulated surface, and of every marker
-//!   to the simulated one (3-vector); points that met nothing are counted apart.
+//! - `rms` is the root mean square *distance*: of every matched depth point to the simulated surface, and of every other
+//!   reading to the simulated place (3-vector); points that met nothing are counted apart.
 //! - `noise` is what would remain with the right model, `sqrt(measurement² + grid²)`, mean squares over the same points:
 //!   - a depth reading's error runs along the camera's axis, so its distance to a surface seen at an angle is shortened by the cosine
 //!     between axis and normal: `(σ² + systematic²) · mean cos²`, the mean taken from the simulated surface in the cameras;
-//!   - a marker coordinate's σ counts three times, and its systematic error (a length) once: `3 σ² + systematic²`;
+//!   - a coordinate's σ counts three times, and the systematic error (a length) once: `3 σ² + systematic²`;
 //!   - grid: root mean square of the band's interpolated distance at points of the true rest surface, where it should be 0.
 
 use crate::embed::Embedding;
@@ -15,10 +15,11 @@ use crate::experiment::Experiment;
 use crate::render::{DepthImage, Pinhole, rasterise};
 use crate::scatter::{Excess, Scatter};
 use glam::DVec3;
-use palpate_engine::{FrameResiduals, Snapshot};
+use palpate_engine::{FrameResiduals, Misfit, Snapshot};
 use palpate_io::recording::RecordedCamera;
 use palpate_model::cutcells::distances::interpolate;
 use palpate_model::effects::sensors::Sensors;
+use palpate_model::observation::{Observation, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::collections::BTreeMap;
@@ -34,9 +35,9 @@ pub struct ResidualSummary {
     /// What measurement noise would leave, and the shape's rounding by the cells of the grid [m]; not what cells and time step change
     /// in the motion.
     pub noise: f64,
-    /// Matched depth points and markers.
+    /// Readings that met something.
     pub points: usize,
-    /// Depth points that met no cell around the body.
+    /// Readings that met nothing: depth points without a cell around the body.
     pub unmatched: usize,
     /// Cost J of the simulation.
     pub cost: f64,
@@ -55,24 +56,38 @@ pub struct FrameResidual {
     pub rms: f64,
     /// Mean signed distance of matched depth points [m], positive outside the model; NaN without any.
     pub bias: f64,
-    /// Matched depth points and markers.
+    /// Readings that met something.
     pub points: usize,
-    /// Depth points that met nothing.
+    /// Readings that met nothing.
     pub unmatched: usize,
 }
 
 impl FrameResidual {
     fn new(time: f64, r: &FrameResiduals) -> FrameResidual {
-        let matched: Vec<f64> = r.points.iter().flatten().copied().collect();
-        let squares = matched.iter().map(|d| d * d).sum::<f64>() + r.markers.iter().map(|m| m.length_squared()).sum::<f64>();
-        let points = matched.len() + r.markers.len();
+        let squares: f64 = ReadingKind::ALL.iter().map(|kind| of_kind(r, *kind).map(Misfit::length_squared).sum::<f64>()).sum();
+        let points = r.readings.iter().filter(|r| r.misfit.is_some()).count();
+        let distances: Vec<f64> = r.distances().flatten().collect();
         FrameResidual {
             time,
             rms: (squares / points as f64).sqrt(),
-            bias: matched.iter().sum::<f64>() / matched.len() as f64,
+            bias: distances.iter().sum::<f64>() / distances.len() as f64,
             points,
-            unmatched: r.points.len() - matched.len(),
+            unmatched: r.readings.len() - points,
         }
+    }
+}
+
+/// Residuals of a kind that met something.
+fn of_kind(r: &FrameResiduals, kind: ReadingKind) -> impl Iterator<Item = Misfit> {
+    r.readings.iter().filter(move |r| r.sensor.kind() == kind).filter_map(|r| r.misfit)
+}
+
+/// Mean square distance that errors of a kind's readings alone would leave [m²], with the mean shortening of depth readings.
+fn mean_square(observation: &Observation, kind: ReadingKind, shortened: f64) -> f64 {
+    let (noise, systematic) = (observation.noise(kind).powi(2), observation.systematic(kind).powi(2));
+    match kind {
+        ReadingKind::Depth => (noise + systematic) * shortened,
+        _ => 3.0 * noise + systematic,
     }
 }
 
@@ -100,15 +115,19 @@ impl ResidualSummary {
         let points = frames.iter().map(|f| f.points).sum::<usize>();
         let unmatched = frames.iter().map(|f| f.unmatched).sum();
         let squares: f64 = frames.iter().filter(|f| f.points > 0).map(|f| f.rms * f.rms * f.points as f64).sum();
-        let markers = observation.frames.iter().map(|f| f.markers.len()).sum::<usize>();
         let shortened = if seen > 0 { cos2 / seen as f64 } else { 1.0 };
-        let depth2 = (observation.depth_noise.powi(2) + observation.depth_systematic.powi(2)) * shortened;
         let grid2 = grid_error(plan, &surface).powi(2);
-        let marker2 = 3.0 * observation.marker_noise.powi(2) + observation.marker_systematic.powi(2);
-        let of_points = (points - markers) as f64 * (depth2 + grid2);
+        // Depth points that met something, and all other readings.
+        let others = |kind: &ReadingKind| if *kind == ReadingKind::Depth { 0 } else { observation.readings(*kind) };
+        let depths = points - ReadingKind::ALL.iter().map(others).sum::<usize>();
+        let expected = |kind: &ReadingKind| match (kind, others(kind)) {
+            (ReadingKind::Depth, _) if depths > 0 => depths as f64 * (mean_square(observation, *kind, shortened) + grid2),
+            (_, 0) => 0.0,
+            (_, n) => n as f64 * mean_square(observation, *kind, shortened),
+        };
         Ok(ResidualSummary {
             rms: (squares / points as f64).sqrt(),
-            noise: ((of_points + markers as f64 * marker2) / points as f64).sqrt(),
+            noise: (ReadingKind::ALL.iter().map(expected).sum::<f64>() / points as f64).sqrt(),
             points,
             unmatched,
             cost,
@@ -220,6 +239,8 @@ fn grid_error(plan: &Plan, surface: &Embedding) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_engine::ReadingResidual;
+    use palpate_model::observation::Sensor;
 
     #[test]
     fn a_spread_has_both_ends() {
@@ -230,11 +251,11 @@ mod tests {
 
     #[test]
     fn a_frame_counts_distances_of_points_and_markers() {
-        let r = FrameResiduals {
-            frame: 0,
-            points: vec![Some(0.003), None, Some(-0.001)],
-            markers: vec![DVec3::new(0.0, 0.002, 0.001)],
-        };
+        let reading = |sensor, item, misfit| ReadingResidual { sensor, item, place: DVec3::ZERO, misfit };
+        let depth = |item, distance: Option<f64>| reading(Sensor::Camera(0), item, distance.map(Misfit::Distance));
+        let marker = reading(Sensor::Marker(0), 0, Some(Misfit::Offset(DVec3::new(0.0, 0.002, 0.001))));
+        let readings = vec![depth(0, Some(0.003)), depth(1, None), depth(2, Some(-0.001)), marker];
+        let r = FrameResiduals { frame: 0, readings };
         let f = FrameResidual::new(0.5, &r);
         assert_eq!((f.points, f.unmatched), (3, 1));
         assert!((f.rms - (15e-6f64 / 3.0).sqrt()).abs() < 1e-15 && (f.bias - 0.001).abs() < 1e-15);

@@ -10,8 +10,8 @@
 //! frames), as long as enough of them are left and D rises by more than chance.
 
 use glam::DVec3;
-use palpate_engine::FrameResiduals;
-use palpate_model::observation::kernel;
+use palpate_engine::{FrameResiduals, Misfit, Stream};
+use palpate_model::observation::{ReadingKind, kernel};
 use palpate_model::plan::Plan;
 use std::collections::BTreeMap;
 
@@ -24,18 +24,17 @@ const HALVINGS: i32 = 10;
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     /// Readings of different streams (cameras, axes of markers) are taken as independent.
-    stream: usize,
+    stream: Stream,
     /// Number of the frame among those of the observation.
     frame: usize,
     place: DVec3,
     value: f64,
 }
 
-/// Residuals of one recording, collected frame by frame: depth apart from markers.
+/// Residuals of one recording, collected frame by frame, each kind of readings apart.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scatter {
-    depth: Vec<Reading>,
-    markers: Vec<Reading>,
+    kinds: BTreeMap<ReadingKind, Vec<Reading>>,
 }
 
 /// Sum of squares of residuals, and that times the factor by which means of groups scatter more.
@@ -61,18 +60,15 @@ impl Excess {
 impl Scatter {
     /// Adds a frame's residuals.
     pub fn add(&mut self, plan: &Plan, r: &FrameResiduals) {
-        let o = &plan.observation;
-        let frame = &o.frames[r.frame];
-        for (p, distance) in frame.points.iter().zip(&r.points) {
-            if let Some(d) = distance {
-                let value = kernel::influence(*d, plan.band) / o.depth_noise;
-                self.depth.push(Reading { stream: p.camera as usize, frame: r.frame, place: p.position, value });
-            }
-        }
-        for (m, off) in frame.markers.iter().zip(&r.markers) {
-            for (axis, value) in off.to_array().into_iter().enumerate() {
-                let stream = 3 * m.site as usize + axis;
-                self.markers.push(Reading { stream, frame: r.frame, place: DVec3::ZERO, value: value / o.marker_noise });
+        for reading in &r.readings {
+            let kind = reading.sensor.kind();
+            let noise = plan.observation.noise(kind);
+            // What only one thing gives has no neighbours in space.
+            let place = if reading.sensor.is_spread() { reading.place } else { DVec3::ZERO };
+            for (axis, value) in reading.misfit.into_iter().flat_map(Misfit::components) {
+                let value = if kind == ReadingKind::Depth { kernel::influence(value, plan.band) } else { value } / noise;
+                let stream = Stream { sensor: reading.sensor, axis };
+                self.kinds.entry(kind).or_default().push(Reading { stream, frame: r.frame, place, value });
             }
         }
     }
@@ -80,7 +76,7 @@ impl Scatter {
     /// What all of them say.
     pub fn excess(&self) -> Excess {
         let mut all = Excess::default();
-        for readings in [&self.depth, &self.markers] {
+        for readings in self.kinds.values() {
             let squares: f64 = readings.iter().map(|r| r.value * r.value).sum();
             all.add(Excess { squares, scattered: squares * design_effect(readings) });
         }
@@ -88,10 +84,13 @@ impl Scatter {
     }
 }
 
+/// A stream, a stretch of frames, and a cube.
+type Group = (Stream, [i64; 4]);
+
 /// Scatter of sums over groups, and how many groups of equal size would tell as much.
-fn grouped(readings: &[Reading], key: impl Fn(&Reading) -> [i64; 5]) -> (f64, f64) {
+fn grouped(readings: &[Reading], key: impl Fn(&Reading) -> Group) -> (f64, f64) {
     // Ordered, so that sums are taken in the same order in every run.
-    let mut groups: BTreeMap<[i64; 5], (f64, f64)> = BTreeMap::new();
+    let mut groups: BTreeMap<Group, (f64, f64)> = BTreeMap::new();
     for r in readings {
         let (sum, n) = groups.entry(key(r)).or_default();
         *sum += r.value;
@@ -116,7 +115,7 @@ fn design_effect(readings: &[Reading]) -> f64 {
         let order = &order;
         move |r: &Reading| {
             let [x, y, z] = ((r.place - low) / edge).floor().to_array().map(|c| c as i64);
-            [r.stream as i64, order[&r.frame] / frames, x, y, z]
+            (r.stream, [order[&r.frame] / frames, x, y, z])
         }
     };
     let (mut best, mut cubes) = (1.0, HALVINGS);
@@ -147,9 +146,14 @@ fn design_effect(readings: &[Reading]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_model::observation::Sensor;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
+
+    fn stream(number: usize) -> Stream {
+        Stream { sensor: Sensor::Marker(number as u32), axis: 0 }
+    }
 
     fn normal(n: usize, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -165,18 +169,18 @@ mod tests {
         };
         let place = |x, y| DVec3::new(x as f64, y as f64, 0.0) * 1e-3;
         let pixels = (0..side).flat_map(|y| (0..side).map(move |x| (x, y)));
-        pixels.map(|(x, y)| Reading { stream: 0, frame: 0, place: place(x, y), value: mean(x, y) }).collect()
+        pixels.map(|(x, y)| Reading { stream: stream(0), frame: 0, place: place(x, y), value: mean(x, y) }).collect()
     }
 
     /// Series of `length` frames for every stream: each error is `share` of the one before and fresh noise.
     fn series(streams: usize, length: usize, share: f64, seed: u64) -> Vec<Reading> {
         let white = normal(streams * length, seed);
         let mut readings = Vec::new();
-        for stream in 0..streams {
+        for number in 0..streams {
             let mut value = 0.0;
             for frame in 0..length {
-                value = share * value + (1.0 - share * share).sqrt() * white[stream * length + frame];
-                readings.push(Reading { stream, frame, place: DVec3::ZERO, value });
+                value = share * value + (1.0 - share * share).sqrt() * white[number * length + frame];
+                readings.push(Reading { stream: self::stream(number), frame, place: DVec3::ZERO, value });
             }
         }
         readings

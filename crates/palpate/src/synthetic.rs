@@ -7,7 +7,10 @@ use crate::experiment::Experiment;
 use crate::render::{self, Pinhole, Sensor, rasterise};
 use glam::DVec3;
 use palpate_engine::Snapshot;
-use palpate_io::recording::{DepthImage, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
+use palpate_io::recording::{
+    DepthImage, MarkerSample, RecordedCamera, RecordedDisplacements, RecordedFrame, RecordedMarkers, RecordedPoints, Recording,
+    Sequence,
+};
 use palpate_model::effects::check_choices;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::mechanics::rotation::Polar;
@@ -23,6 +26,10 @@ use std::path::PathBuf;
 /// Smallest noise stated for markers [m]: a cost divides by it, and optical systems do not resolve less.
 const LEAST_MARKER_NOISE: f64 = 1e-6;
 
+/// Random numbers of points and of nodes count down from here, far from those of images and of markers.
+const POINTS: u64 = u64::MAX / 2;
+const NODES: u64 = u64::MAX / 4;
+
 /// What watches the simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observers {
@@ -30,10 +37,14 @@ pub struct Observers {
     pub cameras: Vec<Pinhole>,
     /// Points of the rest surface [m] that are tracked, with their labels.
     pub markers: Vec<(String, DVec3)>,
+    /// Points of the body at rest [m] that are tracked by themselves.
+    pub points: Vec<DVec3>,
+    /// Whether the displacement of every simulation node is recorded.
+    pub displacements: bool,
     /// Times of the frames on the recording's clock [s], increasing.
     pub times: Vec<f64>,
-    /// Imperfections of the depth cameras; its noise [m] is also that of every marker coordinate, its dropout the share of
-    /// marker readings that are missing.
+    /// Imperfections of the depth cameras; its noise [m] is also that of every coordinate of markers, points and
+    /// displacements, its dropout the share of their readings that are missing.
     pub sensor: Sensor,
 }
 
@@ -63,6 +74,8 @@ pub fn observe(
     let errors = Errors::new(experiment, observers)?;
     let (surface, triangles) = experiment.surface(0.25 * plan.body.grid.h);
     let tracked = Embedding::new(&plan.body, observers.markers.iter().map(|m| m.1).collect());
+    let points = Embedding::new(&plan.body, observers.points.clone());
+    let (mut tracked_points, mut displaced) = (Sequence::default(), Sequence::default());
     let mut waiting = observers.times.iter().copied().enumerate().peekable();
     let mut last: Option<Snapshot> = None;
     let (mut frames, mut samples) = (Vec::new(), Vec::new());
@@ -74,6 +87,12 @@ pub fn observe(
             let stamp = time + errors.sensors.ahead();
             frames.extend(images(observers, &errors.sensors, (number, stamp), &surface.deform(&u), &triangles));
             samples.extend(marker_samples(observers, number, stamp, &errors.markers(tracked.deform(&u), &u)));
+            if !observers.points.is_empty() {
+                read_vectors(observers, POINTS - number as u64, stamp, points.deform(&u), &mut tracked_points);
+            }
+            if observers.displacements {
+                read_vectors(observers, NODES - number as u64, stamp, u, &mut displaced);
+            }
         }
         last = Some(state);
         let flow = progress(k as f64 / steps);
@@ -100,6 +119,15 @@ pub fn observe(
             .collect(),
         frames,
         markers: (!observers.markers.is_empty()).then(|| recorded_markers(observers, samples)),
+        points: (!observers.points.is_empty()).then(|| RecordedPoints {
+            track: Sequence { file: PathBuf::from("points.npz"), ..tracked_points },
+            rest: observers.points.clone(),
+            tolerance: None,
+        }),
+        displacements: observers.displacements.then(|| RecordedDisplacements {
+            track: Sequence { file: PathBuf::from("displacements.npz"), ..displaced },
+            nodes: plan.body.nodes.clone(),
+        }),
         warnings: Vec::new(),
     })
 }
@@ -189,6 +217,19 @@ fn marker_samples(observers: &Observers, number: usize, time: f64, positions: &[
         }
     }
     samples
+}
+
+/// Reads vectors at one time, with noise and gaps; `stream` numbers the random ones.
+fn read_vectors(observers: &Observers, stream: u64, time: f64, vectors: Vec<DVec3>, out: &mut Sequence) {
+    let mut rng = ChaCha8Rng::seed_from_u64(observers.sensor.seed);
+    rng.set_stream(stream);
+    out.times.push(time);
+    out.noise_sigma = Some(observers.sensor.noise.max(LEAST_MARKER_NOISE));
+    out.vectors.extend(vectors.into_iter().map(|v| {
+        let gauss: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+        let seen = rand::RngExt::random::<f64>(&mut rng) >= observers.sensor.dropout;
+        if seen { v + observers.sensor.noise * DVec3::from_array(gauss) } else { DVec3::NAN }
+    }));
 }
 
 /// A camera as a recording of this sensor states it.

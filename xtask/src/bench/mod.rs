@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::effects::{self, Effect, Family};
-use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
+use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
 use palpate_model::scene::{Analytic, InitialShape, Solver};
@@ -137,9 +137,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     let observation = Observation {
         cameras: vec![Camera { center: camera, axis: DVec3::Y }],
         frames: (1..=steps).map(frame).collect(),
-        depth_noise: 1e-3,
-        marker_noise: 1e-3,
-        displacement_noise: 1e-3,
+        channels: vec![Channel::new(ReadingKind::Depth, 1e-3)],
         ..Observation::default()
     };
     Plan {

@@ -291,7 +291,7 @@ fn localisation(map: &[MapEntry], moved: &[Moved]) -> Option<f64> {
     for m in moved {
         let near = |b: &usize| (map[*b].place.distance(m.rest), b.to_owned());
         let during = |e: &MapEntry| (e.time.0 - 1e-9..=e.time.1 + 1e-9).contains(&m.time);
-        let blocks = (0..map.len()).filter(|b| map[*b].sensor == m.sensor && during(&map[*b]));
+        let blocks = (0..map.len()).filter(|b| map[*b].stream == m.stream && during(&map[*b]));
         if let Some((_, b)) = blocks.map(|b| near(&b)).min_by(|a, b| a.0.total_cmp(&b.0)) {
             real[b].0 += m.change;
             real[b].1 += 1.0;

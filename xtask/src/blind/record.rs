@@ -73,6 +73,8 @@ fn record(setup: &Setup, e: &Experiment, maker: &Maker) -> Result<Recording, Err
     let observers = Observers {
         cameras: setup.cameras()?,
         markers: setup.markers(),
+        points: Vec::new(),
+        displacements: false,
         times: (1..=count).map(|k| start + k as f64 * setup.spacing).collect(),
         sensor: Sensor { noise: maker.noise, dropout: 0.0, depth_scale: DEPTH_SCALE, seed: maker.seed },
     };

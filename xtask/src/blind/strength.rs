@@ -11,7 +11,7 @@ use super::scenes::Setup;
 use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, fit};
 use palpate_cpu::CpuBackend;
-use palpate_diagnose::sensor;
+use palpate_engine::Stream;
 use palpate_engine::{Linearised, ResidualRow, Rollout};
 use palpate_model::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ pub struct Ruler<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Moved {
     /// Sensor as in a residual map.
-    pub sensor: u32,
+    pub stream: Stream,
     /// Place on the rest shape [m].
     pub rest: DVec3,
     /// Time [s].
@@ -96,7 +96,7 @@ impl<'a> Ruler<'a> {
         let rows = linearise(&e, &theta, &[])?.rows.residuals;
         let time = |r: &ResidualRow| e.plan().observation.frames[r.frame].time;
         let moved = |r: &ResidualRow| Moved {
-            sensor: sensor(r.source),
+            stream: r.source.stream(),
             rest: r.rest,
             time: time(r),
             change: r.value.map_or(0.0, |v| v / r.noise),
@@ -124,7 +124,7 @@ impl<'a> Ruler<'a> {
         let mut d: Vec<f64> = l.rows.residuals.iter().zip(&self.rows).map(difference).collect();
         project(&self.free, &mut d);
         let moved = |((change, r), time): ((f64, &ResidualRow), &f64)| Moved {
-            sensor: sensor(r.source),
+            stream: r.source.stream(),
             rest: r.rest,
             time: *time,
             change,

@@ -5,10 +5,11 @@ use palpate::synthetic::{Observers, observe};
 use palpate::{Backend, Error, Experiment};
 use palpate_fit::{FitResult, FitScene, FreeParameter, Hooks, Problem, Settings, Slot, fit};
 use palpate_io::recording::Recording;
+use palpate_model::observation::ReadingKind;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
-use palpate_model::scene::{CostKind, ObservationSpec, Optimizer, Scene};
+use palpate_model::scene::{ObservationSpec, Optimizer, Scene};
 
 /// Metres per count of a depth image: far below every noise studied, and 65535 counts reach past every scene.
 const DEPTH_SCALE: f64 = 2e-5;
@@ -40,6 +41,8 @@ pub fn record(truth: &Scene, watch: &Watch) -> Result<Recording, Error> {
     let observers = Observers {
         cameras: watch.cameras.clone(),
         markers: Vec::new(),
+        points: Vec::new(),
+        displacements: false,
         times: (1..=t.steps).filter(|k| k.is_multiple_of(watch.every)).map(|k| t.start + k as f64 * t.step).collect(),
         sensor: Sensor { noise: watch.noise, dropout: 0.0, depth_scale: DEPTH_SCALE, seed: watch.seed },
     };
@@ -54,7 +57,7 @@ pub fn plan(scene: &Scene, recording: &Recording, band: f64) -> Result<Plan, Err
     let spec = ObservationSpec {
         recording: "recording".into(),
         file: "recording.toml".into(),
-        costs: vec![CostKind::SparseSurface],
+        costs: vec![ReadingKind::Depth],
         band,
         from: f64::NEG_INFINITY,
         to: f64::INFINITY,

@@ -28,8 +28,8 @@ pub fn track(experiment: &Experiment, theta: &[f64], marker: &str) -> Result<Vec
     let seen = |frame: usize| &plan.observation.frames[frame];
     rollout.visit(theta, |_, _, residuals| {
         for r in residuals {
-            for (sample, off) in seen(r.frame).markers.iter().zip(&r.markers).filter(|(s, _)| s.site as usize == site) {
-                all.push(Sighting { time: seen(r.frame).time, seen: sample.position, simulated: sample.position + *off });
+            for (sample, off) in r.offsets().filter(|(s, _)| s.item as usize == site) {
+                all.push(Sighting { time: seen(r.frame).time, seen: sample.place, simulated: sample.place + off });
             }
         }
         std::ops::ControlFlow::Continue(())

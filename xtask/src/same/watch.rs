@@ -2,7 +2,9 @@
 //! of the simulation leaves the measurement as it is.
 
 use glam::{DQuat, DVec3};
-use palpate_model::observation::{Camera, Frame, Observation, ObservedMarker, ObservedPoint};
+use palpate_model::observation::{
+    Camera, Channel, Frame, Observation, ObservedDisplacement, ObservedMarker, ObservedPoint, ReadingKind,
+};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::scene::Scene;
@@ -26,9 +28,10 @@ const SPACING: f64 = 0.8;
 
 /// The plan of a scene of which `seen` is seen at these times [s].
 pub fn watched(scene: &Scene, seen: Seen, times: &[f64]) -> Result<Plan, PlanError> {
-    let noises = Observation { depth_noise: 1e-3, marker_noise: 2e-3, displacement_noise: 5e-3, ..Observation::default() };
+    let noises = [(ReadingKind::Depth, 1e-3), (ReadingKind::Marker, 2e-3), (ReadingKind::Displacement, 5e-3)];
+    let channels = noises.map(|(kind, noise)| Channel::new(kind, noise)).to_vec();
     let rests = scene.observation.as_ref().map_or(Vec::new(), |o| o.markers.clone());
-    let body = build_plan(scene, noises.clone(), &[])?.body;
+    let body = build_plan(scene, Observation::default(), &[])?.body;
     let motion = Motion::of(scene, body.center);
     let surface = shape_of(&scene.object).surface(SPACING * body.grid.h).vertices;
     // One on each side: every point is seen by the camera nearest to it.
@@ -48,12 +51,12 @@ pub fn watched(scene: &Scene, seen: Seen, times: &[f64]) -> Result<Plan, PlanErr
             frame.markers = (0..).zip(rests.iter().map(|m| m.position)).map(marker).collect();
         }
         if seen == Seen::Nodes {
-            frame.displacements = body.nodes.iter().map(|p| motion.carry(*p, time) - *p).collect();
+            frame.displacements = ObservedDisplacement::of_all(body.nodes.iter().map(|p| motion.carry(*p, time) - *p));
         }
         frame
     };
     let frames = times.iter().map(frame).collect();
-    build_plan(scene, Observation { cameras: cameras.clone(), frames, ..noises }, &rests)
+    build_plan(scene, Observation { channels, cameras: cameras.clone(), frames, ..Observation::default() }, &rests)
 }
 
 /// Free flight with spin where nothing is held, and a small shear in any case, so that no residual is zero.

@@ -160,7 +160,7 @@ impl Bench {
                 value += d.iter().zip(values).zip(&offsets).map(|((d, v), o)| d * (v - o)).sum::<f64>();
                 let row = ResidualRow {
                     frame,
-                    source: Source::Point { point: i as u32, camera: 0 },
+                    source: Source::point(i as u32, 0),
                     value: Some(value),
                     noise: NOISE,
                     weight: 1.0,

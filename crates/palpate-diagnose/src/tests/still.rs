@@ -35,7 +35,7 @@ fn seen(sd: f64, run: usize, motion: impl Fn(f64, usize) -> f64) -> Readings {
             let value = 1e-3 * (30.0 * x).sin() + noise + motion(x, frame);
             let row = ResidualRow {
                 frame,
-                source: Source::Point { point, camera: 0 },
+                source: Source::point(point, 0),
                 value: Some(value),
                 noise: STATED,
                 weight: 1.0,

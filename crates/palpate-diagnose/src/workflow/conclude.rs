@@ -7,7 +7,6 @@ use crate::laboratory::{Field, Readings};
 use crate::linear::least_squares;
 use crate::null::{Adequacy, Block, LARGEST};
 use crate::quantity::millimetres;
-use palpate_engine::Source;
 
 /// Distance over what noise and discretisation explain beyond which a recording that no fit has seen counts as not met: bodies simulated
 /// by another method, with nothing missing, stay below 1.2.
@@ -44,7 +43,7 @@ impl Session<'_> {
         let grid = grid + finer.iter().map(|f| f.rough.powi(2) * f.mean_square()).sum::<f64>();
         for r in readings.rows.iter().filter(|r| r.row.value.is_some()) {
             sum += self.variance(r) + grid;
-            n += if matches!(r.row.source, Source::Point { .. }) { 1.0 } else { 1.0 / 3.0 };
+            n += r.row.source.share();
         }
         let noise = (sum / f64::max(n, 1.0)).sqrt();
         let columns: Vec<Vec<f64>> = finer.iter().map(|f| f.change.iter().map(|c| c.unwrap_or(0.0)).collect()).collect();
@@ -130,7 +129,7 @@ impl Session<'_> {
         let times = before.cells.iter().map(|c| self.cells.times[*c]);
         MapEntry {
             scene: before.scene,
-            sensor: before.sensor,
+            stream: before.stream,
             region: before.region,
             place: self.cells.regions.centers[before.region],
             time: times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t))),

@@ -44,8 +44,6 @@ pub struct Sight {
     pub turned_away: f32,
     /// 1/(n σ²) of depth points [1/m²].
     pub depth: f32,
-    /// 1/(n σ²) of markers [1/m²].
-    pub marker: f32,
     /// 1/(n σ²) of observed displacements [1/m²].
     pub displacement: f32,
     /// Numbers that move depth readings.
@@ -112,7 +110,7 @@ pub struct Shot {
     pub marker_count: u32,
     /// First observed node.
     pub node_start: u32,
-    /// Observed nodes: none or all N.
+    /// Nodes of observed displacements: none or all N, those that were not seen among them.
     pub node_count: u32,
     /// First entry of `cube_starts`.
     pub cube_start: u32,
@@ -151,7 +149,9 @@ pub struct BandCell {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Site {
     /// From the attachment point to the marker's centre at rest [m].
-    pub stalk: [f32; 4],
+    pub stalk: [f32; 3],
+    /// 1/(n σ²) of its readings [1/m²].
+    pub weight: f32,
     /// Columns of the rest shape's deformation gradient, minus the identity.
     pub excess: [[f32; 4]; 3],
 }

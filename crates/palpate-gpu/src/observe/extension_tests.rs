@@ -4,7 +4,7 @@ use super::rollout_tests::{seen, watched};
 use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use glam::DVec3;
-use palpate_cpu::passes::{frames, matching};
+use palpate_cpu::costs::{blend, matching};
 use palpate_engine::{Backend, ParamBatch, Request};
 
 /// Rounding of displacements of some centimetres in two parts, and of sums over 60 weights.
@@ -43,7 +43,7 @@ fn displacements_in_the_band_are_those_of_the_cpu_and_one_percent_shows() {
     // The last frame of the step is what is left in the buffers.
     let last = world.observer.rounds(0).last().map(|r| world.observer.agenda.looks[r.first].value);
     let value = last.unwrap_or_else(|| panic!("the step has a frame")).map(f64::from);
-    let u = frames::blend(&value, [&states[0].1, &states[0].2, &states[1].1, &states[1].2]);
+    let u = blend(&value, [&states[0].1, &states[0].2, &states[1].1, &states[1].2]);
     let right = matching::extend(&plan.body, &u);
     assert!(right.len() == all && all > nodes.len());
     let size = right.iter().map(|v| v.length()).fold(0.0, f64::max);

@@ -6,12 +6,11 @@ use crate::GpuBackend;
 use crate::tests::faults::Fault;
 use crate::tests::scenes::device;
 use glam::DVec3;
-use palpate_cpu::passes::frames::{self, Look};
-use palpate_cpu::passes::matching::{BandLookup, PointHash};
-use palpate_engine::{Backend, ParamBatch};
+use palpate_cpu::costs::{Costs, Look, blend};
+use palpate_engine::{Backend, Misfit, ParamBatch};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::Observation;
 use palpate_model::observation::instant::instants;
+use palpate_model::observation::{Observation, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Analytic;
@@ -26,13 +25,17 @@ fn seen(plan: &mut Plan) -> &mut Observation {
     Arc::make_mut(&mut plan.observation)
 }
 
+fn noise(plan: &mut Plan, kind: ReadingKind) {
+    seen(plan).channels.iter_mut().filter(|c| c.kind == kind).for_each(|c| c.noise *= 1.01);
+}
+
 /// Faults of the comparison; the first three act on points and displacements, too.
 pub(super) const FAULTS: [Fault; 6] = [
     ("weights of the extension", |p| body(p).band.values.iter_mut().for_each(|w| *w *= 1.01)),
     ("distances", |p| body(p).band.cells.iter_mut().for_each(|c| c.sdf.iter_mut().for_each(|d| *d *= 1.01))),
     ("width of the kernel", |p| p.band *= 1.01),
-    ("noise of markers", |p| seen(p).marker_noise *= 1.01),
-    ("noise of depth", |p| seen(p).depth_noise *= 1.01),
+    ("noise of markers", |p| noise(p, ReadingKind::Marker)),
+    ("noise of depth", |p| noise(p, ReadingKind::Depth)),
     ("stalk of a marker", |p| seen(p).markers[2].stalk *= 1.01),
 ];
 
@@ -80,7 +83,7 @@ fn single_residuals(backend: &GpuBackend, plan: &Plan, given: &Plan) -> (f64, us
     let mut theta = vec![given.theta.clone(); 2];
     theta[1][given.layout.index(ParamKey::TimeStart)] = MEMBERS[1].0;
     backend.set_params(&mut world, &ParamBatch::from_rows(&theta));
-    let (lookup, sensors) = (BandLookup::new(&plan.body), Sensors::default());
+    let (costs, sensors) = (Costs::new(plan), Sensors::default());
     let (start, size) = MEMBERS[1];
     let (mut worst, mut compared) = (0.0f64, 0);
     for k in 0..plan.clock.steps {
@@ -92,23 +95,24 @@ fn single_residuals(backend: &GpuBackend, plan: &Plan, given: &Plan) -> (f64, us
             let at = |k: usize, f: fn(f64, f64, DVec3) -> DVec3| -> Vec<DVec3> {
                 plan.body.nodes.iter().map(|x| f(size, k as f64 * plan.clock.step, *x)).collect()
             };
-            let u = frames::blend(&i.value, [&at(k, motion), &at(k, velocity), &at(k + 1, motion), &at(k + 1, velocity)]);
-            let f = &plan.observation.frames[i.frame];
+            let u = blend(&i.value, [&at(k, motion), &at(k, velocity), &at(k + 1, motion), &at(k + 1, velocity)]);
             let look = Look { plan, sensors: &sensors, frame: i.frame };
-            let here = frames::compare(look, &lookup, &PointHash::new(&f.points, plan.body.grid.h), &u);
-            let right = frames::residuals(look, &here, &u);
-            assert_eq!((found.points.len(), found.markers.len()), (right.points.len(), right.markers.len()));
-            compared += right.points.len() + right.markers.len();
+            let right = costs.compare(look, u).residuals(look);
+            assert_eq!(found.readings.len(), right.readings.len());
+            compared += right.readings.len();
             // A thousandth of the noise is far above rounding (1e-7 of a cell) and far below what matters.
-            let points = found.points.iter().zip(&right.points).map(|(a, b)| match (a, b) {
-                (Some(a), Some(b)) => (a - b).abs() / (1e-3 * plan.observation.depth_noise),
-                (None, None) => 0.0,
-                _ => f64::INFINITY,
+            let off = found.readings.iter().zip(&right.readings).map(|(a, b)| {
+                assert_eq!((a.sensor, a.item, a.place), (b.sensor, b.item, b.place));
+                let distance = match (a.misfit, b.misfit) {
+                    (Some(Misfit::Distance(a)), Some(Misfit::Distance(b))) => (a - b).abs(),
+                    (Some(Misfit::Offset(a)), Some(Misfit::Offset(b))) => (a - b).length(),
+                    (None, None) => 0.0,
+                    _ => f64::INFINITY,
+                };
+                distance / (1e-3 * plan.observation.noise(a.sensor.kind()))
             });
-            let distance = |(a, b): (&DVec3, &DVec3)| (*a - *b).length() / (1e-3 * plan.observation.marker_noise);
-            let markers = found.markers.iter().zip(&right.markers).map(distance);
             // Not a number is a difference as well.
-            worst = points.chain(markers).fold(worst, |w, d| if d > w || d.is_nan() { d } else { w });
+            worst = off.fold(worst, |w, d| if d > w || d.is_nan() { d } else { w });
         }
     }
     (worst, compared)

@@ -11,7 +11,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::Effect;
-use palpate_model::observation::kernel;
+use palpate_model::observation::{ReadingKind, kernel};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource, InitialShape};
@@ -84,7 +84,7 @@ fn check(plan: &Plan, keys: &[usize]) {
         let (mut wrong, q) = (lin.clone(), directions.len());
         places.iter().for_each(|i| wrong.rows.sensitivity[i * q..(i + 1) * q].iter_mut().for_each(|d| *d *= 1.01));
         assert!(apart(&wrong, &right, plan)[2] > 1e-3);
-        let (mut wrong, noise) = (a.clone(), plan.observation.depth_noise);
+        let (mut wrong, noise) = (a.clone(), plan.observation.noise(ReadingKind::Depth));
         let more = |r: f64| kernel::cost(1.01 * r, plan.band) - kernel::cost(r, plan.band);
         let by_fronts: f64 = places.iter().filter_map(|i| right.rows.residuals[*i].value).map(more).sum();
         wrong.cost += by_fronts / (noise * noise * plan.observation.residuals() as f64);

@@ -1,5 +1,6 @@
 //! Which frames belong to which step, member by member, in rounds that hold at most one frame of each member.
 
+use super::shots::{node_count, row_count};
 use crate::layout::Look;
 use palpate_model::observation::instant::instants;
 use palpate_model::plan::Plan;
@@ -66,8 +67,8 @@ impl Round {
             let f = &plan.observation.frames[look.frame as usize];
             round.points = round.points.max(f.points.len());
             round.markers = round.markers.max(f.markers.len());
-            round.nodes = round.nodes.max(f.displacements.len());
-            round.rows = round.rows.max(f.residuals());
+            round.nodes = round.nodes.max(node_count(plan, f));
+            round.rows = round.rows.max(row_count(plan, f));
         }
         round
     }

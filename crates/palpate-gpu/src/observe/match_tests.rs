@@ -11,12 +11,13 @@ use crate::layout::Found;
 use crate::tests::scenes::device;
 use crate::world::{State, World};
 use glam::DVec3;
-use palpate_cpu::passes::frames::{self, Look};
-use palpate_cpu::passes::matching::{BandLookup, PointHash, extend};
+use palpate_cpu::costs::depth::Depth;
+use palpate_cpu::costs::matching::extend;
+use palpate_cpu::costs::{Costs, Look};
 use palpate_engine::{Backend, ParamBatch, Request};
 use palpate_model::cutcells::pullback::{TURNED_AWAY, pull_back};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
+use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::Analytic;
@@ -32,7 +33,7 @@ fn plan_of((min, max): (DVec3, DVec3), points: &[DVec3], eye: DVec3) -> Plan {
     let points = points.iter().map(|p| ObservedPoint { position: H * *p, camera: 0 }).collect();
     let frames = vec![Frame { time: scene.time.start - 0.01, points, ..Frame::default() }];
     let observation =
-        Observation { cameras, frames, depth_noise: 0.05 * H, marker_noise: H, displacement_noise: H, ..Observation::default() };
+        Observation { cameras, frames, channels: vec![Channel::new(ReadingKind::Depth, 0.05 * H)], ..Observation::default() };
     build_plan(&scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -44,14 +45,13 @@ struct Matched {
 
 /// The CPU's answer for a displacement field.
 fn right(plan: &Plan, u: &[DVec3]) -> Matched {
-    let (lookup, sensors) = (BandLookup::new(&plan.body), Sensors::default());
-    let hash = PointHash::new(&plan.observation.frames[0].points, H);
+    let sensors = Sensors::default();
     let look = Look { plan, sensors: &sensors, frame: 0 };
-    let compared = frames::compare(look, &lookup, &hash, u);
     let mut points = vec![None; plan.observation.frames[0].points.len()];
-    compared.matches.iter().for_each(|m| points[m.point as usize] = Some((m.cell, m.place.phi)));
+    Depth::new(plan).matches(look, u).iter().for_each(|m| points[m.point as usize] = Some((m.cell, m.place.phi)));
     let scale = 1.0 / plan.observation.residuals() as f64;
-    Matched { points, gradient: frames::gradient(look, &compared, u, scale, &mut vec![0.0; plan.layout.len()]) }
+    let compared = Costs::new(plan).compare(look, u.to_vec());
+    Matched { points, gradient: compared.gradient(look, scale, &mut vec![0.0; plan.layout.len()]) }
 }
 
 /// A body at rest, displaced by this.

@@ -1,6 +1,7 @@
 //! What observations found, back on the host: sums over frames in double precision, and residuals for reports.
 
 use super::readings::shifts;
+use super::shots::row_count;
 use super::{FOUND, Observer, VECTOR, look};
 use crate::device::GpuError;
 use crate::device::Maker as _;
@@ -9,8 +10,8 @@ use crate::device::recorder::Buffers;
 use crate::layout::{Found, Health};
 use crate::world::World;
 use glam::DVec3;
-use palpate_engine::{Curvature, Evaluation, FrameResiduals, ResidualRow, Rows, Source};
-use palpate_model::observation::kernel;
+use palpate_engine::{Curvature, Evaluation, FrameResiduals, Misfit, ReadingResidual, ResidualRow, Rows, Source};
+use palpate_model::observation::{ReadingKind, Sensor, kernel};
 
 impl Observer {
     /// What a tally of `members` holds of observations along `directions` directions: buffers, and their bytes.
@@ -75,22 +76,47 @@ pub(crate) fn residuals(
         world.record(|r| look(r, &own, &o.sight, round));
         let frame = at.frame as usize;
         let shot = &o.shots.shots[at.shot as usize];
-        let (points, markers) = (shot.point_count as usize, shot.marker_count as usize);
-        let sizes = [("found", FOUND as usize * points), ("rows", 8 * (points + 3 * markers))];
+        let obs = &world.plan.observation;
+        let f = &obs.frames[frame];
+        let points = shot.point_count as usize;
+        let sizes = [("found", FOUND as usize * points), ("rows", 8 * row_count(&world.plan, f))];
         let all_found = gpu.download_all(&sizes.map(|(name, bytes)| (&o.buffers[name], bytes)))?;
         let found: Vec<Found> = bytemuck::pod_collect_to_vec(&all_found[0]);
         let rows: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&all_found[1]);
-        let mut out = FrameResiduals { frame, points: vec![None; points], markers: vec![DVec3::ZERO; markers] };
-        let order = &o.shots.point_order[shot.point_start as usize..][..points];
-        for (f, &p) in found.iter().zip(order) {
-            out.points[p as usize] = (f.cell != NONE).then(|| f64::from(f.phi));
+        let offset = |place: usize| {
+            let r = &rows[points + 3 * place..][..3];
+            Some(Misfit::Offset(DVec3::new(r[0][0].into(), r[1][0].into(), r[2][0].into())))
+        };
+        let mut readings: Vec<ReadingResidual> = Vec::with_capacity(obs.frames[frame].residuals());
+        for (p, (&place, seen)) in
+            places(&o.shots.point_order[shot.point_start as usize..][..points]).iter().zip(&f.points).enumerate()
+        {
+            let distance = || Misfit::Distance(f64::from(found[place].phi));
+            let misfit = (found[place].cell != NONE).then(distance);
+            readings.push(ReadingResidual { sensor: Sensor::Camera(seen.camera), item: p as u32, place: seen.position, misfit });
         }
-        for (r, &m) in rows[points..].chunks_exact(3).zip(&o.shots.mark_order[shot.marker_start as usize..]) {
-            out.markers[m as usize] = DVec3::new(r[0][0].into(), r[1][0].into(), r[2][0].into());
+        let markers = f.markers.len();
+        let order = places(&o.shots.mark_order[shot.marker_start as usize..][..markers]);
+        for (&place, m) in order.iter().zip(&f.markers) {
+            let sensor = obs.sensor_of(m.site);
+            readings.push(ReadingResidual { sensor, item: m.site, place: m.position, misfit: offset(place) });
         }
+        for d in &f.displacements {
+            let place = world.plan.body.nodes[d.node as usize] + d.value;
+            let misfit = offset(markers + d.node as usize);
+            readings.push(ReadingResidual { sensor: Sensor::Nodes, item: d.node, place, misfit });
+        }
+        let out = FrameResiduals { frame, readings };
         all.push(out);
     }
     Ok(all)
+}
+
+/// Where each thing stands in the device's order, which lists the things.
+fn places(order: &[u32]) -> Vec<usize> {
+    let mut all = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(place, &thing)| all[thing as usize] = place);
+    all
 }
 
 /// Every residual of the frames of step k of one member with its derivatives along the tangents; `tally` was made for as many.
@@ -121,7 +147,7 @@ pub(crate) fn rows(
         let (points, most) = (f.points.len(), o.sight.rows as usize);
         let all_found = gpu.download_all(&[
             (&o.buffers["found"], FOUND as usize * points),
-            (&o.buffers["rows"], 8 * f.residuals()),
+            (&o.buffers["rows"], 8 * row_count(&world.plan, f)),
             (&tally["slopes"], 4 * q * most),
         ])?;
         let found: Vec<Found> = bytemuck::pod_collect_to_vec(&all_found[0]);
@@ -132,14 +158,11 @@ pub(crate) fn rows(
             out.sensitivity.extend((0..q).map(|q| f64::from(slopes[q * most + place])));
         };
         // The device has points and markers in an order of its own.
-        let mut place_of = vec![0; points];
-        for (place, &p) in o.shots.point_order[shot.point_start as usize..][..points].iter().enumerate() {
-            place_of[p as usize] = place;
-        }
+        let place_of = places(&o.shots.point_order[shot.point_start as usize..][..points]);
         for (p, (&place, seen)) in place_of.iter().zip(&f.points).enumerate() {
             let Found { xi, phi, gradient, cell } = found[place];
-            let source = Source::Point { point: p as u32, camera: seen.camera };
-            let (noise, value) = (obs.depth_noise, f64::from(phi));
+            let source = Source::point(p as u32, seen.camera);
+            let (noise, value) = (obs.noise(ReadingKind::Depth), f64::from(phi));
             let (rest, by_place) = (seen.position, DVec3::ZERO);
             let bare = ResidualRow { frame, source, value: None, noise, weight: 0.0, rest, along_sight: 0.0, by_place };
             let row = body.band.cells.get(cell as usize).map_or(bare, |cell| {
@@ -157,24 +180,21 @@ pub(crate) fn rows(
             });
             add(row, place);
         }
-        let mut vector = |noise: f64, rest: DVec3, place: usize, source: &dyn Fn(u8) -> Source| {
-            for a in 0..3u8 {
-                let place = points + 3 * place + usize::from(a);
-                let value = Some(f64::from(values[place][0]));
-                let by_place = -DVec3::AXES[usize::from(a)];
-                add(ResidualRow { frame, source: source(a), value, noise, weight: 1.0, rest, along_sight: 1.0, by_place }, place);
+        let mut vector = |sensor: Sensor, item: u32, rest: DVec3, place: usize| {
+            for axis in 0..3u8 {
+                let place = points + 3 * place + usize::from(axis);
+                let source = Source { sensor, item, axis };
+                add(ResidualRow::coordinate(frame, source, values[place][0].into(), obs.noise(sensor.kind()), rest), place);
             }
         };
         let markers = f.markers.len();
-        let order = &o.shots.mark_order[shot.marker_start as usize..][..markers];
-        for (m, marker) in f.markers.iter().enumerate() {
-            let place = order.iter().position(|&o| o as usize == m).unwrap_or(m);
-            let rest = obs.markers[marker.site as usize].carry(|i| body.nodes[i]).0;
-            vector(obs.marker_noise, rest, place, &|axis| Source::Marker { site: marker.site, axis });
+        let order = places(&o.shots.mark_order[shot.marker_start as usize..][..markers]);
+        for (&place, m) in order.iter().zip(&f.markers) {
+            let rest = obs.markers[m.site as usize].carry(|i| body.nodes[i]).0;
+            vector(obs.sensor_of(m.site), m.site, rest, place);
         }
-        for i in 0..f.displacements.len() {
-            let source = |axis| Source::Node { node: i as u32, axis };
-            vector(obs.displacement_noise, body.nodes[i], markers + i, &source);
+        for d in &f.displacements {
+            vector(Sensor::Nodes, d.node, body.nodes[d.node as usize], markers + d.node as usize);
         }
     }
     Ok(out)

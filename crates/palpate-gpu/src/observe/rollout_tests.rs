@@ -9,7 +9,7 @@ use crate::tests::scenes::{device, held};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
-use palpate_model::observation::{Camera, Frame, Observation, ObservedPoint};
+use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
@@ -54,7 +54,7 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     let cameras = vec![side(1.0), side(-1.0)];
     let h = body.grid.h;
     let observation =
-        Observation { cameras, frames, depth_noise: 0.1 * h, marker_noise: h, displacement_noise: h, ..Observation::default() };
+        Observation { cameras, frames, channels: vec![Channel::new(ReadingKind::Depth, 0.1 * h)], ..Observation::default() };
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -7,6 +7,7 @@ use crate::tests::scenes::{ball, device};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Source, Wanted};
 use palpate_model::effects::{ALL, Effect, Unstated, find};
+use palpate_model::observation::Sensor;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -52,7 +53,7 @@ fn rows_are_those_of_the_cpu_and_one_percent_shows() {
         let mut linearise = |theta: &[f64]| rollout.linearise(theta, &directions).unwrap_or_else(|e| panic!("{e}"));
         let found = linearise(&plan.theta);
         let kinds = |f: fn(&Source) -> bool| found.rows.residuals.iter().filter(|r| f(&r.source)).count();
-        let [points, markers] = [kinds(|s| matches!(s, Source::Point { .. })), kinds(|s| matches!(s, Source::Marker { .. }))];
+        let [points, markers] = [kinds(|s| s.is_depth()), kinds(|s| matches!(s.sensor, Sensor::Marker(_)))];
         let d = apart(&found, &right, &plan);
         println!("{points} points, {markers} coordinates of markers: {d:?}");
         assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");

@@ -3,6 +3,7 @@
 use crate::layout::{Mark, Shot};
 use glam::DVec3;
 use palpate_model::effects::sensors::Sensors;
+use palpate_model::observation::Frame;
 use palpate_model::plan::Plan;
 
 /// Most cubes along y and z: a cell's loop over rows of cubes stays far below [`super::MOST_LOOPS`] with it.
@@ -60,7 +61,7 @@ impl Shots {
                 marker_start: known.map_or(all.marks.len() as u32, |s| s.marker_start),
                 marker_count: f.markers.len() as u32,
                 node_start: known.map_or((all.measured.len() / 2) as u32, |s| s.node_start),
-                node_count: f.displacements.len() as u32,
+                node_count: node_count(plan, f) as u32,
                 cube_start: all.cube_starts.len() as u32,
                 ..Shot::default()
             };
@@ -92,9 +93,29 @@ impl Shots {
             let before = |site: usize| order.partition_point(|&m| (f.markers[m as usize].site as usize) < site) as u32;
             all.mark_rows.extend((0..=sites.len()).map(before));
             all.mark_order.extend(order);
-            all.measured.extend(f.displacements.iter().flat_map(|d| split(*d)));
+            all.measured.extend(measured(plan, f).into_iter().flatten());
         }
     }
+}
+
+/// Nodes that a frame's displacements are compared at: all of them as soon as one was seen.
+pub(crate) fn node_count(plan: &Plan, frame: &Frame) -> usize {
+    if frame.displacements.is_empty() { 0 } else { plan.body.nodes.len() }
+}
+
+/// Scalar residuals of a frame on the device, those of nodes that were not seen among them.
+pub(crate) fn row_count(plan: &Plan, frame: &Frame) -> usize {
+    frame.points.len() + 3 * (frame.markers.len() + node_count(plan, frame))
+}
+
+/// A frame's displacements node by node: a float with 1 where the node was seen, and what the float leaves.
+fn measured(plan: &Plan, frame: &Frame) -> Vec<[[f32; 4]; 2]> {
+    let mut all = vec![[[0.0; 4]; 2]; node_count(plan, frame)];
+    for d in &frame.displacements {
+        all[d.node as usize] = split(d.value);
+        all[d.node as usize][0][3] = 1.0;
+    }
+    all
 }
 
 /// Points sorted by the cubes of a lattice, x fastest.

@@ -4,7 +4,7 @@ use crate::device::pipelines::shared::structs::NONE;
 use crate::layout::{BandCell, Site};
 use crate::observe::shots::split;
 use glam::{DMat3, DVec3};
-use palpate_model::observation::MarkerSite;
+use palpate_model::observation::{MarkerSite, Observation, ReadingKind};
 use palpate_model::plan::Plan;
 
 /// Rows of a sparse matrix: where each starts, which column, which value.
@@ -96,7 +96,7 @@ impl SiteTables {
         let mut tables = SiteTables::default();
         let (mut entries, mut transposed) = (Vec::new(), Vec::new());
         for (s, site) in plan.observation.markers.iter().enumerate() {
-            tables.sites.push(place(site, &plan.body.nodes));
+            tables.sites.push(place(plan, site));
             for (k, &node) in site.nodes.iter().enumerate() {
                 let g = site.gradient_weights[k].as_vec3();
                 transposed.push((node, s as u32, entries.len() as u32));
@@ -109,8 +109,20 @@ impl SiteTables {
     }
 }
 
-fn place(site: &MarkerSite, rest: &[DVec3]) -> Site {
-    let excess = site.carry(|i| rest[i]).1 - DMat3::IDENTITY;
+/// 1/(n σ²) of a kind of readings [1/m²].
+pub(crate) fn weight(obs: &Observation, kind: ReadingKind) -> f32 {
+    let residuals = obs.residuals();
+    let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
+    (scale / (obs.noise(kind) * obs.noise(kind))) as f32
+}
+
+fn place(plan: &Plan, site: &MarkerSite) -> Site {
+    let excess = site.carry(|i| plan.body.nodes[i]).1 - DMat3::IDENTITY;
     let column = |c: DVec3| split(c)[0];
-    Site { stalk: split(site.stalk)[0], excess: [column(excess.x_axis), column(excess.y_axis), column(excess.z_axis)] }
+    let weight = weight(&plan.observation, site.kind);
+    Site {
+        stalk: site.stalk.as_vec3().to_array(),
+        weight,
+        excess: [column(excess.x_axis), column(excess.y_axis), column(excess.z_axis)],
+    }
 }

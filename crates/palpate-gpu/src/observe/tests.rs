@@ -6,17 +6,18 @@ use crate::GpuBackend;
 use crate::tests::scenes::{ball, device};
 use crate::world::{State, World};
 use glam::{DQuat, DVec3};
-use palpate_cpu::passes::frames::{self, Along, Look};
-use palpate_cpu::passes::matching::{BandLookup, PointHash};
+use palpate_cpu::costs::{Along, Costs, Look, blend};
 use palpate_engine::{Backend, Direction, Evaluation, ParamBatch, Request};
 use palpate_model::effects::Effect;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::instant::instants;
-use palpate_model::observation::{Camera, Frame, MarkerRest, Observation, ObservedMarker, ObservedPoint};
+use palpate_model::observation::{
+    Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker, ObservedPoint, ReadingKind,
+};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
-use palpate_model::scene::{Analytic, BodySource, CostKind, ObservationSpec, Resolution, Scene};
+use palpate_model::scene::{Analytic, BodySource, ObservationSpec, Resolution, Scene};
 
 /// Cost, sums and derivatives agree to this much of their size. Rounding of φ is some 1e-7 of a cell, 1e-6 of a residual of a tenth
 /// of a cell, slopes over a quarter of a cell have four times that; where a thousand terms of both signs nearly cancel, ten to a hundred
@@ -98,7 +99,9 @@ pub(super) fn observed(scene: &Scene, rest: &[MarkerRest], per_patch: usize) -> 
         Frame { time: 0.0671, markers: markers(0.0671, &mut noise, stalks), ..Frame::default() },
         Frame {
             time: 0.0723,
-            displacements: body.nodes.iter().map(|x| motion(1.0, 0.0223, *x) + 0.1 * h * noise.vector()).collect(),
+            displacements: ObservedDisplacement::of_all(
+                body.nodes.iter().map(|x| motion(1.0, 0.0223, *x) + 0.1 * h * noise.vector()),
+            ),
             ..Frame::default()
         },
         Frame { time: 0.2, points: points(0.08, &mut noise), ..Frame::default() },
@@ -106,9 +109,11 @@ pub(super) fn observed(scene: &Scene, rest: &[MarkerRest], per_patch: usize) -> 
     let observation = Observation {
         cameras,
         frames,
-        depth_noise: 0.05 * h,
-        marker_noise: 0.08 * h,
-        displacement_noise: 0.1 * h,
+        channels: vec![
+            Channel::new(ReadingKind::Depth, 0.05 * h),
+            Channel::new(ReadingKind::Marker, 0.08 * h),
+            Channel::new(ReadingKind::Displacement, 0.1 * h),
+        ],
         ..Observation::default()
     };
     build_plan(scene, observation, rest).unwrap_or_else(|e| panic!("{e}"))
@@ -123,7 +128,7 @@ pub(super) fn scene(source: Analytic, h: f64) -> Scene {
     s.observation = Some(ObservationSpec {
         recording: "recording".into(),
         file: "recording.toml".into(),
-        costs: vec![CostKind::SparseSurface],
+        costs: vec![ReadingKind::Depth],
         band: 2.0,
         from: f64::NEG_INFINITY,
         to: f64::INFINITY,
@@ -190,11 +195,10 @@ fn outcome(plan: &Plan, e: &Evaluation, adjoint: Vec<f64>) -> Outcome {
 pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
     let (start, size) = MEMBERS[member];
     let nodes = &plan.body.nodes;
-    let obs = &plan.observation;
-    let (lookup, sensors) = (BandLookup::new(&plan.body), Sensors::default());
-    let hashes: Vec<PointHash> = obs.frames.iter().map(|f| PointHash::new(&f.points, plan.body.grid.h)).collect();
-    let scale = 1.0 / obs.residuals() as f64;
+    let (costs, sensors) = (Costs::new(plan), Sensors::default());
+    let scale = 1.0 / plan.observation.residuals() as f64;
     let keys = directions(plan);
+    let along: Vec<Direction> = keys.iter().copied().map(Direction::Parameter).collect();
     let mut e = Evaluation { gradient: vec![0.0; plan.layout.len()], ..Evaluation::default() };
     let (mut gn, mut matrix) = (vec![0.0; 3], vec![0.0; 9]);
     let mut adjoint = Vec::new();
@@ -208,16 +212,15 @@ pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
         let ends = [&a[0][..], &a[1], &b[0], &b[1]];
         let mut adj = vec![vec![DVec3::ZERO; nodes.len()]; 4];
         for i in instants(plan, start, k) {
-            let u = frames::blend(&i.value, ends);
             let look = Look { plan, sensors: &sensors, frame: i.frame };
-            let compared = frames::compare(look, &lookup, &hashes[i.frame], &u);
-            e.cost += scale * compared.cost;
-            e.matched += compared.matched;
-            e.sum_squares += compared.sum_squares;
-            e.sum_signed += compared.sum_signed;
+            let compared = costs.compare(look, blend(&i.value, ends));
+            e.cost += scale * compared.sums.cost;
+            e.matched += compared.sums.matched;
+            e.sum_squares += compared.sums.squares;
+            e.sum_signed += compared.sums.signed;
             let mut unused = vec![0.0; plan.layout.len()];
-            let g = frames::gradient(look, &compared, &u, scale, &mut unused);
-            let rate = frames::blend(&i.rate, ends);
+            let g = compared.gradient(look, scale, &mut unused);
+            let rate = blend(&i.rate, ends);
             e.gradient[at] -= g.iter().zip(&rate).map(|(g, r)| g.dot(*r)).sum::<f64>();
             for (sum, factor) in adj.iter_mut().zip(i.value) {
                 sum.iter_mut().zip(&g).for_each(|(s, g)| *s += factor * *g);
@@ -225,22 +228,14 @@ pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
             let du: Vec<Vec<DVec3>> = (0..3)
                 .map(|q| {
                     let of = |k: usize, part: usize| nodes.iter().map(|x| tangent(q, k, *x)[part]).collect::<Vec<_>>();
-                    let mut d = frames::blend(&i.value, [&of(k, 0), &of(k, 1), &of(k + 1, 0), &of(k + 1, 1)]);
+                    let mut d = blend(&i.value, [&of(k, 0), &of(k, 1), &of(k + 1, 0), &of(k + 1, 1)]);
                     if keys[q] == at {
                         d.iter_mut().zip(&rate).for_each(|(d, r)| *d -= *r);
                     }
                     d
                 })
                 .collect();
-            frames::gauss_newton(
-                look,
-                &compared,
-                &u,
-                Along { directions: &Direction::parameters(&keys), du: &du },
-                scale,
-                &mut gn,
-                &mut matrix,
-            );
+            compared.gauss_newton(look, Along { directions: &along, du: &du }, scale, &mut gn, &mut matrix);
         }
         adjoint.extend(adj.iter().flat_map(|v| flat(v).collect::<Vec<_>>()));
     }

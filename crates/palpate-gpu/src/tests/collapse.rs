@@ -14,7 +14,7 @@ use palpate_cpu::terms::elastic_cells::corners;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::mechanics::motion::RigidMotion;
-use palpate_model::observation::{Frame, Observation};
+use palpate_model::observation::{Channel, Frame, Observation, ObservedDisplacement, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
@@ -106,14 +106,12 @@ fn measured(scene: &Scene) -> Plan {
     let mut near = |u: &DVec3| *u + 3e-4 * DVec3::from_array(std::array::from_fn(|_| noise.uniform(-1.0, 1.0)));
     let frames = moments.iter().enumerate().map(|(k, m)| Frame {
         time: scene.time.start + scene.time.step * k as f64,
-        displacements: m[0].0.iter().map(&mut near).collect(),
+        displacements: ObservedDisplacement::of_all(m[0].0.iter().map(&mut near)),
         ..Frame::default()
     });
     let observation = Observation {
         frames: frames.collect(),
-        depth_noise: 1e-3,
-        marker_noise: 1e-3,
-        displacement_noise: 1e-3,
+        channels: vec![Channel::new(ReadingKind::Displacement, 1e-3)],
         ..Observation::default()
     };
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))

@@ -33,7 +33,7 @@ pub(crate) const BALANCE: [Fault; 8] = [
 ];
 
 /// A fault of the comparison with what was measured; `observe/fault_tests.rs` has more.
-const OBSERVATION: [Fault; 1] = [("noise of depth", |p| Arc::make_mut(&mut p.observation).depth_noise *= 1.01)];
+const OBSERVATION: [Fault; 1] = [("noise of depth", |p| Arc::make_mut(&mut p.observation).channels[0].noise *= 1.01)];
 
 /// A plan that is wrong in one place, and parameters of its members that are wrong in the same.
 pub(crate) fn faulty(right: &Plan, theta: &[Vec<f64>], (_, fault): &Fault) -> (Plan, Vec<Vec<f64>>) {

@@ -1,4 +1,4 @@
-//! Format `recording/1`: a folder of depth images, masks and markers ↔ [`Recording`].
+//! Format `recording/1`: a folder of depth images, masks, markers and arrays ↔ [`Recording`].
 
 mod c3d;
 mod camera;
@@ -6,6 +6,7 @@ mod image;
 mod markers;
 mod observation;
 mod overlap;
+mod sequence;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -15,6 +16,7 @@ pub use image::DepthImage;
 pub use markers::{MarkerSample, RecordedMarkers};
 pub use observation::ObservationError;
 pub use overlap::check_overlap;
+pub use sequence::{RecordedDisplacements, RecordedPoints, Sequence};
 pub use write::write_recording;
 
 use crate::document::{Source, Table};
@@ -41,8 +43,12 @@ pub struct Recording {
     pub cameras: Vec<RecordedCamera>,
     /// Images, ordered by time.
     pub frames: Vec<RecordedFrame>,
-    /// Tracked points.
+    /// Markers.
     pub markers: Option<RecordedMarkers>,
+    /// Tracked points of the body.
+    pub points: Option<RecordedPoints>,
+    /// Displacements of the simulation's nodes.
+    pub displacements: Option<RecordedDisplacements>,
     /// What looks suspicious without being wrong.
     pub warnings: Vec<String>,
 }
@@ -80,8 +86,11 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     let cameras = camera::cameras(&root)?;
     let frames = frames(&source, &root, &cameras, &mut warnings)?;
     let markers = markers(&source, &root, &mut warnings)?;
-    if frames.is_empty() && markers.is_none() {
-        return Err(root.own_error("holds neither a [[frame]] nor [markers]: nothing was measured"));
+    let points = sequence::points(&source, &root)?;
+    let displacements = sequence::displacements(&source, &root)?;
+    if frames.is_empty() && markers.is_none() && points.is_none() && displacements.is_none() {
+        let text = "holds neither a [[frame]] nor [markers], [points] or [displacements]: nothing was measured";
+        return Err(root.own_error(text));
     }
     image::check_depth_unit(&root, &cameras, &frames)?;
     Ok(Recording {
@@ -91,13 +100,19 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
         cameras,
         frames,
         markers,
+        points,
+        displacements,
         warnings,
     })
 }
 
 /// A file that is there; its path must stay inside the recording's folder.
 fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, InputError> {
-    let Some(text) = t.optional_str(key)? else { return Ok(None) };
+    t.optional_str(key)?.map(|text| inside_text(source, t, key, text)).transpose()
+}
+
+/// The same for a path that is part of a key's value.
+fn inside_text(source: &Source, t: &Table, key: &str, text: &str) -> Result<PathBuf, InputError> {
     let mut depth = 0i32;
     for c in Path::new(text).components() {
         match c {
@@ -122,7 +137,7 @@ fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, Inpu
     if !path.exists() {
         return Err(t.error(key, format!("there is no file {}", path.display())));
     }
-    Ok(Some(path))
+    Ok(path)
 }
 
 /// A frame's table, before its images are loaded.

@@ -1,15 +1,18 @@
 //! A recording as an [`Observation`]: pixels to world points, markers to frames.
 
-use super::{RecordedFrame, RecordedMarkers, Recording};
+use super::{RecordedFrame, RecordedMarkers, Recording, Sequence};
 use crate::error::{InputError, number};
-use palpate_model::observation::Observation;
-use palpate_model::observation::{Camera, Frame, MarkerRest, ObservedMarker, ObservedPoint};
-use palpate_model::scene::{CostKind, ObservationSpec};
+use glam::DVec3;
+use palpate_model::observation::{
+    Camera, Channel, Frame, MarkerRest, NodeRest, Observation, ObservedDisplacement, ObservedMarker, ObservedPoint, ReadingKind,
+    TrackRest,
+};
+use palpate_model::scene::ObservationSpec;
 
 /// Noise of a depth reading where the recording states none [m]: that of common depth cameras at half a metre.
 const DEPTH_NOISE: f64 = 0.002;
 
-/// Noise of a marker coordinate where the recording states none [m].
+/// Noise of a coordinate of a marker, a tracked point or a displacement where the recording states none [m].
 const MARKER_NOISE: f64 = 0.001;
 
 /// Times closer than this are one instant [s]; clocks in files have microseconds.
@@ -37,7 +40,7 @@ fn asked(key: impl Into<String>, message: String) -> ObservationError {
 
 impl Recording {
     /// What a scene's `[observation]` uses of this recording, in world coordinates; sites are left to the caller, who
-    /// knows the body: `ObservedMarker::site` counts the returned rest places.
+    /// knows the body: `ObservedMarker::site` counts the returned rest places, and after them those of the tracks.
     ///
     /// Of images and of marker times in `from..=to`, every `every`-th is used; pixels on every `pixel_stride`-th row and column.
     /// What was assumed is added to `warnings`.
@@ -51,18 +54,21 @@ impl Recording {
     ) -> Result<(Observation, Vec<MarkerRest>), ObservationError> {
         let mut o = Observation {
             cameras: self.cameras.iter().map(|c| Camera { center: c.position(), axis: c.axis() }).collect(),
-            depth_noise: DEPTH_NOISE,
-            marker_noise: MARKER_NOISE,
-            // Displacements come from other simulators, not from recordings; one metre keeps the weight neutral.
-            displacement_noise: 1.0,
+            camera_names: self.cameras.iter().map(|c| c.name.clone()).collect(),
             ..Observation::default()
         };
-        if spec.costs.contains(&CostKind::SparseSurface) {
+        if spec.costs.contains(&ReadingKind::Depth) {
             self.add_depth(spec, &mut o, warnings)?;
         }
         let mut rest = Vec::new();
-        if spec.costs.contains(&CostKind::Markers) {
+        if spec.costs.contains(&ReadingKind::Marker) {
             rest = self.add_markers(spec, &mut o, warnings)?;
+        }
+        if spec.costs.contains(&ReadingKind::Track) {
+            self.add_points(spec, &mut o, rest.len() as u32, warnings)?;
+        }
+        if spec.costs.contains(&ReadingKind::Displacement) {
+            self.add_displacements(spec, &mut o, warnings)?;
         }
         o.frames.sort_by(|a, b| a.time.total_cmp(&b.time));
         o.frames.dedup_by(|later, first| {
@@ -70,6 +76,7 @@ impl Recording {
             if same {
                 first.points.append(&mut later.points);
                 first.markers.append(&mut later.markers);
+                first.displacements.append(&mut later.displacements);
             }
             same
         });
@@ -144,8 +151,9 @@ impl Recording {
                 c.name
             ));
         }
-        o.depth_noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
-        o.depth_systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        let noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
+        let systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        o.channels.push(Channel { kind: ReadingKind::Depth, noise, systematic });
         Ok(())
     }
 
@@ -208,9 +216,67 @@ impl Recording {
         if m.noise_sigma.is_none() {
             warnings.push(format!("{}: markers state no noise_sigma; {MARKER_NOISE} m is assumed", self.path.display()));
         }
-        o.marker_noise = m.noise_sigma.unwrap_or(MARKER_NOISE);
-        o.marker_systematic = m.noise_systematic;
+        let noise = m.noise_sigma.unwrap_or(MARKER_NOISE);
+        o.channels.push(Channel { kind: ReadingKind::Marker, noise, systematic: m.noise_systematic });
         Ok(rest)
+    }
+
+    /// `first`: number of the first point's site.
+    fn add_points(
+        &self,
+        spec: &ObservationSpec,
+        o: &mut Observation,
+        first: u32,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), ObservationError> {
+        let none = || asked("observation.cost", format!("\"points\" needs [points], which {} lacks", self.path.display()));
+        let points = self.points.as_ref().ok_or_else(none)?;
+        let marker = |(k, position): (usize, DVec3)| ObservedMarker { site: first + k as u32, position };
+        let frame = |time, k| Frame { time, markers: points.track.seen(k).map(marker).collect(), ..Frame::default() };
+        self.add_sequence(spec, o, &points.track, (ReadingKind::Track, "tracked point"), frame, warnings)?;
+        o.tracks = TrackRest { places: points.rest.clone(), tolerance: points.tolerance };
+        Ok(())
+    }
+
+    fn add_displacements(
+        &self,
+        spec: &ObservationSpec,
+        o: &mut Observation,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), ObservationError> {
+        let lacks = || format!("\"displacements\" needs [displacements], which {} lacks", self.path.display());
+        let all = self.displacements.as_ref().ok_or_else(|| asked("observation.cost", lacks()))?;
+        let displacement = |(node, value): (usize, DVec3)| ObservedDisplacement { node: node as u32, value };
+        let frame = |time, k| Frame { time, displacements: all.track.seen(k).map(displacement).collect(), ..Frame::default() };
+        self.add_sequence(spec, o, &all.track, (ReadingKind::Displacement, "displacement"), frame, warnings)?;
+        o.nodes = Some(NodeRest { count: all.track.count(), places: all.nodes.clone() });
+        Ok(())
+    }
+
+    /// Frames of the times in use at which something was seen, and the channel.
+    fn add_sequence(
+        &self,
+        spec: &ObservationSpec,
+        o: &mut Observation,
+        all: &Sequence,
+        (kind, what): (ReadingKind, &str),
+        frame: impl Fn(f64, usize) -> Frame,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), ObservationError> {
+        let chosen = (0..all.times.len()).filter(|k| (spec.from..=spec.to).contains(&all.times[*k])).step_by(spec.every);
+        let before = o.frames.len();
+        o.frames.extend(chosen.map(|k| frame(all.times[k], k)).filter(|f| f.residuals() > 0));
+        if o.frames.len() == before {
+            let seen = (0..all.times.len()).filter(|k| all.seen(*k).next().is_some()).map(|k| all.times[k]);
+            return Err(self.no_data(spec, what, seen));
+        }
+        if all.noise_sigma.is_none() {
+            let (path, name) = (self.path.display(), kind.name());
+            warnings.push(format!("{path}: {name} state no noise_sigma; {MARKER_NOISE} m is assumed"));
+        }
+        let noise = all.noise_sigma.unwrap_or(MARKER_NOISE);
+        o.channels.push(Channel { kind, noise, systematic: all.noise_systematic });
+        Ok(())
     }
 
     /// The rest place of every marker, the scene's word before the recording's. A first sample would not do: a body is

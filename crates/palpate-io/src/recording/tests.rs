@@ -3,7 +3,8 @@
 use super::*;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::observation::Observation;
-use palpate_model::scene::{CostKind, ObservationSpec};
+use palpate_model::observation::ReadingKind;
+use palpate_model::scene::ObservationSpec;
 use std::fs;
 use tempfile::TempDir;
 
@@ -48,6 +49,8 @@ fn sample() -> Recording {
                 MarkerRest { name: "b".into(), position: DVec3::Z, surface: None },
             ],
         }),
+        points: None,
+        displacements: None,
         warnings: Vec::new(),
     }
 }
@@ -58,7 +61,7 @@ fn written() -> TempDir {
     folder
 }
 
-fn spec(costs: &[CostKind]) -> ObservationSpec {
+fn spec(costs: &[ReadingKind]) -> ObservationSpec {
     ObservationSpec {
         recording: PathBuf::new(),
         file: "recording.toml".into(),
@@ -139,14 +142,17 @@ fn frames_group_instants_and_choices_thin_them() {
     let folder = written();
     let r = read_recording(folder.path()).unwrap();
     let mut warnings = Vec::new();
-    let both = spec(&[CostKind::SparseSurface, CostKind::Markers]);
+    let both = spec(&[ReadingKind::Depth, ReadingKind::Marker]);
     let (o, rest) = r.observation(&both, &mut warnings).unwrap();
     let times: Vec<f64> = o.frames.iter().map(|f| f.time).collect();
     assert_eq!(times, [-0.1, 0.05, 0.1]);
     // Even pixels with a reading: 24 even ones less those divisible by ten.
     assert_eq!(o.frames[0].points.len(), 2 * 19);
     assert_eq!((o.frames[0].markers.len(), o.frames[1].markers.len(), o.frames[2].points.len()), (2, 1, 19));
-    assert_eq!((o.depth_noise, o.marker_noise, o.depth_systematic), (0.003, 0.0005, 0.001));
+    assert_eq!(
+        (o.noise(ReadingKind::Depth), o.noise(ReadingKind::Marker), o.systematic(ReadingKind::Depth)),
+        (0.003, 0.0005, 0.001)
+    );
     assert_eq!(rest.iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
     assert!(o.markers.is_empty() && warnings.is_empty());
     let first = o.frames[0].points[0];
@@ -159,7 +165,7 @@ fn frames_group_instants_and_choices_thin_them() {
     assert_eq!(o.frames.len(), 1, "every second image time and marker time is left out");
     // Even columns of rows 0, 2, 4, less pixels 0 and 20 without a reading.
     assert_eq!(o.frames[0].points.len(), 2 * (12 - 2));
-    let late = ObservationSpec { from: 0.0, to: 0.07, ..spec(&[CostKind::Markers]) };
+    let late = ObservationSpec { from: 0.0, to: 0.07, ..spec(&[ReadingKind::Marker]) };
     assert_eq!(r.observation(&late, &mut warnings).unwrap().0.frames.len(), 1);
     let never = ObservationSpec { from: 5.0, ..both };
     let e = r.observation(&never, &mut warnings).unwrap_err().to_string();
@@ -176,8 +182,8 @@ fn unstated_noise_is_assumed_with_a_warning() {
     write_recording(folder.path(), &s).unwrap();
     let r = read_recording(folder.path()).unwrap();
     let mut warnings = Vec::new();
-    let (o, _) = r.observation(&spec(&[CostKind::SparseSurface, CostKind::Markers]), &mut warnings).unwrap();
-    assert_eq!((o.depth_noise, o.marker_noise, warnings.len()), (0.002, 0.001, 3));
+    let (o, _) = r.observation(&spec(&[ReadingKind::Depth, ReadingKind::Marker]), &mut warnings).unwrap();
+    assert_eq!((o.noise(ReadingKind::Depth), o.noise(ReadingKind::Marker), warnings.len()), (0.002, 0.001, 3));
 }
 
 #[test]
@@ -187,7 +193,7 @@ fn every_marker_needs_a_rest_place() {
     s.markers.as_mut().unwrap().rest.pop();
     write_recording(folder.path(), &s).unwrap();
     let r = read_recording(folder.path()).unwrap();
-    let mut spec = spec(&[CostKind::Markers]);
+    let mut spec = spec(&[ReadingKind::Marker]);
     let e = r.observation(&spec, &mut Vec::new()).unwrap_err().to_string();
     assert!(e.contains("no rest position for b; give [[markers.rest]]"), "{e}");
     spec.markers.push(MarkerRest { name: "b".into(), position: DVec3::NEG_X, surface: None });
@@ -283,7 +289,7 @@ fn frames_without_cameras_are_refused() {
 fn a_recording_elsewhere_is_refused_with_numbers() {
     let folder = written();
     let r = read_recording(folder.path()).unwrap();
-    let (o, _) = r.observation(&spec(&[CostKind::SparseSurface]), &mut Vec::new()).unwrap();
+    let (o, _) = r.observation(&spec(&[ReadingKind::Depth]), &mut Vec::new()).unwrap();
     let c = o.frames[0].points[0].position;
     assert_eq!(check_overlap(&o, c - DVec3::splat(0.1), c + DVec3::splat(0.1)), Ok(()));
     let far = c + DVec3::new(0.0, 0.0, 7.0);

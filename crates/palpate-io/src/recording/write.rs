@@ -1,14 +1,15 @@
 //! Synthetic recordings, in the format that is read.
 
-use super::{FORMAT, RecordedMarkers, Recording};
+use super::{FORMAT, RecordedDisplacements, RecordedMarkers, RecordedPoints, Recording, Sequence};
 use crate::error::OutputError;
+use crate::npy::{Array, write_npz};
 use crate::output::{make_folder, write_file};
 use glam::{DAffine3, DVec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `markers.csv`. [`super::read_recording`] gives it back.
+/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `markers.csv`, `points.npz`, `displacements.npz`. [`super::read_recording`] gives it back.
 ///
 /// # Errors
 /// The file that could not be written and why.
@@ -40,6 +41,12 @@ pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Resul
     }
     if let Some(m) = &recording.markers {
         write_markers(folder, &mut toml, m)?;
+    }
+    if let Some(p) = &recording.points {
+        write_points(folder, &mut toml, p)?;
+    }
+    if let Some(d) = &recording.displacements {
+        write_displacements(folder, &mut toml, d)?;
     }
     // Last, so that a folder with this file is complete.
     write_file(folder.join("recording.toml"), |w| w.write_all(toml.as_bytes()))
@@ -108,4 +115,41 @@ fn write_markers(folder: &Path, toml: &mut String, m: &RecordedMarkers) -> Resul
         }
         csv.flush()
     })
+}
+
+/// Vectors as an array.
+fn array(shape: &[usize], vectors: &[DVec3]) -> Array {
+    Array { shape: shape.to_vec(), values: vectors.iter().flat_map(|v| v.to_array()).collect() }
+}
+
+/// Array and times of a sequence, and the lines about them.
+fn sequence(toml: &mut String, name: &str, s: &Sequence) -> [Array; 2] {
+    let _ = writeln!(toml, "\n[{name}]\nfile = \"{name}.npz\"\ntimes = \"times\"");
+    if let Some(s) = s.noise_sigma {
+        let _ = writeln!(toml, "noise_sigma = {s:?}");
+    }
+    let _ = writeln!(toml, "noise_systematic = {:?}", s.noise_systematic);
+    let times = Array { shape: vec![s.times.len()], values: s.times.clone() };
+    [array(&[s.times.len(), s.count(), 3], &s.vectors), times]
+}
+
+fn write_points(folder: &Path, toml: &mut String, p: &RecordedPoints) -> Result<(), OutputError> {
+    let [points, times] = sequence(toml, "points", &p.track);
+    let _ = writeln!(toml, "rest = \"rest\"");
+    if let Some(t) = p.tolerance {
+        let _ = writeln!(toml, "tolerance = {t:?}");
+    }
+    let rest = array(&[p.rest.len(), 3], &p.rest);
+    write_npz(folder.join("points.npz"), &[("points", &points), ("times", &times), ("rest", &rest)])
+}
+
+fn write_displacements(folder: &Path, toml: &mut String, d: &RecordedDisplacements) -> Result<(), OutputError> {
+    let [displacements, times] = sequence(toml, "displacements", &d.track);
+    let nodes = array(&[d.nodes.len(), 3], &d.nodes);
+    let mut arrays = vec![("displacements", &displacements), ("times", &times)];
+    if !d.nodes.is_empty() {
+        let _ = writeln!(toml, "nodes = \"nodes\"");
+        arrays.push(("nodes", &nodes));
+    }
+    write_npz(folder.join("displacements.npz"), &arrays)
 }

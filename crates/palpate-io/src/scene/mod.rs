@@ -17,6 +17,7 @@ use crate::keys::SCENE;
 use glam::DVec3;
 use palpate_model::materials::{self, Model};
 use palpate_model::observation::MarkerRest;
+use palpate_model::observation::ReadingKind;
 use palpate_model::plan::scheme::{self, Scheme};
 use palpate_model::scene::*;
 use std::path::Path;
@@ -275,12 +276,17 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     let Some(t) = root.optional_table("observation")? else { return Ok(None) };
     let recording = t.optional_path("recording")?.ok_or_else(|| t.missing("recording", "the folder of a recording"))?;
     if t.optional_str("cost").is_ok_and(|c| c == Some("silhouette")) {
-        return Err(t.error("cost", "\"silhouette\" is not available in this version; allowed: \"sparse-surface\", \"markers\""));
+        return Err(t.error("cost", "\"silhouette\" is not available in this version; allowed: \"sparse-surface\", \"markers\", \"points\", \"displacements\""));
     }
-    let kinds = [("sparse-surface", CostKind::SparseSurface), ("markers", CostKind::Markers)];
-    let costs = t
-        .optional_choices("cost", &kinds)?
-        .ok_or_else(|| t.missing("cost", "\"sparse-surface\", \"markers\", or an array of these"))?;
+    let kinds = [
+        ("sparse-surface", ReadingKind::Depth),
+        ("markers", ReadingKind::Marker),
+        ("points", ReadingKind::Track),
+        ("displacements", ReadingKind::Displacement),
+    ];
+    let costs = t.optional_choices("cost", &kinds)?.ok_or_else(|| {
+        t.missing("cost", "\"sparse-surface\", \"markers\", \"points\", \"displacements\", or an array of these")
+    })?;
     let (mut from, mut to, mut every) = (f64::NEG_INFINITY, f64::INFINITY, 1);
     if let Some(f) = t.optional_table("frames")? {
         from = f.optional_f64("from")?.unwrap_or(from);

@@ -1,6 +1,7 @@
 //! Scenes read and written, and refused with what is wrong.
 
 use super::*;
+use palpate_model::observation::ReadingKind;
 use palpate_model::scene::FitParameter;
 
 const BASE: &str = r#"format = "scene/1"
@@ -52,7 +53,7 @@ fn absent_keys_take_the_documented_defaults() {
     let o = s.observation.unwrap();
     assert_eq!(o.recording, Path::new("some/r"));
     assert_eq!((o.file.as_str(), o.band, o.every, o.pixel_stride), ("recording.toml", 4.0, 1, 1));
-    assert_eq!(o.costs, [CostKind::Markers, CostKind::SparseSurface]);
+    assert_eq!(o.costs, [ReadingKind::Marker, ReadingKind::Depth]);
     assert_eq!((o.from, o.to), (f64::NEG_INFINITY, f64::INFINITY));
     let f = s.fit.unwrap();
     assert_eq!((f.optimizer, f.iterations, f.starts, f.seed, f.threads), (Optimizer::GaussNewton, 50, 1, 1, 0));

@@ -1,136 +1,121 @@
-//! What was measured, ready to be compared: frames of points and markers.
+//! What was measured, ready to be compared: channels, frames, and where sensors and tracked things sit.
 
+pub mod channel;
+pub mod frame;
 pub mod instant;
 pub mod kernel;
+pub mod marker;
 
-use crate::effects::reading::Seen;
-use glam::{DMat3, DVec3};
+pub use channel::{Channel, ReadingKind, Sensor};
+pub use frame::{Camera, Frame, ObservedDisplacement, ObservedMarker, ObservedPoint};
+pub use marker::{MarkerRest, MarkerSite, TrackRest};
+
+use glam::DVec3;
 
 /// Everything observed in one recording, in world coordinates and SI units.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
+    /// Kinds of readings that frames may hold, one channel each at most.
+    pub channels: Vec<Channel>,
     /// Cameras, for visibility.
     pub cameras: Vec<Camera>,
+    /// Their names in the recording; fewer where it gives none.
+    pub camera_names: Vec<String>,
     /// Frames ordered by time; times are on the recording's clock.
     pub frames: Vec<Frame>,
-    /// Where tracked markers sit on the body.
+    /// Where markers sit on the body, and after them, where tracked points do.
     pub markers: Vec<MarkerSite>,
-    /// Standard deviation of one depth point's distance [m]; divides its residual.
-    pub depth_noise: f64,
-    /// Standard deviation of one marker coordinate [m]; divides its residual.
-    pub marker_noise: f64,
-    /// Standard deviation of one coordinate of a directly observed node displacement [m].
-    pub displacement_noise: f64,
-    /// Size of errors that do not average out over depth points [m]; widens standard errors.
-    pub depth_systematic: f64,
-    /// The same for markers [m].
-    pub marker_systematic: f64,
+    /// Rest places of tracked points: their sites are made of them when a plan is built.
+    pub tracks: TrackRest,
+    /// Nodes that displacements count, for a plan to compare with its own.
+    pub nodes: Option<NodeRest>,
+}
+
+/// Simulation nodes as a recording of displacements knows them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NodeRest {
+    /// Number of nodes N.
+    pub count: usize,
+    /// Their rest places [m] `[N]`; empty where the recording does not say.
+    pub places: Vec<DVec3>,
 }
 
 impl Observation {
-    /// Number of scalar residuals over all frames (a point counts 1, a marker or node 3).
+    /// Number of scalar residuals over all frames (a depth point counts 1, everything else 3).
     pub fn residuals(&self) -> usize {
         self.frames.iter().map(Frame::residuals).sum()
     }
 
-    /// Cameras, markers and noises alone: enough to simulate what sensors would read.
-    pub fn without_frames(&self) -> Observation {
-        Observation { cameras: self.cameras.clone(), frames: Vec::new(), markers: self.markers.clone(), ..*self }
+    /// The channel of a kind, if the recording has it.
+    pub fn channel(&self, kind: ReadingKind) -> Option<&Channel> {
+        self.channels.iter().find(|c| c.kind == kind)
     }
-}
 
-/// A camera's place and direction.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Camera {
-    /// Centre of projection in the world [m].
-    pub center: DVec3,
-    /// Unit vector along which depth counts.
-    pub axis: DVec3,
-}
-
-impl Camera {
-    /// A reading of this camera at a world point [m].
-    pub fn sees(&self, point: DVec3) -> Seen<f64> {
-        Seen { point: point.to_array(), center: self.center.to_array(), axis: self.axis.to_array() }
+    /// Standard deviation of one scalar residual of a kind [m]; infinite without such a channel, so that readings weigh nothing.
+    pub fn noise(&self, kind: ReadingKind) -> f64 {
+        self.channel(kind).map_or(f64::INFINITY, |c| c.noise)
     }
-}
 
-/// What was seen at one time.
-#[derive(Clone, Debug, Default)]
-pub struct Frame {
-    /// Time on the recording's clock [s].
-    pub time: f64,
-    /// Points of depth images.
-    pub points: Vec<ObservedPoint>,
-    /// Tracked markers.
-    pub markers: Vec<ObservedMarker>,
-    /// Directly observed displacement of every simulation node [m], shape `[N]`, or empty (tests, other simulators).
-    pub displacements: Vec<DVec3>,
-}
-
-impl Frame {
-    /// Number of scalar residuals (a point counts 1, a marker or node 3).
-    pub fn residuals(&self) -> usize {
-        self.points.len() + 3 * (self.markers.len() + self.displacements.len())
+    /// Size of errors of a kind that do not average out [m]; 0 without such a channel.
+    pub fn systematic(&self, kind: ReadingKind) -> f64 {
+        self.channel(kind).map_or(0.0, |c| c.systematic)
     }
-}
 
-/// One pixel of a depth image as a world point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObservedPoint {
-    /// World position [m].
-    pub position: DVec3,
-    /// Number of the camera in [`Observation::cameras`].
-    pub camera: u32,
-}
+    /// Name of a sensor: that of the camera or marker in the recording, or what it is.
+    pub fn name(&self, sensor: Sensor) -> String {
+        let known = match sensor {
+            Sensor::Camera(c) => self.camera_names.get(c as usize).cloned(),
+            Sensor::Marker(m) => self.markers.get(m as usize).map(|m| m.name.clone()),
+            Sensor::Nodes | Sensor::Tracks => None,
+        };
+        known.unwrap_or_else(|| sensor.to_string())
+    }
 
-/// One marker at one time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObservedMarker {
-    /// Number of the site in [`Observation::markers`].
-    pub site: u32,
-    /// World position of the marker's centre [m].
-    pub position: DVec3,
-}
-
-/// Where a marker sits on the body at rest, as the files say it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MarkerRest {
-    /// Label in the recording.
-    pub name: String,
-    /// The marker's centre in the rest configuration [m].
-    pub position: DVec3,
-    /// The surface point it is rigidly attached to [m]; `None` = the nearest one.
-    pub surface: Option<DVec3>,
-}
-
-/// A marker that is carried rigidly by the body at its surface point:
-/// `x = Σ position_weights·x_i + R·stalk`, R the rotation of `F = Σ x_i ⊗ gradient_weights`.
-#[derive(Clone, Debug, Default)]
-pub struct MarkerSite {
-    /// Label in the recording.
-    pub name: String,
-    /// Simulation nodes around the attachment.
-    pub nodes: Vec<u32>,
-    /// Weights of the nodes for the attachment point; they sum to one.
-    pub position_weights: Vec<f64>,
-    /// Weights of the nodes for the local deformation gradient [1/m]; they sum to zero.
-    pub gradient_weights: Vec<DVec3>,
-    /// Marker centre minus attachment point at rest [m].
-    pub stalk: DVec3,
-}
-
-impl MarkerSite {
-    /// Attachment point and deformation gradient at node positions `x(i)` [m].
-    pub fn carry(&self, x: impl Fn(usize) -> DVec3) -> (DVec3, DMat3) {
-        let mut p = DVec3::ZERO;
-        let mut f = DMat3::ZERO;
-        for (k, &n) in self.nodes.iter().enumerate() {
-            let xi = x(n as usize);
-            p += self.position_weights[k] * xi;
-            let g = self.gradient_weights[k];
-            f += DMat3::from_cols(xi * g.x, xi * g.y, xi * g.z);
+    /// The sensor that takes readings of a site.
+    pub fn sensor_of(&self, site: u32) -> Sensor {
+        match self.markers[site as usize].kind {
+            ReadingKind::Track => Sensor::Tracks,
+            _ => Sensor::Marker(site),
         }
-        (p, f)
+    }
+
+    /// Number of markers, tracked points not among them.
+    pub fn marker_count(&self) -> usize {
+        self.markers.iter().filter(|m| m.kind == ReadingKind::Marker).count()
+    }
+
+    /// Number of sensors of a kind that took readings, each with errors of its own.
+    pub fn sensors(&self, kind: ReadingKind) -> usize {
+        let used = |c: usize| self.frames.iter().flat_map(|f| &f.points).any(|p| p.camera as usize == c);
+        match kind {
+            ReadingKind::Depth => (0..self.cameras.len()).filter(|c| used(*c)).count(),
+            ReadingKind::Marker => self.marker_count(),
+            ReadingKind::Track | ReadingKind::Displacement => 1,
+        }
+    }
+
+    /// Number of readings of a kind over all frames.
+    pub fn readings(&self, kind: ReadingKind) -> usize {
+        self.frames.iter().map(|f| self.readings_in(f, kind)).sum()
+    }
+
+    /// Number of readings of a kind in a frame of this observation.
+    pub fn readings_in(&self, frame: &Frame, kind: ReadingKind) -> usize {
+        match kind {
+            ReadingKind::Depth => frame.points.len(),
+            ReadingKind::Displacement => frame.displacements.len(),
+            _ => frame.markers.iter().filter(|m| self.markers[m.site as usize].kind == kind).count(),
+        }
+    }
+
+    /// Channels, cameras and markers alone: enough to simulate what sensors would read.
+    pub fn without_frames(&self) -> Observation {
+        Observation {
+            channels: self.channels.clone(),
+            cameras: self.cameras.clone(),
+            camera_names: self.camera_names.clone(),
+            markers: self.markers.clone(),
+            ..Observation::default()
+        }
     }
 }

@@ -1,13 +1,17 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
+mod sites;
+
+pub use sites::marker_sites;
+
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::{ClipBox, HeldMoments, Lattice, held_moments};
-use crate::cutcells::extension::{NodeLookup, active_cell, affine_weights};
+use crate::cutcells::extension::active_cell;
 use crate::cutcells::grid::shape_functions;
 use crate::cutcells::held::Pins;
 use crate::effects::check_choices;
 use crate::mechanics::contact;
-use crate::observation::{MarkerRest, MarkerSite, Observation};
+use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
@@ -17,9 +21,6 @@ use crate::shape::{Shape, shape_of};
 use crate::space::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
-
-/// Radius of the fit that a marker's rotation is taken from, in cells: the smallest that spans a cut cell's neighbourhood.
-const MARKER_RADIUS: f64 = 2.0;
 
 /// Why a scene gives no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,8 +65,8 @@ fn band_cells(scene: &Scene) -> f64 {
     scene.observation.as_ref().map_or(1.0, |o| o.band)
 }
 
-/// Everything a backend needs for a scene. `observation` comes with frames, cameras and noise; its markers are filled here, one per
-/// entry of `marker_rest` in the same order.
+/// Everything a backend needs for a scene. `observation` comes with frames, cameras and channels; its markers are filled here: one per
+/// entry of `marker_rest` in the same order, then one per rest place of its tracks.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
     let (parts, shape) = build_parts(scene)?;
     let clamps =
@@ -77,12 +78,12 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         .enumerate()
         .map(|(i, m)| mass_site(&format!("mass.{i}.point"), m.point, &body))
         .collect::<Result<Vec<_>, _>>()?;
-    let lookup = NodeLookup::new(&body);
-    observation.markers =
-        marker_rest.iter().map(|m| marker_site(m, &body, &lookup, shape.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    observation.markers = marker_sites(marker_rest, &body, shape.as_ref())?;
+    observation.markers.extend(sites::track_sites(&observation.tracks, &body, shape.as_ref())?);
+    sites::check_nodes(&observation, &body)?;
     // A scene that is only simulated concerns no camera.
     if !observation.frames.is_empty() {
-        check_choices(&scene.effects, observation.cameras.len(), observation.markers.len()).map_err(|(k, m)| error(k, m))?;
+        check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
     }
     let planes = scene
         .planes
@@ -208,49 +209,6 @@ fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<MassSite, PlanError
             ),
         )),
     }
-}
-
-/// Where markers sit on a body, for a recording that is to be made.
-///
-/// # Errors
-/// A marker that lies far from the surface.
-pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
-    let lookup = NodeLookup::new(body);
-    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
-}
-
-fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
-    let h = body.grid.h;
-    let surface = m.surface.unwrap_or_else(|| shape.closest_point(m.position));
-    let (min, max) = shape.bounds();
-    // Scans and hand-measured points are off by millimetres, not by a large part of the body.
-    let allowed = (0.1 * (max - min).length()).max(2.0 * h);
-    let (key, point) = if m.surface.is_some() { ("surface", surface) } else { ("position", m.position) };
-    let away = shape.signed_distance(point);
-    if !(away.is_finite() && m.position.is_finite()) || (m.surface.is_some() && away.abs() > allowed) {
-        return Err(error(
-            format!("markers.rest \"{}\".{key}", m.name),
-            format!("{point} m lies {:.4} m from the body's surface; allowed are {allowed:.4} m", away.abs()),
-        ));
-    }
-    let (stalk, longest) = ((m.position - surface).length(), (max - min).length());
-    if stalk > longest {
-        return Err(error(
-            format!("markers.rest \"{}\".position", m.name),
-            format!(
-                "{} m lies {stalk:.4} m from where it is attached to the body; a stalk may be as long as the body's diagonal, {longest:.4} m",
-                m.position
-            ),
-        ));
-    }
-    let w = affine_weights(body, lookup, surface, MARKER_RADIUS * h);
-    Ok(MarkerSite {
-        name: m.name.clone(),
-        nodes: w.nodes,
-        position_weights: w.position_weights,
-        gradient_weights: w.gradient_weights,
-        stalk: m.position - surface,
-    })
 }
 
 #[cfg(test)]

@@ -9,12 +9,13 @@ use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
 use crate::results::inspection::{
     CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
-    SceneInspection, Time,
+    SceneInspection, SequenceInspection, Time,
 };
 use crate::results::{self, finite};
 use clap::Args;
 use palpate_gpu::AdapterReport;
-use palpate_io::recording::{Recording, read_recording};
+use palpate_io::recording::{Recording, Sequence, read_recording};
+use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
 use palpate_model::scene::{BodySource, Optimizer};
 use std::path::{Path, PathBuf};
@@ -222,36 +223,45 @@ fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let o = &e.plan().observation;
     let (Some(first), Some(last)) = (o.frames.first(), o.frames.last()) else { return };
     let points: Vec<usize> = o.frames.iter().map(|f| f.points.len()).collect();
-    let readings: usize = o.frames.iter().map(|f| f.markers.len()).sum();
     let [low, high] = extremes(&points);
-    let total: usize = points.iter().sum();
-    let of = |seen: usize, size: f64, what: &str| (seen > 0).then(|| format!("{:.2} mm ({what})", size * 1e3));
-    let noise: Vec<String> =
-        [of(total, o.depth_noise, "depth"), of(readings, o.marker_noise, "markers")].into_iter().flatten().collect();
+    let of = |c: &Channel| (o.readings(c.kind) > 0).then(|| format!("{:.2} mm ({})", c.noise * 1e3, c.kind.name()));
+    let noise: Vec<String> = o.channels.iter().filter_map(of).collect();
     let noise = if noise.is_empty() { "unknown".to_string() } else { noise.join(", ") };
+    let [readings, tracks, displacements] =
+        [ReadingKind::Marker, ReadingKind::Track, ReadingKind::Displacement].map(|kind| o.readings(kind));
+    let tracked = o.markers.len() - o.marker_count();
+    let more = |count: usize, text: String| if count == 0 { String::new() } else { text };
     lines.push((
         "observed",
         format!(
-            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings); \
+            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings){}{}; \
              noise {noise}; lies around the object",
             o.frames.len(),
             short(first.time),
             short(last.time),
             o.cameras.len(),
-            o.markers.len(),
+            o.marker_count(),
+            more(tracks, format!(", {tracked} tracked points ({tracks} readings)")),
+            more(displacements, format!(", {displacements} displacements of nodes")),
         ),
     ));
+    let noise_of = |kind| o.channel(kind).map(|c| c.noise);
     content.observation = Some(Observed {
         frames: o.frames.len(),
         from: first.time,
         to: last.time,
         cameras: o.cameras.len(),
-        points: total,
+        points: points.iter().sum(),
         points_per_frame: [low, high],
         marker_readings: readings,
-        markers: o.markers.len(),
-        depth_noise: o.depth_noise,
-        marker_noise: o.marker_noise,
+        markers: o.marker_count(),
+        tracked_readings: tracks,
+        tracked_points: tracked,
+        displacements,
+        depth_noise: noise_of(ReadingKind::Depth),
+        marker_noise: noise_of(ReadingKind::Marker),
+        tracked_noise: noise_of(ReadingKind::Track),
+        displacement_noise: noise_of(ReadingKind::Displacement),
         overlap: true,
     });
 }
@@ -316,7 +326,38 @@ fn recording(r: &Recording) -> (RecordingInspection, Lines) {
             rest_places: m.rest.len(),
         });
     }
+    let mut of_array = |label: &'static str, s: &Sequence, things: &str| {
+        let found = sequence(s);
+        let text = format!(
+            "{} {things}, {} of {} readings seen in {} frames from {} s to {} s, noise {}",
+            found.count,
+            found.readings,
+            found.readings + found.unseen,
+            found.frames,
+            short(found.from),
+            short(found.to),
+            stated(s.noise_sigma)
+        );
+        lines.push((label, text));
+        found
+    };
+    content.points = r.points.as_ref().map(|p| of_array("tracked points", &p.track, "points"));
+    content.displacements = r.displacements.as_ref().map(|d| of_array("displacements", &d.track, "nodes"));
     (content, lines)
+}
+
+/// What an array holds.
+fn sequence(s: &Sequence) -> SequenceInspection {
+    let (count, readings) = (s.count(), s.readings());
+    SequenceInspection {
+        count,
+        frames: s.times.len(),
+        readings,
+        unseen: s.vectors.len() - readings,
+        from: s.times.first().copied().unwrap_or_default(),
+        to: s.times.last().copied().unwrap_or_default(),
+        noise: s.noise_sigma,
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
 use palpate_io::InputError;
+use palpate_io::npy::read_array;
 use palpate_io::output::make_folder;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,12 @@ pub struct Arguments {
     /// File of tracked surface points (CSV with the header name,x,y,z)
     #[arg(long, value_name = "FILE")]
     markers: Option<PathBuf>,
+    /// File of tracked points of the body at rest, without markers (NPY, or NPZ with one array; points × 3)
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
+    /// Record the displacement of every simulation node, too
+    #[arg(long)]
+    displacements: bool,
     /// Folder of the recording
     #[arg(long, value_name = "RECORDING")]
     out: PathBuf,
@@ -73,8 +80,12 @@ pub struct Arguments {
 
 fn check(a: &Arguments) -> Result<(), Error> {
     let wrong = |option, value: f64, allowed: &str| Err(Error::option(option, value, format!("must be {allowed}")));
-    if a.camera.is_empty() && a.markers.is_none() {
-        return Err(Error::Input("nothing observes: give --camera \"eye=x,y,z target=x,y,z\" or --markers FILE".into()));
+    if a.camera.is_empty() && a.markers.is_none() && a.points.is_none() && !a.displacements {
+        let text = "nothing observes: give --camera \"eye=x,y,z target=x,y,z\", --markers FILE, --points FILE or --displacements";
+        return Err(Error::Input(text.into()));
+    }
+    if a.displacements && a.refine != 1.0 {
+        return Err(Error::Input("--displacements: with --refine the nodes would not be those of the scene".into()));
     }
     if !(0.0..=1.0).contains(&a.noise) {
         return wrong("noise", a.noise, "in [0, 1] (m)");
@@ -166,6 +177,25 @@ fn markers(path: &Path, experiment: &Experiment) -> Result<Vec<(String, DVec3)>,
     Ok(markers)
 }
 
+/// Tracked points of an array, each checked to lie on or in the body.
+fn points(path: &Path, experiment: &Experiment) -> Result<Vec<DVec3>, Error> {
+    let array = read_array(path, None)?;
+    let wrong = |message: String| Error::from(InputError::file(path, message));
+    if array.shape.len() != 2 || array.shape[1] != 3 || array.shape[0] == 0 {
+        return Err(wrong(format!("has shape {}, expected (points, 3)", array.shape_text())));
+    }
+    let points: Vec<DVec3> = array.values.chunks_exact(3).map(DVec3::from_slice).collect();
+    let allowed = 2.0 * experiment.plan().body.grid.h;
+    let away = |p: &DVec3| experiment.shape().signed_distance(*p);
+    // What is no number is away as well.
+    let far = points.iter().filter(|p| !(away(p).abs() <= allowed)).count();
+    if far > 0 {
+        let text = format!("{far} of {} points lie more than {allowed:.4} m (two cells) away from the surface", points.len());
+        return Err(wrong(text));
+    }
+    Ok(points)
+}
+
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     check(a)?;
     let cameras = cameras(&a.camera)?;
@@ -179,6 +209,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let observers = Observers {
         cameras,
         markers: a.markers.as_deref().map_or(Ok(Vec::new()), |p| markers(p, &coarse))?,
+        points: a.points.as_deref().map_or(Ok(Vec::new()), |p| points(p, &coarse))?,
+        displacements: a.displacements,
         // The scene's own steps: the same frames whatever the refinement.
         times: times(a, &coarse)?,
         sensor: Sensor { noise: a.noise, dropout: a.dropout, depth_scale: a.depth_scale, seed: a.seed },
@@ -195,6 +227,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     track.finish();
     let readings: usize = recording.frames.iter().map(|f| f.readings().count()).sum();
     let samples = recording.markers.as_ref().map_or(0, |m| m.samples.len());
+    let tracked = recording.points.as_ref().map_or(0, |p| p.track.readings());
+    let displacements = recording.displacements.as_ref().map_or(0, |d| d.track.readings());
     if !recording.cameras.is_empty() && readings == 0 {
         let (scale, far) = (a.depth_scale, 65535.0 * a.depth_scale);
         let message = format!(
@@ -217,10 +251,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             images: recording.frames.len(),
             depth_readings: readings,
             marker_readings: samples,
+            tracked_readings: tracked,
+            displacements,
         }));
     } else {
         console.print(&format!(
-            "{}: {} times, {} images with {readings} depth readings, {samples} marker readings",
+            "{}: {} times, {} images with {readings} depth readings, {samples} marker readings, \
+             {tracked} readings of points, {displacements} displacements",
             a.out.display(),
             observers.times.len(),
             recording.frames.len()

@@ -82,7 +82,7 @@ impl<'a> Lab<'a> {
             places: regions.centers.iter().filter_map(nearest).collect(),
             spot: 0.5 * body.grid.h,
             cameras: most(|e| e.plan.observation.cameras.len()),
-            markers: most(|e| e.plan.observation.markers.len()),
+            markers: most(|e| e.plan.observation.marker_count()),
             held: held(base),
             contact: contact?,
             still: still?,

@@ -9,6 +9,7 @@ use crate::experiment::Experiment;
 use glam::DVec3;
 use palpate_diagnose::{Change, LabError, Model, Readings};
 use palpate_fit::{FitScene, Hooks, Problem, Settings};
+use palpate_model::observation::ReadingKind;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::Optimizer;
 use std::ops::ControlFlow;
@@ -61,7 +62,7 @@ pub(super) fn still_frames(e: &Experiment, backend: Backend) -> Result<Vec<usize
         last = Some((now, s.displacement));
         ControlFlow::Continue(())
     })?;
-    Ok((0..ways.len()).filter(|f| ways[*f] < 0.1 * o.depth_noise).collect())
+    Ok((0..ways.len()).filter(|f| ways[*f] < 0.1 * o.noise(ReadingKind::Depth)).collect())
 }
 
 /// Residuals of a recording that no fit has seen: what describes the body comes from the model, what belongs to the recording (how the

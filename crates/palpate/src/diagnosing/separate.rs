@@ -13,11 +13,12 @@ use palpate_diagnose::{Model, Separation, direction};
 use palpate_engine::Snapshot;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::mechanics::rotation::Polar;
-use palpate_model::observation::Observation;
+use palpate_model::observation::{Observation, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::space::body::Body;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -134,8 +135,8 @@ struct Motion {
 struct Seen {
     /// By frame, camera and pixel [m]; infinite where nothing is.
     depths: Vec<f64>,
-    /// By frame and marker [m].
-    markers: Vec<DVec3>,
+    /// Positions of markers and of tracked points [m], by frame and site.
+    tracked: BTreeMap<ReadingKind, Vec<DVec3>>,
 }
 
 impl Watch {
@@ -197,22 +198,25 @@ impl Watch {
             for number in (0..self.observation.markers.len()).filter(|_| markers) {
                 let site = m.sensors.site(&self.observation, number as u32);
                 let (p, f) = site.carry(|i| m.body.nodes[i] + u[i]);
-                out.markers.push(p + Polar::new(f).r * site.stalk);
+                out.tracked.entry(site.kind).or_default().push(p + Polar::new(f).r * site.stalk);
             }
         }
         out
     }
 
-    /// Root mean square difference of readings and the noise of one [m], of depths or of markers, whichever shows more; `None` where nothing
+    /// Root mean square difference of readings and the noise of one [m], of depths, markers or tracked points, whichever shows more; `None` where nothing
     /// is seen of both.
     fn apart(&self, a: &Seen, b: &Seen) -> Option<(f64, f64)> {
         let o = &self.observation;
         let depths = a.depths.iter().zip(&b.depths).filter(|(a, b)| a.is_finite() && b.is_finite());
         let depths = mean_square(depths.map(|(a, b)| (a - b).abs().min(self.largest).powi(2)));
-        let markers = mean_square(a.markers.iter().zip(&b.markers).map(|(a, b)| a.distance_squared(*b)));
-        // A marker has three coordinates.
-        let both = [depths.map(|d| (d.sqrt(), o.depth_noise)), markers.map(|d| (d.sqrt(), 3f64.sqrt() * o.marker_noise))];
-        both.into_iter().flatten().max_by(|x, y| (x.0 / x.1).total_cmp(&(y.0 / y.1)))
+        let tracked = a.tracked.iter().zip(b.tracked.values()).filter_map(|((kind, a), b)| {
+            // A position has three coordinates.
+            let noise = (kind.components() as f64).sqrt() * o.noise(*kind);
+            Some((mean_square(a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)))?.sqrt(), noise))
+        });
+        let depths = depths.map(|d| (d.sqrt(), o.noise(ReadingKind::Depth)));
+        depths.into_iter().chain(tracked).max_by(|x, y| (x.0 / x.1).total_cmp(&(y.0 / y.1)))
     }
 
     /// The cameras elsewhere: nearer and farther along the line to the middle of a motion, and a quarter turn around it.
@@ -295,6 +299,8 @@ mod tests {
         let observers = Observers {
             cameras: vec![camera],
             markers: vec![("low".into(), DVec3::new(0.01, 0.01, 0.0))],
+            points: Vec::new(),
+            displacements: false,
             times: vec![0.0],
             sensor: Sensor { noise: 5e-4, dropout: 0.0, depth_scale: 1e-4, seed: 1 },
         };

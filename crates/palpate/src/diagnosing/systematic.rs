@@ -7,6 +7,7 @@ use crate::experiment::Experiment;
 use palpate_diagnose::{Change, Field, LabError};
 use palpate_engine::Source;
 use palpate_model::effects::{Effect, find};
+use palpate_model::observation::{ReadingKind, Sensor};
 
 /// A measuring effect with its choice (a marker, say) made.
 fn effect(kind: &str, choice: Option<usize>) -> Option<Change> {
@@ -17,23 +18,22 @@ fn effect(kind: &str, choice: Option<usize>) -> Option<Change> {
     Some(Change::Effect(effect))
 }
 
-/// One field for every marker and axis, and for every camera, of every recording that states `noise_systematic`.
+/// One field for every marker and axis, for every camera, and for every axis of tracked points, of every recording that states `noise_systematic`.
 pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
-    let sizes = |size: fn(&Experiment) -> f64| base.iter().map(size).collect::<Vec<_>>();
-    let marker = sizes(|e| e.plan.observation.marker_systematic);
-    let depth = sizes(|e| e.plan.observation.depth_systematic);
+    let sizes = |kind: ReadingKind| base.iter().map(|e| e.plan.observation.systematic(kind)).collect::<Vec<_>>();
+    let [depth, marker, track] = [ReadingKind::Depth, ReadingKind::Marker, ReadingKind::Track].map(sizes);
     let mut all = changes.to_vec();
     // The number of the first column of what was added, and what it is.
     let mut markers = 0;
     if marker.iter().any(|s| *s > 0.0) {
-        markers = base.iter().map(|e| e.plan.observation.markers.len()).max().unwrap_or(0);
+        markers = base.iter().map(|e| e.plan.observation.marker_count()).max().unwrap_or(0);
         all.extend((0..markers).filter_map(|m| effect("marker-offset", Some(m))));
     }
     let cameras = depth.iter().any(|s| *s > 0.0);
     if cameras {
         all.extend(effect("depth-bias", None));
     }
-    if all.len() == changes.len() {
+    if all.len() == changes.len() && track.iter().all(|s| *s == 0.0) {
         return Ok(Vec::new());
     }
     let ready = prepare(base, &all).map_err(lab_error)?;
@@ -41,31 +41,32 @@ pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]
     let mut at: Vec<f64> = values.to_vec();
     at.resize(ready.free.len(), 0.0);
     let readings = linearise(&ready, &at, from)?;
-    let field = |name: &'static str, column: usize, size: f64, mine: &dyn Fn(usize, &Source) -> bool| Field {
+    // What an error changes of every reading that is its sensor's.
+    let field = |name: &'static str, mine: &dyn Fn(usize, &Source) -> bool, change: &dyn Fn(usize) -> f64| Field {
         name,
         change: (readings.rows.iter().enumerate())
-            .map(|(i, r)| {
-                let d = size * readings.sensitivity[i * readings.columns + column];
-                r.row.value?;
-                Some(if mine(r.scene, &r.row.source) { d } else { 0.0 })
-            })
+            .map(|(i, r)| r.row.value.map(|_| if mine(r.scene, &r.row.source) { change(i) } else { 0.0 }))
             .collect(),
         rough: 0.0,
     };
+    let rows = &readings;
+    let along = |column: usize, size: f64| move |i: usize| size * rows.sensitivity[i * rows.columns + column];
     let mut out = Vec::new();
     for (scene, e) in base.iter().enumerate() {
         // A marker's error is a length, shared by three axes.
         for column in (0..3 * markers).filter(|_| marker[scene] > 0.0) {
             let size = marker[scene] / 3f64.sqrt();
-            out.push(field("place of a marker", column, size, &|s, source| {
-                s == scene && matches!(source, Source::Marker { .. })
-            }));
+            let mine = |s: usize, source: &Source| s == scene && matches!(source.sensor, Sensor::Marker(_));
+            out.push(field("place of a marker", &mine, &along(column, size)));
         }
         for camera in (0..e.plan.observation.cameras.len()).filter(|_| cameras && depth[scene] > 0.0) {
-            let mine = |s: usize, source: &Source| {
-                s == scene && matches!(source, Source::Point { camera: c, .. } if *c as usize == camera)
-            };
-            out.push(field("zero point of a camera", 3 * markers, depth[scene], &mine));
+            let mine = |s: usize, source: &Source| s == scene && source.sensor == Sensor::Camera(camera as u32);
+            out.push(field("zero point of a camera", &mine, &along(3 * markers, depth[scene])));
+        }
+        // All tracked points share one error, a length along three axes.
+        for axis in 0..3u8 {
+            let mine = |s: usize, source: &Source| s == scene && source.sensor == Sensor::Tracks && source.axis == axis;
+            out.push(field("origin of tracked points", &mine, &|_| track[scene] / 3f64.sqrt()));
         }
     }
     out.retain(|f| f.change.iter().flatten().any(|c| *c != 0.0));

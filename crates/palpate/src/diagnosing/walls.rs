@@ -177,6 +177,8 @@ steps = 20
         let observers = Observers {
             cameras: vec!["eye=0.1,-0.6,0.2 target=0,0,0.04 fov=24 size=24x24".parse::<Pinhole>().unwrap()],
             markers: Vec::new(),
+            points: Vec::new(),
+            displacements: false,
             times: (1..=10).map(|k| 0.02 * f64::from(k)).collect(),
             sensor: Sensor { noise: 5e-4, dropout: 0.0, depth_scale: 5e-5, seed: 1 },
         };

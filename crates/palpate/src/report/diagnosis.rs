@@ -7,6 +7,7 @@ use crate::results::fit::Parameter;
 use palpate_diagnose::{
     Diagnosis, Found, FoundNumber, Level, MapEntry, Model, Number, Place, Separated, Slack, SlackWindow, Tried, stated,
 };
+use palpate_engine::Stream;
 use palpate_model::params::unit_behind;
 use std::collections::BTreeMap;
 
@@ -86,7 +87,7 @@ fn slack(s: &Slack) -> results::Slack {
 fn map_entry(done: &Diagnosed, m: &MapEntry) -> results::MapEntry {
     results::MapEntry {
         scene: m.scene,
-        sensor: sensor(done, m.scene, m.sensor),
+        sensor: stream(done, m.scene, m.stream),
         region: m.place.to_array(),
         time: [m.time.0, m.time.1],
         before: finite(m.before),
@@ -148,22 +149,8 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
     text + &format!("  {what}: {}\n  report: {}", folder.join(model).display(), folder.join("report.html").display())
 }
 
-/// Number of the first marker's x: numbers below are those of cameras.
-const MARKERS: u32 = 1000;
-
-/// True for the number of a camera, false for that of a marker's coordinate.
-pub(super) fn is_camera(sensor: u32) -> bool {
-    sensor < MARKERS
-}
-
-/// Name of a sensor: a camera, or a coordinate of a marker.
-pub(super) fn sensor(done: &Diagnosed, scene: usize, sensor: u32) -> String {
-    let recording = done.experiments[scene].recording();
-    let markers = &done.experiments[scene].plan().observation.markers;
-    if is_camera(sensor) {
-        return recording.and_then(|r| r.cameras.get(sensor as usize)).map_or("camera".into(), |c| c.name.clone());
-    }
-    let (marker, axis) = ((sensor - MARKERS) as usize / 3, (sensor - MARKERS) as usize % 3);
-    let name = markers.get(marker).map_or("marker", |s| s.name.as_str());
-    format!("{name}.{}", ["x", "y", "z"][axis])
+/// Name of a stream: a camera, or a coordinate of something else.
+pub(super) fn stream(done: &Diagnosed, scene: usize, stream: Stream) -> String {
+    let name = done.experiments[scene].plan().observation.name(stream.sensor);
+    if stream.sensor.is_camera() { name } else { format!("{name}.{}", ["x", "y", "z"][usize::from(stream.axis)]) }
 }

@@ -43,7 +43,7 @@ pub fn pictures(
             let vertices = surface.deform(&displacement());
             let camera = camera(experiment, frame, &vertices);
             let mut picture = shade(&camera, &vertices, &triangles, experiment.up(), |_| DVec3::splat(0.72));
-            mark(&mut picture, &camera, experiment, frame, residuals, scale);
+            mark(&mut picture, &camera, residuals, scale);
             out.push(FramePicture { time: plan.observation.frames[frame].time, picture });
         }
     })?;
@@ -87,19 +87,19 @@ fn cropped(camera: &Pinhole, (lo, hi): (DVec3, DVec3)) -> Pinhole {
     }
 }
 
-fn mark(picture: &mut Picture, camera: &Pinhole, experiment: &Experiment, frame: usize, r: &FrameResiduals, scale: f64) {
-    let f = &experiment.plan().observation.frames[frame];
+fn mark(picture: &mut Picture, camera: &Pinhole, r: &FrameResiduals, scale: f64) {
     // Not more dots than the picture can show.
-    let every = (f.points.len() / 8000).max(1);
-    for (p, d) in f.points.iter().zip(&r.points).step_by(every) {
-        let q = camera.project(p.position);
+    let distances: Vec<_> = r.readings.iter().filter(|r| r.sensor.is_camera()).zip(r.distances()).collect();
+    let every = (distances.len() / 8000).max(1);
+    for (p, d) in distances.into_iter().step_by(every) {
+        let q = camera.project(p.place);
         if q.z > 0.0 {
             let colour = d.map_or([20, 20, 20], |d| residual_colour(d, scale));
             picture.dot(q.x, q.y, 1, colour);
         }
     }
-    for (m, d) in f.markers.iter().zip(&r.markers) {
-        let (a, b) = (camera.project(m.position), camera.project(m.position + *d));
+    for (m, d) in r.offsets() {
+        let (a, b) = (camera.project(m.place), camera.project(m.place + d));
         if a.z > 0.0 && b.z > 0.0 {
             for k in 0..=32 {
                 let p = a.lerp(b, f64::from(k) / 32.0);

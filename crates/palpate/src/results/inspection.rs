@@ -135,10 +135,25 @@ pub struct Observed {
     pub marker_readings: usize,
     /// Number of markers.
     pub markers: usize,
-    /// Standard deviation of a depth reading [m].
-    pub depth_noise: f64,
-    /// Standard deviation of a marker's coordinate [m].
-    pub marker_noise: f64,
+    /// Readings of tracked points.
+    #[serde(default)]
+    pub tracked_readings: usize,
+    /// Number of tracked points.
+    #[serde(default)]
+    pub tracked_points: usize,
+    /// Displacements of nodes in all frames.
+    #[serde(default)]
+    pub displacements: usize,
+    /// Standard deviation of a depth reading [m]; `None` where no depth is compared.
+    pub depth_noise: Option<f64>,
+    /// Standard deviation of a marker's coordinate [m]; `None` where no marker is compared.
+    pub marker_noise: Option<f64>,
+    /// Standard deviation of a tracked point's coordinate [m]; `None` where none is compared.
+    #[serde(default)]
+    pub tracked_noise: Option<f64>,
+    /// Standard deviation of a displacement's component [m]; `None` where none is compared.
+    #[serde(default)]
+    pub displacement_noise: Option<f64>,
     /// True where it lies around the object; a scene of which it does not is refused.
     pub overlap: bool,
 }
@@ -158,6 +173,31 @@ pub struct RecordingInspection {
     /// Its markers; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub markers: Option<Markers>,
+    /// Its tracked points; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<SequenceInspection>,
+    /// Its displacements of nodes; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displacements: Option<SequenceInspection>,
+}
+
+/// Things that are seen again and again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SequenceInspection {
+    /// How many there are.
+    pub count: usize,
+    /// Number of times.
+    pub frames: usize,
+    /// Readings of all.
+    pub readings: usize,
+    /// How often one was not seen.
+    pub unseen: usize,
+    /// First time [s].
+    pub from: f64,
+    /// Last time [s].
+    pub to: f64,
+    /// Standard deviation of a coordinate [m]; `None` where it is not stated.
+    pub noise: Option<f64>,
 }
 
 /// A camera.
@@ -260,6 +300,8 @@ mod tests {
                 noise: Some(1e-3),
                 rest_places: 1,
             }),
+            points: Some(SequenceInspection { count: 5, frames: 3, readings: 14, unseen: 1, from: 0.0, to: 0.2, noise: None }),
+            displacements: None,
         };
         let file = round_trip(&document(Inspected::Recording(whole)));
         assert_eq!((&file["kind"], &file["frames"]["count"]), (&"recording".into(), &17.into()));

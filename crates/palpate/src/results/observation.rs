@@ -20,6 +20,12 @@ pub struct ObservationDocument {
     pub depth_readings: usize,
     /// Readings of markers.
     pub marker_readings: usize,
+    /// Readings of tracked points.
+    #[serde(default)]
+    pub tracked_readings: usize,
+    /// Displacements of nodes.
+    #[serde(default)]
+    pub displacements: usize,
 }
 
 impl Document for ObservationDocument {
@@ -41,8 +47,21 @@ mod tests {
             images: 17,
             depth_readings: 4000,
             marker_readings: 0,
+            tracked_readings: 30,
+            displacements: 0,
         });
-        let all = ["backend", "cameras", "depth_readings", "format", "frames", "images", "marker_readings", "recording"];
+        let all = [
+            "backend",
+            "cameras",
+            "depth_readings",
+            "displacements",
+            "format",
+            "frames",
+            "images",
+            "marker_readings",
+            "recording",
+            "tracked_readings",
+        ];
         assert_eq!(keys(&file), all);
     }
 }

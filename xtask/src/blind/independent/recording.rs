@@ -63,6 +63,8 @@ pub fn observed(scene: &Independent, truth: &Truth, seed: u64, folder: &Path, ot
         cameras: cameras.iter().map(|c| stated(c, truth, &sensor)).collect(),
         frames,
         markers: (!setup.markers.is_empty()).then(|| tracked(scene, truth, &mesh, &instants, &mut rng)),
+        points: None,
+        displacements: None,
         warnings: Vec::new(),
     };
     write_recording(folder, &recording).map_err(|e| Error::Failed(e.to_string()))?;

@@ -2,7 +2,7 @@
 
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::diagnosing::Diagnosed;
-use crate::report::diagnosis::{fitted, is_camera, sensor};
+use crate::report::diagnosis::{fitted, stream};
 use crate::report::fit::number;
 use crate::report::pictures::FramePicture;
 use crate::residuals::ResidualSummary;
@@ -182,7 +182,7 @@ fn map(done: &Diagnosed) -> Markup {
     if entries.is_empty() {
         return Markup::default();
     }
-    let key = |e: &MapEntry| (e.scene, e.sensor, e.region);
+    let key = |e: &MapEntry| (e.scene, e.stream, e.region);
     let mut rows: Vec<_> = entries.iter().map(key).collect();
     rows.sort_unstable();
     rows.dedup();
@@ -213,8 +213,8 @@ fn map_row(done: &Diagnosed, entries: &[&MapEntry]) -> Markup {
         tr {
             td {
                 @if done.experiments.len() > 1 { "scene " (first.scene + 1) ", " }
-                (sensor(done, first.scene, first.sensor))
-                @if is_camera(first.sensor) { (format!(" ({:.3}, {:.3}, {:.3})", c.x, c.y, c.z)) }
+                (stream(done, first.scene, first.stream))
+                @if first.stream.sensor.is_spread() { (format!(" ({:.3}, {:.3}, {:.3})", c.x, c.y, c.z)) }
             }
             @for e in entries { (block(e, e.before)) }
             td { "|" }

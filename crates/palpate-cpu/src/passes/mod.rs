@@ -1,5 +1,0 @@
-//! Comparison with what was measured.
-
-pub mod frames;
-pub mod markers;
-pub mod matching;

@@ -1,0 +1,170 @@
+//! Arrays of NumPy: `.npy` files, and `.npz` archives of them.
+//!
+//! Numbers are read from single and double precision, either byte order, in C or Fortran order; they are written in double precision,
+//! little-endian, in C order.
+
+use crate::error::{InputError, OutputError};
+use crate::keys::suggest;
+use crate::output::write_file;
+use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
+use std::io::{Cursor, Read, Write};
+use std::path::Path;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+/// Largest array that is read [B]: more is a broken file, or more than a recording of this kind can be used for.
+const LARGEST: u64 = 16 << 30;
+
+/// An array of numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Array {
+    /// Length along every axis.
+    pub shape: Vec<usize>,
+    /// The numbers, last axis fastest.
+    pub values: Vec<f64>,
+}
+
+impl Array {
+    /// The shape as NumPy prints it.
+    pub fn shape_text(&self) -> String {
+        let lengths: Vec<String> = self.shape.iter().map(usize::to_string).collect();
+        format!("({}{})", lengths.join(", "), if lengths.len() == 1 { "," } else { "" })
+    }
+}
+
+/// True for the name of an archive.
+pub fn is_archive(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+}
+
+/// Reads an array: of an archive the one of this name, or the only one.
+///
+/// # Errors
+/// The file cannot be read, is no array of real numbers, or has no array of the name.
+pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> {
+    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    if !is_archive(path) {
+        return match name {
+            None => decode(path, "", &bytes),
+            Some(name) => {
+                Err(InputError::file(path, format!("holds one array without a name; \"{name}\" is one of an .npz file")))
+            }
+        };
+    }
+    let broken = |e: &dyn std::fmt::Display| InputError::file(path, format!("is not a readable .npz file: {e}"));
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken(&e))?;
+    let bare = |n: std::borrow::Cow<str>| n.strip_suffix(".npy").unwrap_or(&n).to_string();
+    let names: Vec<String> = archive.file_names().filter_map(Result::ok).map(bare).collect();
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    let name = match (name, &known[..]) {
+        (Some(name), _) if known.contains(&name) => name,
+        (Some(name), _) => {
+            return Err(InputError::file(path, format!("holds no array \"{name}\"; {}", suggest(name, &known))));
+        }
+        (None, [only]) => only,
+        (None, _) => {
+            return Err(InputError::file(path, format!("holds {} arrays ({}); say which", known.len(), known.join(", "))));
+        }
+    };
+    let member = [format!("{name}.npy"), name.to_string()].into_iter().find(|m| archive.index_for_name(m).is_some());
+    let file = archive.by_name(&member.unwrap_or_default()).map_err(|e| broken(&e))?;
+    let mut content = Vec::new();
+    file.take(LARGEST).read_to_end(&mut content).map_err(|e| broken(&e))?;
+    decode(path, name, &content)
+}
+
+/// The array in the bytes of an `.npy` file.
+fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Array, InputError> {
+    let which = if name.is_empty() { String::new() } else { format!("array \"{name}\": ") };
+    let wrong = |text: String| InputError::file(path, format!("{which}{text}"));
+    if !is_plausible(bytes) {
+        return Err(wrong("says that it holds more numbers than the file has bytes".into()));
+    }
+    let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
+    let (dtype, order) = (file.dtype(), file.order());
+    let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
+    let size = match &dtype {
+        DType::Plain(t) if t.type_char() == TypeChar::Float && [4, 8].contains(&t.size_field()) => t.size_field(),
+        other => {
+            let text = other.descr();
+            return Err(wrong(format!("holds {text}, expected float32 or float64; convert it with .astype(numpy.float32)")));
+        }
+    };
+    // Counted before anything is allocated: what a header says may be anything.
+    let count: usize = shape.iter().product();
+    let header = bytes.len() - file.into_inner().len();
+    if count.checked_mul(size as usize).is_none_or(|n| n > bytes.len() - header) {
+        return Err(wrong(format!("ends before its {count} numbers")));
+    }
+    let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
+    let short = |e: npyz::DTypeError| wrong(e.to_string());
+    let values: Result<Vec<f64>, std::io::Error> = if size == 4 {
+        file.data::<f32>().map_err(short)?.map(|x| x.map(f64::from)).collect()
+    } else {
+        file.data::<f64>().map_err(short)?.collect()
+    };
+    let values = values.map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
+    Ok(Array { values: if order == Order::Fortran { to_c_order(&shape, &values) } else { values }, shape })
+}
+
+/// False where the header's shape has more entries than the file has bytes: their number need not fit into any integer.
+fn is_plausible(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+    let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
+    let Some((lengths, _)) = shape else { return true };
+    let lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
+    lengths.fold(Some(1u128), |n, x| n?.checked_mul(x)).is_some_and(|n| n <= bytes.len() as u128)
+}
+
+/// Numbers in Fortran order (first axis fastest) with the last axis fastest.
+fn to_c_order(shape: &[usize], values: &[f64]) -> Vec<f64> {
+    let mut strides = Vec::with_capacity(shape.len());
+    let mut stride = 1;
+    for n in shape {
+        strides.push(stride);
+        stride *= n;
+    }
+    let mut index = vec![0; shape.len()];
+    (0..values.len())
+        .map(|_| {
+            let at: usize = index.iter().zip(&strides).map(|(i, s)| i * s).sum();
+            for a in (0..shape.len()).rev() {
+                index[a] += 1;
+                if index[a] < shape[a] {
+                    break;
+                }
+                index[a] = 0;
+            }
+            values[at]
+        })
+        .collect()
+}
+
+/// Writes an archive of named arrays.
+///
+/// # Errors
+/// The file that could not be written and why.
+pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &Array)]) -> Result<(), OutputError> {
+    write_file(path, |out| {
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
+        for (name, array) in arrays {
+            archive.start_file(format!("{name}.npy"), options)?;
+            archive.write_all(&encode(array)?)?;
+        }
+        out.write_all(&archive.finish()?.into_inner())
+    })
+}
+
+fn encode(array: &Array) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let shape: Vec<u64> = array.shape.iter().map(|n| *n as u64).collect();
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
+    writer.extend(array.values.iter().copied())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+#[path = "npy_tests.rs"]
+mod tests;

@@ -1,0 +1,132 @@
+//! Where markers and tracked points sit on a body, and whether displacements count its nodes.
+
+use super::{PlanError, error};
+use crate::cutcells::extension::{NodeLookup, active_cell, affine_weights};
+use crate::cutcells::grid::{shape_functions, shape_gradients};
+use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, TrackRest};
+use crate::shape::Shape;
+use crate::space::body::Body;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Radius of the fit that a marker's rotation is taken from, in cells: the smallest that spans a cut cell's neighbourhood.
+const MARKER_RADIUS: f64 = 2.0;
+/// How far tracked points may lie from the rest surface where the recording does not say, in cells.
+const TRACK_REACH: f64 = 2.0;
+/// How far apart nodes of a recording and of a scene may be, in cells: rounding to single precision and the like.
+const SAME_NODE: f64 = 1e-3;
+
+/// Where markers sit on a body, for a recording that is to be made.
+///
+/// # Errors
+/// A marker that lies far from the surface.
+pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
+    let lookup = NodeLookup::new(body);
+    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
+}
+
+fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
+    let h = body.grid.h;
+    let surface = m.surface.unwrap_or_else(|| shape.closest_point(m.position));
+    let (min, max) = shape.bounds();
+    // Scans and hand-measured points are off by millimetres, not by a large part of the body.
+    let allowed = (0.1 * (max - min).length()).max(2.0 * h);
+    let (key, point) = if m.surface.is_some() { ("surface", surface) } else { ("position", m.position) };
+    let away = shape.signed_distance(point);
+    if !(away.is_finite() && m.position.is_finite()) || (m.surface.is_some() && away.abs() > allowed) {
+        return Err(error(
+            format!("markers.rest \"{}\".{key}", m.name),
+            format!("{point} m lies {:.4} m from the body's surface; allowed are {allowed:.4} m", away.abs()),
+        ));
+    }
+    let (stalk, longest) = ((m.position - surface).length(), (max - min).length());
+    if stalk > longest {
+        return Err(error(
+            format!("markers.rest \"{}\".position", m.name),
+            format!(
+                "{} m lies {stalk:.4} m from where it is attached to the body; a stalk may be as long as the body's diagonal, {longest:.4} m",
+                m.position
+            ),
+        ));
+    }
+    let w = affine_weights(body, lookup, surface, MARKER_RADIUS * h);
+    Ok(MarkerSite {
+        name: m.name.clone(),
+        kind: ReadingKind::Marker,
+        nodes: w.nodes,
+        position_weights: w.position_weights,
+        gradient_weights: w.gradient_weights,
+        stalk: m.position - surface,
+    })
+}
+
+/// Where tracked points sit. They have no stalk: a point moves with the body where it lies itself.
+///
+/// # Errors
+/// Points farther from the rest surface than allowed: how many, and the farthest.
+pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
+    let allowed = tracks.tolerance.unwrap_or(TRACK_REACH * body.grid.h);
+    let away: Vec<f64> = tracks.places.par_iter().map(|p| shape.signed_distance(*p).abs()).collect();
+    // What is no number is away as well.
+    let far: Vec<usize> = (0..away.len()).filter(|k| !(away[*k] <= allowed)).collect();
+    if let Some(&first) = far.first() {
+        let worst = far.iter().copied().fold(first, |a, b| if away[b] > away[a] { b } else { a });
+        return Err(error(
+            "points.rest",
+            format!(
+                "{} of {} points lie more than {allowed:.4} m away from the rest surface, point {worst} at {} m by {:.4} m; \
+                 check unit, transform and rest, or give a larger points.tolerance",
+                far.len(),
+                away.len(),
+                tracks.places[worst],
+                away[worst]
+            ),
+        ));
+    }
+    let lookup = NodeLookup::new(body);
+    let site = |(number, place): (usize, &DVec3)| track_site(format!("points.{number}"), *place, body, &lookup);
+    Ok(tracks.places.par_iter().enumerate().map(site).collect())
+}
+
+/// A point of the body itself: interpolated in its cell, or continued to from the nodes around it.
+fn track_site(name: String, place: DVec3, body: &Body, lookup: &NodeLookup) -> MarkerSite {
+    let (nodes, position_weights, gradient_weights) = match active_cell(body, place) {
+        Some((cell, xi)) => {
+            let gradients = shape_gradients(xi).map(|g| g / body.grid.h);
+            (body.cells[cell].nodes.to_vec(), shape_functions(xi).to_vec(), gradients.to_vec())
+        }
+        None => {
+            let w = affine_weights(body, lookup, place, MARKER_RADIUS * body.grid.h);
+            (w.nodes, w.position_weights, w.gradient_weights)
+        }
+    };
+    MarkerSite { name, kind: ReadingKind::Track, nodes, position_weights, gradient_weights, stalk: DVec3::ZERO }
+}
+
+/// Compares the nodes that displacements count with those of the body.
+///
+/// # Errors
+/// Another number of nodes, or other places.
+pub(super) fn check_nodes(observation: &Observation, body: &Body) -> Result<(), PlanError> {
+    let Some(nodes) = &observation.nodes else { return Ok(()) };
+    if nodes.count != body.nodes.len() {
+        return Err(error(
+            "displacements.file",
+            format!(
+                "holds {} nodes, and the body has {} at cells of {} m; displacements are those of the nodes of this very scene",
+                nodes.count,
+                body.nodes.len(),
+                body.grid.h
+            ),
+        ));
+    }
+    let apart = |(a, b): (&DVec3, &DVec3)| a.distance(*b);
+    let off = nodes.places.iter().zip(&body.nodes).map(apart).enumerate().find(|(_, d)| !(*d <= SAME_NODE * body.grid.h));
+    match off {
+        None => Ok(()),
+        Some((node, d)) => Err(error(
+            "displacements.nodes",
+            format!("node {node} lies {d:.6} m from where this scene has it, {} m; is it the same scene?", body.nodes[node]),
+        )),
+    }
+}
