@@ -35,7 +35,7 @@ pub(crate) struct Effects {
     pub(crate) bits: u32,
     pub(crate) slope_rows: u32,
     /// Parameters of changes in time.
-    aging_rows: u32,
+    pub(crate) aging_rows: u32,
     /// Parameters of the stress-free shape.
     rest_rows: u32,
     /// Parameters of how clamps are held: effect and number of each.
@@ -130,6 +130,11 @@ impl Effects {
     /// Place of an effect among those on cells.
     pub(crate) fn cell_law(&self, effect: usize) -> Option<u32> {
         self.cells.iter().position(|c| c.0 == effect).map(|k| k as u32)
+    }
+
+    /// Number of effects on cells.
+    pub(crate) fn cell_laws(&self) -> u32 {
+        self.cells.len() as u32
     }
 
     /// True when some effect acts on cells.
