@@ -15,6 +15,7 @@ use crate::layout::EffectSite;
 use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
+use palpate_model::params::fields::Varied;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
@@ -108,6 +109,12 @@ impl Effects {
                 }
             }
             e.stride += count;
+        }
+        for field in &plan.fields {
+            e.bits |= match field.varied {
+                Varied::Modulus => FIELD_MODULUS,
+                Varied::Density => FIELD_DENSITY,
+            };
         }
         e.matrix_rows = grips::matrix_rows(plan, &e.grip_rows);
         for (_, p) in e.points.iter_mut().chain(&mut e.cells) {
