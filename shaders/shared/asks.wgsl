@@ -42,7 +42,3 @@ const WIDE_PARTS = 2u;
 // is an error.
 const FOR_DIRECTION = 0u;
 const FOR_DERIVATIVE = 1u;
-
-// Of dot_column, on top of the parameter: −z · ∂r/∂p, unless it is ∂v/∂p or ∂u/∂p of the start.
-const OF_VELOCITY = 65536u;
-const OF_SHAPE = 131072u;

@@ -21,6 +21,11 @@ struct Corner {
     young: f32,
 }
 
+// Pose of the cell in the stress-free shape.
+fn rest_pose(c: Corner) -> Pose {
+    return pose_of(rests[c.node].xyz - rests[c.first].xyz, c.sign);
+}
+
 fn find_corner(group: vec3<u32>, groups: vec3<u32>, local: u32) -> Corner {
     lanes_start(local);
     let p = find_place(group, groups, local / 8u, shape.cells, 8u);

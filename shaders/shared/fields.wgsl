@@ -16,6 +16,15 @@ fn aging_at(member: u32, row: u32) -> f32 {
     return agings[(row * shape.members + member) * (shape.steps + 1u) + call.step + call.mode];
 }
 
+// Young's modulus of cells without a factor of their own.
+fn unvaried(m: Member, member: u32) -> f32 {
+    var young = m.young;
+    if (shape.fields & FIELD_AGING) != 0u {
+        young *= aging_at(member, 0u);
+    }
+    return young;
+}
+
 fn young_at(m: Member, member: u32, cell: u32) -> f32 {
     var young = m.young;
     if (shape.fields & FIELD_MODULUS) != 0u {

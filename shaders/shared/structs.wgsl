@@ -35,6 +35,9 @@ struct Shape { // mirrored
     fields: u32,
     slope_rows: u32,
     contact_width: f32,
+    aging_rows: u32,
+    point_groups: u32,
+    pad: vec2<u32>,
 }
 
 struct Member { // mirrored

@@ -111,7 +111,7 @@ impl Backend for GpuBackend {
     }
 
     fn new_tally(&self, world: &World, request: &Request) -> Tally {
-        Tally::new(world, &request.sensitivities)
+        Tally::new(world, request)
     }
 
     fn rollout<T>(&self, world: &mut World, watched: bool, mut body: impl FnMut(&mut World) -> T) -> T {

@@ -75,6 +75,12 @@ pub struct Shape {
     pub slope_rows: u32,
     /// Half width of contact [m].
     pub contact_width: f32,
+    /// Numbers of effects that change the stiffness in time.
+    pub aging_rows: u32,
+    /// Workgroups of 64 over nodes or patches, whichever are more.
+    pub point_groups: u32,
+    /// Fills up.
+    pub pad: [u32; 2],
 }
 
 /// Parameters of one member.

@@ -3,7 +3,7 @@
 use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::observe;
-use crate::world::{COLUMN_VECTORS, Geometry, MANY, VECTOR, columns, tally_sizes, work};
+use crate::world::{COLUMN_VECTORS, Geometry, MANY, Sums, VECTOR, columns, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
@@ -90,6 +90,8 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     constants.extend(observe::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();
     space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
+    let sums = Sums::new(plan, &geometry.effects, &request.gradient);
+    space.extend(sums.iter().flat_map(|s| s.sizes(shape, &geometry.effects, b)).map(|s| s.1));
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;
     // A static start keeps a state at rest beside the first one.
     let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 };

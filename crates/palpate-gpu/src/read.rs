@@ -3,7 +3,7 @@
 use crate::device::GpuError;
 use crate::device::pipelines::shared::structs as code;
 use crate::layout::Health;
-use crate::world::{State, Tally, World};
+use crate::world::{Found, State, Tally, World};
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, Failure, FailureKind, number};
 
@@ -75,8 +75,12 @@ fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> 
     let (b, p, q) = (world.members(), world.plan.layout.len(), tally.directions.len());
     let own = [(tally.get("health"), b * size_of::<Health>()), (tally.get("gradient"), 4 * b * p)];
     let observed = world.observer.results(&tally.buffers, b, q);
-    let found = world.gpu.download_all(&[&own[..], &observed].concat())?;
-    let (own, observed) = found.split_at(own.len());
+    let summed = summed(world, tally);
+    let parts: Vec<_> = summed.iter().map(|(_, buffer, bytes)| (*buffer, *bytes)).collect();
+    let found = world.gpu.download_all(&[&own[..], &observed, &parts].concat())?;
+    let (own, rest) = found.split_at(own.len());
+    let (observed, sums) = rest.split_at(observed.len());
+    let sums: Found = summed.iter().zip(sums).map(|(s, bytes)| (s.0, bytemuck::pod_collect_to_vec(bytes))).collect();
     let health: Vec<Health> = bytemuck::pod_collect_to_vec(&own[0]);
     let gradient: Vec<f32> = bytemuck::pod_collect_to_vec(&own[1]);
     let mut all: Vec<Evaluation> = (0..b)
@@ -93,5 +97,18 @@ fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> 
         })
         .collect();
     world.observer.add_to(observed, q, &mut all);
+    if let Some(own) = &tally.sums {
+        for (m, e) in all.iter_mut().enumerate().filter(|(_, e)| e.failure.is_none()) {
+            let by = own.gradient(&world.plan, &world.geometry, &world.batch.theta[m], m, &sums);
+            e.gradient.iter_mut().zip(by).for_each(|(g, b)| *g += b);
+        }
+    }
     Ok(all)
+}
+
+/// What an adjoint summed up: names, buffers and bytes that count.
+fn summed<'a>(world: &World, tally: &'a Tally) -> Vec<(&'static str, &'a wgpu::Buffer, usize)> {
+    let geometry = &world.geometry;
+    let sizes = tally.sums.as_ref().map(|s| s.sizes(&geometry.shape, &geometry.effects, world.members() as u64));
+    sizes.unwrap_or_default().into_iter().map(|(name, bytes)| (name, tally.get(name), bytes as usize)).collect()
 }

@@ -20,7 +20,7 @@ pub(crate) fn step_adjoint(world: &World, k: usize, now: &State, next: &State, a
         s.couple_cells(asks::TRANSPOSED, &[]);
         s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
         s.press_nodes(ALL, BACK, None, &adj_now.0.buffer, &[]);
-        s.add_columns();
+        s.pull(tally);
     });
 }
 
@@ -31,12 +31,12 @@ pub(crate) fn start_adjoint(world: &World, first: &State, adj: &Adjoint, tally: 
         r.clear(&blank.0.buffer);
         let mut s = Passes::new(world, r, None, &blank, first, tally);
         s.list();
-        s.add_start_columns(&adj.0.buffer);
+        s.pull_start(tally, &adj.0.buffer);
         if world.plan.initial == InitialShape::StaticEquilibrium {
             s.linearise();
             s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
             s.solve();
-            s.add_columns();
+            s.pull(tally);
         }
     });
 }

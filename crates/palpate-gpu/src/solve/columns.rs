@@ -1,9 +1,9 @@
-//! ∂r/∂p on the device: which passes make the column of each parameter, for the adjoint (dotted with z) and for tangents.
+//! ∂r/∂p on the device: which passes make the column of each parameter, for tangents.
 
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks::{
     HOLD_AGING, HOLD_GRIP, HOLD_MATRIX, HOLD_POISSON, HOLD_REST, HOLD_ROW, HOLD_SLOPE, HOLD_TIME, HOLD_YOUNG, NO_HOLD, NO_TOUCH,
-    OF_SHAPE, OF_VELOCITY, PLANE_ASKS, PLANE_HEIGHT, PLANE_PHI, PLANE_THETA, TOUCH_YOUNG,
+    PLANE_ASKS, PLANE_HEIGHT, PLANE_PHI, PLANE_THETA, TOUCH_YOUNG,
 };
 use crate::device::pipelines::shared::keys::{
     AGING_SLOPE, ANGULAR_VELOCITY, DENSITY, DENSITY_SLOPE, EFFECT, GRAVITY, KEYS, MASS_DAMPING, MODULUS_SLOPE, NOTHING, OF_CELLS,
@@ -114,17 +114,6 @@ impl Passes<'_, '_> {
         }
     }
 
-    /// dJ/dp −= z · ∂r/∂p for every parameter, z in `direction`.
-    pub(crate) fn add_columns(&mut self) {
-        let keys = self.world.plan.layout.keys.clone();
-        for (p, key) in keys.iter().enumerate() {
-            if let Some(column) = self.column_of(*key) {
-                self.column(Some(column));
-                self.run(pass::DOT_COLUMN, ALL, Per::Member, p as u32);
-            }
-        }
-    }
-
     /// ∂u/∂p of the start → `column`; false for parameters that the shape at the start does not depend on.
     pub(crate) fn shape_column(&mut self, key: ParamKey) -> bool {
         let Some(row) = self.start_row(key) else { return false };
@@ -159,18 +148,5 @@ impl Passes<'_, '_> {
     /// True when a static start depends on this parameter.
     pub(crate) fn moves_equilibrium(&self, key: ParamKey) -> bool {
         self.velocity_kind(key).is_none() && self.column_of(key).is_some()
-    }
-
-    /// dJ/dp += dJ/dv · ∂v/∂p + dJ/du · ∂u/∂p of the start.
-    pub(crate) fn add_start_columns(&mut self, adj: &wgpu::Buffer) {
-        let keys = self.world.plan.layout.keys.clone();
-        for (p, key) in keys.iter().enumerate() {
-            if self.velocity_column(*key) {
-                self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + OF_VELOCITY, &[("probe", adj)]);
-            }
-            if self.shape_column(*key) {
-                self.run_with(pass::DOT_COLUMN, ALL, Per::Member, p as u32 + OF_SHAPE, &[("probe", adj)]);
-            }
-        }
     }
 }

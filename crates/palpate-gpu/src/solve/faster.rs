@@ -5,7 +5,7 @@ use crate::device::{Gpu, GpuError};
 use crate::layout::Newton;
 use crate::passes::{Passes, SOLVE};
 use crate::world::{MANY, Product, State, Tally, Tuning, World};
-use palpate_engine::ParamBatch;
+use palpate_engine::{ParamBatch, Request};
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -112,7 +112,7 @@ fn choose([plain, other]: [f64; 2]) -> usize {
 
 /// Seconds of a product of every member with a matrix of zeros, which takes as long as any.
 pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
-    let tally = Tally::new(world, &[]);
+    let tally = Tally::new(world, &Request::default());
     let blank = State(world.lend(3));
     let wanting = vec![Newton { stage: SOLVE, ..Newton::default() }; world.members()];
     world.gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::cast_slice(&wanting));

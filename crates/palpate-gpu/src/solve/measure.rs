@@ -9,6 +9,7 @@ use crate::layout::Newton;
 use crate::passes::Passes;
 use crate::world::Product;
 use crate::world::{State, Tally, VECTOR, World};
+use palpate_engine::Request;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -105,7 +106,7 @@ impl World {
         let products = if self.many { vec![Product::Matrix, Product::Free] } else { Vec::new() };
         let alone = |p: Product| Ok((p, Traffic { seconds: faster::time(self, p)?, bytes: self.bytes_of(p) }));
         let products = products.into_iter().map(alone).collect::<Result<Vec<_>, GpuError>>()?;
-        let rest = Rest { tally: Tally::new(self, &[]), blank: State(self.lend(3)) };
+        let rest = Rest { tally: Tally::new(self, &Request::default()), blank: State(self.lend(3)) };
         self.record(|r| r.clear(&rest.blank.0.buffer));
         self.work(&rest, |s| s.linearise());
         let run = |repeats: u32| {

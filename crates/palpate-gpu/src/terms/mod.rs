@@ -2,6 +2,7 @@
 
 mod cell_laws;
 pub(crate) mod point_laws;
+mod pull;
 
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::points::{FORCE, STIFFNESS};

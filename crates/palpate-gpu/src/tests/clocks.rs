@@ -101,7 +101,7 @@ fn dispatched(backend: &GpuBackend, scene: &Scene) -> BTreeSet<&'static str> {
     backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
     world.time_passes(true);
     let all: Vec<usize> = (0..plan.layout.len()).collect();
-    let mut tally = backend.new_tally(&world, &Request { sensitivities: all.to_vec(), ..Request::default() });
+    let mut tally = backend.new_tally(&world, &Request { gradient: Wanted::All, sensitivities: all.to_vec() });
     let [mut now, mut next] = [0; 2].map(|_| backend.new_state(&world));
     let [mut tangent, mut tangent_next] = [0; 2].map(|_| backend.new_tangent(&world, &Direction::parameters(&all)));
     let [adj, mut adj_now] = [0; 2].map(|_| backend.new_adjoint(&world));

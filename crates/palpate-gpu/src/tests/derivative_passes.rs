@@ -11,7 +11,7 @@ use crate::passes::{ALL, Passes, Per};
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
-use palpate_engine::{Backend, Request};
+use palpate_engine::{Backend, Request, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -36,7 +36,7 @@ fn name_of(key: ParamKey) -> String {
 /// The device's numbers; derivatives of the whole in these `sizes`.
 fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
     let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
-    let tally = backend.new_tally(world, &Request::default());
+    let tally = backend.new_tally(world, &Request { gradient: Wanted::All, ..Request::default() });
     let (now, next) = (backend.new_state(world), backend.new_state(world));
     let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
     backend.clear_adjoint(&mut adj);
@@ -79,9 +79,9 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
     }
     let [u, v] = along(plan);
     write(&world.buffers["direction"], &v);
-    run(&|s| s.add_columns());
-    let gradient: Vec<f32> = world.gpu.download(tally.get("gradient"), plan.layout.len()).unwrap_or_else(|e| panic!("{e}"));
-    parts.push(("dot_column".into(), gradient.iter().zip(sizes).map(|(g, size)| f64::from(*g) / size).collect()));
+    run(&|s| s.pull(&tally));
+    let gradient = backend.read(world, &tally).remove(0).gradient;
+    parts.push((PULL.into(), gradient.iter().zip(sizes).map(|(g, size)| g / size).collect()));
     run(&|s| {
         s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
         s.couple_patches(BACK, &[]);
@@ -139,7 +139,7 @@ fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
                 parts.push((name_of(*key), flat(&column)));
             }
         }
-        parts.push(("dot_column".into(), gradient));
+        parts.push((PULL.into(), gradient));
         // What is free of inertia on the device is the sum of two terms here whose inertia cancels.
         let back = equation.by_past_transposed(u1, &v);
         let to_u: Vec<DVec3> = back.u.iter().zip(&back.each[0]).map(|(a, b)| *a + *b).collect();
@@ -208,6 +208,8 @@ fn apart(found: &[Part], right: &[Part]) -> Vec<String> {
     out
 }
 
+/// Derivatives by all parameters at once.
+const PULL: &str = "pull";
 const BACK_U: &str = "couple_old and step_back, displacement";
 const BACK_V: &str = "couple_old and step_back, velocity";
 const FORTH: &str = "couple_old and sum_old";
@@ -216,14 +218,14 @@ const CG: &str = "turn_cg and advance_cg";
 
 /// Parts that must show each fault of [`BALANCE`].
 const SHOWN: [&[&str]; 8] = [
-    &[OLD, "column of material.poisson_ratio", "column of time.start", "dot_column", BACK_U, BACK_V, FORTH, CG],
-    &[OLD, "column of material.youngs_modulus", "dot_column", BACK_U, BACK_V, FORTH, CG],
-    &["column of material.mass_damping", "column of world.gravity.z", "dot_column", BACK_V, FORTH, CG],
-    &["column of material.density", "dot_column", BACK_V, FORTH, CG],
+    &[OLD, "column of material.poisson_ratio", "column of time.start", PULL, BACK_U, BACK_V, FORTH, CG],
+    &[OLD, "column of material.youngs_modulus", PULL, BACK_U, BACK_V, FORTH, CG],
+    &["column of material.mass_damping", "column of world.gravity.z", PULL, BACK_V, FORTH, CG],
+    &["column of material.density", PULL, BACK_V, FORTH, CG],
     &["column of material.youngs_modulus", BACK_U, BACK_V, FORTH, CG],
-    &["column of world.gravity.x", "dot_column", CG],
-    &[OLD, "column of material.stiffness_damping", "dot_column", BACK_U, BACK_V, FORTH, CG],
-    &["column of plane.0.height", "column of plane.1.theta", "dot_column", BACK_U, BACK_V, FORTH, CG],
+    &["column of world.gravity.x", PULL, CG],
+    &[OLD, "column of material.stiffness_damping", PULL, BACK_U, BACK_V, FORTH, CG],
+    &["column of plane.0.height", "column of plane.1.theta", PULL, BACK_U, BACK_V, FORTH, CG],
 ];
 
 /// The column of a point mass depends on where it is alone: its own size does not enter, and the acceleration is given.
@@ -240,7 +242,7 @@ fn passes_of_derivatives_agree_with_the_cpu_and_one_percent_shows() {
     let (right, sizes) = exact(&plan);
     let seen = |plan: &Plan| apart(&found(&backend, plan, &sizes), &right);
     assert_eq!(seen(&plan), [""; 0]);
-    let place = (PLACE, &["column of mass.0.mass", "column of world.gravity.x", "dot_column"][..]);
+    let place = (PLACE, &["column of mass.0.mass", "column of world.gravity.x", PULL][..]);
     for ((name, fault), parts) in BALANCE.into_iter().zip(SHOWN).chain([place]) {
         let mut wrong = plan.clone();
         fault(&mut wrong);

@@ -6,7 +6,7 @@ use crate::GpuBackend;
 use crate::world::Adjoint;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend, Direction, ParamBatch, Request};
+use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -48,7 +48,7 @@ fn gradients(backend: &GpuBackend, plan: &Plan, theta: &[Vec<f64>]) -> (Vec<Vec<
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
     let mut world = backend.build(plan, theta.len()).unwrap_or_else(|e| panic!("{e}"));
     backend.set_params(&mut world, &ParamBatch::from_rows(theta));
-    let mut tally = backend.new_tally(&world, &Request::default());
+    let mut tally = backend.new_tally(&world, &Request { gradient: Wanted::All, ..Request::default() });
     let mut tape = vec![backend.new_state(&world)];
     backend.start(&mut world, &mut tape[0], &mut tally);
     let mut tangent = backend.new_tangent(&world, &Direction::parameters(&directions));

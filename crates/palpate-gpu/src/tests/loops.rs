@@ -2,7 +2,7 @@
 //! that a build accepts. A loop whose header is not known here fails the test.
 
 use crate::device::pipelines::PASSES;
-use crate::device::pipelines::shared::laws;
+use crate::device::pipelines::shared::{laws, pulls};
 use crate::observe::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::world::KINDS;
 use crate::world::{LOOPS, Most, columns};
@@ -38,6 +38,11 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("max(shape.planes, 1u)") => most.pressed.max(1),
         () if has("shape.planes") => most.planes,
         () if has("shape.masses") => most.masses,
+        () if has("row < poses") => most.grips,
+        () if has("row < matrices") => most.grips,
+        () if has("shape.aging_rows") => most.aging,
+        () if has("< PLANE_ROWS") => pulls::PLANE_ROWS.into(),
+        () if has("MOST + POINT_ROWS") => palpate_model::effects::law::MOST as u64 + u64::from(pulls::POINT_ROWS),
         () if has("call.extra * shape.members") => columns(most.members) * most.members,
         () if has("q < call.extra") => columns(most.members),
         () if has("shape.members") => most.members,
@@ -158,8 +163,19 @@ fn observed(seen: &Seen) -> bool {
 }
 
 /// A large body with everything: 40 patches and clamp cells on a cell, ten planes, ten point masses.
-const BODY: Most =
-    Most { members: LOOPS - 16, nodes: 1000, row: 60, supports: 40, planes: 10, pressed: 10, masses: 10, chunk: 1, many: false };
+const BODY: Most = Most {
+    members: LOOPS - 16,
+    nodes: 1000,
+    row: 60,
+    supports: 40,
+    planes: 10,
+    pressed: 10,
+    masses: 10,
+    grips: 20,
+    aging: 4,
+    chunk: 1,
+    many: false,
+};
 
 /// 40 × 40 rows of cubes, a million points in stripes of 12,500, some markers.
 const RECORDING: Seen = Seen {
@@ -190,6 +206,8 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.planes = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| (m.planes, m.pressed) = (n, n), built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.row = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.grips = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.aging = n, built),
         largest(Most { nodes: 512, masses: 0, ..BODY }, |m, n| m.chunk = n, built),
     ];
     assert!(bodies[0].nodes > 30_000 && bodies[2].nodes > 1_000_000 && bodies[3].supports > 1000, "{bodies:?}");
@@ -245,7 +263,19 @@ fn a_nested_loop_is_counted_as_often_as_it_runs() {
     let number = |h: &str| {
         bound(
             h,
-            &Most { members: 0, nodes: 0, row: 0, supports: 0, planes: 0, pressed: 0, masses: 0, chunk: 0, many: false },
+            &Most {
+                members: 0,
+                nodes: 0,
+                row: 0,
+                supports: 0,
+                planes: 0,
+                pressed: 0,
+                masses: 0,
+                grips: 0,
+                aging: 0,
+                chunk: 0,
+                many: false,
+            },
             &RECORDING,
         )
         .unwrap_or(0.0)

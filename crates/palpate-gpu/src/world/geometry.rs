@@ -118,6 +118,8 @@ impl Geometry {
             planes: plan.planes.len() as u64,
             pressed: if effects.on_contact() { plan.planes.len() as u64 } else { 0 },
             masses: masses.len() as u64,
+            grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
+            aging: effects.aging_rows.into(),
             chunk: 1,
             many,
         };
@@ -150,6 +152,9 @@ impl Geometry {
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 },
             slope_rows: effects.slope_rows,
+            aging_rows: effects.aging_rows,
+            point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
+            pad: [0; 2],
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);

@@ -28,6 +28,10 @@ pub(crate) struct Most {
     /// Planes at which effects on contact are asked.
     pub(crate) pressed: u64,
     pub(crate) masses: u64,
+    /// Numbers of effects on clamps, those that change matrices twice.
+    pub(crate) grips: u64,
+    /// Numbers of effects that change the stiffness in time.
+    pub(crate) aging: u64,
     /// Iterations of conjugate gradients in one dispatch.
     pub(crate) chunk: u64,
     /// Many workgroups share the solve of a member.
@@ -46,7 +50,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 8] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 11] {
         // 600: rotations by Jacobi's method, and sums over the corners of a cell.
         let cell = 600 + self.supports;
         [
@@ -57,6 +61,10 @@ impl Most {
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 380 * self.pressed.max(1) + 100),
             ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
+            // Once for each input, all planes together, and once for each of a plane's own numbers.
+            ("pull_patch_laws", 750 * self.pressed.max(1) + 450),
+            ("pull_holds", 2 * (18 * self.grips + 60) + 60),
+            ("pull_cells", cell + self.aging + 200),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("gather_column", cell + self.row + 20 * self.masses + self.planes),
         ]

@@ -7,6 +7,7 @@ mod limits;
 mod members;
 mod room;
 mod states;
+mod sums;
 mod tally;
 mod tuning;
 
@@ -16,6 +17,7 @@ pub(crate) use limits::columns;
 pub(crate) use room::{COLUMN_VECTORS, KINDS, VECTOR, work};
 pub(crate) use states::Loan;
 pub use states::{Adjoint, State, Tangent};
+pub(crate) use sums::{Found, Sums};
 pub use tally::Tally;
 pub(crate) use tally::tally_sizes;
 pub(crate) use tuning::MANY;
@@ -97,6 +99,12 @@ impl World {
     /// True where effects add to blocks, which only the matrix holds.
     pub(crate) fn needs_matrix(&self) -> bool {
         self.geometry.effects.on_nodes() || self.geometry.effects.on_cells()
+    }
+
+    /// True where an effect does nothing in any member.
+    pub(crate) fn is_absent(&self, effect: usize) -> bool {
+        let law = self.plan.layout.effects().nth(effect).map(|e| e.0);
+        law.is_some_and(|law| self.batch.physics.iter().all(|p| law.is_absent(&p.effects[effect])))
     }
 
     /// Members of the current batch.

@@ -1,39 +1,52 @@
 //! What is read of every member at the end.
 
 use super::World;
+use super::sums::Sums;
 use crate::device::Maker as _;
 use crate::device::recorder::Buffers;
 use crate::layout::Health;
+use palpate_engine::Request;
 
 /// Everything to be read of every member.
 #[derive(Debug)]
 pub struct Tally {
     pub(crate) directions: Vec<usize>,
-    /// health `[B]`, gradient `[B, P]`, and what observations add.
+    /// health `[B]`, derivatives by what observations depend on `[B, P]`, what observations add, and the sums of an adjoint.
     pub(crate) buffers: Buffers,
+    /// What an adjoint sums up; `None` where no gradient is wanted.
+    pub(crate) sums: Option<Sums>,
 }
 
-/// What a tally of B members and P parameters holds beside observations, in bytes.
+/// What a tally of B members and P parameters holds beside observations and the sums of an adjoint, in bytes.
 pub(crate) fn tally_sizes(b: u64, p: u64) -> [(&'static str, u64); 2] {
     [("health", b * size_of::<Health>() as u64), ("gradient", 4 * b * p)]
 }
 
 impl Tally {
-    pub(crate) fn new(world: &World, directions: &[usize]) -> Tally {
+    pub(crate) fn new(world: &World, request: &Request) -> Tally {
         let (b, p) = (world.members() as u64, world.plan.layout.len() as u64);
+        let geometry = &world.geometry;
+        let sums = Sums::new(&world.plan, &geometry.effects, &request.gradient);
+        let of_sums = sums.as_ref().map_or_else(Vec::new, |s| s.sizes(&geometry.shape, &geometry.effects, b));
         let mut buffers = Buffers::new();
-        for (name, bytes) in tally_sizes(b, p) {
+        for (name, bytes) in tally_sizes(b, p).into_iter().chain(of_sums) {
             let buffer = world.gpu.buffer(name, bytes).unwrap_or_else(|e| {
                 world.gpu.keep(e);
                 world.gpu.small()
             });
             buffers.insert(name, buffer);
         }
+        let directions = &request.sensitivities;
         world.observer.extend_tally(&world.gpu, directions, &mut buffers);
-        Tally { directions: directions.to_vec(), buffers }
+        Tally { directions: directions.clone(), buffers, sums }
     }
 
     pub(crate) fn get(&self, name: &'static str) -> &wgpu::Buffer {
         &self.buffers[name]
+    }
+
+    /// All buffers, for passes.
+    pub(crate) fn named(&self) -> Vec<(&'static str, &wgpu::Buffer)> {
+        self.buffers.iter().map(|(name, buffer)| (*name, buffer)).collect()
     }
 }

@@ -57,6 +57,11 @@ impl Effects {
         self.bits & FIELD_GRIPS != 0
     }
 
+    /// Numbers of effects that move the clamps' poses, and those among them that change the matrices.
+    pub(crate) fn hold_numbers(&self) -> [u32; 2] {
+        [&self.grip_rows.len(), &self.matrix_rows.len()].map(|n| *n as u32)
+    }
+
     /// Place among the matrices' slopes of a parameter of the clamps, by its row.
     pub(crate) fn matrix_row(&self, row: u32) -> Option<u32> {
         self.matrix_rows.iter().position(|r| *r == row as usize).map(|k| k as u32)

@@ -15,6 +15,7 @@ use crate::layout::EffectSite;
 use palpate_model::effects::cell::Part;
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
+use palpate_model::params::fields::Varied;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::InitialShape;
 use std::collections::HashMap;
@@ -35,7 +36,7 @@ pub(crate) struct Effects {
     pub(crate) bits: u32,
     pub(crate) slope_rows: u32,
     /// Parameters of changes in time.
-    aging_rows: u32,
+    pub(crate) aging_rows: u32,
     /// Parameters of the stress-free shape.
     rest_rows: u32,
     /// Parameters of how clamps are held: effect and number of each.
@@ -109,6 +110,12 @@ impl Effects {
             }
             e.stride += count;
         }
+        for field in &plan.fields {
+            e.bits |= match field.varied {
+                Varied::Modulus => FIELD_MODULUS,
+                Varied::Density => FIELD_DENSITY,
+            };
+        }
         e.matrix_rows = grips::matrix_rows(plan, &e.grip_rows);
         for (_, p) in e.points.iter_mut().chain(&mut e.cells) {
             (p.stride, p.rows) = (e.stride, e.rows);
@@ -130,6 +137,11 @@ impl Effects {
     /// Place of an effect among those on cells.
     pub(crate) fn cell_law(&self, effect: usize) -> Option<u32> {
         self.cells.iter().position(|c| c.0 == effect).map(|k| k as u32)
+    }
+
+    /// Number of effects on cells.
+    pub(crate) fn cell_laws(&self) -> u32 {
+        self.cells.len() as u32
     }
 
     /// True when some effect acts on cells.
