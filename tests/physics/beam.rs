@@ -202,11 +202,8 @@ fn a_beam_that_is_let_go_swings_as_timoshenko_says() {
 
 /// Mean upward displacement over the face at the beam's end [m]: no node of its own dent.
 fn tip(plan: &Plan, u: &[DVec3]) -> f64 {
-    let face = plan.body.patches.iter().filter(|p| p.normal.x > 0.9 && p.point.x > 0.99 * LENGTH);
-    let (sum, area) = face.fold((0.0, 0.0), |(sum, area), p| {
-        let nodes = plan.body.cells[p.cell as usize].nodes;
-        (sum + p.area * (0..8).map(|i| p.weights[i] * u[nodes[i] as usize].z).sum::<f64>(), area + p.area)
-    });
+    let face = plan.body.pieces().filter(|(p, _)| p.normal.x > 0.9 && p.point.x > 0.99 * LENGTH);
+    let (sum, area) = face.fold((0.0, 0.0), |(sum, area), (p, place)| (sum + p.area * place.at(u).z, area + p.area));
     sum / area
 }
 

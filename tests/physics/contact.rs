@@ -45,13 +45,9 @@ fn stiff_contact_limits_no_time_step() {
     s.time = Time { step: 0.01, steps: 60, start: 0.0, theta: 0.6, ..Time::default() };
     let plan = scenes::plan(&s);
     let body = &plan.body;
-    let point = |p: &palpate_model::space::body::Patch, u: &[DVec3]| -> DVec3 {
-        let nodes = body.cells[p.cell as usize].nodes;
-        p.point + (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum::<DVec3>()
-    };
     let states = run::states(&plan);
-    let lowest =
-        states.iter().flat_map(|s| body.patches.iter().map(|p| point(p, &s.displacement).z)).fold(f64::INFINITY, f64::min);
+    let heights = states.iter().flat_map(|s| body.pieces().map(|(p, place)| (p.point + place.at(&s.displacement)).z));
+    let lowest = heights.fold(f64::INFINITY, f64::min);
     println!("deepest point of a patch: {lowest:.2e} m");
     // A patch may dip in by the smoothing width (a twentieth of a cell), no more.
     assert!(lowest > -0.05 * 0.012, "nothing falls through: {lowest}");

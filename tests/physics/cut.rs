@@ -55,9 +55,8 @@ fn block(cut: f64, turn: DMat3, ghost: f64) -> (f64, f64) {
     let body = &plan.body;
     // Mean sag over the top face, from the patches that lie in it.
     let (mut sag, mut area) = (0.0, 0.0);
-    for p in body.patches.iter().filter(|p| p.normal.dot(up) > 0.9) {
-        let nodes = body.cells[p.cell as usize].nodes;
-        sag -= p.area * (0..8).map(|i| p.weights[i] * u[nodes[i] as usize].dot(up)).sum::<f64>();
+    for (p, place) in body.pieces().filter(|(p, _)| p.normal.dot(up) > 0.9) {
+        sag -= p.area * place.at(&u).dot(up);
         area += p.area;
     }
     (eigen[eigen.len() - 1] / eigen[0], sag / area / (1000.0 * top * top / (2.0 * 5000.0)))

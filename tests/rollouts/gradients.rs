@@ -58,11 +58,9 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
             let k = (((time - scene.time.start) / scene.time.step).round().max(0.0) as usize).min(states.len() - 1);
             let u = &states[k].displacement;
             let points = body
-                .patches
-                .iter()
-                .map(|p| {
-                    let nodes = body.cells[p.cell as usize].nodes;
-                    let moved: DVec3 = (0..8).map(|i| p.weights[i] * u[nodes[i] as usize]).sum();
+                .pieces()
+                .map(|(p, place)| {
+                    let moved = place.at(u);
                     // A little off the surface, in and out.
                     let off = 0.002 * (1.0 + 40.0 * p.point.x).sin();
                     let position = p.point + moved + off * p.normal;

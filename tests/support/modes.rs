@@ -29,8 +29,7 @@ impl Mode {
 fn momentum(plan: &Plan, physics: &Physics, u: &[DVec3]) -> Vec<DVec3> {
     let mut p: Vec<DVec3> = plan.body.node_volume.iter().zip(u).map(|(w, u)| physics.density * *w * *u).collect();
     for (site, m) in plan.masses.iter().zip(&physics.masses) {
-        let at: DVec3 = (0..8).map(|i| site.weights[i] * u[site.nodes[i] as usize]).sum();
-        (0..8).for_each(|i| p[site.nodes[i] as usize] += *m * site.weights[i] * at);
+        site.spread(*m * site.at(u), &mut p);
     }
     p
 }

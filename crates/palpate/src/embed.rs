@@ -126,6 +126,7 @@ mod tests {
             grid,
             cells,
             patches: vec![],
+            surface: Default::default(),
             ghosts: vec![],
             band: Band::default(),
             volume: 0.002,

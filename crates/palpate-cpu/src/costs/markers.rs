@@ -129,14 +129,14 @@ impl Carried {
     /// Adds the gradient by the displacement, given that by the position.
     pub fn adjoint(&self, site: &MarkerSite, adj: DVec3, out: &mut [DVec3]) {
         let Some(polar) = &self.polar else {
-            site.nodes.iter().zip(&site.position_weights).for_each(|(&n, w)| out[n as usize] += *w * adj);
+            site.stencil.get().spread(adj, out);
             return;
         };
         // adj·R(ω×s) = ω·(s × Rᵀadj), and w·ax(RᵀdF) = (R [w]×):dF with w = G⁻¹ (s × Rᵀadj).
         let w: DVec3 = polar.g_inv * site.stalk.cross(polar.r.transpose() * adj);
         let adj_f: DMat3 = polar.r * cross_matrix(w);
-        for (k, &n) in site.nodes.iter().enumerate() {
-            out[n as usize] += site.position_weights[k] * adj + adj_f * site.gradient_weights[k];
+        for (k, &n) in site.stencil.nodes.iter().enumerate() {
+            out[n as usize] += site.stencil.value[k] * adj + adj_f * site.stencil.gradient[k];
         }
     }
 }

@@ -10,13 +10,14 @@ use palpate_model::mechanics::contact;
 use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::body::{Body, Patch};
+use palpate_model::space::stencil::Stencil;
 
 /// A surface patch that touches a plane within a step: sums over the instants of [`contact::instants`].
 pub struct Touch<'a> {
-    /// Nodes of the patch.
-    nodes: &'a [u32; 8],
-    /// Shape function means over the patch.
-    weights: &'a [f64; 8],
+    /// Number of the patch.
+    patch: usize,
+    /// Its mean place.
+    place: Stencil<'a>,
     /// Area [m²].
     pub area: f64,
     /// Pressure [Pa].
@@ -30,16 +31,9 @@ pub struct Touch<'a> {
 }
 
 impl Touch<'_> {
-    fn mean(&self, v: &[DVec3]) -> DVec3 {
-        self.nodes.iter().zip(self.weights).map(|(n, w)| *w * v[*n as usize]).sum()
-    }
-
     /// Adds −area · f, spread over the nodes.
     fn add(&self, f: DVec3, out: &mut [DVec3]) {
-        let f = self.area * f;
-        for (n, w) in self.nodes.iter().zip(self.weights) {
-            out[*n as usize] -= *w * f;
-        }
+        self.place.spread(-self.area * f, out);
     }
 }
 
@@ -60,9 +54,9 @@ pub fn touches<'s>(
     let width = contact::WIDTH * body.grid.h;
     let instants = contact::instants(theta);
     let along = contact::acts_along(theta);
-    body.patches.iter().filter_map(move |patch| {
-        let nodes = &body.cells[patch.cell as usize].nodes;
-        let at = |u: &[DVec3]| (0..8).fold(patch.point, |x, i| x + patch.weights[i] * u[nodes[i] as usize]);
+    body.patches.iter().enumerate().filter_map(move |(number, patch)| {
+        let place = body.surface.get(number);
+        let at = |u: &[DVec3]| patch.point + place.at(u);
         let new = at(u1);
         let old = if along { at(u0) } else { new };
         let n = plane.normal[0];
@@ -70,15 +64,8 @@ pub fn touches<'s>(
             return None;
         }
         let gaps = [new, old].map(|x| n.dot(x) - plane.height);
-        let mut t = Touch {
-            nodes,
-            weights: &patch.weights,
-            area: patch.area,
-            pressure: 0.0,
-            slopes: [0.0; 2],
-            lever: DVec3::ZERO,
-            energy: 0.0,
-        };
+        let mut t =
+            Touch { patch: number, place, area: patch.area, pressure: 0.0, slopes: [0.0; 2], lever: DVec3::ZERO, energy: 0.0 };
         for (weight, at) in instants.into_iter().filter(|i| i.0 > 0.0) {
             let gap = gaps[0] + (1.0 - at) * (gaps[1] - gaps[0]);
             let (pressure, slope) = contact::pressure(gap, plane.stiffness, width);
@@ -116,7 +103,7 @@ impl<'a> Contact<'a> {
         for plane in self.c.planes {
             let n = plane.normal[0];
             for (_, t) in self.touches(plane, u1) {
-                t.add(t.slopes[1] * n.dot(t.mean(d)) * n, out);
+                t.add(t.slopes[1] * n.dot(t.place.at(d)) * n, out);
             }
         }
     }
@@ -136,10 +123,11 @@ impl Term for Contact<'_> {
         for plane in self.c.planes {
             let n = plane.normal[0];
             let nn = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
-            for (patch, t) in self.touches(plane, u1) {
-                let places = &self.c.places.cells[patch.cell as usize];
-                for b in 0..64 {
-                    matrix.values[places[b] as usize] += nn * (-t.area * t.slopes[0] * t.weights[b / 8] * t.weights[b % 8]);
+            for (_, t) in self.touches(plane, u1) {
+                let w = t.place.value;
+                for (b, place) in self.c.places.patches.of(t.patch).iter().enumerate() {
+                    let both = w[b / w.len()] * w[b % w.len()];
+                    matrix.values[*place as usize] += nn * (-t.area * t.slopes[0] * both);
                 }
             }
         }
@@ -176,7 +164,7 @@ impl Term for Contact<'_> {
         for (plane, g) in self.c.planes.iter().zip(&mut gradient.physics.planes) {
             let [n, by_theta, by_phi] = plane.normal;
             for (_, t) in self.touches(plane, u1) {
-                let z = -t.area * t.mean(z);
+                let z = -t.area * t.place.at(z);
                 let along = z.dot(n);
                 if plane.scales {
                     gradient.physics.youngs_modulus += t.pressure / self.c.physics().youngs_modulus * along;

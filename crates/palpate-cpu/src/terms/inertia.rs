@@ -35,13 +35,8 @@ impl Inertia<'_> {
     /// Adds m a of the point masses, for masses `m`.
     fn add_points(&self, m: &[f64], a: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
         for (site, m) in self.c.plan.masses.iter().zip(m) {
-            let mut mean = DVec3::ZERO;
-            for i in 0..8 {
-                mean += site.weights[i] * a(site.nodes[i] as usize);
-            }
-            for i in 0..8 {
-                out[site.nodes[i] as usize] += *m * site.weights[i] * mean;
-            }
+            let mean: DVec3 = site.nodes.iter().zip(site.value).map(|(n, w)| *w * a(*n as usize)).sum();
+            site.spread(*m * mean, out);
         }
     }
 
@@ -86,9 +81,10 @@ impl Term for Inertia<'_> {
             add_to_diagonal(&mut matrix.values[self.c.pattern.blocks.diagonal[i]], m * factor);
         }
         for (k, (site, m)) in self.c.plan.masses.iter().zip(&self.c.physics().masses).enumerate() {
-            for b in 0..64 {
-                let s = m * t.displacement * site.weights[b / 8] * site.weights[b % 8];
-                add_to_diagonal(&mut matrix.values[self.c.places.masses[k][b] as usize], s);
+            let w = site.value;
+            for (b, place) in self.c.places.masses.of(k).iter().enumerate() {
+                let s = m * t.displacement * w[b / w.len()] * w[b % w.len()];
+                add_to_diagonal(&mut matrix.values[*place as usize], s);
             }
         }
     }
@@ -146,7 +142,9 @@ impl Term for Inertia<'_> {
             gradient.physics.gravity -= m * z[i];
         }
         for (k, (site, m)) in self.c.plan.masses.iter().zip(&p.masses).enumerate() {
-            let mean = |v: &dyn Fn(usize) -> DVec3| (0..8).map(|i| site.weights[i] * v(site.nodes[i] as usize)).sum::<DVec3>();
+            let mean = |v: &dyn Fn(usize) -> DVec3| -> DVec3 {
+                site.nodes.iter().zip(site.value).map(|(n, w)| *w * v(*n as usize)).sum()
+            };
             let z = mean(&|i| z[i]);
             gradient.physics.masses[k] += z.dot(mean(&|i| self.pull(u1, i)));
             gradient.physics.gravity -= *m * z;

@@ -12,6 +12,7 @@ use palpate_model::mechanics::contact;
 use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
+use palpate_model::space::stencil::Stencil;
 
 /// An effect of one member with its parameters, ready to act.
 #[derive(Clone)]
@@ -48,26 +49,22 @@ struct At<'a> {
     point: &'static dyn Point,
     place: Place,
     z: &'a [f64],
-    nodes: &'a [u32],
-    weights: &'a [f64],
+    stencil: Stencil<'a>,
     /// Node number for effects of nodes.
     node: usize,
-    /// Cell of the patch.
-    cell: Option<usize>,
+    /// Number of the patch for effects of the surface.
+    patch: Option<usize>,
     /// Number of the plane for effects of contact.
     plane: Option<usize>,
 }
 
 impl At<'_> {
     fn mean(&self, v: &[DVec3]) -> DVec3 {
-        self.nodes.iter().zip(self.weights).map(|(n, w)| *w * v[*n as usize]).sum()
+        self.stencil.at(v)
     }
 
     fn add(&self, f: [f64; 3], out: &mut [DVec3]) {
-        let f = DVec3::from_array(f);
-        for (n, w) in self.nodes.iter().zip(self.weights) {
-            out[*n as usize] += *w * f;
-        }
+        self.stencil.spread(DVec3::from_array(f), out);
     }
 }
 
@@ -106,16 +103,15 @@ impl<'a> PointLaws<'a> {
             momentum: self.c.inertia.map_or(0.0, |t| t.velocity),
         };
         let mut patches = |point: &'static dyn Point, plane: Option<(usize, &PlaneNow)>, z: &mut [f64]| {
-            for patch in &body.patches {
-                let nodes = &body.cells[patch.cell as usize].nodes;
-                let at = |v: &[DVec3]| -> DVec3 { (0..8).map(|i| patch.weights[i] * v[nodes[i] as usize]).sum() };
+            for (number, (patch, stencil)) in body.patches.iter().zip(body.surface.iter()).enumerate() {
+                let at = |v: &[DVec3]| stencil.at(v);
                 put(z, 0, patch.point + at(u1));
                 put(z, OLD, patch.point + at(past.u));
                 put(z, VELOCITY, at(past.v));
                 let place = Place { rest: patch.point, normal: patch.normal, measure: patch.area, ..place };
                 if !point.skips(&place, z) {
-                    let (plane, cell) = (plane.map(|p| p.0), Some(patch.cell as usize));
-                    visit(&At { point, place, z, nodes, weights: &patch.weights, node: 0, cell, plane });
+                    let (plane, patch) = (plane.map(|p| p.0), Some(number));
+                    visit(&At { point, place, z, stencil, node: 0, patch, plane });
                 }
             }
         };
@@ -136,7 +132,8 @@ impl<'a> PointLaws<'a> {
                     let measure = acting.shares.as_ref().map_or(body.node_volume[i], |s| s.0[i]);
                     let place = Place { rest: *x, measure, ..place };
                     if !point.skips(&place, z) {
-                        visit(&At { point, place, z, nodes: &[i as u32], weights: &[1.0], node: i, cell: None, plane: None });
+                        let stencil = Stencil { nodes: &[i as u32], value: &[1.0], gradient: &[] };
+                        visit(&At { point, place, z, stencil, node: i, patch: None, plane: None });
                     }
                 }
             }
@@ -212,12 +209,12 @@ impl Term for PointLaws<'_> {
                 if curvature != Curvature::Exact && !positive(h) {
                     return;
                 }
-                match at.cell {
+                match at.patch {
                     None => matrix.values[self.c.pattern.blocks.diagonal[at.node]] += h,
-                    Some(cell) => {
-                        for b in 0..64 {
-                            let place = self.c.places.cells[cell][b] as usize;
-                            matrix.values[place] += h * (at.weights[b / 8] * at.weights[b % 8]);
+                    Some(patch) => {
+                        let w = at.stencil.value;
+                        for (b, place) in self.c.places.patches.of(patch).iter().enumerate() {
+                            matrix.values[*place as usize] += h * (w[b / w.len()] * w[b % w.len()]);
                         }
                     }
                 }

@@ -14,6 +14,8 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, Scene};
+use palpate_model::space::body::Patch;
+use palpate_model::space::stencil::Stencil;
 use std::ops::ControlFlow;
 
 /// Single precision through a few steps and their solves (to 1e-5 or so of the forces) leaves derivatives that are right to a
@@ -38,13 +40,11 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     let (mut frames, mut noise) = (Vec::new(), Noise(11));
     let theta = bare.theta.clone();
     let visit = |_: usize, s: palpate_engine::Snapshot, _: Vec<palpate_engine::FrameResiduals>| {
-        let place = |p: &palpate_model::space::body::Patch| {
-            let nodes = &body.cells[p.cell as usize].nodes;
-            p.point + (0..8).map(|i| p.weights[i] * s.displacement[nodes[i] as usize]).sum::<DVec3>()
+        let mut point = |(p, place): (&Patch, Stencil)| ObservedPoint {
+            position: p.point + place.at(&s.displacement) + off * body.grid.h * noise.vector(),
+            camera: u32::from(p.normal.x < 0.0),
         };
-        let mut point =
-            |p| ObservedPoint { position: place(p) + off * body.grid.h * noise.vector(), camera: u32::from(p.normal.x < 0.0) };
-        let points = body.patches.iter().map(&mut point).collect();
+        let points = body.pieces().map(&mut point).collect();
         frames.push(Frame { time: scene.time.start + s.time + 0.2 * scene.time.step, points, ..Frame::default() });
         ControlFlow::Continue(())
     };

@@ -97,10 +97,10 @@ impl SiteTables {
         let (mut entries, mut transposed) = (Vec::new(), Vec::new());
         for (s, site) in plan.observation.markers.iter().enumerate() {
             tables.sites.push(place(plan, site));
-            for (k, &node) in site.nodes.iter().enumerate() {
-                let g = site.gradient_weights[k].as_vec3();
+            for (k, &node) in site.stencil.nodes.iter().enumerate() {
+                let g = site.stencil.gradient[k].as_vec3();
                 transposed.push((node, s as u32, entries.len() as u32));
-                entries.push((s as u32, node, [g.x, g.y, g.z, site.position_weights[k] as f32]));
+                entries.push((s as u32, node, [g.x, g.y, g.z, site.stencil.value[k] as f32]));
             }
         }
         tables.nodes = Rows::new(tables.sites.len(), &entries);

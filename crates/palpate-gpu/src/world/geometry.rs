@@ -29,6 +29,16 @@ pub(crate) struct Geometry {
     pub(crate) effects: Effects,
 }
 
+/// Weights of a stencil of eight nodes, as all on cut cells are.
+fn eight(weights: &[f64]) -> [f32; 8] {
+    std::array::from_fn(|i| weights[i] as f32)
+}
+
+/// Its nodes.
+fn eight_nodes(nodes: &[u32]) -> [u32; 8] {
+    std::array::from_fn(|i| nodes[i])
+}
+
 fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w as f32]
 }
@@ -81,11 +91,12 @@ impl Geometry {
         let patches: Vec<Patch> = body
             .patches
             .iter()
-            .map(|p| Patch { point: vec4(p.point, p.area), weights: p.weights.map(|w| w as f32), cell: p.cell, pad: [0; 3] })
+            .zip(body.surface.iter())
+            .map(|(p, s)| Patch { point: vec4(p.point, p.area), weights: eight(s.value), cell: p.cell, pad: [0; 3] })
             .collect();
         let rest: Vec<[f32; 4]> = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| vec4(*x, *v)).collect();
         let masses: Vec<Mass> =
-            plan.masses.iter().map(|m| Mass { nodes: m.nodes, weights: m.weights.map(|w| w as f32) }).collect();
+            plan.masses.iter().map(|m| Mass { nodes: eight_nodes(m.nodes), weights: eight(m.value) }).collect();
 
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
         let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();

@@ -7,6 +7,7 @@ use crate::cutcells::distances::{SAMPLES, STEPS, place};
 use crate::cutcells::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::Shape;
 use crate::space::body::{Band, BandCell, Body};
+use crate::space::stencil::StencilBuf;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -129,20 +130,9 @@ impl AffineFit {
     }
 }
 
-/// Weights that carry a material point and its surroundings with the nodes.
-#[derive(Clone, Debug, Default)]
-pub struct AffineWeights {
-    /// Simulation nodes.
-    pub nodes: Vec<u32>,
-    /// Weights for the point's position; sum to one and reproduce affine fields.
-    pub position_weights: Vec<f64>,
-    /// Weights for the local deformation gradient [1/m]; sum to zero and reproduce affine fields.
-    pub gradient_weights: Vec<DVec3>,
-}
-
-/// Weights for a point of the rest configuration [m]: its position by trilinear interpolation if it lies in an active cell, else
+/// Stencil that carries a point of the rest configuration [m] and its surroundings: its position by trilinear interpolation if it lies in an active cell, else
 /// by the affine fit; the gradient always by the affine fit of radius about `radius` [m] around the point.
-pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f64) -> AffineWeights {
+pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f64) -> StencilBuf {
     let fit = AffineFit::new(body, lookup, point, radius);
     let mut nodes = fit.nodes.clone();
     let mut gradient_weights = fit.gradient();
@@ -162,7 +152,7 @@ pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f6
         }
         None => position_weights = fit.value(point),
     }
-    AffineWeights { nodes, position_weights, gradient_weights }
+    StencilBuf { nodes, value: position_weights, gradient: gradient_weights }
 }
 
 /// The active cell that holds a point of the rest configuration [m], with local coordinates; on a shared face either of the two.

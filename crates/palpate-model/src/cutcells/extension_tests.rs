@@ -96,12 +96,7 @@ fn marker_weights_follow_affine_motion() {
         for away in [0.0, 0.1] {
             let p = shape.closest_point(body.center + DVec3::new(0.2, 0.3, 1.0)) + DVec3::splat(away);
             let w = affine_weights(&body, &lookup, p, 0.14);
-            let site = crate::observation::MarkerSite {
-                nodes: w.nodes,
-                position_weights: w.position_weights,
-                gradient_weights: w.gradient_weights,
-                ..Default::default()
-            };
+            let site = crate::observation::MarkerSite { stencil: w, ..Default::default() };
             let (x, g) = site.carry(|n| f * body.nodes[n] + shift);
             assert!((x - (f * p + shift)).length() < 1e-10, "{x}");
             assert!((0..3).all(|c| (g.col(c) - f.col(c)).length() < 1e-9), "{g}");

@@ -1,6 +1,7 @@
 //! Where tracked things sit on the body: markers, also on stalks, and tracked points of the body itself.
 
 use super::channel::ReadingKind;
+use crate::space::stencil::StencilBuf;
 use glam::{DMat3, DVec3};
 
 /// Where points that are tracked by themselves, without markers, lie on the body at rest.
@@ -24,32 +25,27 @@ pub struct MarkerRest {
 }
 
 /// A marker that is carried rigidly by the body at its surface point:
-/// `x = Σ position_weights·x_i + R·stalk`, R the rotation of `F = Σ x_i ⊗ gradient_weights`.
+/// `x = Σ w x_i + R·stalk`, R the rotation of `F = Σ x_i ⊗ g_i`.
 #[derive(Clone, Debug, Default)]
 pub struct MarkerSite {
     /// Label in the recording.
     pub name: String,
     /// [`ReadingKind::Marker`] or [`ReadingKind::Track`]: which channel its readings belong to.
     pub kind: ReadingKind,
-    /// Simulation nodes around the attachment.
-    pub nodes: Vec<u32>,
-    /// Weights of the nodes for the attachment point; they sum to one.
-    pub position_weights: Vec<f64>,
-    /// Weights of the nodes for the local deformation gradient [1/m]; they sum to zero.
-    pub gradient_weights: Vec<DVec3>,
+    /// The attachment point, and the deformation gradient around it.
+    pub stencil: StencilBuf,
     /// Marker centre minus attachment point at rest [m].
     pub stalk: DVec3,
 }
 
 impl MarkerSite {
-    /// Attachment point and deformation gradient at node positions `x(i)` [m].
+    /// Attachment point and deformation gradient at node positions `x(i)` [m], or their changes at the nodes' changes.
     pub fn carry(&self, x: impl Fn(usize) -> DVec3) -> (DVec3, DMat3) {
-        let mut p = DVec3::ZERO;
-        let mut f = DMat3::ZERO;
-        for (k, &n) in self.nodes.iter().enumerate() {
-            let xi = x(n as usize);
-            p += self.position_weights[k] * xi;
-            let g = self.gradient_weights[k];
+        let s = &self.stencil;
+        let (mut p, mut f) = (DVec3::ZERO, DMat3::ZERO);
+        for ((n, w), g) in s.nodes.iter().zip(&s.value).zip(&s.gradient) {
+            let xi = x(*n as usize);
+            p += *w * xi;
             f += DMat3::from_cols(xi * g.x, xi * g.y, xi * g.z);
         }
         (p, f)

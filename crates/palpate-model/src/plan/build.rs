@@ -15,10 +15,11 @@ use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
-use crate::plan::{ClampCell, ClampSite, Clock, MassSite, Plan, PlaneSite};
+use crate::plan::{ClampCell, ClampSite, Clock, Plan, PlaneSite};
 use crate::scene::{Clamp, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
+use crate::space::stencil::Stencils;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
@@ -72,12 +73,11 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);
-    let masses = scene
-        .masses
-        .iter()
-        .enumerate()
-        .map(|(i, m)| mass_site(&format!("mass.{i}.point"), m.point, &body))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut masses = Stencils::default();
+    for (i, m) in scene.masses.iter().enumerate() {
+        let (nodes, weights) = mass_site(&format!("mass.{i}.point"), m.point, &body)?;
+        masses.push(&nodes, &weights);
+    }
     observation.markers = marker_sites(marker_rest, &body, shape.as_ref())?;
     observation.markers.extend(sites::track_sites(&observation.tracks, &body, shape.as_ref())?);
     sites::check_nodes(&observation, &body)?;
@@ -189,18 +189,16 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
     Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })
 }
 
-fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<MassSite, PlanError> {
+fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<([u32; 8], [f64; 8]), PlanError> {
     if let Some((cell, xi)) = active_cell(body, point) {
-        return Ok(MassSite { nodes: body.cells[cell].nodes, weights: shape_functions(xi) });
+        return Ok((body.cells[cell].nodes, shape_functions(xi)));
     }
     let h = body.grid.h;
     let local = |c: &body::Cell| (point - body.grid.position(c.lattice)) / h;
     let gap = |c: &body::Cell| (local(c) - local(c).clamp(DVec3::ZERO, DVec3::ONE)).length();
     let nearest = body.cells.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
     match nearest {
-        Some(c) if gap(c) <= 1.0 => {
-            Ok(MassSite { nodes: c.nodes, weights: shape_functions(local(c).clamp(DVec3::ZERO, DVec3::ONE)) })
-        }
+        Some(c) if gap(c) <= 1.0 => Ok((c.nodes, shape_functions(local(c).clamp(DVec3::ZERO, DVec3::ONE)))),
         _ => Err(error(
             key,
             format!(

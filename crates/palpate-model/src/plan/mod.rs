@@ -13,6 +13,7 @@ use crate::params::fields::Field;
 use crate::params::{Layout, ParamKey};
 use crate::scene::{InitialShape, Solver};
 use crate::space::body::Body;
+use crate::space::stencil::Stencils;
 use glam::{DMat3, DVec3};
 use scheme::{Scheme, Stage};
 use std::sync::Arc;
@@ -38,7 +39,7 @@ pub struct Plan {
     /// Held regions.
     pub clamps: Vec<ClampSite>,
     /// Point masses.
-    pub masses: Vec<MassSite>,
+    pub masses: Stencils,
     /// Fields on the body.
     pub fields: Vec<Field>,
     /// Time steps.
@@ -128,15 +129,6 @@ impl ClampCell {
         free.take(&self.held);
         free
     }
-}
-
-/// A point mass' place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassSite {
-    /// Nodes of the cell that carries it.
-    pub nodes: [u32; 8],
-    /// Shape functions at the point; they sum to one.
-    pub weights: [f64; 8],
 }
 
 /// Time steps.

@@ -8,6 +8,7 @@ pub(crate) use build::{Parts, build_parts, world_cell};
 
 use crate::cutcells::distances::Distances;
 use crate::cutcells::grid::Grid;
+use crate::space::stencil::{Stencil, Stencils};
 use glam::DVec3;
 
 /// A body cut out of a lattice; constant over a simulation, in world coordinates of the rest configuration.
@@ -24,6 +25,8 @@ pub struct Body {
     pub cells: Vec<Cell>,
     /// Surface of the body in small pieces, grouped by cell in increasing order.
     pub patches: Vec<Patch>,
+    /// Mean place of every patch.
+    pub surface: Stencils,
     /// Ghost penalty lines: squared second differences of u on cut cells' faces.
     pub ghosts: Vec<GhostLine>,
     /// The body and the cells around it, where observed points are looked up.
@@ -39,6 +42,11 @@ pub struct Body {
 }
 
 impl Body {
+    /// Every patch of the surface with its mean place.
+    pub fn pieces(&self) -> impl Iterator<Item = (&Patch, Stencil<'_>)> {
+        self.patches.iter().zip(self.surface.iter())
+    }
+
     /// Rest position of the middle of every cell [m].
     pub fn middles(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.cells.iter().map(|c| self.grid.position(c.lattice) + 0.5 * self.grid.h)
@@ -70,12 +78,10 @@ impl Cell {
 /// A piece of the surface inside one cell; forces and gaps are taken as means over it.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    /// Number of the cell in [`Body::cells`].
+    /// Number of the cell or element that it belongs to.
     pub cell: u32,
     /// Area [m²].
     pub area: f64,
-    /// Mean of the eight shape functions over the piece; sums to one.
-    pub weights: [f64; 8],
     /// Mean outward unit normal (area-weighted, normalised).
     pub normal: DVec3,
     /// Centroid at rest [m].

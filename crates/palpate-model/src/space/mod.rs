@@ -2,3 +2,4 @@
 
 pub mod body;
 pub mod pattern;
+pub mod stencil;

@@ -2,6 +2,7 @@
 
 use crate::plan::Plan;
 use crate::space::body::Body;
+use crate::space::stencil::Stencils;
 use std::collections::BTreeMap;
 
 /// Block-compressed rows over the simulation nodes (3 × 3 blocks), with the places where cells, ghost lines and point
@@ -116,8 +117,10 @@ pub struct Places {
     pub cells: Vec<[u32; 64]>,
     /// Blocks that ghost lines add to, increasing, and the factor on the identity there: the sum over its lines.
     pub ghosts: Vec<(u32, f64)>,
-    /// Per point mass, the 64 blocks of its nodes.
-    pub masses: Vec<[u32; 64]>,
+    /// Blocks of the nodes of every surface patch.
+    pub patches: Squares,
+    /// Blocks of the nodes of every point mass.
+    pub masses: Squares,
 }
 
 impl Places {
@@ -126,8 +129,33 @@ impl Places {
         Places {
             cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
             ghosts: ghosts(&plan.body, pattern),
-            masses: plan.masses.iter().map(|m| pattern.blocks8(&m.nodes)).collect(),
+            patches: Squares::new(pattern, &plan.body.surface),
+            masses: Squares::new(pattern, &plan.masses),
         }
+    }
+}
+
+/// Places of the blocks of all pairs of a stencil's nodes, stencil by stencil, row by row.
+#[derive(Debug, Default)]
+pub struct Squares {
+    starts: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl Squares {
+    fn new(pattern: &Pattern, stencils: &Stencils) -> Squares {
+        let mut all = Squares { starts: vec![0], places: Vec::new() };
+        for s in stencils.iter() {
+            let pairs = s.nodes.iter().flat_map(|a| s.nodes.iter().map(move |b| (*a, *b)));
+            all.places.extend(pairs.map(|(a, b)| pattern.blocks.find(a, b) as u32));
+            all.starts.push(all.places.len() as u32);
+        }
+        all
+    }
+
+    /// Blocks (a, b) of stencil `s` `[n · n]`.
+    pub fn of(&self, s: usize) -> &[u32] {
+        &self.places[self.starts[s] as usize..self.starts[s + 1] as usize]
     }
 }
 

@@ -6,6 +6,7 @@ use crate::cutcells::grid::{shape_functions, shape_gradients};
 use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, TrackRest};
 use crate::shape::Shape;
 use crate::space::body::Body;
+use crate::space::stencil::StencilBuf;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -49,13 +50,10 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Sha
             ),
         ));
     }
-    let w = affine_weights(body, lookup, surface, MARKER_RADIUS * h);
     Ok(MarkerSite {
         name: m.name.clone(),
         kind: ReadingKind::Marker,
-        nodes: w.nodes,
-        position_weights: w.position_weights,
-        gradient_weights: w.gradient_weights,
+        stencil: affine_weights(body, lookup, surface, MARKER_RADIUS * h),
         stalk: m.position - surface,
     })
 }
@@ -90,17 +88,18 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
 
 /// A point of the body itself: interpolated in its cell, or continued to from the nodes around it.
 fn track_site(name: String, place: DVec3, body: &Body, lookup: &NodeLookup) -> MarkerSite {
-    let (nodes, position_weights, gradient_weights) = match active_cell(body, place) {
+    let stencil = match active_cell(body, place) {
         Some((cell, xi)) => {
             let gradients = shape_gradients(xi).map(|g| g / body.grid.h);
-            (body.cells[cell].nodes.to_vec(), shape_functions(xi).to_vec(), gradients.to_vec())
+            StencilBuf {
+                nodes: body.cells[cell].nodes.to_vec(),
+                value: shape_functions(xi).to_vec(),
+                gradient: gradients.to_vec(),
+            }
         }
-        None => {
-            let w = affine_weights(body, lookup, place, MARKER_RADIUS * body.grid.h);
-            (w.nodes, w.position_weights, w.gradient_weights)
-        }
+        None => affine_weights(body, lookup, place, MARKER_RADIUS * body.grid.h),
     };
-    MarkerSite { name, kind: ReadingKind::Track, nodes, position_weights, gradient_weights, stalk: DVec3::ZERO }
+    MarkerSite { name, kind: ReadingKind::Track, stencil, stalk: DVec3::ZERO }
 }
 
 /// Compares the nodes that displacements count with those of the body.

@@ -5,6 +5,7 @@ use crate::cutcells::cut::{CellCut, Lattice, POINTS27, cut_cell};
 use crate::cutcells::extension;
 use crate::cutcells::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::Shape;
+use crate::space::stencil::Stencils;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -196,6 +197,7 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         nodes.push(grid.position(grid.coordinates(index)));
     }
     let (mut active, mut patches) = (Vec::with_capacity(found.len()), Vec::new());
+    let mut surface = Stencils::default();
     let mut node_volume = vec![0.0; nodes.len()];
     let (mut fractions, mut moment) = (0.0, DVec3::ZERO);
     let basis = POINTS27.map(shape_functions);
@@ -209,13 +211,10 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
             moment += (low + POINTS27[q] * h) * cut.weights[q];
         }
         fractions += cut.fraction;
-        patches.extend(cut.pieces.iter().map(|p| Patch {
-            cell: n as u32,
-            area: p.area,
-            weights: p.weights,
-            normal: p.normal,
-            point: p.point,
-        }));
+        for p in &cut.pieces {
+            surface.push(&ids, &p.weights);
+            patches.push(Patch { cell: n as u32, area: p.area, normal: p.normal, point: p.point });
+        }
         active.push(Cell { lattice, nodes: ids, fraction: cut.fraction, weights: cut.weights });
     }
     let ghosts = ghost_lines(&grid, &active);
@@ -232,6 +231,7 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         node_volume,
         cells: active,
         patches,
+        surface,
         ghosts,
         band: super::Band::default(),
     };

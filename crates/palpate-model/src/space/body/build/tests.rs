@@ -19,10 +19,11 @@ fn check(body: &Body) {
     assert!(body.cells.is_sorted_by_key(|c| body.grid.index(c.lattice)) && body.patches.is_sorted_by_key(|p| p.cell));
     // A closed surface has no net normal, and its flux of x is three times the volume (both up to the chords of pieces: exact here,
     // as every piece of the discrete surface is flat within a tetrahedron; only the mean normal of a patch is rounded to unit length).
-    for p in &body.patches {
-        assert!((p.weights.iter().sum::<f64>() - 1.0).abs() < 1e-10 && (p.normal.length() - 1.0).abs() < 1e-12);
+    for (p, s) in body.pieces() {
+        assert!((s.value.iter().sum::<f64>() - 1.0).abs() < 1e-10 && (p.normal.length() - 1.0).abs() < 1e-12);
         let cell = &body.cells[p.cell as usize];
-        let x: DVec3 = (0..8).map(|i| body.nodes[cell.nodes[i] as usize] * p.weights[i]).sum();
+        let x = s.at(&body.nodes);
+        assert_eq!(s.nodes, cell.nodes);
         assert!((x - p.point).length() < 1e-9 * body.grid.h, "weights reproduce the centroid");
     }
 }
