@@ -97,11 +97,19 @@ enum Verb {
     },
     /// Fit every measured recording and print what docs/real-data.md says of them
     Real,
-    /// Run all tests, installing Mesa's software graphics adapter first where there is none and it may be installed
+    /// Run the tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
-        /// Further arguments for `cargo test`
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        more: Vec<String>,
+        /// Also the slow ones: whole recoveries and blind cases
+        #[arg(long)]
+        full: bool,
+        /// Only those of this package
+        #[arg(long = "package", short, value_name = "NAME")]
+        packages: Vec<String>,
+        /// Only unit tests with debug assertions and overflow checks
+        #[arg(long)]
+        checked: bool,
+        /// Only tests whose name holds one of these
+        names: Vec<String>,
     },
     /// Say which graphics adapter would be used
     Adapter {
@@ -148,7 +156,9 @@ fn run(verb: Verb) -> Result<(), String> {
         }
         Verb::Same { only, backend, why, .. } => same::run(&same::Options { only, backend, why })?,
         Verb::Real => println!("\nwritten to {}", real::run()?.display()),
-        Verb::Test { more } => test::run(&table::root(), &more)?,
+        Verb::Test { full, packages, checked, names } => {
+            test::run(&table::root(), &test::Options { full, packages, names, checked })?;
+        }
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Tidy => {
             let found = tidy::check(&table::root());

@@ -57,7 +57,13 @@ pub const CASES: [Case; 16] = [
     case("effects of sensors", &["bounce", "effects-sensors"], Seen::Both, THREE),
     changed(
         case("first fit", &[], Seen::Points, &[]),
-        &[("cells = 16", "cells = 9"), ("= 0.006", "= 0.01"), ("starts     = 3", "starts     = 2"), ("= 20\n", "= 4\n")],
+        &[
+            ("cells = 16", "cells = 9"),
+            ("= 0.006", "= 0.01"),
+            ("starts     = 3", "starts     = 2"),
+            ("= 20\n", "= 4\n"),
+            ("[fit]", "pixel_stride = 2\n[fit]"),
+        ],
     ),
 ];
 

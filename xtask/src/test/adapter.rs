@@ -1,6 +1,5 @@
-//! All tests with one command: finds a graphics adapter, installs Mesa's software one where it may, and runs cargo.
+//! Finds a graphics adapter, and installs Mesa's software one where it may.
 
-use std::path::Path;
 use std::process::Command;
 
 /// What to install where we may not: by system.
@@ -58,35 +57,4 @@ pub fn find_adapter(may_install: bool) -> Result<String, String> {
         }
     }
     Err(format!("there is no usable graphics adapter. Install one:\n{ADVICE}"))
-}
-
-/// Runs all tests of the workspace at `root`, with `more` arguments for cargo.
-///
-/// # Errors
-/// No adapter although `PALPATE_GPU=require`, or a test fails.
-pub fn run(root: &Path, more: &[String]) -> Result<(), String> {
-    let found = find_adapter(true);
-    let required = std::env::var("PALPATE_GPU").is_ok_and(|v| v == "require");
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(root).args(["test", "--release", "--workspace"]).args(more);
-    match &found {
-        Ok(name) => {
-            println!("GPU tests run on {name}");
-            cargo.env("PALPATE_GPU", "require");
-            // Lavapipe's own threads cost more per dispatch than small problems compute; the tests run side by side instead.
-            if std::env::var_os("LP_NUM_THREADS").is_none() {
-                cargo.env("LP_NUM_THREADS", "0");
-            }
-        }
-        Err(e) if required => return Err(format!("PALPATE_GPU=require, but {e}")),
-        Err(e) => println!("GPU tests are skipped: {e}"),
-    }
-    let status = cargo.status().map_err(|e| format!("cargo cannot be started: {e}"))?;
-    if !status.success() {
-        return Err("some tests failed".into());
-    }
-    if let Err(e) = found {
-        println!("all tests passed except those of the GPU, which were skipped: {e}");
-    }
-    Ok(())
 }
