@@ -1,6 +1,6 @@
 //! Displacements that were observed directly: simulated minus measured.
 // use shared/seen
-// use shared/found
+// use costs/displacements
 
 // Measured displacements of frames that have them: a float [m] with 1 where the node was seen and 0 where not, and what the float leaves.
 var<storage, read> measured: array<vec4<f32>>;
@@ -18,7 +18,7 @@ fn compare_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let known = measured[k].w;
     let weight = sight.displacement * known;
     let r = known * ((seen[at].xyz - measured[k].xyz) + (seen[rest_part() + at].xyz - measured[k + 1u].xyz));
-    let row = s.slot * sight.rows + shot.point_count + 3u * (shot.marker_count + s.item);
+    let row = displacement_row(s.slot, shot, s.item);
     rows[row] = vec2(r.x, weight);
     rows[row + 1u] = vec2(r.y, weight);
     rows[row + 2u] = vec2(r.z, weight);

@@ -1,6 +1,7 @@
 //! dJ/du of a look: band nodes folded back onto the body (transpose of the extension), markers and observed nodes added; handed to
 //! both ends of the step, and to the time that the curve is read at. Mode 1: the round has depth points.
 // use costs/markers
+// use costs/displacements
 // use shared/found
 // use shared/reduce
 
@@ -41,8 +42,7 @@ fn pull_of(s: Seat, shot: Shot, node: u32) -> vec3<f32> {
         }
     }
     if node < shot.node_count {
-        let row = s.slot * sight.rows + shot.point_count + 3u * (shot.marker_count + node);
-        g += vec3(rows[row].x, rows[row + 1u].x, rows[row + 2u].x) * rows[row].y;
+        g += displacement_pull(s.slot, shot, node);
     }
     return g;
 }

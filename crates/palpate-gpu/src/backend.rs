@@ -3,7 +3,7 @@
 use crate::device::{Choice, Gpu, GpuError};
 use crate::solve::{backward, forward};
 use crate::world::{Adjoint, Effort, Level, State, Tally, Tangent, Tuning, World};
-use crate::{observe, read, solve};
+use crate::{costs, read, solve};
 use glam::DVec3;
 use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::plan::Plan;
@@ -241,7 +241,7 @@ impl Backend for GpuBackend {
         let tangents: Vec<_> = pairs.map(|(a, b)| [&a.buffer, &b.buffer]).collect();
         let ends = states.map(|s| &s.0.buffer);
         // What went wrong is read with the evaluation.
-        Some(observe::rows(world, k, ends, &tangents, &tally.buffers, member).unwrap_or_else(|e| {
+        Some(costs::rows(world, k, ends, &tangents, &tally.buffers, member).unwrap_or_else(|e| {
             self.gpu.keep(e);
             Rows::default()
         }))
@@ -265,7 +265,7 @@ impl Backend for GpuBackend {
     }
 
     fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
-        observe::residuals(world, k, [&now.0.buffer, &next.0.buffer], member).unwrap_or_else(|e| {
+        costs::residuals(world, k, [&now.0.buffer, &next.0.buffer], member).unwrap_or_else(|e| {
             self.gpu.keep(e);
             Vec::new()
         })

@@ -7,10 +7,10 @@
 #![allow(clippy::mutable_key_type)]
 
 mod backend;
+mod costs;
 pub mod device;
 pub mod layout;
 mod memory;
-mod observe;
 mod passes;
 mod read;
 mod solve;

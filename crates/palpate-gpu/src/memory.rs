@@ -1,8 +1,8 @@
 //! How much device memory an evaluation takes, known before a device is asked for it: the same code that makes buffers counts them.
 
+use crate::costs;
 use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
-use crate::observe;
 use crate::world::{COLUMN_VECTORS, Geometry, MANY, Sums, VECTOR, columns, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
@@ -87,7 +87,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     ]);
     let effects = geometry.effects.sizes(members, shape.nodes as usize, shape.cells as usize, shape.clamps as usize);
     constants.extend(effects.iter().map(|s| 4 * s.1 as u64));
-    constants.extend(observe::memory(&counter, plan, members, q)?);
+    constants.extend(costs::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();
     space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
     let sums = Sums::new(plan, &geometry.effects, &request.gradient);

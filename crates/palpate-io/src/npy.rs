@@ -112,8 +112,8 @@ fn is_plausible(bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
     let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
     let Some((lengths, _)) = shape else { return true };
-    let lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
-    lengths.fold(Some(1u128), |n, x| n?.checked_mul(x)).is_some_and(|n| n <= bytes.len() as u128)
+    let mut lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
+    lengths.try_fold(1u128, |n, x| n.checked_mul(x)).is_some_and(|n| n <= bytes.len() as u128)
 }
 
 /// Numbers in Fortran order (first axis fastest) with the last axis fastest.

@@ -58,8 +58,9 @@ fn a_bar_is_fitted_to_tracks_and_to_displacements_from_files() {
     let folder = std::env::temp_dir().join(format!("palpate-tracks-{}", std::process::id()));
     let truth = Experiment::from_toml(BAR, "bar.toml").unwrap_or_else(|e| panic!("{e}"));
     // On the upper face and inside.
-    let on =
-        |k: u32| DVec3::new(0.015 + 0.01 * f64::from(k), 0.005 + 0.02 * f64::from(k % 2), if k % 3 == 0 { 0.02 } else { 0.03 });
+    let on = |k: u32| {
+        DVec3::new(0.015 + 0.01 * f64::from(k), 0.005 + 0.02 * f64::from(k % 2), if k.is_multiple_of(3) { 0.02 } else { 0.03 })
+    };
     let observers = Observers {
         cameras: Vec::new(),
         markers: Vec::new(),

@@ -2,11 +2,11 @@
 
 use super::effects::{Noise, compare, compare_within, with};
 use super::scenes::{ball, device, held};
+use crate::costs::rollout_tests::{seen, watched};
 use crate::device::Gpu;
 use crate::device::Maker as _;
 use crate::device::pipelines::pass;
 use crate::device::recorder::{Args, Recorder, Size};
-use crate::observe::rollout_tests::{seen, watched};
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
 use palpate_model::effects::{ALL, Law, Site};
 use palpate_model::scene::Scene;

@@ -3,10 +3,10 @@
 use super::effects::with;
 use super::products::crowded;
 use super::scenes::{ball, device, own_device, plan, spread};
+use crate::costs::rollout_tests::{seen, watched};
 use crate::device::Maker as _;
 use crate::device::pipelines::{PASSES, pass};
 use crate::device::recorder::{Args, QUERIES, Recorder, Size};
-use crate::observe::rollout_tests::{seen, watched};
 use crate::world::FULL;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};

@@ -2,12 +2,12 @@
 
 use super::scenes::{ball, device, held};
 use crate::GpuBackend;
+use crate::costs::rollout_tests::{assert_agreement, seen, watched};
+use crate::costs::rows_tests::apart as apart_by_row;
 use crate::device::Gpu;
 use crate::device::Maker as _;
 use crate::device::pipelines::pass;
 use crate::device::recorder::{Args, Recorder, Size};
-use crate::observe::rollout_tests::{assert_agreement, seen, watched};
-use crate::observe::rows_tests::apart as apart_by_row;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate, ParamBatch, Request, Rollout, Wanted};

@@ -3,8 +3,8 @@
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan};
 use crate::GpuBackend;
+use crate::costs::rollout_tests::{differences, seen};
 use crate::device::Gpu;
-use crate::observe::rollout_tests::{differences, seen};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::params::ParamKey;
@@ -112,7 +112,7 @@ fn comparisons_of_evaluations_see_one_percent() {
     let Some(gpu) = device(None) else { return };
     let mut scene = busy(ball(0.03));
     scene.time.steps = 3;
-    scene.observation = crate::observe::rollout_tests::watched();
+    scene.observation = crate::costs::rollout_tests::watched();
     let right = seen(&scene);
     let directions: Vec<usize> =
         [ParamKey::YoungsModulus, ParamKey::Density, ParamKey::Gravity(2)].map(|k| right.layout.index(k)).to_vec();

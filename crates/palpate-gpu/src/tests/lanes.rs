@@ -3,9 +3,9 @@
 use super::effects::with;
 use super::products::crowded;
 use super::scenes::device;
+use crate::costs::rollout_tests::{seen, watched};
 use crate::device::GpuError;
 use crate::device::{Lanes, lanes_for};
-use crate::observe::rollout_tests::{seen, watched};
 use crate::{GpuBackend, Tuning};
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::params::ParamKey;

@@ -1,6 +1,7 @@
 //! What is too large, lost or out of memory is an error with a name, a size and a way out.
 
 use super::scenes::{ball, device, held, own_device, plan, spread};
+use crate::costs::MOST_DIRECTIONS;
 use crate::device::GpuError;
 use crate::device::Maker as _;
 use crate::device::pipelines::shared::structs;
@@ -8,7 +9,6 @@ use crate::device::pipelines::{PASSES, PassSource, Pipelines, compile, constant,
 use crate::device::recorder::{Args, Recorder, Size};
 use crate::device::{Lanes, STORAGE_BUFFERS, WIDTH, WORKGROUP_BYTES, fits, no_room, refusal};
 use crate::layout::{Health, Newton, Shape};
-use crate::observe::MOST_DIRECTIONS;
 use crate::passes::{ALL, MATRIX, Passes, Per, SOLVE, TRIAL};
 use crate::solve;
 use crate::world::LOOPS;

@@ -1,9 +1,9 @@
 //! No invocation loops longer than adapters allow: bounds are read off the shaders' own loops and evaluated at the largest sizes
 //! that a build accepts. A loop whose header is not known here fails the test.
 
+use crate::costs::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::device::pipelines::PASSES;
 use crate::device::pipelines::shared::{laws, pulls};
-use crate::observe::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::world::KINDS;
 use crate::world::{LOOPS, Most, columns};
 use palpate_model::cutcells::{front, pullback};

@@ -1,7 +1,7 @@
 //! Predicted device memory against what is really made.
 
 use super::scenes::{ball, held, own_device, plan};
-use crate::observe::rollout_tests::{seen, watched};
+use crate::costs::rollout_tests::{seen, watched};
 use crate::{Gpu, GpuBackend, Load, Product, Tuning, memory, world};
 use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, Effect};

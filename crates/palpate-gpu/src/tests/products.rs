@@ -3,7 +3,7 @@
 use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, spread};
-use crate::observe::rollout_tests::{differences, seen, watched};
+use crate::costs::rollout_tests::{differences, seen, watched};
 use crate::passes::Passes;
 use crate::solve;
 use crate::solve::Choices;

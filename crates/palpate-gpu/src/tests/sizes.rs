@@ -5,7 +5,7 @@ use super::faults::{busy, but, check_states};
 use super::forward::CLOSE;
 use super::scenes::{ball, device, plan, spread};
 use crate::GpuBackend;
-use crate::observe::rollout_tests::{differences, seen, watched};
+use crate::costs::rollout_tests::{differences, seen, watched};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};

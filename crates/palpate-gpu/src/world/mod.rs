@@ -28,9 +28,9 @@ pub(crate) use {
     room::SECTIONS,
 };
 
+use crate::costs::Observer;
 use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
 use crate::device::{Gpu, GpuError, Maker as _};
-use crate::observe::Observer;
 use members::Batch;
 use palpate_engine::ParamBatch;
 use palpate_model::effects::sensors::Sensors;

@@ -64,7 +64,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let (kind, content, lines, warnings) = if is_recording(path) {
         let r = read_recording(path)?;
         let (content, lines) = recording(&r);
-        ("recording", Inspected::Recording(content), lines, r.warnings)
+        ("recording", Inspected::Recording(Box::new(content)), lines, r.warnings)
     } else {
         let e = Experiment::open(path)?;
         let (content, lines) = scene(&e);

@@ -188,7 +188,7 @@ fn points(path: &Path, experiment: &Experiment) -> Result<Vec<DVec3>, Error> {
     let allowed = 2.0 * experiment.plan().body.grid.h;
     let away = |p: &DVec3| experiment.shape().signed_distance(*p);
     // What is no number is away as well.
-    let far = points.iter().filter(|p| !(away(p).abs() <= allowed)).count();
+    let far = points.iter().filter(|p| away(p).abs() > allowed || away(p).is_nan()).count();
     if far > 0 {
         let text = format!("{far} of {} points lie more than {allowed:.4} m (two cells) away from the surface", points.len());
         return Err(wrong(text));

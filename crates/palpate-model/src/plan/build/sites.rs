@@ -66,7 +66,7 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
     let allowed = tracks.tolerance.unwrap_or(TRACK_REACH * body.grid.h);
     let away: Vec<f64> = tracks.places.par_iter().map(|p| shape.signed_distance(*p).abs()).collect();
     // What is no number is away as well.
-    let far: Vec<usize> = (0..away.len()).filter(|k| !(away[*k] <= allowed)).collect();
+    let far: Vec<usize> = (0..away.len()).filter(|k| away[*k] > allowed || away[*k].is_nan()).collect();
     if let Some(&first) = far.first() {
         let worst = far.iter().copied().fold(first, |a, b| if away[b] > away[a] { b } else { a });
         return Err(error(
@@ -120,7 +120,8 @@ pub(super) fn check_nodes(observation: &Observation, body: &Body) -> Result<(), 
         ));
     }
     let apart = |(a, b): (&DVec3, &DVec3)| a.distance(*b);
-    let off = nodes.places.iter().zip(&body.nodes).map(apart).enumerate().find(|(_, d)| !(*d <= SAME_NODE * body.grid.h));
+    let allowed = SAME_NODE * body.grid.h;
+    let off = nodes.places.iter().zip(&body.nodes).map(apart).enumerate().find(|(_, d)| *d > allowed || d.is_nan());
     match off {
         None => Ok(()),
         Some((node, d)) => Err(error(

@@ -5,6 +5,8 @@
 //! are found again on the way back, which costs less memory than keeping them for every frame and member.
 
 mod bounds;
+mod depth;
+mod displacements;
 #[cfg(test)]
 mod extension_tests;
 #[cfg(test)]
@@ -12,6 +14,7 @@ mod fault_tests;
 #[cfg(test)]
 mod front_tests;
 mod looks;
+mod markers;
 #[cfg(test)]
 mod match_tests;
 mod readings;
@@ -34,6 +37,7 @@ use crate::layout::{Carried, Found, Look, Sight};
 pub(crate) use bounds::MOST_DIRECTIONS;
 pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
+use palpate_engine::{ReadingResidual, ResidualRow};
 use palpate_model::cutcells::pullback::{NOISE_REACH, TURNED_AWAY};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::ReadingKind;
@@ -56,6 +60,26 @@ const PARTS: usize = reduce::PARTS as usize;
 const VECTOR: u64 = 16;
 const FOUND: u64 = size_of::<Found>() as u64;
 const CARRIED: u64 = size_of::<Carried>() as u64;
+
+/// Every cost, in the order in which residuals stand in a frame.
+const COSTS: [&dyn Cost; 3] = [&depth::Depth, &markers::Markers, &displacements::Displacements];
+
+/// What one kind of readings takes beside the passes that serve all (`see_nodes`, `sum_rows`, `fold_pulls`, `see_tangents`,
+/// `differentiate_rows`, `weigh_rows`).
+trait Cost: Sync {
+    /// Most readings of a look in a round.
+    fn items(&self, round: &Round) -> usize;
+    /// Scratch buffers of one look, and their bytes.
+    fn scratch(&self, s: &Sight) -> Vec<(&'static str, u64)>;
+    /// Finds the residuals of a round's looks.
+    fn compare(&self, r: &mut Recorder, own: &Named, sight: &Sight, round: Round);
+    /// Prepares what nodes gather of dJ/dr, and adds to dJ/dθ at fixed displacement.
+    fn pull(&self, r: &mut Recorder, own: &Named, sight: &Sight, round: Round);
+    /// Residuals of a frame, reading by reading.
+    fn readings(&self, d: &results::Downloaded) -> Vec<ReadingResidual>;
+    /// Scalar residuals of a frame, with their places among the device's rows.
+    fn rows(&self, d: &results::Downloaded) -> Vec<(ResidualRow, usize)>;
+}
 
 /// What is observed, on the device.
 #[derive(Debug)]
@@ -191,16 +215,7 @@ impl Observer {
             let adjoint = [("adj_now", adjoints[0]), ("adj_next", adjoints[1]), ("sums", &tally["start_sums"])];
             let own = self.named(&[&states[..], &adjoint[..]].concat(), tally);
             look(r, &own, &self.sight, round);
-            if round.points > 0 {
-                run(r, pass::PULL_POINTS, &own, round, cell_groups(&self.sight), 0);
-                run(r, pass::GATHER_PULLS, &own, round, groups_of(self.sight.extended as usize), 0);
-            }
-            if round.markers > 0 && self.sight.offsets > 0 {
-                run(r, pass::PULL_OFFSETS, &own, round, self.sight.offsets as usize, 0);
-            }
-            if round.points > 0 && self.sight.readings > 0 {
-                run(r, pass::PULL_READINGS, &own, round, self.sight.readings as usize, 0);
-            }
+            COSTS.iter().for_each(|cost| cost.pull(r, &own, &self.sight, round));
             let parts = groups_of(self.sight.nodes as usize).min(PARTS);
             run(r, pass::FOLD_PULLS, &own, round, parts, usize::from(round.points > 0));
             run(r, pass::ADD_PARTS, &own, round, 1, parts);
@@ -245,7 +260,7 @@ impl Observer {
             if round.points > 0 && band > 0 {
                 run(r, pass::EXTEND_TANGENTS, &own, round, groups_of(q * band), q);
             }
-            let items = round.points + round.markers + round.nodes;
+            let items: usize = COSTS.iter().map(|cost| cost.items(&round)).sum();
             run(r, pass::DIFFERENTIATE_ROWS, &own, round, groups_of(q * items), q);
         }
         own
@@ -335,57 +350,23 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         for (name, bytes) in each {
             buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
         }
-        let node_sites: Vec<[u32; 2]> = sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
         let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
         buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
         buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
         readings::upload(gpu, plan, &sensors, &shots, &mut buffers)?;
         buffers.insert("reading_places", gpu.upload("reading_places", &readings::places(plan))?);
-        buffers.insert("marks", gpu.upload("marks", &shots.marks)?);
-        buffers.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
         buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
-        buffers.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
-        buffers.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
-        buffers.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
-        buffers.insert("band_rows", gpu.upload("band_rows", &band.extend.starts)?);
-        buffers.insert("band_columns", gpu.upload("band_columns", &band.extend.columns)?);
-        buffers.insert("band_values", gpu.upload("band_values", &band.extend.values)?);
-        buffers.insert("fold_rows", gpu.upload("fold_rows", &band.fold.starts)?);
-        buffers.insert("fold_columns", gpu.upload("fold_columns", &band.fold.columns)?);
-        buffers.insert("fold_values", gpu.upload("fold_values", &band.fold.values)?);
-        buffers.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
-        buffers.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
-        buffers.insert("sites", gpu.upload("sites", &sites.sites)?);
-        buffers.insert("offsets", gpu.buffer("offsets", VECTOR * (members.max(1) * sites.sites.len()) as u64)?);
-        buffers.insert("offset_places", gpu.upload("offset_places", &readings::offset_places(plan))?);
-        buffers.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
-        buffers.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
-        buffers.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);
-        buffers.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
-        buffers.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
+        depth::upload(gpu, &band, &mut buffers)?;
+        markers::upload(gpu, plan, members, (&shots, &sites), &mut buffers)?;
     }
     Ok((shots, sight, buffers))
 }
 
 /// Bytes of every scratch buffer for one look.
-fn scratch(s: &Sight) -> [(&'static str, u64); 9] {
-    let (points, extended) = (u64::from(s.points), u64::from(s.extended));
-    let corners = if points == 0 { 0 } else { 8 * u64::from(s.stripes) * u64::from(s.cells) };
-    [
-        ("seen", 2 * VECTOR * extended),
-        ("keys", 4 * points),
-        ("owners", 4 * points),
-        ("found", FOUND * points),
-        ("rows", 8 * u64::from(s.rows)),
-        ("carried", CARRIED * u64::from(s.markers)),
-        ("partials", VECTOR * PARTS as u64),
-        ("corner_pulls", VECTOR * corners),
-        ("pulls", VECTOR * extended),
-    ]
-}
-
-fn cell_groups(s: &Sight) -> usize {
-    groups_of(8 * s.cells as usize * s.stripes as usize)
+fn scratch(s: &Sight) -> Vec<(&'static str, u64)> {
+    let shared =
+        [("seen", 2 * VECTOR * u64::from(s.extended)), ("rows", 8 * u64::from(s.rows)), ("partials", VECTOR * PARTS as u64)];
+    shared.into_iter().chain(COSTS.iter().flat_map(|cost| cost.scratch(s))).collect()
 }
 
 fn run(r: &mut Recorder, kernel: usize, own: &Named, round: Round, groups: usize, mode: usize) {
@@ -393,23 +374,8 @@ fn run(r: &mut Recorder, kernel: usize, own: &Named, round: Round, groups: usize
     r.run(kernel, own, Size::All { members: round.count, groups }, args);
 }
 
-/// Displacements, matches and residuals of a round.
+/// Displacements and residuals of a round.
 fn look(r: &mut Recorder, own: &Named, sight: &Sight, round: Round) {
     run(r, pass::SEE_NODES, own, round, groups_of(sight.nodes as usize), 0);
-    if round.points > 0 {
-        if sight.extended > sight.nodes {
-            run(r, pass::EXTEND_BAND, own, round, groups_of((sight.extended - sight.nodes) as usize), 0);
-        }
-        run(r, pass::FORGET_MATCHES, own, round, groups_of(round.points), 0);
-        for mode in [0, 1] {
-            run(r, pass::MATCH_POINTS, own, round, cell_groups(sight), mode);
-        }
-        run(r, pass::PLACE_POINTS, own, round, groups_of(round.points), 0);
-    }
-    if round.markers > 0 {
-        run(r, pass::CARRY_MARKERS, own, round, groups_of(round.markers), 0);
-    }
-    if round.nodes > 0 {
-        run(r, pass::COMPARE_NODES, own, round, groups_of(round.nodes), 0);
-    }
+    COSTS.iter().for_each(|cost| cost.compare(r, own, sight, round));
 }

@@ -1,8 +1,8 @@
 //! Tables of the band and of the markers' sites, each with its transpose, so that every sum gathers in a fixed order.
 
+use crate::costs::shots::split;
 use crate::device::pipelines::shared::structs::NONE;
 use crate::layout::{BandCell, Site};
-use crate::observe::shots::split;
 use glam::{DMat3, DVec3};
 use palpate_model::observation::{MarkerSite, Observation, ReadingKind};
 use palpate_model::plan::Plan;
