@@ -15,8 +15,8 @@ fn couple_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let old = old_side(c);
     let w = way_of(c, fresh, old);
     let matrix = stiffness_of(c);
-    let by_d = loss_of(c, w, old, vec2(1.0, 0.0), NONE, 0u);
-    let by_old = loss_of(c, w, old, vec2(0.0, 1.0), NONE, 0u).z;
+    let by_d = loss_of(c, w, old, vec2(1.0, 0.0));
+    let by_old = loss_of(c, w, old, vec2(0.0, 1.0)).z;
     var f = vec3(0.0);
     if call.extra == ALONG {
         let dq = strain_rate(old.pose, d, c.sign);
@@ -31,7 +31,7 @@ fn couple_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     // The old state's own force, whose derivative is symmetric.
     let body = centred(transpose(old.pose.r) * d);
     let dq = strain_rate(old.pose, d, c.sign);
-    let r = ask(c, ENERGY_PART, old.s, scalar_rates(c, old, dq), NONE, 0u);
+    let r = ask(c, ENERGY_PART, old.s, scalar_rates(c, old, dq));
     let rate = c.young * (stress(c, old, r.bend) + r.first[0] * stiff(matrix, c.number, dq));
     let own = force_body(old.pose, centred(rate), c.sign)
         + second_body(old.pose, centred(c.young * stress(c, old, r.first)), body, c.sign);

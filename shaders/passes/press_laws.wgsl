@@ -16,10 +16,10 @@ fn press_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if call.extra == 0u {
         side = new_side(c);
         w = way_of(c, side, old);
-        loss = loss_of(c, w, old, vec2(0.0), NONE, 0u);
+        loss = loss_of(c, w, old, vec2(0.0));
         weight = c.mix.fresh;
     }
-    let r = ask(c, ENERGY_PART, side.s, nowhere(), NONE, 0u);
+    let r = ask(c, ENERGY_PART, side.s, nowhere());
     let f = force(side.pose, c.young * (weight * stress(c, side, r.first) + loss.y * w.kd), c.sign);
     // Of the old state's force the potential is linear; gather_residual knows it.
     let energy = select(0.0, c.young * volume_of(c) * (weight * r.value + loss.x) * 0.125, call.extra == 0u);

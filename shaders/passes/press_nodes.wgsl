@@ -25,8 +25,6 @@ fn press_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     let effect = effects[asked_effect()];
     let what = asked_question();
-    let kind = asked_kind();
-    let index = asked_index();
     let m = members[p.member];
     let a = at_node(p.member, p.item);
     let v = part(2u) + a;
@@ -45,9 +43,14 @@ fn press_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         weight = probe[a].xyz;
     }
     if what == COLUMN {
-        change_by(kind, index);
-        if kind == EFFECT && effect.slopes != NONE {
-            measure.z = effect_measures[(p.member * effect.rows + effect.slopes + index) * shape.nodes + p.item];
+        change_along(effect, p.member);
+        if effect.slopes != NONE {
+            for (var i = 0u; i < MOST; i++) {
+                if i < effect.count {
+                    let slope = effect_measures[(p.member * effect.rows + effect.slopes + i) * shape.nodes + p.item];
+                    measure.z += slope * change[COMMON + i];
+                }
+            }
         }
     }
     let r = respond(effect.law, what, weight);

@@ -20,8 +20,6 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let effect = effects[asked_effect()];
     let what = asked_question();
-    let kind = asked_kind();
-    let index = asked_index();
     let m = members[p.member];
     let site = patches[p.item];
     var whole = vec3(0.0);
@@ -60,7 +58,7 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             }
         }
         if what == COLUMN {
-            change_by(kind, index);
+            change_along(effect, p.member);
         }
         if effect.site == AT_CONTACT {
             let plane = planes[p.member * shape.planes + k];
@@ -68,23 +66,14 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 z[PLANE_AT + i] = number(plane.normal[i]);
             }
             z[PLANE_AT + 4u] = number(plane.stiffness);
-            if what == COLUMN && kind == YOUNGS_MODULUS {
-                change[PLANE_AT + 4u] = plane.scales * DEFAULT_STIFFNESS / shape.h;
-            }
-            if what == COLUMN && kind == PLANE && index / PLANE_ASKS == k {
-                switch index % PLANE_ASKS {
-                    case PLANE_HEIGHT: { change[PLANE_AT + 3u] = 1.0; }
-                    case PLANE_THETA: {
-                        for (var i = 0u; i < 3u; i++) {
-                            change[PLANE_AT + i] = plane.by_theta[i];
-                        }
-                    }
-                    default: {
-                        for (var i = 0u; i < 3u; i++) {
-                            change[PLANE_AT + i] = plane.by_phi[i];
-                        }
-                    }
+            if what == COLUMN {
+                let rate = plane_rate(p.member, k);
+                let turned = rate.y * plane.by_theta.xyz + rate.z * plane.by_phi.xyz;
+                for (var i = 0u; i < 3u; i++) {
+                    change[PLANE_AT + i] = turned[i];
                 }
+                change[PLANE_AT + 3u] = rate.x;
+                change[PLANE_AT + 4u] = plane.scales * rates[p.member].young * DEFAULT_STIFFNESS / shape.h;
             }
         }
         let r = respond(effect.law, what, mean);

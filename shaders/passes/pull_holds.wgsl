@@ -11,7 +11,7 @@ var<storage, read> probe: array<vec4<f32>>;
 var<storage, read_write> hold_forces: array<vec4<f32>>;
 // [B][clamp cells]: by the factor on the cell's modulus.
 var<storage, read_write> hold_pulls: array<f32>;
-// [HOLD_ROWS + poses + matrices][B][workgroups]: by Poisson's ratio and the start first.
+// [HOLD_ROWS + aging + poses + matrices][B][workgroups]: by Poisson's ratio and the start first.
 var<storage, read_write> hold_sums: array<f32>;
 
 // z · (pose and matrix force) along a change of the pose, at one instant; `kz` and `kd` are the matrix times z in the clamp's frame and times the
@@ -72,7 +72,7 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             let along = (alive * weight * young) * along_pose(slope.turn, slope.shift.xyz, pose, z, kz, kd, place);
             let sum = sum64(local, vec4(along, 0.0, 0.0, 0.0)).x;
             if local == 0u && p.live {
-                hold_sums[row_at(HOLD_ROWS + row, p.member, hold, shape.holds, 8u)] -= sum;
+                hold_sums[row_at(HOLD_ROWS + shape.aging_rows + row, p.member, hold, shape.holds, 8u)] -= sum;
             }
         }
         for (var row = 0u; row < matrices; row++) {
@@ -81,7 +81,7 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             let along = (alive * weight * young) * dot(tz, hold_stiff(slope, corner, d));
             let sum = sum64(local, vec4(along, 0.0, 0.0, 0.0)).x;
             if local == 0u && p.live {
-                hold_sums[row_at(HOLD_ROWS + poses + row, p.member, hold, shape.holds, 8u)] -= sum;
+                hold_sums[row_at(HOLD_ROWS + shape.aging_rows + poses + row, p.member, hold, shape.holds, 8u)] -= sum;
             }
         }
     }
@@ -94,6 +94,10 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if local == 0u && p.live {
         hold_sums[row_at(0u, p.member, hold, shape.holds, 8u)] -= total.y;
         hold_sums[row_at(1u, p.member, hold, shape.holds, 8u)] -= total.z;
+        for (var row = 0u; row < shape.aging_rows; row++) {
+            let slope = aging_at(p.member, 1u + row) / aging_at(p.member, 0u);
+            hold_sums[row_at(HOLD_ROWS + row, p.member, hold, shape.holds, 8u)] -= slope * total.x;
+        }
     }
     if p.live && seeks(SEEK_REST) {
         hold_forces[(p.member * shape.holds + hold) * 8u + corner] = vec4(corners, 0.0);

@@ -52,9 +52,9 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let ds1 = scalar_rates(c, fresh, dq1);
     let ds0 = scalar_rates(c, old, dq0);
     let dd = mean(c, w.kd, dq1);
-    let r = ask(c, ENERGY_PART, fresh.s, ds1, NONE, 0u);
-    let before = ask(c, ENERGY_PART, old.s, ds0, NONE, 0u);
-    let by_old = loss_of(c, w, old, vec2(0.0, 1.0), NONE, 0u);
+    let r = ask(c, ENERGY_PART, fresh.s, ds1);
+    let before = ask(c, ENERGY_PART, old.s, ds0);
+    let by_old = loss_of(c, w, old, vec2(0.0, 1.0));
     let unit = c.young * volume_of(c);
     // The force is proportional to the modulus.
     let own = c.mix.fresh * contract(r.first, ds1) + c.mix.old * contract(before.first, ds0) + by_old.y * dd;
@@ -63,7 +63,7 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         let by_nu = matrix_at(c.m.slot, 1u, cells[c.cell].kind);
         let k1 = stiff(by_nu, c.number, fresh.q);
         let k0 = stiff(by_nu, c.number, old.q);
-        let by_d = loss_of(c, w, old, vec2(1.0, 0.0), NONE, 0u).z;
+        let by_d = loss_of(c, w, old, vec2(1.0, 0.0)).z;
         let dn0 = 0.5 * mean(c, old.q, k0);
         poisson = c.mix.fresh * (0.5 * mean(c, fresh.q, k1) * r.bend[0] + r.first[0] * mean(c, dq1, k1))
             + c.mix.old * (dn0 * before.bend[0] + before.first[0] * mean(c, dq0, k0))

@@ -21,8 +21,8 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let row = min(c.number, n - 1u);
     var ds = nowhere();
     ds[row] = 1.0;
-    let r = ask(c, ENERGY_PART, fresh.s, ds, NONE, 0u);
-    let loss = loss_of(c, w, old, vec2(1.0, 0.0), NONE, 0u);
+    let r = ask(c, ENERGY_PART, fresh.s, ds);
+    let loss = loss_of(c, w, old, vec2(1.0, 0.0));
     let scale = c.young * (c.mix.fresh * r.first[0] + loss.y);
     let y = c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd);
     let half = rank_six(fresh.pose, stiffness_of(c), c.number, c.sign, scale, centred(y), newton[c.member].convex != 0u);

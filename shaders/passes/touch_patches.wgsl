@@ -1,5 +1,5 @@
-//! What the planes do to every surface patch along its way in a step: the vector that corner forces take with the minus sign and their shape function,
-//! and the patch's stiffness; or, as call.extra asks (shared/asks), the vector of ∂r/∂p instead.
+//! What the planes do to every surface patch along its way in a step: the vector that corner forces take with the minus sign and their shape
+//! function, and the patch's stiffness; or what else call.extra asks for (shared/asks).
 // use shared/mix
 // use shared/contact
 // use shared/asks
@@ -20,7 +20,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         return;
     }
     let site = patches[p.item];
-    let what = call.extra % PLANE_ASKS;
+    let what = call.extra;
     let theta = select(1.0, shape.theta, call.mode != 0u);
     let along = acts_along(theta);
     var whole = site.point.xyz;
@@ -52,8 +52,8 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     var diagonal = vec3(0.0);
     var mixed = vec3(0.0);
     for (var k = 0u; k < shape.planes; k++) {
-        if what == NO_TOUCH || (what >= PLANE_HEIGHT && what <= PLANE_PHI && k != call.extra / PLANE_ASKS) {
-            continue;
+        if what == NO_TOUCH {
+            break;
         }
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
@@ -71,12 +71,7 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             let law = contact_law(gap + (1.0 - at.y) * (old_gap - gap), width);
             let pressure = s * at.x * law.pressure;
             let slope = s * at.x * law.slope;
-            let place = (whole + rest) + (1.0 - at.y) * ((old_whole - whole) + (old_rest - rest));
             switch what {
-                case TOUCH_YOUNG: { vector += (pressure * plane.scales / members[p.member].young) * n; }
-                case PLANE_HEIGHT: { vector -= slope * n; }
-                case PLANE_THETA: { vector += slope * dot(plane.by_theta.xyz, place) * n + pressure * plane.by_theta.xyz; }
-                case PLANE_PHI: { vector += slope * dot(plane.by_phi.xyz, place) * n + pressure * plane.by_phi.xyz; }
                 case TOUCH_OLD: { vector += ((1.0 - at.y) * slope * dot(n, mean)) * n; }
                 default: {
                     vector += pressure * n;

@@ -68,38 +68,47 @@ fn ask_law(law: u32, which: u32, count: u32) -> Answer {
     return r;
 }
 
-// Sum over the plan's laws at scalars `s` that change by `ds`, as does parameter `slot` of law `only`.
-fn ask(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, only: u32, slot: u32) -> Answer {
-    var sum: Answer;
+// Puts the input of a law in place: scalars `s` that change by `ds`, and its numbers, which do not.
+fn fill(c: Corner, effect: EffectSite, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) {
     var values = s;
     var changes = ds;
+    step_rate = 1.0 / shape.dt;
+    for (var i = 0u; i < CELL_INPUTS; i++) {
+        if i < SCALARS {
+            input[i] = number(values[min(i, SCALARS - 1u)]);
+            along[i] = changes[min(i, SCALARS - 1u)];
+        } else {
+            let p = i - SCALARS;
+            input[i] = number(0.0);
+            if p < effect.count {
+                input[i] = number(effect_values[c.member * effect.stride + effect.first + p]);
+            }
+            along[i] = 0.0;
+        }
+    }
+}
+
+fn add_answer(sum: ptr<function, Answer>, answer: Answer) {
+    var r = answer;
+    (*sum).value += r.value;
+    for (var i = 0u; i < SCALARS; i++) {
+        (*sum).first[i] += r.first[i];
+        (*sum).bend[i] += r.bend[i];
+    }
+}
+
+// Sum over the plan's laws at scalars `s` that change by `ds`.
+fn ask(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> Answer {
+    var sum: Answer;
     // Dissipation is a function of the increment; what it takes from the old state is not differentiated.
     let count = select(scalars(), 1u, which == LOSS_PART);
-    step_rate = 1.0 / shape.dt;
     for (var k = 0u; k < MOST_LAWS; k++) {
         if k >= (shape.fields >> LAWS_AT) {
             break;
         }
         let effect = cell_effects[k];
-        for (var i = 0u; i < CELL_INPUTS; i++) {
-            if i < SCALARS {
-                input[i] = number(values[min(i, SCALARS - 1u)]);
-                along[i] = changes[min(i, SCALARS - 1u)];
-            } else {
-                let p = i - SCALARS;
-                input[i] = number(0.0);
-                if p < effect.count {
-                    input[i] = number(effect_values[c.member * effect.stride + effect.first + p]);
-                }
-                along[i] = f32(k == only && p == slot);
-            }
-        }
-        var r = ask_law(effect.law, which, count);
-        sum.value += r.value;
-        for (var i = 0u; i < SCALARS; i++) {
-            sum.first[i] += r.first[i];
-            sum.bend[i] += r.bend[i];
-        }
+        fill(c, effect, s, ds);
+        add_answer(&sum, ask_law(effect.law, which, count));
     }
     return sum;
 }
@@ -180,8 +189,8 @@ fn way_of(c: Corner, fresh: Side, old: Side) -> Way {
     return w;
 }
 
-// φ with its first derivative by d, and the change of that along changes of d, a₀ and a parameter; nothing in a static problem.
-fn loss_of(c: Corner, w: Way, old: Side, change: vec2<f32>, only: u32, slot: u32) -> vec3<f32> {
+// φ with its first derivative by d, and the change of that along changes of d and a₀; nothing in a static problem.
+fn loss_of(c: Corner, w: Way, old: Side, change: vec2<f32>) -> vec3<f32> {
     if call.mode == 0u {
         return vec3(0.0);
     }
@@ -191,7 +200,7 @@ fn loss_of(c: Corner, w: Way, old: Side, change: vec2<f32>, only: u32, slot: u32
     s[1] = old.s[0];
     ds[0] = change.x;
     ds[1] = change.y;
-    let r = ask(c, LOSS_PART, s, ds, only, slot);
+    let r = ask(c, LOSS_PART, s, ds);
     return vec3(r.value, r.first[0], r.bend[0]);
 }
 

@@ -4,9 +4,9 @@
 // use shared/mix
 // use shared/contact
 // use shared/hyper
-// use shared/keys
 // use shared/asks
 // use shared/effect_site
+// use shared/rates
 
 // Sites of an effect; laws of cells have tables of their own.
 const AT_NODES = 0u;
@@ -15,32 +15,22 @@ const AT_CONTACT = 2u;
 const AT_CELLS = 3u;
 
 // What is asked of a law: force and energy; its second derivative by x; the force's derivative along a change of the old state;
-// the transpose of that; the force's derivative by a parameter.
+// the transpose of that; the force's change along a direction of parameters.
 const FORCE = 0u;
 const STIFFNESS = 1u;
 const BY_OLD = 2u;
 const BACK = 3u;
 const COLUMN = 4u;
 
-// In call.extra: number of the effect; from this bit on the question; of a derivative by a parameter, from these on its kind and index.
+// In call.extra: number of the effect, and from this bit on the question.
 const QUESTION_AT = 8u;
-const KIND_AT = 12u;
-const INDEX_AT = 16u;
 
 fn asked_effect() -> u32 {
     return extractBits(call.extra, 0u, QUESTION_AT);
 }
 
 fn asked_question() -> u32 {
-    return extractBits(call.extra, QUESTION_AT, KIND_AT - QUESTION_AT);
-}
-
-fn asked_kind() -> u32 {
-    return extractBits(call.extra, KIND_AT, INDEX_AT - KIND_AT);
-}
-
-fn asked_index() -> u32 {
-    return call.extra >> INDEX_AT;
+    return call.extra >> QUESTION_AT;
 }
 
 var<storage, read> effects: array<EffectSite>;
@@ -236,15 +226,19 @@ fn place_point(origin: vec3<f32>, whole: vec3<f32>, rest: vec3<f32>, old_whole: 
     }
 }
 
-// Change of the input by a parameter of the balance; false where there is none. `index` counts axes, slots, or is PLANE_ASKS · plane + which.
-fn change_by(kind: u32, index: u32) {
-    switch kind {
-        case YOUNGS_MODULUS: { change[STIFFNESS_AT] = DEFAULT_STIFFNESS / shape.h; }
-        case GRAVITY: { change[GRAVITY_AT + index] = 1.0; }
-        case TIME_START: { change[TIME_AT] = 1.0; }
-        case EFFECT: { change[COMMON + index] = 1.0; }
-        default: {}
+// Change of the input along a direction, but for a plane's part of it.
+fn change_along(effect: EffectSite, member: u32) {
+    let r = rates[member];
+    for (var i = 0u; i < MOST; i++) {
+        if i < effect.count {
+            change[COMMON + i] = rate_numbers[numbers_at(member) + shape.rate_effects + effect.first + i];
+        }
     }
+    for (var i = 0u; i < 3u; i++) {
+        change[GRAVITY_AT + i] = r.gravity[i];
+    }
+    change[STIFFNESS_AT] = r.young * DEFAULT_STIFFNESS / shape.h;
+    change[TIME_AT] = r.start;
 }
 
 // Two derivatives of the potential at once, as often as the question needs. `weight` is the vector of BACK.

@@ -33,11 +33,12 @@ struct Shape { // mirrored
     quantum: f32,
     ghosts: u32,
     fields: u32,
-    slope_rows: u32,
+    pad: u32,
     contact_width: f32,
     aging_rows: u32,
     point_groups: u32,
-    pad: vec2<u32>,
+    rate_numbers: u32,
+    rate_effects: u32,
 }
 
 struct Member { // mirrored

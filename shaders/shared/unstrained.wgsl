@@ -3,8 +3,6 @@
 
 // [B][N]: displacement W of that shape.
 var<storage, read> rests: array<vec4<f32>>;
-// [rows][B][N]: derivatives of W by parameters.
-var<storage, read> rest_slopes: array<vec4<f32>>;
 // [B][cells · 8]: deformation of every cell in that shape.
 var<storage, read> rest_shapes: array<vec4<f32>>;
 
@@ -23,9 +21,4 @@ fn from_rest(q: vec3<f32>, at: u32) -> vec3<f32> {
         return q - rest_shapes[at].xyz;
     }
     return q;
-}
-
-// ∂W/∂p of the parameter in this row at a node of a state.
-fn rest_slope(row: u32, node: u32) -> vec3<f32> {
-    return rest_slopes[part(row) + node].xyz;
 }

@@ -109,11 +109,7 @@ impl Backend for GpuBackend {
     fn new_tangent(&self, world: &World, directions: &[Direction]) -> Tangent {
         let parts: Vec<_> = directions.iter().map(|_| world.lend(2)).collect();
         world.record(|r| parts.iter().for_each(|p| r.clear(&p.buffer)));
-        let place = |d: &Direction| match d {
-            Direction::Parameter(p) => *p,
-            Direction::Dense(_) => unreachable!("only products with the Gauss-Newton matrix ask for dense directions"),
-        };
-        Tangent { directions: directions.iter().map(place).collect(), parts }
+        Tangent { rates: world.rates(directions), parts }
     }
 
     fn new_tally(&self, world: &World, request: &Request) -> Tally {

@@ -71,16 +71,18 @@ pub struct Shape {
     pub ghosts: u32,
     /// What effects change, and numbers of the laws of cells: bits of `shared/structs.wgsl`.
     pub fields: u32,
-    /// Rows of the slopes of such fields, per member.
-    pub slope_rows: u32,
+    /// Fills up.
+    pub pad: u32,
     /// Half width of contact [m].
     pub contact_width: f32,
     /// Numbers of effects that change the stiffness in time.
     pub aging_rows: u32,
     /// Workgroups of 64 over nodes or patches, whichever are more.
     pub point_groups: u32,
-    /// Fills up.
-    pub pad: [u32; 2],
+    /// Numbers of a member among the rates of a direction.
+    pub rate_numbers: u32,
+    /// Where those of effects begin.
+    pub rate_effects: u32,
 }
 
 /// Parameters of one member.
@@ -106,6 +108,32 @@ pub struct Member {
     /// Initial velocity [m/s].
     pub velocity: [f32; 4],
     /// Initial angular velocity [rad/s].
+    pub spin: [f32; 4],
+}
+
+/// How the coefficients of one member change along a direction; `shared/rates.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Rate {
+    /// Of Young's modulus [Pa].
+    pub young: f32,
+    /// Of Poisson's ratio.
+    pub poisson: f32,
+    /// Of the density [kg/m³].
+    pub density: f32,
+    /// Of the Rayleigh damping of mass [1/s].
+    pub mass_damping: f32,
+    /// Of the Rayleigh damping of stiffness [s].
+    pub stiffness_damping: f32,
+    /// Of the time of the start [s].
+    pub start: f32,
+    /// Fills up.
+    pub pad: [f32; 2],
+    /// Of gravity [m/s²].
+    pub gravity: [f32; 4],
+    /// Of the initial velocity [m/s].
+    pub velocity: [f32; 4],
+    /// Of the initial angular velocity [rad/s].
     pub spin: [f32; 4],
 }
 

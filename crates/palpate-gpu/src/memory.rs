@@ -3,6 +3,7 @@
 use crate::costs;
 use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
+use crate::world::rates;
 use crate::world::{COLUMN_VECTORS, Geometry, MANY, Sums, VECTOR, columns, tally_sizes, work};
 use palpate_engine::Request;
 use palpate_model::plan::Plan;
@@ -96,13 +97,15 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     // A static start keeps a state at rest beside the first one.
     let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 };
     let all = |sizes: &[u64]| sizes.iter().map(|s| whole(*s)).sum();
+    let of_rates: u64 = request.sensitivities.iter().map(|p| all(&rates::sizes(&geometry, plan, *p, b))).sum();
     // Each state is a buffer of three vectors.
     let largest = constants.iter().chain(&space).fold(vectors(3), |most, s| most.max(*s));
     Ok(Memory {
         constants: all(&constants),
         work: all(&space),
         states: vectors(3 * kept.max(2)) + if request.gradient.any() { vectors(4) } else { 0 },
-        tangents: vectors(4 * q as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
+        tangents: of_rates
+            + vectors(4 * q as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
         largest,
     })
 }

@@ -44,34 +44,27 @@ pub(crate) fn start_adjoint(world: &World, first: &State, adj: &Adjoint, tally: 
 /// Tangent of the start along the tangent's own directions.
 pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tally: &Tally) {
     let blank = State(world.lend(3));
-    let room = ColumnRoom::new(world, tangent.directions.len());
+    let room = ColumnRoom::new(world, tangent.parts.len());
     let half = VECTOR * u64::from(world.geometry.shape.nodes) * world.members() as u64;
-    let keys = &world.plan.layout.keys;
     world.record(|r| {
         r.clear(&blank.0.buffer);
         tangent.parts.iter().for_each(|part| r.clear(&part.buffer));
         let mut s = Passes::new(world, r, None, &blank, first, tally);
         room.lend_to(&mut s);
         s.list();
-        for (part, p) in tangent.parts.iter().zip(&tangent.directions) {
-            if s.velocity_column(keys[*p]) {
-                let column = (&world.buffers["column"], 0);
-                s.recorder.copy_part([column, (&part.buffer, half)], half);
-                if s.shape_column(keys[*p]) {
-                    s.recorder.copy_part([column, (&part.buffer, 0)], half);
-                }
+        for (part, rates) in tangent.parts.iter().zip(&*tangent.rates) {
+            if rates.flying || rates.moved.rest {
+                s.push_start(rates, &part.buffer);
             }
         }
         if world.plan.initial != InitialShape::StaticEquilibrium {
             return;
         }
         s.linearise();
-        let moved: Vec<_> =
-            tangent.parts.iter().zip(&tangent.directions).filter(|(_, p)| s.moves_equilibrium(keys[**p])).collect();
+        let moved: Vec<_> = tangent.parts.iter().zip(&*tangent.rates).collect();
         for together in moved.chunks(room.columns) {
-            for (q, (_, p)) in together.iter().enumerate() {
-                let column = s.column_of(keys[**p]);
-                s.column(column);
+            for (q, (_, rates)) in together.iter().enumerate() {
+                s.push(rates);
                 s.run(pass::SUM_OLD, ALL, Per::Node, 0);
                 s.begin_column(q);
             }
@@ -85,19 +78,17 @@ pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tal
 
 /// Tangent of step k.
 pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, old: &Tangent, new: &Tangent, tally: &Tally) {
-    let keys = &world.plan.layout.keys;
-    let room = ColumnRoom::new(world, old.directions.len());
+    let room = ColumnRoom::new(world, old.parts.len());
     let flight = &world.buffers["trial"];
-    let all: Vec<_> = old.parts.iter().zip(&new.parts).zip(&old.directions).collect();
+    let all: Vec<_> = old.parts.iter().zip(&new.parts).zip(&*old.rates).collect();
     world.record(|r| {
         let mut s = Passes::new(world, r, Some(k), now, next, tally);
         room.lend_to(&mut s);
         s.linearise();
         for together in all.chunks(room.columns) {
-            for (q, ((from, _), p)) in together.iter().enumerate() {
+            for (q, ((from, _), rates)) in together.iter().enumerate() {
                 let from = &from.buffer;
-                let column = s.column_of(keys[**p]);
-                s.column(column);
+                s.push(rates);
                 s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
                 s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
                 s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &[("probe", from)]);

@@ -3,7 +3,6 @@
 
 pub(crate) mod backward;
 mod choices;
-mod columns;
 mod faster;
 pub(crate) mod forward;
 mod measure;

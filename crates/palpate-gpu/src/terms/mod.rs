@@ -1,8 +1,9 @@
 //! The terms of a balance, one file each, and what they make together: residual, tangent, and derivatives by the old state.
 
 mod cell_laws;
-pub(crate) mod point_laws;
+mod point_laws;
 mod pull;
+mod push;
 
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::points::{FORCE, STIFFNESS};

@@ -1,14 +1,9 @@
 //! Laws of points: what effects do to nodes, and to patches of the surface, one pass an effect.
 
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::points::{AT_NODES, COLUMN, INDEX_AT, KIND_AT, QUESTION_AT};
+use crate::device::pipelines::shared::points::{AT_NODES, QUESTION_AT};
 use crate::device::recorder::Named;
 use crate::passes::{Passes, Per};
-
-/// The question for the derivative by a parameter of kind `kind` (`shared/keys.wgsl`) and this index.
-pub(crate) fn question(kind: u32, index: u32) -> u32 {
-    COLUMN + (kind << (KIND_AT - QUESTION_AT)) + (index << (INDEX_AT - QUESTION_AT))
-}
 
 impl Passes<'_, '_> {
     /// Asks every effect on nodes (or the one of number `only`) and adds its answer to `forces`, or to the matrix.

@@ -33,7 +33,7 @@ impl Passes<'_, '_> {
         let Some(sums) = &tally.sums else { return };
         let (sought, named) = (&sums.sought, tally.named());
         let material = sought.modulus || sought.poisson || sought.rest;
-        if material || sought.damping[1] || self.seeks_effect(sought, |s| matches!(s, Site::Aging(_))) {
+        if material || sought.damping[1] {
             self.run_with(pass::PULL_CELLS, ALL, Per::Cell, asked(sought), &named);
         }
         if material || self.seeks_effect(sought, |s| matches!(s, Site::Cells(_))) {
@@ -69,7 +69,7 @@ impl Passes<'_, '_> {
     }
 
     /// Whether numbers of some effect on such a site are sought.
-    fn seeks_effect(&self, sought: &Sought, on: fn(&Site) -> bool) -> bool {
+    pub(super) fn seeks_effect(&self, sought: &Sought, on: fn(&Site) -> bool) -> bool {
         self.world.plan.layout.effects().zip(&sought.effects).any(|((law, _), own)| *own && on(&law.site))
     }
 

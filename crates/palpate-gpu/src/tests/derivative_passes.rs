@@ -11,7 +11,7 @@ use crate::passes::{ALL, Passes, Per};
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
-use palpate_engine::{Backend, Request, Wanted};
+use palpate_engine::{Backend, Direction, Request, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
@@ -27,6 +27,12 @@ fn along(plan: &Plan) -> [Vec<DVec3>; 2] {
     let wave = |x: &DVec3, f: f64| DVec3::new((f * x.x).sin() + 0.3, (f * x.y + 1.0).cos(), (f * (x.x + x.z)).sin() - 0.2);
     let of = |f: f64, size: f64| plan.body.nodes.iter().map(|x| size * wave(x, f)).collect();
     [of(30.0, 1e-3), of(50.0, 0.1)]
+}
+
+/// A direction in which every parameter moves by some part of its size.
+fn dense(plan: &Plan) -> Vec<f64> {
+    let size = |(p, key): (usize, &ParamKey)| (p as f64 + 0.5).sin() * plan.theta[p].abs().max(0.1 * key.spec().typical.min(1.0));
+    plan.layout.keys.iter().enumerate().map(size).collect()
 }
 
 fn name_of(key: ParamKey) -> String {
@@ -66,17 +72,15 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
         s.run(pass::FINISH_STEP, ALL, Per::Node, 0);
         s.linearise();
     });
-    for key in &plan.layout.keys {
-        let known = std::cell::Cell::new(false);
-        run(&|s| {
-            let column = s.column_of(*key);
-            known.set(column.is_some());
-            s.column(column);
-        });
-        if known.get() {
-            parts.push((name_of(*key), three(&read(&world.buffers["column"], n))));
-        }
+    let directions: Vec<Direction> = (0..plan.layout.len()).map(Direction::Parameter).collect();
+    for (key, rates) in plan.layout.keys.iter().zip(&*world.rates(&directions)) {
+        run(&|s| s.push(rates));
+        parts.push((name_of(*key), three(&read(&world.buffers["column"], n))));
     }
+    // All of them at once are their sum.
+    let dense = world.rates(&[Direction::Dense(dense(plan))]);
+    run(&|s| s.push(&dense[0]));
+    parts.push((DENSE.into(), three(&read(&world.buffers["column"], n))));
     let [u, v] = along(plan);
     write(&world.buffers["direction"], &v);
     run(&|s| s.pull(&tally));
@@ -127,18 +131,21 @@ fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
         let mut parts = vec![("press_old and gather_old".into(), flat(&old_forces(c)))];
         let mut equation = Equation::new(c);
         equation.residual(u1);
+        let mut all = vec![DVec3::ZERO; u1.len()];
         let (mut gradient, mut sizes) = (vec![0.0; plan.layout.len()], vec![1.0; plan.layout.len()]);
         for (p, key) in plan.layout.keys.iter().enumerate() {
             let mut unit = vec![0.0; plan.layout.len()];
             unit[p] = 1.0;
             let column = equation.by_coefficients(u1, &c.coefficients.along(plan, &unit));
-            if !matches!(key, ParamKey::Velocity(_) | ParamKey::AngularVelocity(_)) {
+            all.iter_mut().zip(&column).for_each(|(sum, c)| *sum += dense(plan)[p] * *c);
+            parts.push((name_of(*key), flat(&column)));
+            if column.iter().any(|c| *c != DVec3::ZERO) {
                 let terms = || column.iter().zip(&v).map(|(c, z)| c.dot(*z));
                 sizes[p] = terms().map(f64::abs).sum();
                 gradient[p] = -terms().sum::<f64>() / sizes[p];
-                parts.push((name_of(*key), flat(&column)));
             }
         }
+        parts.push((DENSE.into(), flat(&all)));
         parts.push((PULL.into(), gradient));
         // What is free of inertia on the device is the sum of two terms here whose inertia cancels.
         let back = equation.by_past_transposed(u1, &v);
@@ -198,8 +205,10 @@ fn apart(found: &[Part], right: &[Part]) -> Vec<String> {
     for ((name, a), (_, b)) in found.iter().zip(right) {
         let size = b.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         let off = a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
-        print!("{name} {:.1e}; ", off / size);
-        // The old forces are forces.
+        if size > 0.0 {
+            print!("{name} {:.1e}; ", off / size);
+        }
+        // What does not depend on a parameter is zero on both sides; the old forces are forces.
         if off.is_nan() || off > if name == OLD { FORCES } else { ALLOWED } * size {
             out.push(name.clone());
         }
@@ -208,6 +217,8 @@ fn apart(found: &[Part], right: &[Part]) -> Vec<String> {
     out
 }
 
+/// Along a direction in which all parameters change.
+const DENSE: &str = "along all parameters";
 /// Derivatives by all parameters at once.
 const PULL: &str = "pull";
 const BACK_U: &str = "couple_old and step_back, displacement";

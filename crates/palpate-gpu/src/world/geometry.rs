@@ -2,6 +2,7 @@
 
 use super::effects::Effects;
 use super::limits::{LOOPS, Most, check_loops};
+use super::rates;
 use crate::device::pipelines::shared::structs::FIELD_COUPLED;
 use crate::device::{GpuError, Maker};
 use crate::layout::{Cell, Mass, Patch, Shape};
@@ -137,6 +138,7 @@ impl Geometry {
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
         let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
+        let [rate_effects, rate_numbers] = rates::places(plan, &effects);
         let shape = Shape {
             members: 0,
             nodes: n as u32,
@@ -162,10 +164,11 @@ impl Geometry {
             quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 },
-            slope_rows: effects.slope_rows,
+            pad: 0,
             aging_rows: effects.aging_rows,
             point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
-            pad: [0; 2],
+            rate_numbers,
+            rate_effects,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);

@@ -50,9 +50,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 11] {
-        // 600: rotations by Jacobi's method, and sums over the corners of a cell.
-        let cell = 600 + self.supports;
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 13] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
@@ -64,9 +62,12 @@ impl Most {
             // Once for each input, all planes together, and once for each of a plane's own numbers.
             ("pull_patch_laws", 750 * self.pressed.max(1) + 450),
             ("pull_holds", 2 * (18 * self.grips + 60) + 60),
-            ("pull_cells", cell + self.aging + 200),
+            // Rotations by Jacobi's method at up to three states, and sums over the corners of a cell.
+            ("pull_cells", 2600 + self.aging),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
-            ("gather_column", cell + self.row + 20 * self.masses + self.planes),
+            ("push_nodes", 60 + self.row + 20 * self.masses),
+            ("push_cells", 2600 + self.supports + self.aging),
+            ("push_holds", 2 * (2 * self.grips + 10 * self.grips + 60) + self.aging + 60),
         ]
     }
 }

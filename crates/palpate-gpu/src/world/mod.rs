@@ -5,6 +5,7 @@ mod effort;
 mod geometry;
 mod limits;
 mod members;
+pub(crate) mod rates;
 mod room;
 mod states;
 mod sums;
@@ -14,6 +15,7 @@ mod tuning;
 pub(crate) use effort::{Effort, FULL, Level};
 pub(crate) use geometry::Geometry;
 pub(crate) use limits::columns;
+pub(crate) use rates::Rates;
 pub(crate) use room::{COLUMN_VECTORS, KINDS, VECTOR, work};
 pub(crate) use states::Loan;
 pub use states::{Adjoint, State, Tangent};
@@ -32,12 +34,15 @@ use crate::costs::Observer;
 use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
 use crate::device::{Gpu, GpuError, Maker as _};
 use members::Batch;
-use palpate_engine::ParamBatch;
+use palpate_engine::{Direction, ParamBatch};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Directions, and what changes along them.
+type Known = (Vec<Direction>, Arc<Vec<Rates>>);
 
 /// A plan made ready on a device, and the current batch.
 #[derive(Debug)]
@@ -51,6 +56,8 @@ pub struct World {
     pub(crate) buffers: Buffers,
     pool: Arc<Mutex<Vec<wgpu::Buffer>>>,
     groups: RefCell<Groups>,
+    /// Directions of this batch's tangents, and what changes along them.
+    rates: RefCell<Known>,
     /// Time on the device per pass, when asked for.
     pub(crate) times: RefCell<HashMap<&'static str, PassTime>>,
     pub(crate) timed: bool,
@@ -83,6 +90,7 @@ impl World {
             buffers,
             pool: Arc::default(),
             groups: RefCell::default(),
+            rates: RefCell::default(),
             times: RefCell::default(),
             timed: false,
             many,
@@ -99,6 +107,15 @@ impl World {
     /// True where effects add to blocks, which only the matrix holds.
     pub(crate) fn needs_matrix(&self) -> bool {
         self.geometry.effects.on_nodes() || self.geometry.effects.on_cells()
+    }
+
+    /// What changes along directions of the current batch; computed once for all tangents of an evaluation.
+    pub(crate) fn rates(&self, directions: &[Direction]) -> Arc<Vec<Rates>> {
+        let mut known = self.rates.borrow_mut();
+        if known.0 != directions || known.1.len() != directions.len() {
+            *known = (directions.to_vec(), Arc::new(Rates::all(self, directions)));
+        }
+        known.1.clone()
     }
 
     /// True where an effect does nothing in any member.
@@ -121,6 +138,7 @@ impl World {
         let before = self.members();
         // Buffers of the batch before are replaced: bind groups that hold them must go.
         self.groups.borrow_mut().clear();
+        *self.rates.borrow_mut() = Known::default();
         let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, theta, &mut self.buffers);
         if let Err(e) = set {
             self.gpu.keep(e);

@@ -62,13 +62,16 @@ pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
     let systems = columns(members as u64) * members as u64;
     let each = WORK.iter().map(|w| (w, members as u64)).chain(OF_COLUMN.iter().map(|w| (w, systems)));
     let own = each.map(|((name, items, bytes), count)| (*name, u64::from(items(shape)) * bytes * count));
-    let shared: [(&'static str, u64); 5] = [
+    let shared: [(&'static str, u64); 7] = [
         ("shape", size_of::<Shape>() as u64),
         ("roster", 4 * SECTIONS as u64 * (systems + 1)),
         ("arguments", 12 * (SECTIONS * KINDS) as u64),
         ("gate", 12),
         // Where listings that may not change `gate` write instead.
         ("no_gate", 12),
+        // What passes find that no direction concerns.
+        ("rates", 0),
+        ("rate_numbers", 0),
     ];
     own.chain(shared).collect()
 }

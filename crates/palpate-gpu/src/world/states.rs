@@ -1,5 +1,6 @@
 //! States on loan from a pool, adjoints and tangents.
 
+use super::rates::Rates;
 use crate::device::Gpu;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -34,9 +35,9 @@ pub struct State(pub(crate) Loan);
 #[derive(Debug)]
 pub struct Adjoint(pub(crate) Loan);
 
-/// du/dθ_q and dv/dθ_q, one buffer of `[2][B][N]` vectors per direction.
+/// Derivatives of u and v along some directions, one buffer of `[2][B][N]` vectors per direction.
 #[derive(Debug)]
 pub struct Tangent {
-    pub(crate) directions: Vec<usize>,
+    pub(crate) rates: Arc<Vec<Rates>>,
     pub(crate) parts: Vec<Loan>,
 }

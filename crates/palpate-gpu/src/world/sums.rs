@@ -48,7 +48,8 @@ impl Sums {
         let each = |items: u32, width: u32| u64::from(items.div_ceil(width));
         let [nodes, cells, holds] = [shape.nodes, shape.cells, shape.holds].map(u64::from);
         let cell_rows = u64::from(CELL_ROWS + shape.aging_rows + CELL_SLOTS * effects.cell_laws());
-        let hold_rows = u64::from(HOLD_ROWS) + effects.hold_numbers().iter().map(|n| u64::from(*n)).sum::<u64>();
+        let hold_rows =
+            u64::from(HOLD_ROWS + shape.aging_rows) + effects.hold_numbers().iter().map(|n| u64::from(*n)).sum::<u64>();
         let floats = [
             ("cell_pulls", cells),
             ("cell_sums", cell_rows * each(shape.cells, 8)),
@@ -81,15 +82,15 @@ impl Sums {
     /// The numbers of effects, and what laws of points depend on beside them.
     fn add_effects(&self, plan: &Plan, effects: &Effects, at: &Member, g: &mut Coefficients) {
         let shape = at.shape;
-        let [poses, _] = effects.hold_numbers();
+        let ([poses, _], grips) = (effects.hold_numbers(), HOLD_ROWS + shape.aging_rows);
         for (number, (law, _)) in plan.layout.effects().enumerate() {
             for (slot, out) in g.physics.effects[number].iter_mut().enumerate() {
                 let row = effects.slope_row(number, slot as u32);
                 *out += match (&law.site, row, effects.cell_law(number)) {
-                    (Site::Aging(_), Some(row), _) => at.cells(CELL_ROWS + row),
+                    (Site::Aging(_), Some(row), _) => at.cells(CELL_ROWS + row) + at.holds(HOLD_ROWS + row),
                     (Site::Clamps(_) | Site::Edges(_), Some(row), _) => {
-                        let matrix = effects.matrix_row(row).map_or(0.0, |k| at.holds(HOLD_ROWS + poses + k));
-                        at.holds(HOLD_ROWS + row) + matrix
+                        let matrix = effects.matrix_row(row).map_or(0.0, |k| at.holds(grips + poses + k));
+                        at.holds(grips + row) + matrix
                     }
                     (_, _, Some(law)) => at.cells(CELL_ROWS + shape.aging_rows + CELL_SLOTS * law + slot as u32),
                     _ => 0.0,

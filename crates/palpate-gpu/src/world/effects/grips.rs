@@ -57,6 +57,11 @@ impl Effects {
         self.bits & FIELD_GRIPS != 0
     }
 
+    /// Rows of the numbers that change the clamps' matrices.
+    pub(crate) fn matrix_rows(&self) -> &[usize] {
+        &self.matrix_rows
+    }
+
     /// Numbers of effects that move the clamps' poses, and those among them that change the matrices.
     pub(crate) fn hold_numbers(&self) -> [u32; 2] {
         [&self.grip_rows.len(), &self.matrix_rows.len()].map(|n| *n as u32)

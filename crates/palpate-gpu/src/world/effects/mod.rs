@@ -30,15 +30,12 @@ pub(crate) struct Effects {
     pub(crate) points: Vec<(usize, EffectSite)>,
     /// Effects on cells, likewise.
     cells: Vec<(usize, EffectSite)>,
-    /// First row of slopes of every effect that is computed here.
+    /// First row of every effect that changes the stiffness in time or acts on clamps, among those that do.
     fields: Vec<Option<u32>>,
     /// As `Shape` has them.
     pub(crate) bits: u32,
-    pub(crate) slope_rows: u32,
     /// Parameters of changes in time.
     pub(crate) aging_rows: u32,
-    /// Parameters of the stress-free shape.
-    rest_rows: u32,
     /// Parameters of how clamps are held: effect and number of each.
     grip_rows: Vec<[usize; 2]>,
     /// Those among them that change the clamps' matrices, by their row.
@@ -65,8 +62,6 @@ impl Effects {
                 Site::Contact(_) => Some(AT_CONTACT),
                 Site::Modulus(_) | Site::Density(_) => {
                     e.bits |= if matches!(law.site, Site::Modulus(_)) { FIELD_MODULUS } else { FIELD_DENSITY };
-                    field = Some(e.slope_rows);
-                    e.slope_rows += count;
                     None
                 }
                 Site::Aging(_) => {
@@ -77,8 +72,6 @@ impl Effects {
                 }
                 Site::Rest(_) => {
                     e.bits |= FIELD_REST | if plan.initial == InitialShape::Rest { FIELD_STARTS } else { 0 };
-                    field = Some(e.rest_rows);
-                    e.rest_rows += count;
                     None
                 }
                 Site::Clamps(_) | Site::Edges(_) => {
@@ -164,27 +157,19 @@ impl Effects {
         self.points.iter().any(|p| p.1.site == AT_NODES)
     }
 
-    /// True when the body starts in a stress-free shape of its own.
-    pub(crate) fn starts_unstrained(&self) -> bool {
-        self.bits & FIELD_STARTS != 0
-    }
-
-    /// Row of the slopes of number `slot` of an effect that is computed on the host.
+    /// Row of number `slot` of an effect that changes the stiffness in time or acts on clamps.
     pub(crate) fn slope_row(&self, effect: usize, slot: u32) -> Option<u32> {
         self.fields[effect].map(|first| first + slot)
     }
 
     /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
     pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize, clamps: usize) -> Vec<(&'static str, usize)> {
-        let slopes = self.slope_rows as usize;
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
         let mut all = vec![
             ("effect_values", members * self.stride as usize),
             ("effect_measures", members * self.rows as usize * nodes),
             ("moduli", of(FIELD_MODULUS, cells)),
             ("densities", of(FIELD_DENSITY, nodes)),
-            ("modulus_slopes", of(FIELD_MODULUS, slopes * cells)),
-            ("density_slopes", of(FIELD_DENSITY, slopes * nodes)),
             ("agings", of(FIELD_AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
         ];
         all.extend(self.rest_sizes(members, nodes, cells));
@@ -223,27 +208,14 @@ impl Effects {
             let changes = Changes::new(plan, physics);
             changes.modulus.iter().for_each(|m| put(&mut data[2], m));
             changes.density.iter().for_each(|d| put(&mut data[3], d));
-            let varied = |law: &Law| matches!(law.site, Site::Modulus(_) | Site::Density(_));
-            for (effect, (_, places)) in plan.layout.effects().enumerate().filter(|(_, e)| varied(e.0)) {
-                for slot in 0..places.len() {
-                    let stiff = changes.modulus_slope(plan, physics, effect, slot);
-                    let heavy = changes.density_slope(plan, physics, effect, slot);
-                    if self.bits & FIELD_MODULUS != 0 {
-                        put(&mut data[4], &stiff.unwrap_or_else(|| vec![0.0; body.cells.len()]));
-                    }
-                    if self.bits & FIELD_DENSITY != 0 {
-                        put(&mut data[5], &heavy.unwrap_or_else(|| vec![0.0; body.nodes.len()]));
-                    }
-                }
-            }
         }
         if self.bits & FIELD_AGING != 0 {
-            data[6] = self.agings(plan, batch);
+            data[4] = self.agings(plan, batch);
         }
         if self.bits & FIELD_REST != 0 {
-            self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[7 + k] = v);
+            self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[5 + k] = v);
         }
-        data[10] = self.hold_slopes(plan, batch);
+        data[7] = self.hold_slopes(plan, batch);
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
             buffers.insert(name, gpu.upload(name, values)?);

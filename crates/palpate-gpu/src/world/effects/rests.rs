@@ -1,12 +1,11 @@
-//! The stress-free shape that effects give a body: displacement and derivatives per node, deformation per cell, as kernels read them
+//! The stress-free shape that effects give a body: displacement per node, deformation per cell, as kernels read them
 //! (`shared/unstrained.wgsl`).
 
 use super::Effects;
 use crate::device::pipelines::shared::structs::FIELD_REST;
 use glam::DVec3;
 use palpate_model::cutcells::corotation::CellPose;
-use palpate_model::effects::Site;
-use palpate_model::params::changes::{self, Changes};
+use palpate_model::params::changes::Changes;
 use palpate_model::plan::{Physics, Plan};
 
 fn put(out: &mut Vec<f32>, v: &[f64]) {
@@ -19,27 +18,19 @@ fn put_nodes(out: &mut Vec<f32>, v: &[DVec3]) {
 
 impl Effects {
     /// Numbers of every buffer of [`Effects::rests`].
-    pub(super) fn rest_sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 3] {
+    pub(super) fn rest_sizes(&self, members: usize, nodes: usize, cells: usize) -> [(&'static str, usize); 2] {
         let of = |n: usize| if self.bits & FIELD_REST == 0 { 0 } else { 4 * members * n };
-        [("rests", of(nodes)), ("rest_slopes", of(self.rest_rows as usize * nodes)), ("rest_shapes", of(8 * cells))]
+        [("rests", of(nodes)), ("rest_shapes", of(8 * cells))]
     }
 
-    /// W `[B][N]`, ∂W/∂p `[rows][B][N]`, and the deformation of every cell in the shape X + W `[B][cells][8]`; vectors of four.
-    pub(super) fn rests(&self, plan: &Plan, batch: &[Physics]) -> [Vec<f32>; 3] {
-        let (body, mut out) = (&plan.body, [const { Vec::new() }; 3]);
+    /// W `[B][N]` and the deformation of every cell in the shape X + W `[B][cells][8]`; vectors of four.
+    pub(super) fn rests(&self, plan: &Plan, batch: &[Physics]) -> [Vec<f32>; 2] {
+        let (body, mut out) = (&plan.body, [const { Vec::new() }; 2]);
         for physics in batch {
             let w = Changes::new(plan, physics).rest.unwrap_or_else(|| vec![DVec3::ZERO; body.nodes.len()]);
             put_nodes(&mut out[0], &w);
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
-            body.cells.iter().for_each(|c| put(&mut out[2], &CellPose::new(&c.nodes.map(at), body.grid.h).q));
-        }
-        for (effect, (_, places)) in plan.layout.effects().enumerate().filter(|(_, e)| matches!(e.0.site, Site::Rest(_))) {
-            for slot in 0..places.len() {
-                for physics in batch {
-                    let slope = changes::rest_slope(plan, physics, effect, slot);
-                    put_nodes(&mut out[1], &slope.unwrap_or_else(|| vec![DVec3::ZERO; body.nodes.len()]));
-                }
-            }
+            body.cells.iter().for_each(|c| put(&mut out[1], &CellPose::new(&c.nodes.map(at), body.grid.h).q));
         }
         out
     }

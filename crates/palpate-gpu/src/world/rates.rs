@@ -1,0 +1,153 @@
+//! How the coefficients of the balance change along directions of tangents: what kernels read of it, uploaded once for a whole evaluation.
+
+use super::World;
+use super::geometry::Geometry;
+use crate::device::Maker as _;
+use crate::device::pipelines::shared::rates::{WITH_DENSITIES, WITH_MODULI, WITH_POISSON, WITH_RESTS};
+use crate::device::recorder::Buffers;
+use crate::layout::Rate;
+use glam::DVec3;
+use palpate_engine::Direction;
+use palpate_model::effects::Site;
+use palpate_model::params::ParamKey;
+use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::plan::{Physics, Plan};
+
+/// One direction, for all members.
+#[derive(Debug)]
+pub(crate) struct Rates {
+    /// By the names that kernels know them by.
+    pub(crate) buffers: Buffers,
+    /// What kernels are told: bits of `shared/rates.wgsl`.
+    pub(crate) flags: u32,
+    /// Coefficients that change.
+    pub(crate) moved: Sought,
+    /// The velocity at the start changes.
+    pub(crate) flying: bool,
+}
+
+fn vec4(v: DVec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+/// Numbers of a member in the order of `shared/rates.wgsl`.
+fn numbers(geometry: &Geometry, plan: &Plan, p: &Physics, out: &mut Vec<f32>) {
+    let effects = &geometry.effects;
+    let own = |pick: fn(&Site) -> bool| {
+        let numbered = plan.layout.effects().zip(&p.effects).enumerate();
+        numbered.filter(move |(_, ((law, _), _))| pick(&law.site)).flat_map(|(_, (_, values))| values.iter().map(|v| *v as f32))
+    };
+    p.planes.iter().for_each(|[height, theta, phi]| out.extend([*height as f32, *theta as f32, *phi as f32, 0.0]));
+    out.extend(p.masses.iter().map(|m| *m as f32));
+    out.extend(own(|s| matches!(s, Site::Aging(_))));
+    let poses: Vec<f32> = own(|s| matches!(s, Site::Clamps(_) | Site::Edges(_))).collect();
+    out.extend(&poses);
+    out.extend(effects.matrix_rows().iter().map(|row| poses[*row]));
+    out.extend(p.effects.iter().flatten().map(|v| *v as f32));
+}
+
+/// Place of the effects' numbers among a member's, and how many there are.
+pub(super) fn places(plan: &Plan, effects: &super::effects::Effects) -> [u32; 2] {
+    let all = plan.layout.effects().map(|(_, places)| places.len() as u32).sum::<u32>();
+    let first =
+        4 * plan.planes.len() as u32 + plan.masses.len() as u32 + effects.aging_rows + effects.hold_numbers().iter().sum::<u32>();
+    [first, first + all]
+}
+
+/// Bytes of every buffer of a direction along one parameter, for `members`.
+pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64) -> Vec<u64> {
+    let shape = &geometry.shape;
+    let varies = |on: fn(&Site) -> bool, field: bool| match plan.layout.keys[place] {
+        ParamKey::Effect { law, .. } => on(&palpate_model::effects::ALL[usize::from(law)].site),
+        ParamKey::Field { .. } => field,
+        _ => false,
+    };
+    let sought = Sought::new(plan, &(0..plan.layout.len()).map(|p| p == place).collect::<Vec<_>>());
+    let of = |moves: bool, bytes: u32| if moves { u64::from(bytes) * members } else { 0 };
+    vec![
+        size_of::<Rate>() as u64 * members,
+        4 * u64::from(shape.rate_numbers) * members,
+        of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * shape.cells),
+        of(varies(|s| matches!(s, Site::Density(_)), sought.density), 4 * shape.nodes),
+        of(sought.rest, 16 * shape.nodes),
+    ]
+}
+
+/// What one direction makes of all members so far.
+#[derive(Default)]
+struct Gathered {
+    rates: Vec<Rate>,
+    numbers: Vec<f32>,
+    moduli: Vec<f32>,
+    densities: Vec<f32>,
+    rests: Vec<[f32; 4]>,
+}
+
+impl Gathered {
+    fn add(&mut self, world: &World, rate: &Coefficients) {
+        let p = &rate.physics;
+        self.rates.push(Rate {
+            young: p.youngs_modulus as f32,
+            poisson: p.poisson_ratio as f32,
+            density: p.density as f32,
+            mass_damping: p.mass_damping as f32,
+            stiffness_damping: p.stiffness_damping as f32,
+            start: p.start as f32,
+            pad: [0.0; 2],
+            gravity: vec4(p.gravity),
+            velocity: vec4(p.velocity),
+            spin: vec4(p.angular_velocity),
+        });
+        numbers(&world.geometry, &world.plan, p, &mut self.numbers);
+        // Which arrays there are depends on the direction alone, not on the member.
+        self.moduli.extend(rate.changes.modulus.iter().flatten().map(|v| *v as f32));
+        self.densities.extend(rate.changes.density.iter().flatten().map(|v| *v as f32));
+        self.rests.extend(rate.changes.rest.iter().flatten().map(|v| vec4(*v)));
+    }
+
+    fn upload(self, world: &World, direction: &Direction) -> Rates {
+        let bit = |empty: bool, bit: u32| if empty { 0 } else { bit };
+        let mut moved = vec![false; world.plan.layout.len()];
+        direction.entries().for_each(|(p, _)| moved[p] = true);
+        let moved = Sought::new(&world.plan, &moved);
+        let flying = self.rates.iter().any(|r| r.velocity != [0.0; 4] || r.spin != [0.0; 4]);
+        let flags = bit(self.moduli.is_empty(), WITH_MODULI)
+            | bit(self.densities.is_empty(), WITH_DENSITIES)
+            | bit(self.rests.is_empty(), WITH_RESTS)
+            | bit(!moved.poisson, WITH_POISSON);
+        let mut buffers = Buffers::new();
+        let mut put = |name: &'static str, made: Result<wgpu::Buffer, crate::device::GpuError>| {
+            let buffer = made.unwrap_or_else(|e| {
+                world.gpu.keep(e);
+                world.gpu.small()
+            });
+            buffers.insert(name, buffer);
+        };
+        put("rates", world.gpu.upload("rates", &self.rates));
+        put("rate_numbers", world.gpu.upload("rate_numbers", &self.numbers));
+        put("rate_moduli", world.gpu.upload("rate_moduli", &self.moduli));
+        put("rate_densities", world.gpu.upload("rate_densities", &self.densities));
+        put("rate_rests", world.gpu.upload("rate_rests", &self.rests));
+        Rates { buffers, flags, moved, flying }
+    }
+}
+
+impl Rates {
+    /// Along every direction.
+    pub(crate) fn all(world: &World, directions: &[Direction]) -> Vec<Rates> {
+        let (plan, theta) = (&world.plan, &world.batch.theta);
+        let mut gathered: Vec<Gathered> = directions.iter().map(|_| Gathered::default()).collect();
+        for row in theta {
+            let own = Coefficients::new(plan, row);
+            for (all, direction) in gathered.iter_mut().zip(directions) {
+                all.add(world, &own.along(plan, &direction.dense(plan.layout.len())));
+            }
+        }
+        gathered.into_iter().zip(directions).map(|(all, direction)| all.upload(world, direction)).collect()
+    }
+
+    /// All buffers, for passes.
+    pub(crate) fn named(&self) -> Vec<(&'static str, &wgpu::Buffer)> {
+        self.buffers.iter().map(|(name, buffer)| (*name, buffer)).collect()
+    }
+}

@@ -1,0 +1,79 @@
+//! Change of the clamps' forces along a direction: by the modulus of every cell, Poisson's ratio, the time of the start, the stress-free
+//! shape, and how effects hold the clamps.
+// use shared/holds
+// use shared/rates
+// use shared/pulls
+
+// [rows][B][steps + 1][clamps].
+var<storage, read> hold_slopes: array<HoldSlope>;
+// [B][N]
+var<storage, read> rate_rests: array<vec4<f32>>;
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> next: array<vec4<f32>>;
+var<storage, read_write> hold_forces: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn push_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+              @builtin(local_invocation_index) local: u32) {
+    lanes_start(local);
+    let p = find_place(group, groups, local / 8u, shape.holds, 8u);
+    let hold = min(p.item, shape.holds - 1u);
+    let corner = local % 8u;
+    let m = members[p.member];
+    let mix = mix_of(m);
+    let site = holds[hold];
+    let node = cells[site.x].nodes[corner];
+    let a = at_node(p.member, node);
+    let x = rest[node].xyz;
+    let young = young_at(m, p.member, site.x);
+    let change = young_rate(m, p.member, site.x);
+    let r = rates[p.member];
+    let numbers = aging_numbers(p.member) + shape.aging_rows;
+    let poses = extractBits(call.extra, POSES_AT, MATRICES_AT - POSES_AT);
+    let matrices = call.extra >> MATRICES_AT;
+    var total = vec3(0.0);
+    for (var instant = 0u; instant < 2u; instant++) {
+        let weight = select(mix.fresh, mix.old, instant == 1u);
+        var at = 0u;
+        if call.mode != 0u {
+            at = call.step + 1u - instant;
+        }
+        let pose = pose_at(p.member, at, site.y);
+        var turn = r.start * pose.turn_rate;
+        var shift = r.start * pose.shift_rate.xyz;
+        for (var row = 0u; row < poses; row++) {
+            let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + at) * shape.clamps + site.y];
+            turn += rate_numbers[numbers + row] * slope.turn;
+            shift += rate_numbers[numbers + row] * slope.shift.xyz;
+        }
+        var u = next[a].xyz + next[part(1u) + a].xyz;
+        if instant == 1u {
+            u = now[a].xyz + now[part(1u) + a].xyz;
+        }
+        var d = deviation(pose, u, x);
+        if has_rest() {
+            d -= rests[a].xyz;
+        }
+        var rate = transpose(turn) * (u + x - pose.shift.xyz) - transpose(pose.turn) * shift;
+        if with_rate(WITH_RESTS) {
+            rate -= rate_rests[a].xyz;
+        }
+        let matrix = grip_at(m, p.member, 0u, hold);
+        var g = hold_stiff(matrix, corner, change * d + young * rate);
+        if with_rate(WITH_POISSON) {
+            g += (young * r.poisson) * hold_stiff(grip_at(m, p.member, 1u, hold), corner, d);
+        }
+        for (var row = 0u; row < matrices; row++) {
+            // Rows of slopes follow the members' own two matrices.
+            let slope = (((2u + row) * shape.members + p.member) * shape.holds + hold) * 576u;
+            g += (young * rate_numbers[numbers + poses + row]) * hold_stiff(slope, corner, d);
+        }
+        let f = pose.turn * g + turn * (young * hold_stiff(matrix, corner, d));
+        if weight != 0.0 {
+            total += weight * f;
+        }
+    }
+    if p.live {
+        hold_forces[(p.member * shape.holds + hold) * 8u + corner] = vec4(total, 0.0);
+    }
+}

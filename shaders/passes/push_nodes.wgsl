@@ -1,0 +1,93 @@
+//! Change of the residual along a direction, per node: corners of cells from push_cells, and what acts on nodes: density, mass damping,
+//! gravity, point masses, and what multiplies the ghost penalty.
+// use shared/mix
+// use shared/inertia
+// use shared/motion
+// use shared/rates
+// use shared/unstrained
+
+var<storage, read> cell_force: array<vec4<f32>>;
+var<storage, read> node_rows: array<u32>;
+var<storage, read> node_list: array<u32>;
+var<storage, read> block_rows: array<u32>;
+var<storage, read> columns: array<u32>;
+var<storage, read> ghosts: array<f32>;
+// [B][N]: of the factors on the nodes' densities, and of the stress-free shape.
+var<storage, read> rate_densities: array<f32>;
+var<storage, read> rate_rests: array<vec4<f32>>;
+var<storage, read_write> column: array<vec4<f32>>;
+
+// By what multiplies the ghost penalty, and by the stress-free shape.
+fn by_ghosts(member: u32, node: u32, m: Member, mix: Mix) -> vec3<f32> {
+    let r = rates[member];
+    let a = at_node(member, node);
+    let shear = r.young * m.ghost.x + m.young * m.ghost.y * r.poisson;
+    let fixed = -mix.fresh - mix.old;
+    var damped = 0.0;
+    if call.mode != 0u {
+        damped = m.young * m.ghost.x * r.stiffness_damping / shape.dt;
+    }
+    let on_new = shear * mix.on_ghost + damped;
+    let on_old = shear * (mix.old - mix.rate) - damped;
+    var f = vec3(0.0);
+    for (var k = block_rows[node]; k < block_rows[node + 1u]; k++) {
+        let b = at_node(member, columns[k]);
+        let d1 = (next[b].xyz - next[a].xyz) + (next[part(1u) + b].xyz - next[part(1u) + a].xyz);
+        f += (on_new * ghosts[k]) * d1;
+        if call.mode != 0u {
+            let d0 = (now[b].xyz - now[a].xyz) + (now[part(1u) + b].xyz - now[part(1u) + a].xyz);
+            f += (on_old * ghosts[k]) * d0;
+        }
+        if has_rest() {
+            f += (shear * fixed * ghosts[k]) * (rests[b].xyz - rests[a].xyz);
+        }
+        if with_rate(WITH_RESTS) {
+            f += (m.young * m.ghost.x * fixed * ghosts[k]) * (rate_rests[b].xyz - rate_rests[a].xyz);
+        }
+    }
+    return f;
+}
+
+@compute @workgroup_size(64)
+fn push_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+              @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.nodes, 64u);
+    if !p.live {
+        return;
+    }
+    let m = members[p.member];
+    let r = rates[p.member];
+    let mix = mix_of(m);
+    let a = at_node(p.member, p.item);
+    var f = vec3(0.0);
+    if with_rate(WITH_CELLS) {
+        for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
+            f += cell_force[p.member * shape.cells * 8u + node_list[k]].xyz;
+        }
+    }
+    if shape.ghosts != 0u {
+        f += by_ghosts(p.member, p.item, m, mix);
+    }
+    let mass = node_mass(m, p.member, p.item);
+    var heavier = r.density * mass / m.density;
+    if with_rate(WITH_DENSITIES) {
+        heavier += m.density * rest[p.item].w * rate_densities[a];
+    }
+    f += heavier * acceleration(p.member, p.item, m);
+    if call.mode != 0u {
+        f += (heavier * m.mass_damping + mass * r.mass_damping) * speed(p.member, p.item);
+    }
+    f -= mass * r.gravity.xyz;
+    for (var s = 0u; s < shape.masses; s++) {
+        let corner = mass_corner(s, p.item);
+        if corner < 8u {
+            var sum = vec3(0.0);
+            for (var j = 0u; j < 8u; j++) {
+                sum += mass_sites[s].weights[j] * acceleration(p.member, mass_sites[s].nodes[j], m);
+            }
+            let rate = rate_numbers[numbers_at(p.member) + PLANE_NUMBERS * shape.planes + s];
+            f += mass_sites[s].weights[corner] * (rate * sum - mass_values[p.member * shape.masses + s] * r.gravity.xyz);
+        }
+    }
+    column[a] = vec4(f, 0.0);
+}
