@@ -9,3 +9,4 @@ mod effects_contact;
 mod effects_loads;
 mod effects_materials;
 mod free;
+mod tets;

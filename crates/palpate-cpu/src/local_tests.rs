@@ -9,7 +9,7 @@ use crate::world::{Gradient, MemberState, World};
 use glam::{DAffine3, DVec3};
 use palpate_engine::{Direction, ParamBatch};
 use palpate_model::cutcells::corotation::CellPose;
-use palpate_model::effects::{ALL, Effect, Site};
+use palpate_model::effects::{ALL, Effect, Site, find};
 use palpate_model::materials;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
@@ -18,6 +18,7 @@ use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::plan::scheme::{self, Stage};
 use palpate_model::scene::*;
+use palpate_model::space::points::TetMesh;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
 fn altering() -> Vec<Effect> {
@@ -37,7 +38,31 @@ fn altering() -> Vec<Effect> {
     (0..ALL.len()).filter(|l| alters(&ALL[*l].site)).map(make).collect()
 }
 
+/// The box of the ball as cubes of six tetrahedra each, three along every edge.
+fn tetrahedra() -> BodySource {
+    let (low, edge) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / 3.0);
+    let at = |i: usize, j: usize, k: usize| (i + 4 * (j + 4 * k)) as u32;
+    let mut mesh = TetMesh::default();
+    for n in 0..64 {
+        mesh.nodes.push(low + edge * DVec3::new((n % 4) as f64, (n / 4 % 4) as f64, (n / 16) as f64));
+    }
+    for n in 0..27 {
+        let (i, j, k) = (n % 3, n / 3 % 3, n / 9);
+        let c = |bits: usize| at(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2));
+        for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
+            mesh.tets.push([c(0), c(way[0]), c(way[1]), c(7)]);
+        }
+    }
+    let mesh = mesh.checked().unwrap();
+    BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
+}
+
 fn plan(effects: Vec<Effect>) -> Plan {
+    let ball = Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.045) };
+    plan_of(BodySource::Analytic(ball), effects)
+}
+
+fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
     let motion = RigidMotion {
         times: vec![-1.0, 0.0, 1.0],
         translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],
@@ -46,11 +71,7 @@ fn plan(effects: Vec<Effect>) -> Plan {
     let scene = Scene {
         path: "in-code.toml".into(),
         title: String::new(),
-        object: Object {
-            source: BodySource::Analytic(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.045) }),
-            pose: DAffine3::IDENTITY,
-            resolution: Resolution::CellSize(0.03),
-        },
+        object: Object { source, pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(0.03) },
         material: Material {
             model: &palpate_model::materials::ALL[0],
             inertia: Inertia::Density(1000.0),
@@ -157,15 +178,26 @@ impl At<'_> {
 fn everywhere(check: impl Fn(&At)) {
     let models = materials::ALL.iter().map(|model| (model, Vec::new()));
     for (model, effects) in models.chain([(&materials::ALL[0], altering()), (&materials::ALL[1], altering())]) {
-        let p = Plan { model, ..plan(effects) };
-        let n = p.body.nodes.len();
+        check_all(Plan { model, ..plan(effects) }, &check);
+    }
+    // Bodies of tetrahedra, with a law at points and none.
+    for model in materials::ALL {
+        let friction = Effect { values: vec![Some(0.4); 2], ..Effect::absent(find("coulomb-friction").unwrap()) };
+        check_all(Plan { model, ..plan_of(tetrahedra(), vec![friction]) }, &check);
+    }
+}
+
+fn check_all(p: Plan, check: &impl Fn(&At)) {
+    {
+        let (model, n) = (p.model, p.body.nodes.len());
         let theta = p.clock.stages().swap_remove(1);
         let two = scheme::find("bdf2").unwrap().stages(p.clock.step, 3, p.clock.theta).swap_remove(2);
         for stage in [None, Some(&theta), Some(&two)] {
             // Strains of some 10 % or cells turned inside out, contact active, the old states elsewhere, fast.
             let states = [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))];
             // Materials with a barrier do not exist inside out.
-            let exist = if model.name.starts_with("neo-hookean") { 2 } else { 3 };
+            let few = model.name.starts_with("neo-hookean") || !p.body.points.is_empty();
+            let exist = if few { 2 } else { 3 };
             for (seed, u) in states.into_iter().take(exist) {
                 let state = |s| MemberState { u: random(n, 0.003, seed + s), v: random(n, 0.3, seed + s + 10) };
                 let past = stage.map_or(Vec::new(), |s| (0..s.from.len() as u64).map(|i| state(10 + 40 * i)).collect());

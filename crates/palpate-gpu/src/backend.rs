@@ -76,6 +76,12 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
+        if !plan.body.points.is_empty() {
+            return Err(BuildError {
+                message: "the GPU backend cannot compute bodies of tetrahedra".into(),
+                hint: "use --backend cpu, or a surface mesh, which is cut out of a lattice".into(),
+            });
+        }
         if !plan.model.is_linear {
             return Err(BuildError {
                 message: format!("the GPU backend cannot compute the material \"{}\"", plan.model.name),

@@ -44,7 +44,7 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "object",
             Schema {
-                keys: &["mesh", "pose", "cell_size", "cells"],
+                keys: &["mesh", "volume_mesh", "pose", "cell_size", "cells"],
                 tables: &[(
                     "shape",
                     Schema {

@@ -9,6 +9,7 @@ use crate::params::Layout;
 use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
+use crate::space::points::TetMesh;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
 
@@ -85,6 +86,15 @@ pub enum BodySource {
     },
     /// A closed form, before `pose`.
     Analytic(Analytic),
+    /// Tetrahedra, checked by `palpate-io`.
+    Tetrahedra {
+        /// The file they were read from.
+        path: PathBuf,
+        /// The mesh, before `pose`.
+        mesh: TetMesh,
+        /// Its surface.
+        surface: TriMesh,
+    },
 }
 
 /// Analytic bodies, lengths in metres.
@@ -131,6 +141,8 @@ pub enum Analytic {
 /// How fine the grid is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
+    /// That of the file's own elements.
+    Own,
     /// Edge of a cell [m].
     CellSize(f64),
     /// Number of cells along the longest side of the body's bounding box.

@@ -54,6 +54,7 @@ pub trait Shape: Send + Sync + std::fmt::Debug {
 pub fn shape_of(object: &Object) -> Arc<dyn Shape> {
     match &object.source {
         BodySource::Mesh { mesh, .. } => Arc::new(MeshShape::new(mesh.transformed(&object.pose))),
+        BodySource::Tetrahedra { surface, .. } => Arc::new(MeshShape::new(surface.transformed(&object.pose))),
         BodySource::Analytic(body) => Arc::new(Placed::new(body.clone(), object.pose)),
     }
 }

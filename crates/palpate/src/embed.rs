@@ -3,17 +3,17 @@
 use glam::DVec3;
 use palpate_model::cutcells::grid::shape_functions;
 use palpate_model::space::body::Body;
+use palpate_model::space::stencil::Stencils;
+use rayon::prelude::*;
 
 /// Points of the rest configuration that follow the simulation's nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedding {
     /// Rest positions [m], shape `[V]`.
     pub rest: Vec<DVec3>,
-    /// Nodes of each point's cell, shape `[V]`.
-    pub nodes: Vec<[u32; 8]>,
-    /// Shape functions at each point, shape `[V]`; they sum to one.
-    pub weights: Vec<[f64; 8]>,
-    /// Largest distance of a point from the cell that carries it [m]; zero when all lie in active cells.
+    /// Where each point is, shape `[V]`.
+    pub places: Stencils,
+    /// Largest distance of a point from the element that carries it [m]; zero when all lie inside.
     pub farthest: f64,
 }
 
@@ -21,21 +21,27 @@ impl Embedding {
     /// Finds the active cell of every point. A point outside all of them follows the nearest one, whose trilinear field is
     /// continued to it (exact for affine motion).
     pub fn new(body: &Body, rest: Vec<DVec3>) -> Embedding {
+        let mut places = Stencils::default();
+        let mut farthest: f64 = 0.0;
+        if !body.points.is_empty() {
+            for (place, outside) in rest.par_iter().map(|p| body.points.carry(&body.nodes, *p)).collect::<Vec<_>>() {
+                farthest = farthest.max(outside);
+                places.push(&place.nodes, &place.value);
+            }
+            return Embedding { rest, places, farthest };
+        }
         let grid = &body.grid;
         let mut cell_at = vec![u32::MAX; grid.len()];
         for (number, cell) in body.cells.iter().enumerate() {
             cell_at[grid.index(cell.lattice)] = number as u32;
         }
-        let mut farthest: f64 = 0.0;
-        let (mut nodes, mut weights) = (Vec::with_capacity(rest.len()), Vec::with_capacity(rest.len()));
         for p in &rest {
             let (number, distance) = nearest_cell(body, &cell_at, *p);
             farthest = farthest.max(distance);
             let cell = &body.cells[number];
-            nodes.push(cell.nodes);
-            weights.push(shape_functions((*p - grid.position(cell.lattice)) / grid.h));
+            places.push(&cell.nodes, &shape_functions((*p - grid.position(cell.lattice)) / grid.h));
         }
-        Embedding { rest, nodes, weights, farthest }
+        Embedding { rest, places, farthest }
     }
 
     /// Deformed positions [m] of the points at node displacements `[N]` [m].
@@ -45,10 +51,7 @@ impl Embedding {
 
     /// Values of a node field `[N]` at the points.
     pub fn carry<'a>(&'a self, field: &'a [DVec3]) -> impl Iterator<Item = DVec3> + 'a {
-        self.nodes
-            .iter()
-            .zip(&self.weights)
-            .map(|(n, w)| n.iter().zip(w).fold(DVec3::ZERO, |s, (n, w)| s + field[*n as usize] * *w))
+        self.places.iter().map(|s| s.at(field))
     }
 }
 
@@ -127,6 +130,7 @@ mod tests {
             cells,
             patches: vec![],
             surface: Default::default(),
+            points: Default::default(),
             ghosts: vec![],
             band: Band::default(),
             volume: 0.002,
@@ -158,7 +162,8 @@ mod tests {
     #[test]
     fn a_point_outside_takes_the_nearest_cell() {
         let e = Embedding::new(&body(), vec![DVec3::new(0.12, 0.13, 0.05), DVec3::new(0.08, 0.13, 0.05)]);
-        assert_eq!((e.nodes[0], e.nodes[1]), (body().cells[1].nodes, body().cells[0].nodes));
+        let cells = body().cells;
+        assert_eq!([0, 1].map(|k| e.places.get(k).nodes.to_vec()), [1, 0].map(|k| cells[k].nodes.to_vec()));
         assert!((e.farthest - 0.03).abs() < 1e-12);
     }
 }

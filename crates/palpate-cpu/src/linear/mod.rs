@@ -3,6 +3,7 @@
 pub mod cholesky;
 pub mod coarse;
 pub mod conjugate_gradient;
+pub mod dense;
 pub mod jacobi;
 pub mod matrix;
 pub mod simd;

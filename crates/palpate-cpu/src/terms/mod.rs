@@ -8,7 +8,9 @@
 pub mod clamps;
 pub mod contact;
 pub mod elastic_cells;
+pub mod elastic_points;
 pub mod ghost;
+pub mod held_nodes;
 pub mod inertia;
 pub mod point_laws;
 
@@ -17,8 +19,10 @@ use crate::linear::vector::Nodes;
 use clamps::Clamped;
 use contact::Contact;
 use elastic_cells::ElasticCells;
+use elastic_points::ElasticPoints;
 use ghost::Ghost;
 use glam::{DMat3, DVec3};
+use held_nodes::HeldNodes;
 use inertia::Inertia;
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::mechanics::plane::PlaneNow;
@@ -254,6 +258,10 @@ impl<'a> Equation<'a> {
     pub fn new(context: Context<'a>) -> Equation<'a> {
         // The cells come first: their tangent overwrites the matrix.
         let mut terms: Vec<Box<dyn Term + 'a>> = vec![Box::new(ElasticCells::new(context))];
+        if !context.plan.body.points.is_empty() {
+            terms.push(Box::new(ElasticPoints::new(context)));
+            terms.push(Box::new(HeldNodes { c: context }));
+        }
         if !context.plan.body.ghosts.is_empty() {
             terms.push(Box::new(Ghost { c: context }));
         }

@@ -1,8 +1,11 @@
 //! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh.
 
+mod msh;
 mod parse;
 #[cfg(test)]
 mod tests;
+
+pub use msh::read_tets;
 
 use crate::error::{InputError, Loaded, number};
 use glam::DVec3;

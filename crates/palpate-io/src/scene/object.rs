@@ -3,17 +3,22 @@
 use super::corners;
 use crate::document::Table;
 use crate::error::{InputError, number};
-use crate::mesh::{LARGEST_SIDE, read_repaired};
+use crate::mesh::{LARGEST_SIDE, read_repaired, read_tets};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 use palpate_model::shape::Repaired;
 use palpate_model::space::body::unit_hint;
+use std::path::PathBuf;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
-    if t.has("mesh") && t.has("shape") {
-        return Err(t.error("shape", "mesh and shape exclude each other; give one"));
+    let sources = ["mesh", "shape", "volume_mesh"];
+    if let [first, second, ..] = sources.into_iter().filter(|k| t.has(k)).collect::<Vec<_>>()[..] {
+        return Err(t.error(second, format!("{first} and {second} exclude each other; give one")));
+    }
+    if let Some(path) = t.optional_file("volume_mesh")? {
+        return tetrahedra(&t, path);
     }
     let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
         (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
@@ -70,6 +75,26 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
             (Some(h), None) => Resolution::CellSize(h),
         };
     Ok(Object { source: body, pose, resolution })
+}
+
+/// A body of a volume mesh's own tetrahedra.
+fn tetrahedra(t: &Table, path: PathBuf) -> Result<Object, InputError> {
+    if let Some(key) = ["cell_size", "cells"].into_iter().find(|k| t.has(k)) {
+        return Err(t.error(key, "belongs to bodies that are cut out of a lattice; a volume mesh has its own elements"));
+    }
+    let mesh = read_tets(&path)?;
+    let surface = mesh.surface();
+    let (min, max) = crate::mesh::bounds(&mesh.nodes);
+    let longest = (max - min).max_element();
+    if longest > LARGEST_SIDE {
+        let message = format!("its longest side is {} m; in millimetres? lengths are in metres: scale by 0.001", number(longest));
+        return Err(InputError::file(&path, message));
+    }
+    let pose = match t.optional_matrix4("pose")? {
+        None => DAffine3::IDENTITY,
+        Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
+    };
+    Ok(Object { source: BodySource::Tetrahedra { path, mesh, surface }, pose, resolution: Resolution::Own })
 }
 
 fn analytic(shape: &Table) -> Result<Analytic, InputError> {

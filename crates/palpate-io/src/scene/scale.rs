@@ -20,6 +20,10 @@ pub(super) fn check(source: &Source, scene: &Scene, warnings: &mut Vec<String>) 
             let (min, max) = bounds(&mesh.vertices);
             ("object.mesh", max - min)
         }
+        BodySource::Tetrahedra { surface, .. } => {
+            let (min, max) = bounds(&surface.vertices);
+            ("object.volume_mesh", max - min)
+        }
         BodySource::Analytic(shape) => ("object.shape", extent(shape)),
     };
     let longest = own.max_element();

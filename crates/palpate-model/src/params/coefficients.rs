@@ -118,7 +118,7 @@ impl Coefficients {
 
     /// A gradient of zero with room for what is sought.
     pub fn zero_gradient(plan: &Plan, sought: &Sought) -> Coefficients {
-        let (cells, nodes) = (plan.body.cells.len(), plan.body.nodes.len());
+        let (cells, nodes) = (plan.body.elements(), plan.body.nodes.len());
         let changes = Changes {
             modulus: sought.modulus.then(|| vec![0.0; cells]),
             density: sought.density.then(|| vec![0.0; nodes]),

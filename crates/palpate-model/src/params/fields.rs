@@ -87,7 +87,7 @@ impl FieldSpec {
     /// Number of values on a body.
     pub fn count(&self, body: &Body) -> usize {
         match &self.basis {
-            Basis::Cells => body.cells.len(),
+            Basis::Cells => body.elements(),
             Basis::Nodes => body.nodes.len(),
             Basis::Regions(regions, _) => regions.len(),
         }
@@ -149,7 +149,10 @@ impl Field {
                 Varied::Density => cells_around_nodes(body),
             },
             Basis::Nodes => match spec.varied {
-                Varied::Modulus => body.cells.iter().map(|c| c.nodes.map(|n| (n, 0.125)).to_vec()).collect(),
+                Varied::Modulus => {
+                    let share = |nodes: &[u32]| nodes.iter().map(|n| (*n, 1.0 / nodes.len() as f64)).collect();
+                    body.element_nodes().map(share).collect()
+                }
                 Varied::Density => (0..places.len() as u32).map(|n| vec![(n, 1.0)]).collect(),
             },
             Basis::Regions(regions, Blend::Nearest) => places.iter().map(|x| vec![(nearest(regions, *x), 1.0)]).collect(),
@@ -158,7 +161,7 @@ impl Field {
                 let of_nodes = harmonic(regions, body)?;
                 match spec.varied {
                     Varied::Density => of_nodes,
-                    Varied::Modulus => body.cells.iter().map(|c| mean(&c.nodes, &of_nodes)).collect(),
+                    Varied::Modulus => body.element_nodes().map(|nodes| mean(nodes, &of_nodes)).collect(),
                 }
             }
         };
@@ -233,8 +236,8 @@ fn places(varied: Varied, body: &Body) -> Vec<DVec3> {
 /// The cells around every node, weighed alike.
 fn cells_around_nodes(body: &Body) -> Vec<Vec<(u32, f64)>> {
     let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); body.nodes.len()];
-    for (e, cell) in body.cells.iter().enumerate() {
-        cell.nodes.iter().for_each(|n| rows[*n as usize].push((e as u32, 1.0)));
+    for (e, nodes) in body.element_nodes().enumerate() {
+        nodes.iter().for_each(|n| rows[*n as usize].push((e as u32, 1.0)));
     }
     for row in &mut rows {
         let share = 1.0 / row.len().max(1) as f64;

@@ -1,6 +1,7 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
 mod sites;
+mod tets;
 
 pub use sites::marker_sites;
 
@@ -16,7 +17,7 @@ use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
 use crate::plan::{ClampCell, ClampSite, Clock, Plan, PlaneSite};
-use crate::scene::{Clamp, Inertia, Resolution, Scene};
+use crate::scene::{BodySource, Clamp, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
 use crate::space::stencil::Stencils;
@@ -45,10 +46,16 @@ pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanErro
 
 fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
     let shape = shape_of(&scene.object);
+    if let BodySource::Tetrahedra { mesh, .. } = &scene.object.source {
+        tets::refuse_what_needs_cells(scene)?;
+        let body = Body::of_tets(&mesh.transformed(&scene.object.pose));
+        return Ok((Parts { body, merged: Vec::new() }, shape));
+    }
     let (min, max) = shape.bounds();
     let (key, h) = match scene.object.resolution {
         Resolution::CellSize(h) => ("object.cell_size", h),
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
+        Resolution::Own => return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into())),
     };
     let mut parts = body::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
         let key = if matches!(e, BodyError::Empty { .. }) { "object" } else { key };
@@ -75,7 +82,13 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     let body = Arc::new(parts.body);
     let mut masses = Stencils::default();
     for (i, m) in scene.masses.iter().enumerate() {
-        let (nodes, weights) = mass_site(&format!("mass.{i}.point"), m.point, &body)?;
+        let key = format!("mass.{i}.point");
+        if !body.points.is_empty() {
+            let place = tets::place(&key, m.point, &body)?;
+            masses.push(&place.nodes, &place.value);
+            continue;
+        }
+        let (nodes, weights) = mass_site(&key, m.point, &body)?;
         masses.push(&nodes, &weights);
     }
     observation.markers = marker_sites(marker_rest, &body, shape.as_ref())?;
@@ -85,6 +98,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     if !observation.frames.is_empty() {
         check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
     }
+    tets::refuse_depth(&body, &observation)?;
     let planes = scene
         .planes
         .iter()
@@ -144,6 +158,9 @@ fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64
 
 fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {
     let body = &parts.body;
+    if !body.points.is_empty() {
+        return tets::clamp_site(i, clamp, scene, body, shape);
+    }
     let (grid, h) = (&body.grid, body.grid.h);
     let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
     let region = ClipBox { to_frame, min: clamp.min, max: clamp.max };
@@ -186,7 +203,7 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
     let pins = Pins::new(body, cells.iter());
     cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
-    Ok(ClampSite { cells, motion: clamp.motion.clone(), edge: Arc::new(edge) })
+    Ok(ClampSite { cells, nodes: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
 }
 
 fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<([u32; 8], [f64; 8]), PlanError> {

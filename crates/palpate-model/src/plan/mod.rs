@@ -70,6 +70,8 @@ pub struct PlaneSite {
 pub struct ClampSite {
     /// Cells with surface or volume in the region, in increasing order.
     pub cells: Vec<ClampCell>,
+    /// Held nodes and the stiffness of each one's spring [N/m], of bodies without cells.
+    pub nodes: Vec<(u32, f64)>,
     /// Prescribed motion; `None` = held still.
     pub motion: Option<RigidMotion>,
     /// What is held when an effect moves the region's edge.
@@ -79,7 +81,7 @@ pub struct ClampSite {
 impl std::fmt::Debug for ClampSite {
     /// Without the edge, which follows from the rest and the body.
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.debug_struct("ClampSite").field("cells", &self.cells).field("motion", &self.motion).finish()
+        f.debug_struct("ClampSite").field("cells", &self.cells).field("nodes", &self.nodes).field("motion", &self.motion).finish()
     }
 }
 

@@ -8,6 +8,7 @@ pub(crate) use build::{Parts, build_parts, world_cell};
 
 use crate::cutcells::distances::Distances;
 use crate::cutcells::grid::Grid;
+use crate::space::points::{Points, TetMesh};
 use crate::space::stencil::{Stencil, Stencils};
 use glam::DVec3;
 
@@ -27,6 +28,8 @@ pub struct Body {
     pub patches: Vec<Patch>,
     /// Mean place of every patch.
     pub surface: Stencils,
+    /// Elastic points, of bodies that are not cut out of a lattice; such a body has no cells.
+    pub points: Points,
     /// Ghost penalty lines: squared second differences of u on cut cells' faces.
     pub ghosts: Vec<GhostLine>,
     /// The body and the cells around it, where observed points are looked up.
@@ -47,9 +50,58 @@ impl Body {
         self.patches.iter().zip(self.surface.iter())
     }
 
-    /// Rest position of the middle of every cell [m].
+    /// Number of elements: cells, or elastic points.
+    pub fn elements(&self) -> usize {
+        self.cells.len() + self.points.len()
+    }
+
+    /// Nodes of every element.
+    pub fn element_nodes(&self) -> impl Iterator<Item = &[u32]> + '_ {
+        self.cells.iter().map(|c| &c.nodes[..]).chain(self.points.stencils.iter().map(|s| s.nodes))
+    }
+
+    /// Rest position of the middle of every element [m].
     pub fn middles(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.cells.iter().map(|c| self.grid.position(c.lattice) + 0.5 * self.grid.h)
+        let cells = self.cells.iter().map(|c| self.grid.position(c.lattice) + 0.5 * self.grid.h);
+        cells.chain(self.points.stencils.iter().map(|s| s.at(&self.nodes)))
+    }
+
+    /// A body of tetrahedra.
+    pub fn of_tets(mesh: &TetMesh) -> Body {
+        let (points, node_volume) = mesh.points();
+        let volume: f64 = points.volume.iter().sum();
+        let center = points.stencils.iter().zip(&points.volume).map(|(s, v)| s.at(&mesh.nodes) * *v).sum::<DVec3>() / volume;
+        let (mut patches, mut surface) = (Vec::new(), Stencils::default());
+        for (element, face) in mesh.faces() {
+            let [a, b, c] = face.map(|n| mesh.nodes[n as usize]);
+            let twice = (b - a).cross(c - a);
+            surface.push(&face, &[1.0 / 3.0; 3]);
+            patches.push(Patch {
+                cell: element,
+                area: 0.5 * twice.length(),
+                normal: twice.normalize(),
+                point: (a + b + c) / 3.0,
+            });
+        }
+        let low = mesh.nodes.iter().copied().reduce(DVec3::min).unwrap_or(center);
+        let high = mesh.nodes.iter().copied().reduce(DVec3::max).unwrap_or(center);
+        // The edge of a cube of a mean tetrahedron's six: what lengths are measured in where cells have their edge.
+        let length = (6.0 * volume / points.len() as f64).cbrt();
+        Body {
+            grid: Grid::covering(low, high, length, 1),
+            nodes: mesh.nodes.clone(),
+            node_volume,
+            cells: Vec::new(),
+            area: patches.iter().map(|p| p.area).sum(),
+            patches,
+            surface,
+            points,
+            ghosts: Vec::new(),
+            band: Band::default(),
+            volume,
+            center,
+            corners: (low, high),
+        }
     }
 }
 

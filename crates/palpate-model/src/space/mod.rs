@@ -2,4 +2,5 @@
 
 pub mod body;
 pub mod pattern;
+pub mod points;
 pub mod stencil;

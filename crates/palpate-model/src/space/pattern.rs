@@ -76,6 +76,9 @@ impl Pattern {
                 cells[a as usize].push((e as u32, i as u8));
             }
         }
+        for nodes in body.points.stencils.iter().map(|s| s.nodes) {
+            nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(nodes));
+        }
         for ghost in &body.ghosts {
             for a in ghost.nodes {
                 neighbours[a as usize].extend_from_slice(&ghost.nodes);
@@ -117,6 +120,8 @@ pub struct Places {
     pub cells: Vec<[u32; 64]>,
     /// Blocks that ghost lines add to, increasing, and the factor on the identity there: the sum over its lines.
     pub ghosts: Vec<(u32, f64)>,
+    /// Blocks of the nodes of every elastic point.
+    pub points: Squares,
     /// Blocks of the nodes of every surface patch.
     pub patches: Squares,
     /// Blocks of the nodes of every point mass.
@@ -129,6 +134,7 @@ impl Places {
         Places {
             cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
             ghosts: ghosts(&plan.body, pattern),
+            points: Squares::new(pattern, &plan.body.points.stencils),
             patches: Squares::new(pattern, &plan.body.surface),
             masses: Squares::new(pattern, &plan.masses),
         }

@@ -53,7 +53,11 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Sha
     Ok(MarkerSite {
         name: m.name.clone(),
         kind: ReadingKind::Marker,
-        stencil: affine_weights(body, lookup, surface, MARKER_RADIUS * h),
+        stencil: if body.points.is_empty() {
+            affine_weights(body, lookup, surface, MARKER_RADIUS * h)
+        } else {
+            body.points.carry(&body.nodes, surface).0
+        },
         stalk: m.position - surface,
     })
 }
@@ -89,6 +93,7 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
 /// A point of the body itself: interpolated in its cell, or continued to from the nodes around it.
 fn track_site(name: String, place: DVec3, body: &Body, lookup: &NodeLookup) -> MarkerSite {
     let stencil = match active_cell(body, place) {
+        _ if !body.points.is_empty() => body.points.carry(&body.nodes, place).0,
         Some((cell, xi)) => {
             let gradients = shape_gradients(xi).map(|g| g / body.grid.h);
             StencilBuf {

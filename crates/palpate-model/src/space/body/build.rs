@@ -232,6 +232,7 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         cells: active,
         patches,
         surface,
+        points: Default::default(),
         ghosts,
         band: super::Band::default(),
     };
