@@ -24,7 +24,8 @@ pub struct Job {
 const ONE: &str = "--test-threads=1";
 
 /// All jobs in the order in which they begin, and how many slow tests are left out. The longest come first, so that no lane is still at
-/// one of them when the others are done: the device's tests, which share one device in one process, then single tests, then the rest.
+/// one of them when the others are done: the device's tests, which share one device in one process, then other whole binaries, then
+/// single tests, those of the ladder's upper rungs before the quick ones of bad input.
 ///
 /// # Errors
 /// A binary cannot be asked for its tests.
@@ -60,7 +61,8 @@ pub fn all(root: &Path, binaries: &[Binary], options: &Options) -> Result<(Vec<J
         let arguments = ["test", "--release", "--workspace", "--doc", "--", ONE].map(String::from).to_vec();
         device.push(Job { label: "examples in the documentation".into(), program: cargo(), arguments, folder: root.into() });
     }
-    Ok(([device, single, rest].concat(), left))
+    single.reverse();
+    Ok(([device, rest, single].concat(), left))
 }
 
 /// Names of a binary's tests; with `--ignored` in `more` of those that are left out unless asked for.
