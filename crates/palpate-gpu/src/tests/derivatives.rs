@@ -8,6 +8,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
 use palpate_model::params::ParamKey;
+use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 
 /// Weights of the last displacement and velocity in the test's cost; smooth, so that no node stands out.
@@ -164,6 +165,23 @@ fn check(backend: &GpuBackend, plan: &Plan, members: usize) -> Vec<Vec<Slope>> {
 fn every_parameter_of_a_falling_ball() {
     let Some(gpu) = device(None) else { return };
     check(&GpuBackend::on(gpu), &plan(&ball(0.03)), 2);
+}
+
+#[test]
+fn every_parameter_of_balls_whose_modulus_and_density_vary() {
+    let Some(gpu) = device(None) else { return };
+    let field = |varied, basis, scale, count: usize| {
+        let values = Some((0..count).map(|k| 1.0 + 0.3 * (2.0 * k as f64).sin()).collect());
+        FieldSpec { varied, basis, scale, values }
+    };
+    for mut scene in [ball(0.05), held(0.05)] {
+        let body = plan(&scene).body;
+        scene.fields = vec![
+            field(Varied::Modulus, Basis::Cells, Scale::Log, body.cells.len()),
+            field(Varied::Density, Basis::Nodes, Scale::Linear, body.nodes.len()),
+        ];
+        check(&GpuBackend::on(gpu.clone()), &plan(&scene), 1);
+    }
 }
 
 #[test]

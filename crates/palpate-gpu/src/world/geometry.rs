@@ -2,7 +2,6 @@
 
 use super::effects::Effects;
 use super::limits::{LOOPS, Most, check_loops};
-use super::rates;
 use crate::device::pipelines::shared::structs::FIELD_COUPLED;
 use crate::device::{GpuError, Maker};
 use crate::layout::{Cell, Mass, Patch, Shape};
@@ -138,7 +137,7 @@ impl Geometry {
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
         let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
-        let [rate_effects, rate_numbers] = rates::places(plan, &effects);
+        let [rate_effects, rate_numbers] = effects.rate_places(plan);
         let shape = Shape {
             members: 0,
             nodes: n as u32,

@@ -57,11 +57,11 @@ impl Most {
             ("begin_solve", 4 * self.share() + 300),
             ("step_back", 2 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
-            ("press_patches", 380 * self.pressed.max(1) + 100),
+            ("press_patches", 410 * self.pressed.max(1) + 100),
             ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
             // Once for each input, all planes together, and once for each of a plane's own numbers.
-            ("pull_patch_laws", 750 * self.pressed.max(1) + 450),
-            ("pull_holds", 2 * (18 * self.grips + 60) + 60),
+            ("pull_patch_laws", 1000 * self.pressed.max(1) + 700),
+            ("pull_holds", 2 * (27 * self.grips + 60) + self.aging + 100),
             // Rotations by Jacobi's method at up to three states, and sums over the corners of a cell.
             ("pull_cells", 2600 + self.aging),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),

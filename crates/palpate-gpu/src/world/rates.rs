@@ -46,14 +46,6 @@ fn numbers(geometry: &Geometry, plan: &Plan, p: &Physics, out: &mut Vec<f32>) {
     out.extend(p.effects.iter().flatten().map(|v| *v as f32));
 }
 
-/// Place of the effects' numbers among a member's, and how many there are.
-pub(super) fn places(plan: &Plan, effects: &super::effects::Effects) -> [u32; 2] {
-    let all = plan.layout.effects().map(|(_, places)| places.len() as u32).sum::<u32>();
-    let first =
-        4 * plan.planes.len() as u32 + plan.masses.len() as u32 + effects.aging_rows + effects.hold_numbers().iter().sum::<u32>();
-    [first, first + all]
-}
-
 /// Bytes of every buffer of a direction along one parameter, for `members`.
 pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64) -> Vec<u64> {
     let shape = &geometry.shape;

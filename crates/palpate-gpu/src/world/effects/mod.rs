@@ -7,6 +7,7 @@ mod rests;
 
 use crate::device::pipelines::shared::laws;
 use crate::device::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE};
+use crate::device::pipelines::shared::rates::PLANE_NUMBERS;
 use crate::device::pipelines::shared::structs::{
     FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, NONE, SCALARS_AT,
 };
@@ -31,7 +32,7 @@ pub(crate) struct Effects {
     /// Effects on cells, likewise.
     cells: Vec<(usize, EffectSite)>,
     /// First row of every effect that changes the stiffness in time or acts on clamps, among those that do.
-    fields: Vec<Option<u32>>,
+    first_rows: Vec<Option<u32>>,
     /// As `Shape` has them.
     pub(crate) bits: u32,
     /// Parameters of changes in time.
@@ -55,7 +56,7 @@ impl Effects {
         let mut e = Effects { steps: plan.clock.steps, ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
-            let mut field = None;
+            let mut row = None;
             let site = match law.site {
                 Site::Nodes(_) => Some(AT_NODES),
                 Site::Surface(_) => Some(AT_SURFACE),
@@ -66,7 +67,7 @@ impl Effects {
                 }
                 Site::Aging(_) => {
                     e.bits |= FIELD_AGING;
-                    field = Some(e.aging_rows);
+                    row = Some(e.aging_rows);
                     e.aging_rows += count;
                     None
                 }
@@ -76,7 +77,7 @@ impl Effects {
                 }
                 Site::Clamps(_) | Site::Edges(_) => {
                     e.bits |= FIELD_GRIPS;
-                    field = Some(e.grip_rows.len() as u32);
+                    row = Some(e.grip_rows.len() as u32);
                     e.grip_rows.extend((0..places.len()).map(|slot| [number, slot]));
                     None
                 }
@@ -87,7 +88,7 @@ impl Effects {
                 // The observer's business.
                 Site::Clock | Site::Marker | Site::Readings(_) => None,
             };
-            e.fields.push(field);
+            e.first_rows.push(row);
             if let Some(site) = site.filter(|s| *s == AT_CELLS) {
                 let law = palpate_model::effects::find(law.kind).unwrap_or_default() as u32;
                 e.cells.push((number, EffectSite { law, site, first: e.stride, count, ..EffectSite::default() }));
@@ -132,6 +133,13 @@ impl Effects {
         self.cells.iter().position(|c| c.0 == effect).map(|k| k as u32)
     }
 
+    /// Place of the effects' numbers among a member's rates, and how many of these there are.
+    pub(crate) fn rate_places(&self, plan: &Plan) -> [u32; 2] {
+        let held: u32 = self.hold_numbers().iter().sum();
+        let first = PLANE_NUMBERS * plan.planes.len() as u32 + plan.masses.len() as u32 + self.aging_rows + held;
+        [first, first + self.stride]
+    }
+
     /// Number of effects on cells.
     pub(crate) fn cell_laws(&self) -> u32 {
         self.cells.len() as u32
@@ -159,7 +167,7 @@ impl Effects {
 
     /// Row of number `slot` of an effect that changes the stiffness in time or acts on clamps.
     pub(crate) fn slope_row(&self, effect: usize, slot: u32) -> Option<u32> {
-        self.fields[effect].map(|first| first + slot)
+        self.first_rows[effect].map(|first| first + slot)
     }
 
     /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
