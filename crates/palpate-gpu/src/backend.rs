@@ -76,12 +76,6 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        if !plan.model.is_linear {
-            return Err(BuildError {
-                message: format!("the GPU backend cannot compute the material \"{}\"", plan.model.name),
-                hint: "use --backend cpu, or model = \"corotated-linear\"".into(),
-            });
-        }
         let scheme = plan.clock.scheme;
         if *scheme != scheme::ALL[0] {
             return Err(BuildError {
