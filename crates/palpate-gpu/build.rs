@@ -4,12 +4,13 @@
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
 //! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, and
-//! `effects/cells` for every law of cells.
+//! `effects/cells` for every law of cells; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
 
 mod validate;
 
 use naga::{AddressSpace, Expression, Literal, StorageAccess, TypeInner};
 use palpate_model::effects::{self, Law, Site, cell, law};
+use palpate_model::materials;
 use palpate_model::mechanics::contact::DEFAULT_STIFFNESS;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -136,6 +137,9 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
     if file == "effects/cells" {
         return include_cells(shaders, variant, done, out);
     }
+    if file == "materials/all" {
+        return include_materials(shaders, variant, done, out);
+    }
     let path = shaders.join(format!("{file}.wgsl"));
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     for line in text.lines() {
@@ -185,6 +189,22 @@ fn include_cells(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out
     write!(
         out,
         "const SCALARS = {scalars}u;\nconst CELL_INPUTS = {inputs}u;\nfn cell_law(law: u32, which: u32) -> Dual {{\n    switch law {{\n{cases}        default: {{ return vec4(0.0); }}\n    }}\n}}\n"
+    )
+    .expect("a String takes all");
+}
+
+/// All materials that are not linear, and the function `material_energy` that calls the one of a number in the table of materials.
+fn include_materials(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    include(shaders, "shared/materials", variant, done, out);
+    let mut cases = String::new();
+    for (number, model) in materials::ALL.iter().enumerate().filter(|(_, model)| !model.is_linear) {
+        let name = model.name.replace('-', "_");
+        include(shaders, &format!("materials/{name}"), variant, done, out);
+        writeln!(cases, "        case {number}u: {{ return {name}(h, lambda, mu); }}").expect("a String takes all");
+    }
+    write!(
+        out,
+        "fn material_energy(number: u32, h: Gradient, lambda: Dual, mu: Dual) -> Dual {{\n    switch number {{\n{cases}        default: {{ return vec4(0.0); }}\n    }}\n}}\n"
     )
     .expect("a String takes all");
 }

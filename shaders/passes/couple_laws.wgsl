@@ -31,7 +31,7 @@ fn couple_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     // The old state's own force, whose derivative is symmetric.
     let body = centred(transpose(old.pose.r) * d);
     let dq = strain_rate(old.pose, d, c.sign);
-    let r = ask(c, ENERGY_PART, old.s, scalar_rates(c, old, dq));
+    let r = ask_energy(c, old.s, scalar_rates(c, old, dq));
     let rate = c.young * (stress(c, old, r.bend) + r.first[0] * stiff(matrix, c.number, dq));
     let own = force_body(old.pose, centred(rate), c.sign)
         + second_body(old.pose, centred(c.young * stress(c, old, r.first)), body, c.sign);

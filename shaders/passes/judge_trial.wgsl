@@ -1,9 +1,12 @@
 //! Judges a trial of the line search: takes it where it halves the residual or lowers the potential enough (Armijo 1966), else
-//! halves the step. A taken trial becomes the new increment.
-// use shared/grid
+//! halves the step. A taken trial becomes the new increment. A trial where the material does not exist is never taken: the step is halved, and
+//! of a guess half the way from the old state that is left.
+// use shared/mix
+// use shared/hyper
 // use shared/totals
 // use shared/precondition
 
+var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
 var<storage, read> sizes: array<vec4<f32>>;
 var<storage, read> trial: array<vec4<f32>>;
@@ -12,6 +15,11 @@ var<storage, read_write> newton: array<Newton>;
 
 // A step shorter than this is taken whatever it brings.
 const MOST_TRIALS = 12u;
+
+// Way of free flight.
+fn flight(a: u32, m: Member) -> vec3<f32> {
+    return select(vec3(0.0), shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * m.gravity.xyz, call.mode != 0u);
+}
 
 @compute @workgroup_size(256)
 fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -35,6 +43,7 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     let s = total(local, state);
     let after = sqrt(max(s.x, 0.0));
+    let outside = s.z >= NOWHERE_FROM;
     var taken = first;
     if !first {
         // Close to the solution the change drowns in rounding of the nodes' shares; then the step is as good as any.
@@ -45,6 +54,7 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             taken = n.trial >= MOST_TRIALS;
         }
     }
+    taken = taken && !outside;
     if !taken {
         n.length *= 0.5;
         n.trial += 1u;
@@ -69,6 +79,13 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     if local == 0u {
         newton[p.member] = n;
+    }
+    if first && outside {
+        let way = exp2(-f32(n.trial)) - 1.0;
+        for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            increment[a] = vec4(way * flight(a, members[p.member]), 0.0);
+        }
     }
     if taken {
         for (var i = local; i < shape.nodes; i += 256u) {

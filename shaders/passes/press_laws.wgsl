@@ -19,10 +19,14 @@ fn press_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         loss = loss_of(c, w, old, vec2(0.0));
         weight = c.mix.fresh;
     }
-    let r = ask(c, ENERGY_PART, side.s, nowhere());
+    let r = ask_energy(c, side.s, nowhere());
     let f = force(side.pose, c.young * (weight * stress(c, side, r.first) + loss.y * w.kd), c.sign);
     // Of the old state's force the potential is linear; gather_residual knows it.
-    let energy = select(0.0, c.young * volume_of(c) * (weight * r.value + loss.x) * 0.125, call.extra == 0u);
+    var energy = select(0.0, c.young * volume_of(c) * (weight * r.value + loss.x) * 0.125, call.extra == 0u);
+    if r.value >= NOWHERE_FROM {
+        // The material does not exist there: judge_trial sees it.
+        energy = NOWHERE;
+    }
     if c.live {
         cell_force[c.at] += vec4(f, energy);
     }

@@ -29,6 +29,12 @@ fn by_number(c: Corner, k: u32, which: u32, s: array<f32, SCALARS>, ds: array<f3
     return cell_law(effect.law, which).w;
 }
 
+// Second derivative of the material's energy by Poisson's ratio and along a change of the scalars.
+fn material_by_poisson(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> f32 {
+    strain_input(s, ds, nowhere());
+    return material_beyond(vec4(c.m.lame.x, 0.0, c.m.lame.z, 0.0), vec4(c.m.lame.y, 0.0, c.m.lame.w, 0.0)).w;
+}
+
 fn contract(a: array<f32, SCALARS>, b: array<f32, SCALARS>) -> f32 {
     var x = a;
     var y = b;
@@ -52,8 +58,8 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let ds1 = scalar_rates(c, fresh, dq1);
     let ds0 = scalar_rates(c, old, dq0);
     let dd = mean(c, w.kd, dq1);
-    let r = ask(c, ENERGY_PART, fresh.s, ds1);
-    let before = ask(c, ENERGY_PART, old.s, ds0);
+    let r = ask_energy(c, fresh.s, ds1);
+    let before = ask_energy(c, old.s, ds0);
     let by_old = loss_of(c, w, old, vec2(0.0, 1.0));
     let unit = c.young * volume_of(c);
     // The force is proportional to the modulus.
@@ -68,6 +74,9 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         poisson = c.mix.fresh * (0.5 * mean(c, fresh.q, k1) * r.bend[0] + r.first[0] * mean(c, dq1, k1))
             + c.mix.old * (dn0 * before.bend[0] + before.first[0] * mean(c, dq0, k0))
             + (by_d * 0.5 * mean(c, fresh.q - old.q, k1 - k0) + by_old.z * dn0) * dd + by_old.y * mean(c, dq1, k1 - k0);
+    }
+    if seeks(SEEK_POISSON) && material() != 0u {
+        poisson += c.mix.fresh * material_by_poisson(c, fresh.s, ds1) + c.mix.old * material_by_poisson(c, old.s, ds0);
     }
     let first = c.live && c.number == 0u;
     let total = sum64(local, select(vec4(0.0), unit * vec4(own, poisson, 0.0, 0.0), first));
@@ -87,7 +96,7 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     var along_way = nowhere();
     along_way[0] = dd;
     for (var k = 0u; k < MOST_LAWS; k++) {
-        if k >= (shape.fields >> LAWS_AT) {
+        if k >= law_count() {
             break;
         }
         var by = c.mix.fresh * by_number(c, k, ENERGY_PART, fresh.s, ds1) + c.mix.old * by_number(c, k, ENERGY_PART, old.s, ds0);

@@ -11,7 +11,7 @@ fn ask_along(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALA
     var sum: Answer;
     let count = select(scalars(), 1u, which == LOSS_PART);
     for (var k = 0u; k < MOST_LAWS; k++) {
-        if k >= (shape.fields >> LAWS_AT) {
+        if k >= law_count() {
             break;
         }
         let effect = cell_effects[k];
@@ -22,6 +22,15 @@ fn ask_along(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALA
             }
         }
         add_answer(&sum, ask_law(effect.law, which, count));
+    }
+    return sum;
+}
+
+// As `ask_energy`, likewise.
+fn ask_energy_along(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> Answer {
+    var sum = ask_along(c, ENERGY_PART, s, ds);
+    if material() != 0u {
+        add_answer(&sum, ask_material(c, s, ds, rates[c.member].poisson));
     }
     return sum;
 }
@@ -64,8 +73,8 @@ fn push_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
             ds_old[i] += more_old[i];
         }
     }
-    let r = ask_along(c, ENERGY_PART, fresh.s, ds);
-    let before = ask_along(c, ENERGY_PART, old.s, ds_old);
+    let r = ask_energy_along(c, fresh.s, ds);
+    let before = ask_energy_along(c, old.s, ds_old);
     var loss = vec2(0.0);
     if call.mode != 0u {
         var s = nowhere();

@@ -9,6 +9,18 @@ var<storage, read> newton: array<Newton>;
 var<storage, read_write> tangents: array<vec4<f32>>;
 var<storage, read_write> law_modes: array<vec4<f32>>;
 
+// The material's first derivatives, and its second ones along a change that is this lane's own.
+fn material_row(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> Answer {
+    var r: Answer;
+    for (var i = 0u; i < SCALARS; i++) {
+        strain_input(s, along_scalar(i), ds);
+        let v = material_beyond(number(c.m.lame.x), number(c.m.lame.y));
+        r.first[i] = v.y;
+        r.bend[i] = v.w;
+    }
+    return r;
+}
+
 @compute @workgroup_size(64)
 fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
@@ -21,7 +33,10 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let row = min(c.number, n - 1u);
     var ds = nowhere();
     ds[row] = 1.0;
-    let r = ask(c, ENERGY_PART, fresh.s, ds);
+    var r = ask(c, ENERGY_PART, fresh.s, ds);
+    if material() != 0u {
+        add_answer(&r, material_row(c, fresh.s, ds));
+    }
     let loss = loss_of(c, w, old, vec2(1.0, 0.0));
     let scale = c.young * (c.mix.fresh * r.first[0] + loss.y);
     let y = c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd);

@@ -31,6 +31,35 @@ fn logarithm(a: Dual) -> Dual {
     return chain(log(a.x), d, -d * d, a);
 }
 
+// Value of x − ln(1 + x) at x ≤ −1, where it does not exist: finite, and larger than anything that does. From a part of it on a value says so.
+const NOWHERE = 1e30;
+const NOWHERE_FROM = 1e25;
+
+// x − ln(1 + x), to rounding of itself also where x is small: with s = x/(2 + x), ln(1 + x) is 2 artanh s and x is 2s + s x.
+fn minus_ln1p(x: Dual) -> Dual {
+    if x.x <= -1.0 {
+        return number(NOWHERE);
+    }
+    let s = x.x / (2.0 + x.x);
+    var f = x.x - log(1.0 + x.x);
+    if abs(s) < 0.34 {
+        let t = s * s;
+        let series = 1.0 / 3.0 + t * (1.0 / 5.0 + t * (1.0 / 7.0 + t * (1.0 / 9.0 + t * (1.0 / 11.0 + t / 13.0))));
+        f = s * (x.x - 2.0 * t * series);
+    }
+    let d = 1.0 / (1.0 + x.x);
+    return chain(f, d * x.x, d * d, x);
+}
+
+// ln(1 + x) likewise; zero where it does not exist.
+fn ln1p(x: Dual) -> Dual {
+    if x.x <= -1.0 {
+        return number(0.0);
+    }
+    let d = 1.0 / (1.0 + x.x);
+    return chain(x.x - minus_ln1p(number(x.x)).x, d, -d * d, x);
+}
+
 fn exponential(a: Dual) -> Dual {
     let f = exp(a.x);
     return chain(f, f, f, a);

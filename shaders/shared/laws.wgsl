@@ -1,8 +1,9 @@
 //! Laws of cells: scalars of a cell's deformation, what laws say of them, and the body-frame forces that follow. Twin of
-//! palpate-cpu/src/passes/materials.rs and palpate-model/src/effects/cell.rs. Laws are the files of `effects/`; the build script links
-//! them with `cell_law`, which calls the one of a number, and with the sizes of the input. All laws of a plan act at once.
+//! palpate-cpu/src/terms/elastic_cells/laws.rs and palpate-model/src/effects/cell.rs. Laws are the files of `effects/`; the build script links
+//! them with `cell_law`, which calls the one of a number, and with the sizes of the input. All laws of a plan act at once, and the material
+//! where it is not linear, as one more.
 // use shared/corner
-// use shared/hyper
+// use materials/all
 // use shared/effect_site
 
 // The two functions of a law: ψ of (a, ε), and φ of (d, a₀).
@@ -48,6 +49,16 @@ struct Answer {
 // Scalars that the energies of this plan's laws depend on.
 fn scalars() -> u32 {
     return (shape.fields >> SCALARS_AT) & MOST_SCALARS;
+}
+
+// Number of the plan's material, 0 where it is linear.
+fn material() -> u32 {
+    return shape.fields >> MATERIAL_AT;
+}
+
+// Laws of cells that the plan has.
+fn law_count() -> u32 {
+    return (shape.fields >> LAWS_AT) & MOST_COUNT;
 }
 
 // Asks the law of a number, with the input's values and `along` in place, for derivatives by the first `count` scalars.
@@ -103,12 +114,65 @@ fn ask(c: Corner, which: u32, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -
     // Dissipation is a function of the increment; what it takes from the old state is not differentiated.
     let count = select(scalars(), 1u, which == LOSS_PART);
     for (var k = 0u; k < MOST_LAWS; k++) {
-        if k >= (shape.fields >> LAWS_AT) {
+        if k >= law_count() {
             break;
         }
         let effect = cell_effects[k];
         fill(c, effect, s, ds);
         add_answer(&sum, ask_law(effect.law, which, count));
+    }
+    return sum;
+}
+
+// What the plan's material has beyond the linear one at the mean strain in `input`, for E = 1; numbers of changes are those of `input`.
+fn material_beyond(lambda: Dual, mu: Dual) -> Dual {
+    let h = Gradient(
+        Three(strain(0u), strain(5u), strain(4u)),
+        Three(strain(5u), strain(1u), strain(3u)),
+        Three(strain(4u), strain(3u), strain(2u)),
+    );
+    return material_energy(material(), h, lambda, mu) - linear_energy(h, lambda, mu);
+}
+
+// Puts the mean strain of scalars `s` in place: ε₁ stands for `first`, ε₂ for `second`.
+fn strain_input(s: array<f32, SCALARS>, first: array<f32, SCALARS>, second: array<f32, SCALARS>) {
+    var values = s;
+    var a = first;
+    var b = second;
+    for (var i = 0u; i < SCALARS; i++) {
+        input[i] = vec4(values[i], a[i], b[i], 0.0);
+    }
+}
+
+// A unit vector.
+fn along_scalar(k: u32) -> array<f32, SCALARS> {
+    var one = nowhere();
+    one[min(k, SCALARS - 1u)] = f32(k < SCALARS);
+    return one;
+}
+
+// The plan's material at scalars `s` that change by `ds`, and Poisson's ratio by `poisson`: each lane of the cell differentiates by the scalar
+// of its number.
+fn ask_material(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, poisson: f32) -> Answer {
+    strain_input(s, along_scalar(c.number), ds);
+    let lame = c.m.lame;
+    let v = material_beyond(vec4(lame.x, 0.0, poisson * lame.z, 0.0), vec4(lame.y, 0.0, poisson * lame.w, 0.0));
+    var r: Answer;
+    r.value = v.x;
+    publish(vec3(v.y, v.w, 0.0));
+    for (var i = 0u; i < SCALARS; i++) {
+        let of_lane = published(i);
+        r.first[i] = of_lane.x;
+        r.bend[i] = of_lane.y;
+    }
+    return r;
+}
+
+// Energy of laws and material.
+fn ask_energy(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> Answer {
+    var sum = ask(c, ENERGY_PART, s, ds);
+    if material() != 0u {
+        add_answer(&sum, ask_material(c, s, ds, 0.0));
     }
     return sum;
 }

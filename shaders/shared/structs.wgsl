@@ -52,6 +52,8 @@ struct Member { // mirrored
     gravity: vec4<f32>,
     velocity: vec4<f32>,
     spin: vec4<f32>,
+    // λ/E and μ/E, and their derivatives by ν.
+    lame: vec4<f32>,
 }
 
 struct Plane { // mirrored
@@ -114,6 +116,9 @@ const FIELD_COUPLED = 128u;
 const SCALARS_AT = 8u;
 const MOST_SCALARS = 15u;
 const LAWS_AT = 12u;
+const MOST_COUNT = 255u;
+// From this bit on the number of the material, 0 where it is linear.
+const MATERIAL_AT = 20u;
 
 // Vectors that tangent_cells keeps of a cell.
 const TANGENT_VECTORS = 30u;

@@ -82,12 +82,6 @@ impl Backend for GpuBackend {
                 hint: "use --backend cpu, or a surface mesh, which is cut out of a lattice".into(),
             });
         }
-        if !plan.model.is_linear {
-            return Err(BuildError {
-                message: format!("the GPU backend cannot compute the material \"{}\"", plan.model.name),
-                hint: "use --backend cpu, or model = \"corotated-linear\"".into(),
-            });
-        }
         let scheme = plan.clock.scheme;
         if *scheme != scheme::ALL[0] {
             return Err(BuildError {

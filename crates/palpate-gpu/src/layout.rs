@@ -109,6 +109,8 @@ pub struct Member {
     pub velocity: [f32; 4],
     /// Initial angular velocity [rad/s].
     pub spin: [f32; 4],
+    /// λ/E and μ/E, and their derivatives by Poisson's ratio.
+    pub lame: [f32; 4],
 }
 
 /// How the coefficients of one member change along a direction; `shared/rates.wgsl`.

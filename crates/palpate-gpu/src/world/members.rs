@@ -7,6 +7,7 @@ use glam::DVec3;
 use palpate_engine::ParamBatch;
 use palpate_model::cutcells::corotation::M24;
 use palpate_model::cutcells::elements::Elements;
+use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::mechanics::plane::planes;
 use palpate_model::plan::{Physics, Plan};
 use std::collections::HashMap;
@@ -52,6 +53,7 @@ impl Batch {
                 slots.push(p.poisson_ratio);
                 slots.len() - 1
             });
+            let ((lambda, mu), (lambda_by_nu, mu_by_nu)) = (lame(1.0, p.poisson_ratio), lame_by_nu(1.0, p.poisson_ratio));
             let shear = |s: f64| (unit * s) as f32;
             // A ratio without matrices is refused by the kernel that refuses other parameters: no modulus goes with it.
             let sound = p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5;
@@ -60,15 +62,13 @@ impl Batch {
                 density: p.density as f32,
                 mass_damping: p.mass_damping as f32,
                 stiffness_damping: p.stiffness_damping as f32,
-                ghost: [
-                    shear(palpate_model::mechanics::lame::lame(1.0, p.poisson_ratio).1),
-                    shear(palpate_model::mechanics::lame::lame_by_nu(1.0, p.poisson_ratio).1),
-                ],
+                ghost: [shear(mu), shear(mu_by_nu)],
                 slot: slot as u32,
                 start: p.start as f32,
                 gravity: vec4(p.gravity, 0.0),
                 velocity: vec4(p.velocity, 0.0),
                 spin: vec4(p.angular_velocity, 0.0),
+                lame: [lambda, mu, lambda_by_nu, mu_by_nu].map(|v| v as f32),
             });
             all_planes.extend(planes(plan, p).iter().map(|q| Plane {
                 normal: vec4(q.normal[0], q.height),

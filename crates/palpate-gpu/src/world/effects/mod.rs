@@ -9,11 +9,11 @@ use crate::device::pipelines::shared::laws;
 use crate::device::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE};
 use crate::device::pipelines::shared::rates::PLANE_NUMBERS;
 use crate::device::pipelines::shared::structs::{
-    FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, NONE, SCALARS_AT,
+    FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, MATERIAL_AT, NONE, SCALARS_AT,
 };
 use crate::device::{GpuError, Maker};
 use crate::layout::EffectSite;
-use palpate_model::effects::cell::Part;
+use palpate_model::effects::cell::{ENERGY, Part};
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
 use palpate_model::params::fields::Varied;
@@ -114,7 +114,7 @@ impl Effects {
         for (_, p) in e.points.iter_mut().chain(&mut e.cells) {
             (p.stride, p.rows) = (e.stride, e.rows);
         }
-        e.bits |= scalars(plan) << SCALARS_AT | (e.cells.len() as u32) << LAWS_AT;
+        e.bits |= scalars(plan) << SCALARS_AT | (e.cells.len() as u32) << LAWS_AT | material(plan) << MATERIAL_AT;
         Ok(e)
     }
 
@@ -145,9 +145,9 @@ impl Effects {
         self.cells.len() as u32
     }
 
-    /// True when some effect acts on cells.
+    /// True when some effect acts on cells, or the material as one does.
     pub(crate) fn on_cells(&self) -> bool {
-        !self.cells.is_empty()
+        !self.cells.is_empty() || self.bits >> MATERIAL_AT != 0
     }
 
     /// True when some effect acts on patches.
@@ -254,8 +254,17 @@ impl Effects {
     }
 }
 
-/// Number of scalars that the energies of a plan's laws of cells depend on; 0 without such laws.
+/// Number of a plan's material in the table of materials, 0 where it is the one that cells are made of.
+fn material(plan: &Plan) -> u32 {
+    let number = palpate_model::materials::ALL.iter().position(|m| m == plan.model).unwrap_or_default();
+    if plan.model.is_linear { 0 } else { number as u32 }
+}
+
+/// Number of scalars that the energies of a plan's laws of cells and its material depend on; 0 without any.
 fn scalars(plan: &Plan) -> u32 {
+    if material(plan) != 0 {
+        return ENERGY as u32;
+    }
     let needs = |law: &Law| if let Site::Cells(cell) = law.site { cell.needs(Part::Energy) } else { 0 };
     plan.layout.effects().map(|(law, _)| needs(law)).max().unwrap_or(0) as u32
 }
