@@ -1,11 +1,12 @@
 //! VTU and PVD files for ParaView.
 
-use crate::error::OutputError;
+use crate::error::{InputError, OutputError};
+use crate::keys::suggest;
 use crate::output::write_file;
 use glam::DVec3;
 use std::path::Path;
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, UnstructuredGridPiece, Version, VertexNumbers, Vtk,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, Piece, UnstructuredGridPiece, Version, VertexNumbers, Vtk,
 };
 
 /// Corner `VTK_ORDER[i]` of a lattice cell (bit 0 of the number +x, bit 1 +y, bit 2 +z) is corner i of VTK's hexahedron,
@@ -96,11 +97,39 @@ pub fn write_pvd(path: impl AsRef<Path>, frames: &[(f64, String)]) -> Result<(),
     })
 }
 
+/// Reads numbers per cell or per point of a grid: the array of this name, or the only one that holds one number each.
+///
+/// # Errors
+/// The file cannot be read, or has no such array.
+pub fn read_vtu_array(path: &Path, name: Option<&str>, of_cells: bool) -> Result<Vec<f64>, InputError> {
+    let wrong = |message: String| InputError::file(path, message);
+    let vtk = Vtk::import(path).map_err(|e| wrong(format!("is not a readable .vtu file: {e}")))?;
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { return Err(wrong("holds no unstructured grid".into())) };
+    let [Piece::Inline(piece)] = &pieces[..] else { return Err(wrong("holds several pieces; write the grid as one".into())) };
+    let (data, kind) = if of_cells { (&piece.data.cell, "cell") } else { (&piece.data.point, "point") };
+    let scalars: Vec<&DataArray> = data
+        .iter()
+        .filter_map(|a| match a {
+            Attribute::DataArray(d) if d.num_comp() == 1 => Some(d),
+            _ => None,
+        })
+        .collect();
+    let known = scalars.iter().map(|d| d.name.as_str()).collect::<Vec<_>>();
+    let found = match (name, &scalars[..]) {
+        (Some(name), all) => *all
+            .iter()
+            .find(|d| d.name == name)
+            .ok_or_else(|| wrong(format!("has no {kind} array \"{name}\" of single numbers; {}", suggest(name, &known))))?,
+        (None, [only]) => only,
+        (None, _) => return Err(wrong(format!("has {} {kind} arrays ({}); say which: array = …", known.len(), known.join(", ")))),
+    };
+    found.data.cast_into::<f64>().ok_or_else(|| wrong(format!("{kind} array \"{}\" holds no numbers", found.name)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use palpate_model::cutcells::grid::CORNERS;
-    use vtkio::model::Piece;
 
     /// One unit cell with a displacement per corner.
     fn cell() -> (Vec<DVec3>, [u32; 8]) {

@@ -336,6 +336,8 @@ pub enum Optimizer {
     Lbfgs,
     /// Gauss–Newton with Levenberg–Marquardt damping.
     GaussNewton,
+    /// The same without a matrix: products by a tangent and an adjoint, for fields.
+    GaussNewtonCg,
     /// Simplex search without gradients.
     NelderMead,
 }
