@@ -300,7 +300,7 @@ impl<B: Backend> Rollout<B> {
         }
         self.held = None;
         let (b, stages, stop) = (&self.backend, &self.stages, &*self.stop);
-        let forward = Forward { backend: b, stages, stop, directions: &[], keep: true };
+        let forward = Forward { backend: b, stages, stop, directions: None, keep: true };
         let states = b.rollout(&mut self.world, false, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
             let mut tally = b.new_tally(w, &Request::default());

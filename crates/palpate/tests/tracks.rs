@@ -58,7 +58,8 @@ fn a_bar_is_fitted_to_tracks_and_to_displacements_from_files() {
     let folder = std::env::temp_dir().join(format!("palpate-tracks-{}", std::process::id()));
     let truth = Experiment::from_toml(BAR, "bar.toml").unwrap_or_else(|e| panic!("{e}"));
     // On the upper face and inside.
-    let on = |k: u32| DVec3::new(0.015 + 0.01 * f64::from(k), 0.005 + 0.02 * f64::from(k % 2), if k % 3 == 0 { 0.02 } else { 0.03 });
+    let on =
+        |k: u32| DVec3::new(0.015 + 0.01 * f64::from(k), 0.005 + 0.02 * f64::from(k % 2), if k % 3 == 0 { 0.02 } else { 0.03 });
     let observers = Observers {
         cameras: Vec::new(),
         markers: Vec::new(),
@@ -82,7 +83,8 @@ fn a_bar_is_fitted_to_tracks_and_to_displacements_from_files() {
     let e = Experiment::from_toml(&text, folder.join("bar.toml")).map(|_| ()).expect_err("the grid is another one").to_string();
     assert!(e.contains("recording.toml") && e.contains("displacements.file: holds"), "{e}");
     // A body elsewhere is not what the points lie on.
-    let moved = BAR.replace("max = [0.12, 0.03, 0.03]", "max = [0.12, 0.03, 0.2]").replace("min = [0, 0, 0]", "min = [0, 0, 0.1]");
+    let moved =
+        BAR.replace("max = [0.12, 0.03, 0.03]", "max = [0.12, 0.03, 0.2]").replace("min = [0, 0, 0]", "min = [0, 0, 0.1]");
     let text = format!("{moved}\n[observation]\nrecording = \"seen\"\ncost = \"points\"\n");
     let e = Experiment::from_toml(&text, folder.join("bar.toml")).map(|_| ()).expect_err("nothing is there").to_string();
     assert!(e.contains("points.rest: 10 of 10 points lie more than"), "{e}");

@@ -96,14 +96,6 @@ fn value(scene: &Scene, key: ParamKey) -> f64 {
 
 pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputError> {
     let Some(t) = root.optional_table("fit")? else { return Ok(None) };
-    let optimizers = [
-        ("rprop", Optimizer::Rprop),
-        ("gradient-descent", Optimizer::GradientDescent),
-        ("lbfgs", Optimizer::Lbfgs),
-        ("gauss-newton", Optimizer::GaussNewton),
-        ("gauss-newton-cg", Optimizer::GaussNewtonCg),
-        ("nelder-mead", Optimizer::NelderMead),
-    ];
     let known = targets(scene);
     let mut parameters: Vec<FitParameter> = Vec::new();
     for p in t.tables("parameter")? {
@@ -120,7 +112,7 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
         }
     }
     Ok(Some(FitSpec {
-        optimizer: t.optional_choice("optimizer", &optimizers)?.unwrap_or(Optimizer::GaussNewton),
+        optimizer: t.optional_choice("optimizer", &Optimizer::ALL)?,
         iterations: t.optional_count("iterations", 0..=1_000_000)?.unwrap_or(50) as usize,
         starts: t.optional_count("starts", 1..=1_000_000)?.unwrap_or(1) as usize,
         seed: t.optional_count("seed", 0..=u64::MAX)?.unwrap_or(1),
@@ -134,7 +126,8 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
     let path = t.optional_str("path")?.ok_or_else(|| t.missing("path", "the dotted path of a number in this file"))?;
     let component = |k: &Target| k.path.strip_prefix(path).is_some_and(|r| matches!(r, "" | ".x" | ".y" | ".z"));
     let of_field = field_targets(path, scene);
-    let chosen: Vec<&Target> = of_field.as_ref().map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
+    let chosen: Vec<&Target> =
+        of_field.as_ref().map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
     if chosen.is_empty() {
         return Err(t.error("path", unknown_path(path, scene, known)));
     }

@@ -10,7 +10,7 @@ pub(crate) mod scale;
 mod tests;
 mod write;
 
-pub use write::{append_effects, write_scene};
+pub use write::{append_effects, name_field_files, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
