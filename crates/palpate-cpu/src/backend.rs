@@ -319,6 +319,10 @@ impl Backend for CpuBackend {
             });
     }
 
+    fn has_products(&self) -> bool {
+        true
+    }
+
     fn observe_product(
         &self,
         world: &World,

@@ -1,6 +1,6 @@
 //! What an optimiser sees of physics: parameters in, cost and derivatives out.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 
 /// Parameter vectors of a batch, shape `[B, P]`, SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,4 +165,19 @@ pub trait Evaluate: Send {
     fn parameters(&self) -> usize;
     /// Cost and derivatives of every member of a batch; a failed member has infinite cost and says why.
     fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation>;
+
+    /// True where [`Evaluate::product`] is computed.
+    fn has_products(&self) -> bool {
+        false
+    }
+
+    /// Product `H v` `[P]` with the Gauss–Newton matrix of [`Curvature`] over all parameters at `theta` `[P]`, for a direction `v` `[P]`;
+    /// entries that are not `wanted` are zero. What was simulated at the last `theta` is kept, so that further products with its matrix
+    /// take a tangent and an adjoint each.
+    ///
+    /// # Errors
+    /// The simulation fails, or there are no products ([`FailureKind::Unsupported`]).
+    fn product(&mut self, _theta: &[f64], _v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        Err(Failure::new(FailureKind::Unsupported, 0.0, "there are no products with the Gauss-Newton matrix"))
+    }
 }

@@ -7,6 +7,7 @@
 mod backend;
 mod evaluate;
 mod failure;
+mod product;
 mod residuals;
 mod rollout;
 mod rows;

@@ -1,8 +1,9 @@
 //! The driver: forward with tape, back with the adjoint, or forward with tangents. Written once for all backends.
 
 use crate::backend::{Backend, BuildError};
-use crate::evaluate::{Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request};
+use crate::evaluate::{Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 use crate::failure::{Failure, FailureKind};
+use crate::product::{Held, product};
 use crate::residuals::FrameResiduals;
 use crate::rows::{Linearised, Rows};
 use crate::tape::{Adjoints, Tape};
@@ -20,6 +21,8 @@ pub struct Rollout<B: Backend> {
     plan: Plan,
     stages: Vec<Stage>,
     members: usize,
+    /// The way forward that products were last asked for; it holds as long as the world has its θ.
+    held: Option<Held<B>>,
     /// Ends an evaluation at its next stage when set.
     stop: Arc<AtomicBool>,
 }
@@ -142,10 +145,7 @@ impl<B: Backend> Forward<'_, B> {
                 b.observe_adjoint(w, s.step, states.get(now), states.last(), &mut adj, &mut adj_now, tally);
                 adjoints.put(now, adj_now);
             }
-            let mut past: Vec<B::Adjoint> = s.from.iter().map(|f| adjoints.take(b, w, f.0)).collect();
-            b.step_adjoint(w, s, &states.past(s), states.last(), &adj, &mut past, tally);
-            s.from.iter().zip(past).for_each(|(f, a)| adjoints.put(f.0, a));
-            adjoints.done(adj);
+            adjoints.back(b, w, s, (&states, states.last()), adj, tally);
             states.pop();
         }
         let adj = adjoints.take(b, w, 0);
@@ -159,7 +159,7 @@ impl<B: Backend> Rollout<B> {
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
         let stages = plan.clock.stages();
-        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), stop: Arc::default() })
+        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), held: None, stop: Arc::default() })
     }
 
     /// The same rollout, whose evaluations end at their next step once `stop` is set; every member then fails as
@@ -181,6 +181,7 @@ impl<B: Backend> Rollout<B> {
 
     /// Evaluates a batch of at most as many members as there is room for.
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        self.held = None;
         let (b, stop, stages) = (&self.backend, &*self.stop, &self.stages);
         let directions = Direction::parameters(&request.sensitivities);
         let wanted = Some(directions.as_slice()).filter(|d| !d.is_empty());
@@ -217,6 +218,7 @@ impl<B: Backend> Rollout<B> {
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
+        self.held = None;
         let (b, dt) = (&self.backend, self.plan.clock.step);
         let (stages, stop) = (&self.stages, &*self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: false };
@@ -243,6 +245,7 @@ impl<B: Backend> Rollout<B> {
     /// The simulation fails, somebody asked to stop, or the backend has no rows ([`FailureKind::Unsupported`]).
     pub fn linearise(&mut self, theta: &[f64], directions: &[usize]) -> Result<Linearised, Failure> {
         refuse_many(directions.len())?;
+        self.held = None;
         let b = &self.backend;
         let along = Direction::parameters(directions);
         let (stages, stop) = (&self.stages, &*self.stop);
@@ -289,7 +292,28 @@ impl<B: Backend> Rollout<B> {
     }
 }
 
-fn stopped() -> Failure {
+impl<B: Backend> Rollout<B> {
+    /// Simulates one member at `theta` and keeps every state, unless that is what is kept already.
+    fn hold(&mut self, theta: &[f64]) -> Result<(), Failure> {
+        if self.held.as_ref().is_some_and(|h| h.theta == theta) {
+            return Ok(());
+        }
+        self.held = None;
+        let (b, stages, stop) = (&self.backend, &self.stages, &*self.stop);
+        let forward = Forward { backend: b, stages, stop, directions: None, keep: true };
+        let states = b.rollout(&mut self.world, false, |w| {
+            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            let mut tally = b.new_tally(w, &Request::default());
+            let visit = |_: Moment<B>| ControlFlow::Continue(());
+            let states = forward.run(w, &mut tally, visit).continue_value().ok_or_else(stopped)?;
+            b.read(w, &tally).remove(0).failure.map_or(Ok(states), Err)
+        })?;
+        self.held = Some(Held { theta: theta.to_vec(), states });
+        Ok(())
+    }
+}
+
+pub(crate) fn stopped() -> Failure {
     Failure::new(FailureKind::Stopped, 0.0, "the rollout was cut short")
 }
 
@@ -317,5 +341,23 @@ impl<B: Backend> Evaluate for Rollout<B> {
         }
         let rows: Vec<Vec<f64>> = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
         rows.chunks(self.members).flat_map(|rows| self.run(&ParamBatch::from_rows(rows), request)).collect()
+    }
+
+    fn has_products(&self) -> bool {
+        self.backend.has_products()
+    }
+
+    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        if !self.backend.has_products() {
+            let detail = format!("backend {} has no products with the Gauss-Newton matrix", self.backend.name());
+            return Err(Failure {
+                hint: "fit with optimizer = \"lbfgs\", or compute with --backend cpu".into(),
+                ..Failure::new(FailureKind::Unsupported, 0.0, detail)
+            });
+        }
+        self.hold(theta)?;
+        let (b, ways) = (&self.backend, (&self.stages[..], &*self.stop));
+        let states = &self.held.as_ref().expect("a way forward was just kept").states;
+        b.rollout(&mut self.world, false, |w| product(b, w, ways, states, v, wanted))
     }
 }

@@ -88,8 +88,24 @@ impl<B: Backend> Adjoints<B> {
         self.values[number] = Some(adjoint);
     }
 
+    /// The adjoint of a stage: passes dJ/d(what it gave), `adj`, on to what it started from.
+    pub(crate) fn back(
+        &mut self,
+        backend: &B,
+        world: &mut B::World,
+        stage: &Stage,
+        (states, next): (&Tape<B::State>, &B::State),
+        adj: B::Adjoint,
+        tally: &mut B::Tally,
+    ) {
+        let mut past: Vec<B::Adjoint> = stage.from.iter().map(|f| self.take(backend, world, f.0)).collect();
+        backend.step_adjoint(world, stage, &states.past(stage), next, &adj, &mut past, tally);
+        stage.from.iter().zip(past).for_each(|(f, a)| self.put(f.0, a));
+        self.done(adj);
+    }
+
     /// An adjoint that is done with: its memory serves another state.
-    pub(crate) fn done(&mut self, adjoint: B::Adjoint) {
+    fn done(&mut self, adjoint: B::Adjoint) {
         self.spare.push(adjoint);
     }
 }

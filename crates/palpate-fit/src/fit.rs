@@ -7,6 +7,7 @@ use crate::optimise::{Sample, Status};
 use crate::problem::{Problem, Want};
 use crate::settings::{ErrorModel, Settings};
 use crate::uncertainty::{self, Uncertainty};
+use palpate_engine::MOST_SENSITIVITIES;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -83,6 +84,8 @@ pub struct Run {
     pub iterations: usize,
     /// Evaluations used.
     pub evaluations: usize,
+    /// Products with the Gauss–Newton matrix used.
+    pub products: usize,
     /// Longest step that Gauss–Newton would try next ([`Settings::first_step`]).
     pub reach: f64,
     /// How it ended.
@@ -94,6 +97,8 @@ pub struct Run {
 pub struct FittedParameter {
     /// Path as the user wrote it.
     pub path: String,
+    /// Its place among the free values `[q]`.
+    pub index: usize,
     /// Best value.
     pub value: f64,
     /// Standard error in the same unit; `None` if it could not be computed.
@@ -104,12 +109,29 @@ pub struct FittedParameter {
     pub at_bound: Option<AtBound>,
 }
 
+/// A found field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedField {
+    /// Path as the user wrote it.
+    pub path: String,
+    /// Place of its first value among the free values `[q]`.
+    pub first: usize,
+    /// Best values.
+    pub values: Vec<f64>,
+    /// Standard error of each; `None` at a bound or where it was not computed.
+    pub standard_errors: Vec<Option<f64>>,
+    /// SI unit, `1` for none.
+    pub unit: String,
+}
+
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitResult {
-    /// The free parameters at the best point `[q]`.
+    /// The free numbers at the best point.
     pub parameters: Vec<FittedParameter>,
-    /// Correlation matrix of their errors `[q][q]` (of the logarithms where these are fitted).
+    /// The free fields at the best point.
+    pub fields: Vec<FittedField>,
+    /// Correlation matrix of the numbers' errors (of the logarithms where these are fitted).
     pub correlation: Vec<Vec<f64>>,
     /// Mean square residual over the squared noise; 1 if the model is right and the noise as stated.
     pub reduced_chi_square: f64,
@@ -161,6 +183,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
             cost: s.outcome.cost,
             iterations: s.outcome.iterations,
             evaluations: s.outcome.evaluations,
+            products: s.outcome.products,
             reach: s.outcome.reach,
             status: s.outcome.status.clone(),
         })
@@ -201,21 +224,15 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     if cut.is_none() && runs[best].status == Status::IterationLimit {
         warnings.push(format!("the best start used up its {} iterations; more may lower the cost", settings.iterations));
     }
-    let parameters = problem
-        .free()
-        .iter()
-        .enumerate()
-        .map(|(i, f)| FittedParameter {
-            path: f.path.clone(),
-            value: values[i],
-            standard_error: u.standard_errors[i],
-            unit: f.unit.clone(),
-            at_bound: problem.charts()[i].at_bound(values[i]),
-        })
-        .collect();
+    let (parameters, fields) = found(problem, &values, &u);
+    let correlation = match u.correlation.is_empty() {
+        true => uncertainty::identity(parameters.len()),
+        false => parameters.iter().map(|a| parameters.iter().map(|b| u.correlation[a.index][b.index]).collect()).collect(),
+    };
     Ok(FitResult {
         parameters,
-        correlation: u.correlation,
+        fields,
+        correlation,
         reduced_chi_square: u.reduced_chi_square,
         independent: u.independent,
         best,
@@ -228,6 +245,28 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         runs,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// The free numbers and fields at the best point.
+fn found(problem: &Problem, values: &[f64], u: &Uncertainty) -> (Vec<FittedParameter>, Vec<FittedField>) {
+    let (mut parameters, mut fields) = (Vec::new(), Vec::new());
+    for (f, range) in problem.blocks() {
+        let (path, unit, first) = (f.path.clone(), f.unit.clone(), range.start);
+        if f.count == 1 {
+            parameters.push(FittedParameter {
+                path,
+                index: first,
+                value: values[first],
+                standard_error: u.standard_errors[first],
+                unit,
+                at_bound: problem.charts()[first].at_bound(values[first]),
+            });
+        } else {
+            let standard_errors = u.standard_errors[range.clone()].to_vec();
+            fields.push(FittedField { path, first, values: values[range].to_vec(), standard_errors, unit });
+        }
+    }
+    (parameters, fields)
 }
 
 /// Uncertainty at the best point, and how many evaluations that took. Nothing is computed for a fit that was `cut` short; a device
@@ -254,6 +293,13 @@ fn curvature(
     }
     if let Some(why) = cut {
         return (without(problem, why), 0);
+    }
+    if z.len() > MOST_SENSITIVITIES {
+        let mut u =
+            without(problem, &format!("{} values are free, and they are computed of {MOST_SENSITIVITIES} at most", z.len()));
+        // Said first: nothing else is said of errors.
+        u.warnings.rotate_right(1);
+        return (u, 0);
     }
     let sample = problem.evaluate(&[z.to_vec()], Want::Curvature).swap_remove(0);
     match &sample.failure {

@@ -42,8 +42,19 @@ struct HeadParameter {
     typical: f64,
     bounds: [String; 2],
     start: [f64; 2],
+    /// Number of values, of a field.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    count: usize,
     /// Scene, place in its θ, and bits of the factor.
     slots: Vec<(usize, usize, String)>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 /// A scene, as the head describes it.
@@ -137,7 +148,7 @@ impl Journal {
         if place.resume && path.exists() {
             let text = std::fs::read(&path).map_err(io)?;
             keep = text.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
-            entries = read(&path, &String::from_utf8_lossy(&text[..keep]), &head, problem.free().len())?;
+            entries = read(&path, &String::from_utf8_lossy(&text[..keep]), &head, problem.values_count())?;
         }
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(io)?;
         file.set_len(keep as u64).map_err(io)?;
@@ -196,6 +207,7 @@ impl Head {
             typical: f.typical,
             bounds: [f.bounds.0.to_string(), f.bounds.1.to_string()],
             start: [f.start.0, f.start.1],
+            count: f.count,
             slots: f.slots.iter().map(|s| (s.scene, s.place, to_hex(&[s.factor]))).collect(),
         };
         let scene = |s: &FitScene| HeadScene { fingerprint: s.fingerprint.clone(), theta: to_hex(&s.base) };

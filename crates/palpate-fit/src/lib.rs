@@ -14,7 +14,7 @@ mod settings;
 mod uncertainty;
 
 pub use chart::{AtBound, Chart};
-pub use fit::{FitError, FitResult, FittedParameter, Hooks, Progress, Run, Worth, fit};
+pub use fit::{FitError, FitResult, FittedField, FittedParameter, Hooks, Progress, Run, Worth, fit};
 pub use journal::{JournalError, JournalFile};
 pub use optimise::{Outcome, Sample, Search, Status, Stop, want};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};

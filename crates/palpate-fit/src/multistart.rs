@@ -9,6 +9,7 @@ use crate::journal::Journal;
 use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
 use crate::problem::{FreeParameter, Problem};
 use crate::settings::Settings;
+use palpate_engine::FailureKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::Ordering;
@@ -28,8 +29,22 @@ pub struct StartRun {
     pub outcome: Outcome,
 }
 
+/// What a start asks for.
+enum Ask {
+    /// Cost and derivatives at z `[q]`.
+    Sample(Vec<f64>),
+    /// Product with the curvature at z, both `[q]`.
+    Product(Vec<f64>, Vec<f64>),
+}
+
+/// What it gets.
+enum Answer {
+    Sample(Sample),
+    Product(Vec<f64>),
+}
+
 enum Message {
-    Evaluate(Vec<f64>),
+    Ask(Ask),
     Iteration(usize, f64, Vec<f64>),
     Done(Box<StartRun>),
 }
@@ -41,13 +56,19 @@ pub fn draw(free: &[FreeParameter], charts: &[Chart], rng: &mut ChaCha8Rng) -> V
         let (a, b) = (f.start.0.max(f.bounds.0), f.start.1.min(f.bounds.1));
         c.between((a, b), share)
     };
-    free.iter().zip(charts).map(one).collect()
+    by_value(free).zip(charts).map(one).collect()
+}
+
+/// The parameter of every free value `[q]`.
+fn by_value(free: &[FreeParameter]) -> impl Iterator<Item = &FreeParameter> {
+    free.iter().flat_map(|f| std::iter::repeat_n(f, f.count))
 }
 
 /// The scene's own values where they lie in the start range, the drawn ones elsewhere.
 fn first_start(free: &[FreeParameter], own: &[f64], drawn: Vec<f64>) -> Vec<f64> {
     let inside = |f: &FreeParameter, v: f64| v >= f.start.0.max(f.bounds.0) && v <= f.start.1.min(f.bounds.1);
-    drawn.into_iter().enumerate().map(|(i, v)| if inside(&free[i], own[i]) { own[i] } else { v }).collect()
+    let pairs = by_value(free).zip(own).zip(drawn);
+    pairs.map(|((f, own), drawn)| if inside(f, *own) { *own } else { drawn }).collect()
 }
 
 /// What one start needs to know.
@@ -62,7 +83,7 @@ struct Runner<'a> {
 }
 
 impl Runner<'_> {
-    fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Sample, Stop>>) -> StartRun {
+    fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Answer, Stop>>) -> StartRun {
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
         rng.set_stream(self.number as u64);
         let fixed = self.free.iter().all(|f| f.start.0 == f.start.1);
@@ -74,17 +95,26 @@ impl Runner<'_> {
                 values = first_start(self.free, self.own, values);
             }
             let start: Vec<f64> = self.charts.iter().zip(&values).map(|(c, &v)| c.coordinate(v)).collect();
-            let mut evaluate = |z: &[f64]| {
-                let sent = tell.send((self.number, Message::Evaluate(z.to_vec())));
+            let ask = |what: Ask| {
+                let sent = tell.send((self.number, Message::Ask(what)));
                 // A broker that is gone cannot answer any more: the same as an interruption.
                 sent.map_err(|_| Stop::Interrupted)?;
                 answers.recv().unwrap_or(Err(Stop::Interrupted))
+            };
+            let mut evaluate = |z: &[f64]| match ask(Ask::Sample(z.to_vec()))? {
+                Answer::Sample(sample) => Ok(sample),
+                Answer::Product(_) => Err(Stop::Broken("a product was given for a sample".into())),
+            };
+            let mut product = |z: &[f64], v: &[f64]| match ask(Ask::Product(z.to_vec(), v.to_vec()))? {
+                Answer::Product(product) => Ok(product),
+                Answer::Sample(sample) => Err(Stop::Broken(sample.failure.unwrap_or_default())),
             };
             let mut progress = |n: usize, cost: f64, z: &[f64]| {
                 // Without a broker nobody listens, and the next evaluation ends the search.
                 let _ = tell.send((self.number, Message::Iteration(n, cost, z.to_vec())));
             };
             let search = Search::new(&mut evaluate, &mut progress, self.lower, self.upper, self.settings);
+            let search = search.with_products(&mut product);
             let mut outcome = search.run(self.settings.optimizer, &start);
             spent += outcome.evaluations;
             attempt += 1;
@@ -131,6 +161,7 @@ pub fn run(
                             start_cost: f64::INFINITY,
                             iterations: 0,
                             evaluations: 0,
+                            products: 0,
                             reach: f64::INFINITY,
                             status: Status::Failed("the optimiser broke off".into()),
                             sample: None,
@@ -159,11 +190,11 @@ fn broker(
     hooks: &mut Hooks,
     mut journal: Option<Journal>,
     inbox: &Receiver<(usize, Message)>,
-    answers: &[Sender<Result<Sample, Stop>>],
+    answers: &[Sender<Result<Answer, Stop>>],
 ) -> Result<Vec<StartRun>, FitError> {
     let starts = answers.len();
     let mut done: Vec<Option<StartRun>> = vec![None; starts];
-    let mut asked: Vec<Option<Vec<f64>>> = vec![None; starts];
+    let mut asked: Vec<Option<Ask>> = (0..starts).map(|_| None).collect();
     let mut served = vec![0; starts];
     let mut residuals = 0;
     let mut broken = None;
@@ -174,7 +205,7 @@ fn broker(
                 return Err(FitError::Threads("a start ended without a result".into()));
             };
             match message {
-                Message::Evaluate(z) => asked[s] = Some(z),
+                Message::Ask(what) => asked[s] = Some(what),
                 Message::Iteration(n, cost, z) => heard.push((s, n, cost, z)),
                 Message::Done(run) => done[s] = Some(*run),
             }
@@ -186,29 +217,50 @@ fn broker(
                 f(&Progress { start, iteration, cost, values: problem.values(&z) });
             }
         }
-        let live: Vec<usize> = (0..starts).filter(|&s| asked[s].is_some()).collect();
-        if live.is_empty() {
+        if asked.iter().all(Option::is_none) {
             return Ok(done.into_iter().flatten().collect());
         }
+        let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
+        let mut stop = broken.clone().map(Stop::Broken).or(interrupted.then_some(Stop::Interrupted));
+        for (ask, answer) in asked.iter_mut().zip(answers) {
+            let Some(Ask::Product(z, v)) = ask else { continue };
+            let product = match &stop {
+                Some(stop) => Err(stop.clone()),
+                None => problem.product(z, v).map(Answer::Product).map_err(|f| match f.kind {
+                    FailureKind::Stopped => Stop::Interrupted,
+                    _ => Stop::Broken(f.to_string()),
+                }),
+            };
+            if let Err(Stop::Broken(why)) = &product {
+                broken = Some(why.clone());
+                stop = Some(Stop::Broken(why.clone()));
+            }
+            *ask = None;
+            // A start that no longer listens has ended and said so.
+            let _ = answer.send(product);
+        }
+        let z_of = |s: usize| match &asked[s] {
+            Some(Ask::Sample(z)) => Some(z),
+            _ => None,
+        };
+        let live: Vec<usize> = (0..starts).filter(|s| z_of(*s).is_some()).collect();
         // What an earlier run has computed is served even when the fit is about to end: it costs nothing.
         let mut answered = Vec::new();
         if let Some(journal) = &mut journal {
             for &s in &live {
-                if let Some(sample) = asked[s].as_ref().map_or(Ok(None), |z| journal.find(s, served[s], z))? {
+                if let Some(sample) = z_of(s).map_or(Ok(None), |z| journal.find(s, served[s], z))? {
                     answered.push((s, sample));
                 }
             }
         }
         let fresh: Vec<usize> = live.iter().copied().filter(|s| answered.iter().all(|(a, _)| a != s)).collect();
-        let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
-        let stop = broken.clone().map(Stop::Broken).or(interrupted.then_some(Stop::Interrupted));
         if let Some(stop) = stop {
             for &s in &fresh {
                 asked[s] = None;
                 let _ = answers[s].send(Err(stop.clone()));
             }
         } else if !fresh.is_empty() {
-            let z: Vec<Vec<f64>> = fresh.iter().filter_map(|&s| asked[s].clone()).collect();
+            let z: Vec<Vec<f64>> = fresh.iter().filter_map(|&s| z_of(s).cloned()).collect();
             let samples = problem.evaluate(&z, want(settings.optimizer));
             broken = samples.iter().find(|s| s.broken).and_then(|s| s.failure.clone());
             // A round that broke or was stopped is computed again by a resumed fit, as a whole.
@@ -232,7 +284,7 @@ fn broker(
             let answer = match sample {
                 Sample { broken: true, failure, .. } => Err(Stop::Broken(failure.unwrap_or_default())),
                 Sample { stopped: true, .. } => Err(Stop::Interrupted),
-                sample => Ok(sample),
+                sample => Ok(Answer::Sample(sample)),
             };
             // A start that no longer listens has ended and said so.
             let _ = answers[s].send(answer);

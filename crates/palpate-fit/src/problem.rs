@@ -2,10 +2,10 @@
 
 use crate::chart::Chart;
 use crate::optimise::Sample;
-use palpate_engine::{Evaluate, FailureKind, ParamBatch, Request, Wanted};
+use palpate_engine::{Evaluate, Failure, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
 
-/// Where a free parameter acts: `theta[scene][place] = value · factor`.
+/// Where a free parameter acts: `theta[scene][place] = value · factor`; value k of a field at `place + k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slot {
     /// Number of the scene in [`Problem::scenes`].
@@ -16,7 +16,7 @@ pub struct Slot {
     pub factor: f64,
 }
 
-/// One free number.
+/// One free number, or the values of a free field, which share everything but their places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FreeParameter {
     /// Path as the user wrote it.
@@ -33,6 +33,8 @@ pub struct FreeParameter {
     pub start: (f64, f64),
     /// Places that follow it; at least one.
     pub slots: Vec<Slot>,
+    /// How many values follow each other from every slot's place on: 1 for a number.
+    pub count: usize,
     /// The vector that it is a component of, where only the direction of that counts: its length is no unknown.
     pub direction: Option<String>,
 }
@@ -61,11 +63,16 @@ pub enum Want {
 }
 
 /// A joint fit of one or more scenes. Its cost is `Σ n_s J_s / Σ n_s` with n_s the residual count of scene s, so that every
-/// residual counts once.
+/// residual counts once. The free values of all parameters, one after the other, are the vector `[q]` that optimisers see.
 pub struct Problem<'a> {
     scenes: Vec<FitScene<'a>>,
     free: Vec<FreeParameter>,
+    /// First value of each parameter; the last entry is q.
+    firsts: Vec<usize>,
+    /// Of every value `[q]`.
     charts: Vec<Chart>,
+    /// Residuals n_s of every scene when it was last evaluated.
+    residuals: Vec<f64>,
 }
 
 impl<'a> Problem<'a> {
@@ -81,43 +88,53 @@ impl<'a> Problem<'a> {
             }
         }
         let mut charts = Vec::new();
-        let mut taken = Vec::new();
+        let mut firsts = vec![0];
+        let mut taken: Vec<Vec<bool>> = scenes.iter().map(|s| vec![false; s.base.len()]).collect();
         for f in &free {
             let wrong = |message: String| format!("parameter {}: {message}", f.path);
-            charts.push(Chart::new(f.transform, f.typical, f.bounds.0, f.bounds.1).map_err(wrong)?);
-            let (a, b) = f.start;
-            if !(a.is_finite() && b.is_finite() && a <= b) {
-                return Err(wrong(format!("start [{a}, {b}] must be two finite numbers, the smaller one first")));
-            }
-            if b < f.bounds.0 || a > f.bounds.1 {
-                return Err(wrong(format!("start [{a}, {b}] lies outside the bounds [{}, {}]", f.bounds.0, f.bounds.1)));
-            }
-            if f.slots.is_empty() {
-                return Err(wrong("it acts on no scene".into()));
-            }
+            let chart = Chart::new(f.transform, f.typical, f.bounds.0, f.bounds.1).map_err(wrong)?;
+            charts.extend(std::iter::repeat_n(chart, f.count));
+            firsts.push(charts.len());
+            check_start(f).map_err(wrong)?;
             for s in &f.slots {
                 let scene = scenes.get(s.scene).ok_or_else(|| wrong(format!("scene number {} does not exist", s.scene)))?;
-                if s.place >= scene.base.len() {
-                    return Err(wrong(format!("place {} is not in θ of scene {}", s.place, scene.name)));
-                }
+                let Some(taken) = taken[s.scene].get_mut(s.place..s.place + f.count) else {
+                    return Err(wrong(format!("place {} is not in θ of scene {}", s.place + f.count - 1, scene.name)));
+                };
                 if !(s.factor.is_finite() && s.factor != 0.0) {
                     return Err(wrong(format!("factor {} must be finite and not zero", s.factor)));
                 }
-                if taken.contains(&(s.scene, s.place)) {
+                if taken.contains(&true) {
                     return Err(wrong("another free parameter already sets the same number".into()));
                 }
-                taken.push((s.scene, s.place));
+                taken.fill(true);
             }
         }
-        Ok(Problem { scenes, free, charts })
+        let residuals = vec![1.0; scenes.len()];
+        Ok(Problem { scenes, free, firsts, charts, residuals })
     }
 
-    /// Free parameters `[q]`.
+    /// Free parameters; each stands for as many values as it counts.
     pub fn free(&self) -> &[FreeParameter] {
         &self.free
     }
 
-    /// Charts of the free parameters `[q]`.
+    /// Number of free values q.
+    pub fn values_count(&self) -> usize {
+        self.charts.len()
+    }
+
+    /// The free parameters with the places of their values among the q.
+    pub fn blocks(&self) -> impl Iterator<Item = (&FreeParameter, std::ops::Range<usize>)> {
+        self.free.iter().zip(self.firsts.windows(2).map(|w| w[0]..w[1]))
+    }
+
+    /// The parameter that value i belongs to.
+    pub fn of(&self, i: usize) -> &FreeParameter {
+        &self.free[self.firsts.partition_point(|first| *first <= i) - 1]
+    }
+
+    /// Charts of the free values `[q]`.
     pub fn charts(&self) -> &[Chart] {
         &self.charts
     }
@@ -134,23 +151,64 @@ impl<'a> Problem<'a> {
 
     /// The scenes' own values `[q]` of the free parameters (of the first scene that has each).
     pub fn own_values(&self) -> Vec<f64> {
-        self.free.iter().map(|f| f.slots[0]).map(|s| self.scenes[s.scene].base[s.place] / s.factor).collect()
+        let own = |f: &FreeParameter| {
+            let s = f.slots[0];
+            self.scenes[s.scene].base[s.place..s.place + f.count].iter().map(move |v| v / s.factor)
+        };
+        self.free.iter().flat_map(own).collect()
     }
 
     /// θ of one scene with the free parameters at `values` `[q]`.
     pub fn theta(&self, scene: usize, values: &[f64]) -> Vec<f64> {
         let mut theta = self.scenes[scene].base.clone();
-        for (f, v) in self.free.iter().zip(values) {
-            for s in f.slots.iter().filter(|s| s.scene == scene) {
-                theta[s.place] = v * s.factor;
-            }
+        for (i, slot) in self.slots(scene) {
+            theta[slot.place] = values[i] * slot.factor;
         }
         theta
     }
 
-    /// Cost and derivatives by the free parameters at each row of physical values `[B][q]`.
+    /// Every free value that acts on a scene, with the place where it does.
+    fn slots(&self, scene: usize) -> impl Iterator<Item = (usize, Slot)> {
+        self.blocks().flat_map(move |(f, range)| {
+            let of_scene = f.slots.iter().filter(move |s| s.scene == scene);
+            of_scene.flat_map(move |s| range.clone().enumerate().map(move |(k, i)| (i, Slot { place: s.place + k, ..*s })))
+        })
+    }
+
+    /// True where every scene's physics has [`Problem::product`].
+    pub fn has_products(&self) -> bool {
+        self.scenes.iter().all(|s| s.evaluate.has_products())
+    }
+
+    /// Product `[q]` of the Gauss–Newton curvature by z, at z `[q]`, with a direction `[q]`.
+    ///
+    /// # Errors
+    /// Why it could not be computed.
+    pub fn product(&mut self, z: &[f64], direction: &[f64]) -> Result<Vec<f64>, Failure> {
+        let slopes: Vec<f64> = self.charts.iter().zip(z).map(|(c, &z)| c.slope(z)).collect();
+        let values = self.values(z);
+        let mut out = vec![0.0; z.len()];
+        let all: f64 = self.residuals.iter().sum();
+        for s in 0..self.scenes.len() {
+            let slots: Vec<(usize, Slot)> = self.slots(s).collect();
+            if slots.is_empty() {
+                continue;
+            }
+            let theta = self.theta(s, &values);
+            let mut v = vec![0.0; theta.len()];
+            slots.iter().for_each(|(i, slot)| v[slot.place] = slot.factor * slopes[*i] * direction[*i]);
+            let wanted = Wanted::Places(slots.iter().map(|(_, slot)| slot.place).collect());
+            let product = self.scenes[s].evaluate.product(&theta, &v, &wanted)?;
+            for (i, slot) in &slots {
+                out[*i] += self.residuals[s] / all * slot.factor * slopes[*i] * product[slot.place];
+            }
+        }
+        Ok(out)
+    }
+
+    /// Cost and derivatives by the free values at each row of physical values `[B][q]`.
     pub fn evaluate_values(&mut self, values: &[Vec<f64>], want: Want) -> Vec<Sample> {
-        let q = self.free.len();
+        let q = self.values_count();
         let mut sums: Vec<Sample> = values
             .iter()
             .map(|_| Sample {
@@ -166,10 +224,7 @@ impl<'a> Problem<'a> {
             if live.is_empty() {
                 break;
             }
-            let slots: Vec<(usize, Slot)> = (0..q)
-                .flat_map(|i| self.free[i].slots.iter().map(move |slot| (i, *slot)))
-                .filter(|(_, slot)| slot.scene == s)
-                .collect();
+            let slots: Vec<(usize, Slot)> = self.slots(s).collect();
             let mut places: Vec<usize> = slots.iter().map(|(_, slot)| slot.place).collect();
             places.sort_unstable();
             let request = Request {
@@ -190,6 +245,7 @@ impl<'a> Problem<'a> {
                 // Physics that counts no residuals (an analytic cost) weighs as one.
                 let n = e.residuals.max(1) as f64;
                 weights[b] += n;
+                self.residuals[s] = n;
                 sum.residuals += e.residuals;
                 sum.cost += n * e.cost;
                 if want == Want::Gradient {
@@ -235,4 +291,18 @@ impl<'a> Problem<'a> {
         }
         samples
     }
+}
+
+fn check_start(f: &FreeParameter) -> Result<(), String> {
+    let (a, b) = f.start;
+    if !(a.is_finite() && b.is_finite() && a <= b) {
+        return Err(format!("start [{a}, {b}] must be two finite numbers, the smaller one first"));
+    }
+    if b < f.bounds.0 || a > f.bounds.1 {
+        return Err(format!("start [{a}, {b}] lies outside the bounds [{}, {}]", f.bounds.0, f.bounds.1));
+    }
+    if f.count == 0 {
+        return Err("it has no values".into());
+    }
+    if f.slots.is_empty() { Err("it acts on no scene".into()) } else { Ok(()) }
 }

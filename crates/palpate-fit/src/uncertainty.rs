@@ -35,6 +35,8 @@ const CONFIDENCE: f64 = 0.95;
 const RANK: f64 = 1e-12;
 /// Components of a unit vector below this share of the largest are not named.
 const NAMED: f64 = 0.3;
+/// Correlations are kept of no more values.
+const MOST_CORRELATED: usize = 256;
 /// Other optima closer than this in z are not worth a sentence.
 const CLOSE: f64 = 0.1;
 
@@ -43,7 +45,7 @@ const CLOSE: f64 = 0.1;
 pub struct Uncertainty {
     /// Standard error of every parameter in its unit `[q]`; `None` at a bound or without curvature.
     pub standard_errors: Vec<Option<f64>>,
-    /// Correlation matrix `[q][q]` in z; rows of parameters without standard error are those of the identity.
+    /// Correlation matrix `[q][q]` in z; rows of parameters without standard error are those of the identity. Empty for very many.
     pub correlation: Vec<Vec<f64>>,
     /// Mean square residual over the squared noise, `2 n J/(n − q)`; NaN when there are too few residuals.
     pub reduced_chi_square: f64,
@@ -60,7 +62,7 @@ pub struct Uncertainty {
 /// Unit vectors `[m]` along which vectors of which only the direction counts grow: that changes no residual and is no unknown.
 fn lengths(problem: &Problem, inner: &[usize], z: &[f64]) -> Vec<Vec<f64>> {
     let values = problem.values(z);
-    let vector = |i: usize| problem.free()[i].direction.as_deref();
+    let vector = |i: usize| problem.of(i).direction.as_deref();
     let names: std::collections::BTreeSet<&str> = inner.iter().filter_map(|i| vector(*i)).collect();
     let along = |name: &str| -> Vec<f64> {
         inner.iter().map(|&i| if vector(i) == Some(name) { values[i] / problem.charts()[i].slope(z[i]) } else { 0.0 }).collect()
@@ -99,14 +101,23 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
 fn inside(problem: &Problem, z: &[f64], warnings: &mut Vec<String>) -> Vec<usize> {
     let values = problem.values(z);
     let mut inner = Vec::new();
-    for (i, f) in problem.free().iter().enumerate() {
-        let (side, bound) = match problem.charts()[i].at_bound(values[i]) {
-            None => {
-                inner.push(i);
+    for (f, range) in problem.blocks() {
+        let mut held = Vec::new();
+        for i in range {
+            match problem.charts()[i].at_bound(values[i]) {
+                None => inner.push(i),
+                Some(side) => held.push(side),
+            }
+        }
+        let (side, bound) = match (held.first(), f.count) {
+            (None, _) => continue,
+            (Some(_), 2..) => {
+                let (path, n, count) = (&f.path, held.len(), f.count);
+                warnings.push(format!("{path}: {n} of {count} values ended at a bound and have no standard error"));
                 continue;
             }
-            Some(AtBound::Lower) => ("lower", f.bounds.0),
-            Some(AtBound::Upper) => ("upper", f.bounds.1),
+            (Some(AtBound::Lower), _) => ("lower", f.bounds.0),
+            (Some(AtBound::Upper), _) => ("upper", f.bounds.1),
         };
         warnings.push(format!(
             "{} ended at its {side} bound {bound}: the best value may lie beyond it, and has no standard error",
@@ -162,13 +173,18 @@ impl Spread {
     }
 }
 
+/// The identity matrix `[q][q]`.
+pub(crate) fn identity(q: usize) -> Vec<Vec<f64>> {
+    (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
+}
+
 impl Uncertainty {
     /// Nothing is known of q parameters.
     fn unknown(q: usize) -> Uncertainty {
         Uncertainty {
             standard_errors: vec![None; q],
             errors_z: vec![None; q],
-            correlation: (0..q).map(|i| (0..q).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect(),
+            correlation: if q <= MOST_CORRELATED { identity(q) } else { Vec::new() },
             reduced_chi_square: f64::NAN,
             independent: f64::NAN,
             ..Uncertainty::default()
@@ -213,6 +229,10 @@ impl Uncertainty {
             }
             let top = vector.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
             let members: Vec<usize> = (0..inner.len()).filter(|&a| vector[a].abs() > NAMED * top).collect();
+            // Of fields it is said how many values are open, not which.
+            if members.iter().any(|&a| problem.of(inner[a]).count > 1) {
+                continue;
+            }
             // Two directions of the same pair say the same of it.
             if told.contains(&members) {
                 continue;
@@ -229,15 +249,23 @@ impl Uncertainty {
             });
             told.push(members);
         }
+        for (f, range) in problem.blocks().filter(|(f, _)| f.count > 1) {
+            let open = self.errors_z[range].iter().flatten().filter(|e| **e > UNDETERMINED).count();
+            if open > 0 {
+                let (path, count, factor) = (&f.path, f.count, digits(UNDETERMINED.exp(), 2));
+                self.warnings.push(format!("{path}: {open} of {count} values are not determined to within a factor of {factor}"));
+            }
+        }
         told
     }
 
     /// Sentences about pairs whose errors go together, where `told` does not name them already.
     fn tell_correlated(&mut self, problem: &Problem, spread: &Spread, told: &[Vec<usize>]) {
         let (names, inner, sd) = (Names { problem }, &spread.inner, &spread.sd);
-        let direction = |k: usize| &problem.free()[inner[k]].direction;
-        for a in 0..inner.len() {
-            for b in a + 1..inner.len() {
+        let direction = |k: usize| &problem.of(inner[k]).direction;
+        let numbers: Vec<usize> = (0..inner.len()).filter(|a| problem.of(inner[*a]).count == 1).collect();
+        for (k, &a) in numbers.iter().enumerate() {
+            for &b in &numbers[k + 1..] {
                 let r = self.correlation[inner[a]][inner[b]];
                 // Components of a direction turn together.
                 let turn = direction(a).is_some() && direction(a) == direction(b);
@@ -258,24 +286,32 @@ impl Uncertainty {
 /// Sentences about starts that ended elsewhere with a cost that noise alone could explain: `n ΔJ` below half the χ² quantile
 /// of q degrees of freedom, widened by the errors of [`Uncertainty`].
 pub fn compare_starts(problem: &Problem, runs: &[StartRun], best: usize, u: &Uncertainty) -> Vec<String> {
-    let q = problem.free().len();
+    let q = problem.values_count();
     let quantile = ChiSquared::new(q as f64).map_or(2.0 * q as f64, |d| d.inverse_cdf(CONFIDENCE));
     let z_best = &runs[best].outcome.z;
     let limit = runs[best].outcome.cost + 0.5 * quantile * u.tau;
     let equal: Vec<&StartRun> = runs.iter().filter(|r| r.outcome.cost <= limit).collect();
     let mut sentences = Vec::new();
-    for (i, f) in problem.free().iter().enumerate() {
+    let differs = |i: usize| {
         let allowed = u.errors_z[i].map_or(0.0, |e| 2.0 * quantile.sqrt() * e).max(CLOSE);
-        if equal.iter().all(|r| (r.outcome.z[i] - z_best[i]).abs() <= allowed) {
+        equal.iter().any(|r| (r.outcome.z[i] - z_best[i]).abs() > allowed)
+    };
+    for (f, range) in problem.blocks() {
+        let different: Vec<usize> = range.filter(|i| differs(*i)).collect();
+        let Some(&i) = different.first() else { continue };
+        let (of, starts) = (equal.len(), runs.len());
+        if f.count > 1 {
+            let (path, n, count) = (&f.path, different.len(), f.count);
+            sentences.push(format!(
+                "{path} is not unique: {of} of {starts} starts reach equal costs, and differ in {n} of {count} values"
+            ));
             continue;
         }
         let ends: Vec<f64> = equal.iter().map(|r| problem.charts()[i].value(r.outcome.z[i])).collect();
         let (low, high) = ends.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
         sentences.push(format!(
-            "{} is not unique: {} of {} starts reach equal costs with values from {} to {}{}",
+            "{} is not unique: {of} of {starts} starts reach equal costs with values from {} to {}{}",
             f.path,
-            equal.len(),
-            runs.len(),
             digits(low, 4),
             digits(high, 4),
             unit_behind(&f.unit)
@@ -290,11 +326,11 @@ struct Names<'p, 'a> {
 
 impl Names<'_, '_> {
     fn path(&self, i: usize) -> &str {
-        &self.problem.free()[i].path
+        &self.problem.of(i).path
     }
 
     fn undetermined(&self, i: usize, spread: f64, value: f64, z: f64) -> String {
-        let f = &self.problem.free()[i];
+        let f = self.problem.of(i);
         let range = if f.transform == Transform::Log {
             format!("a factor of {} up or down", digits(spread.min(300.0).exp(), 2))
         } else {
@@ -317,7 +353,7 @@ impl Names<'_, '_> {
         if (if x.abs() >= y.abs() { x } else { y }) < 0.0 {
             (x, y) = (-x, -y);
         }
-        let (a, b) = (&self.problem.free()[i], &self.problem.free()[j]);
+        let (a, b) = (self.problem.of(i), self.problem.of(j));
         let combination = if a.transform == Transform::Log && b.transform == Transform::Log {
             format!("{}^{x:.2}·{}^{y:.2}", short(&a.path), short(&b.path))
         } else {

@@ -67,6 +67,13 @@ pub(crate) const SCENE: Schema = Schema {
         ("clamp", Schema { keys: &["frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
         ("plane", table(&["point", "normal", "stiffness"])),
         ("mass", table(&["point", "mass"])),
+        (
+            "field",
+            Schema {
+                keys: &["path", "basis", "scale", "blend", "file", "array"],
+                tables: &[("regions", table(&["center", "radius", "value"]))],
+            },
+        ),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
         ("time", table(&["step", "duration", "steps", "start", "scheme", "theta"])),
         ("solver", table(&["element", "linear", "tolerance", "newton_iterations", "ghost"])),

@@ -1,11 +1,13 @@
 //! VTU and PVD files for ParaView.
 
-use crate::error::OutputError;
+use crate::error::{InputError, OutputError};
+use crate::keys::suggest;
 use crate::output::write_file;
 use glam::DVec3;
 use std::path::Path;
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, UnstructuredGridPiece, Version, VertexNumbers, Vtk,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, Piece, UnstructuredGridPiece, Version, VertexNumbers,
+    Vtk,
 };
 
 /// Corner `VTK_ORDER[i]` of a lattice cell (bit 0 of the number +x, bit 1 +y, bit 2 +z) is corner i of VTK's hexahedron,
@@ -25,7 +27,28 @@ pub fn write_vtu(
     cell_data: &[(&str, &[f64])],
 ) -> Result<(), OutputError> {
     let connectivity = hexes.iter().flat_map(|h| VTK_ORDER.map(|i| u64::from(h[i]))).collect();
-    write_grid(path.as_ref(), points, connectivity, (8, CellType::Hexahedron), hexes.len(), point_data, cell_data)
+    let vectors = vectors(path.as_ref(), point_data, points.len())?;
+    let scalars = scalars(path.as_ref(), cell_data.iter().copied(), hexes.len())?;
+    write_grid(path.as_ref(), points, connectivity, (8, CellType::Hexahedron), hexes.len(), vectors, scalars)
+}
+
+/// Writes hexahedra with numbers per point `[N]` and per cell `[cells]`.
+///
+/// # Errors
+/// As [`write_vtu`].
+pub fn write_vtu_scalars(
+    path: impl AsRef<Path>,
+    points: &[DVec3],
+    hexes: &[[u32; 8]],
+    point_data: &[(String, Vec<f64>)],
+    cell_data: &[(String, Vec<f64>)],
+) -> Result<(), OutputError> {
+    let path = path.as_ref();
+    let connectivity = hexes.iter().flat_map(|h| VTK_ORDER.map(|i| u64::from(h[i]))).collect();
+    let borrowed =
+        |data: &'_ [(String, Vec<f64>)], wanted| scalars(path, data.iter().map(|(n, d)| (n.as_str(), d.as_slice())), wanted);
+    let (of_points, of_cells) = (borrowed(point_data, points.len())?, borrowed(cell_data, hexes.len())?);
+    write_grid(path, points, connectivity, (8, CellType::Hexahedron), hexes.len(), of_points, of_cells)
 }
 
 /// Writes a triangle surface with vectors per vertex as a VTU file.
@@ -38,11 +61,40 @@ pub fn write_vtu_surface(
     point_data: &[(&str, &[DVec3])],
 ) -> Result<(), OutputError> {
     let connectivity = mesh.triangles.iter().flatten().map(|v| u64::from(*v)).collect();
-    write_grid(path.as_ref(), &mesh.vertices, connectivity, (3, CellType::Triangle), mesh.triangles.len(), point_data, &[])
+    let vectors = vectors(path.as_ref(), point_data, mesh.vertices.len())?;
+    write_grid(path.as_ref(), &mesh.vertices, connectivity, (3, CellType::Triangle), mesh.triangles.len(), vectors, Vec::new())
 }
 
 fn flat(v: &[DVec3]) -> Vec<f64> {
     v.iter().flat_map(|p| p.to_array()).collect()
+}
+
+/// An error where an array has another number of entries than it should.
+fn check(path: &Path, name: &str, found: usize, wanted: usize) -> Result<(), OutputError> {
+    match found == wanted {
+        true => Ok(()),
+        false => Err(OutputError::new(path, format!("data \"{name}\" has {found} entries, {wanted} are needed"))),
+    }
+}
+
+fn vectors(path: &Path, data: &[(&str, &[DVec3])], wanted: usize) -> Result<Vec<Attribute>, OutputError> {
+    let one = |(name, d): &(&str, &[DVec3])| {
+        check(path, name, d.len(), wanted)?;
+        Ok(Attribute::DataArray(DataArray::vectors(*name).with_data(flat(d))))
+    };
+    data.iter().map(one).collect()
+}
+
+fn scalars<'a>(
+    path: &Path,
+    data: impl Iterator<Item = (&'a str, &'a [f64])>,
+    wanted: usize,
+) -> Result<Vec<Attribute>, OutputError> {
+    let one = |(name, d): (&str, &[f64])| {
+        check(path, name, d.len(), wanted)?;
+        Ok(Attribute::DataArray(DataArray::scalars(name, 1).with_data(d.to_vec())))
+    };
+    data.map(one).collect()
 }
 
 fn write_grid(
@@ -51,17 +103,10 @@ fn write_grid(
     connectivity: Vec<u64>,
     (corners, kind): (u64, CellType),
     cells: usize,
-    point_data: &[(&str, &[DVec3])],
-    cell_data: &[(&str, &[f64])],
+    point: Vec<Attribute>,
+    cell: Vec<Attribute>,
 ) -> Result<(), OutputError> {
-    let lengths = point_data.iter().map(|(n, d)| (n, d.len(), points.len()));
-    if let Some((name, found, wanted)) = lengths.chain(cell_data.iter().map(|(n, d)| (n, d.len(), cells))).find(|l| l.1 != l.2) {
-        return Err(OutputError::new(path, format!("data \"{name}\" has {found} entries, {wanted} are needed")));
-    }
-    let data = Attributes {
-        point: point_data.iter().map(|(n, d)| Attribute::DataArray(DataArray::vectors(*n).with_data(flat(d)))).collect(),
-        cell: cell_data.iter().map(|(n, d)| Attribute::DataArray(DataArray::scalars(*n, 1).with_data(d.to_vec()))).collect(),
-    };
+    let data = Attributes { point, cell };
     let offsets = (1..=cells as u64).map(|i| corners * i).collect();
     let piece = UnstructuredGridPiece {
         points: flat(points).into(),
@@ -96,11 +141,41 @@ pub fn write_pvd(path: impl AsRef<Path>, frames: &[(f64, String)]) -> Result<(),
     })
 }
 
+/// Reads numbers per cell or per point of a grid: the array of this name, or the only one that holds one number each.
+///
+/// # Errors
+/// The file cannot be read, or has no such array.
+pub fn read_vtu_array(path: &Path, name: Option<&str>, of_cells: bool) -> Result<Vec<f64>, InputError> {
+    let wrong = |message: String| InputError::file(path, message);
+    let vtk = Vtk::import(path).map_err(|e| wrong(format!("is not a readable .vtu file: {e}")))?;
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { return Err(wrong("holds no unstructured grid".into())) };
+    let [Piece::Inline(piece)] = &pieces[..] else { return Err(wrong("holds several pieces; write the grid as one".into())) };
+    let (data, kind) = if of_cells { (&piece.data.cell, "cell") } else { (&piece.data.point, "point") };
+    let scalars: Vec<&DataArray> = data
+        .iter()
+        .filter_map(|a| match a {
+            Attribute::DataArray(d) if d.num_comp() == 1 => Some(d),
+            _ => None,
+        })
+        .collect();
+    let known = scalars.iter().map(|d| d.name.as_str()).collect::<Vec<_>>();
+    let found = match (name, &scalars[..]) {
+        (Some(name), all) => *all
+            .iter()
+            .find(|d| d.name == name)
+            .ok_or_else(|| wrong(format!("has no {kind} array \"{name}\" of single numbers; {}", suggest(name, &known))))?,
+        (None, [only]) => only,
+        (None, _) => {
+            return Err(wrong(format!("has {} {kind} arrays ({}); say which: array = …", known.len(), known.join(", "))));
+        }
+    };
+    found.data.cast_into::<f64>().ok_or_else(|| wrong(format!("{kind} array \"{}\" holds no numbers", found.name)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use palpate_model::cutcells::grid::CORNERS;
-    use vtkio::model::Piece;
 
     /// One unit cell with a displacement per corner.
     fn cell() -> (Vec<DVec3>, [u32; 8]) {

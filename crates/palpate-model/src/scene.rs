@@ -323,8 +323,8 @@ pub struct ObservationSpec {
 /// What is to be found out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSpec {
-    /// Name of the optimiser.
-    pub optimizer: Optimizer,
+    /// The optimiser; `None` where the scene leaves the choice.
+    pub optimizer: Option<Optimizer>,
     /// Most iterations per start.
     pub iterations: usize,
     /// Number of starts.
@@ -348,14 +348,34 @@ pub enum Optimizer {
     Lbfgs,
     /// Gauss–Newton with Levenberg–Marquardt damping.
     GaussNewton,
+    /// The same without a matrix: products by a tangent and an adjoint, for fields.
+    GaussNewtonCg,
     /// Simplex search without gradients.
     NelderMead,
+}
+
+impl Optimizer {
+    /// All by their names in files and on the command line.
+    pub const ALL: [(&'static str, Optimizer); 6] = [
+        ("rprop", Optimizer::Rprop),
+        ("gradient-descent", Optimizer::GradientDescent),
+        ("lbfgs", Optimizer::Lbfgs),
+        ("gauss-newton", Optimizer::GaussNewton),
+        ("gauss-newton-cg", Optimizer::GaussNewtonCg),
+        ("nelder-mead", Optimizer::NelderMead),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Optimizer::ALL.iter().find(|o| o.1 == self).map_or("", |o| o.0)
+    }
 }
 
 /// One free number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitParameter {
-    /// Path in the scene file (a component of a vector has its own entry; `material.mass` stays as written).
+    /// Path in the scene file: a component of a vector and a region of a field have their own entry, a field by cells or nodes has one for
+    /// all its values; `material.mass` stays as written.
     pub path: String,
     /// Where starts are drawn from (equal ends: a fixed start).
     pub start: (f64, f64),

@@ -4,7 +4,9 @@ use crate::error::Error;
 use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Backend as _, Evaluate, Evaluation, FrameResiduals, ParamBatch, Request, Rollout, Snapshot};
+use palpate_engine::{
+    Backend as _, Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Wanted,
+};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::observation::Frame;
 use palpate_model::params::ParamKey;
@@ -96,6 +98,15 @@ impl Evaluate for InTurn {
         let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         self.0.evaluate(theta, request)
     }
+
+    fn has_products(&self) -> bool {
+        self.0.has_products()
+    }
+
+    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        self.0.product(theta, v, wanted)
+    }
 }
 
 /// The first steps of a plan, with as many frames a step as the whole has where they are compared; the first ones, in which the body is
@@ -178,6 +189,14 @@ impl Backend {
             (Ok(c), Ok(g)) => (Backend::Cpu, format!("{what} takes {}, {} on {name}", ms(c), ms(g))),
             (Ok(_), Err(why)) => (Backend::Cpu, format!("{name} cannot compute this body: {why}")),
             (Err(why), _) => (Backend::Cpu, format!("the first steps fail on the CPU: {why}")),
+        }
+    }
+
+    /// True where products with the Gauss–Newton matrix are computed.
+    pub(crate) fn has_products(self) -> bool {
+        match self {
+            Backend::Gpu => gpu().is_ok_and(|g| g.has_products()),
+            _ => CpuBackend.has_products(),
         }
     }
 

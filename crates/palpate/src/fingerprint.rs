@@ -28,6 +28,12 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
         format!("{:?} {:?} {:?} {laws:?}", plan.masses, o.markers, o.cameras),
     ];
     texts.iter().for_each(|t| t.bytes().for_each(|b| eat(u64::from(b))));
+    // What a field does is told by the factors of unequal values.
+    for f in &plan.fields {
+        f.varied.path().bytes().for_each(|b| eat(u64::from(b)));
+        let unequal: Vec<f64> = (0..f.count).map(|k| 1.0 + (k % 7) as f64).collect();
+        f.factors(&unequal).iter().for_each(|x| eat(x.to_bits()));
+    }
     for f in &o.frames {
         eat(f.time.to_bits());
         for p in &f.points {

@@ -9,7 +9,7 @@ use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
 use crate::results::fit::FitStatus;
 use crate::scatter::Excess;
-use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
+use palpate_engine::{Evaluate, Evaluation, Failure, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 use palpate_fit::{
     ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
 };
@@ -46,7 +46,7 @@ pub struct FitOptions<'a> {
     pub on_iteration: Option<&'a mut (dyn FnMut(&Progress) + Send)>,
 }
 
-/// One free number of a fit over one or several scenes.
+/// One free number, or field, of a fit over one or several scenes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FreeNumber {
     /// Path in the scene file.
@@ -69,6 +69,12 @@ pub struct Fitted {
     pub backend: &'static str,
     /// The free numbers, in the order of `result.parameters`.
     pub free: Vec<FreeNumber>,
+    /// The free fields of many values, in the order of `result.fields`.
+    pub fields: Vec<FreeNumber>,
+    /// Why the optimiser is not the usual one, where nobody named one.
+    pub chosen: Option<String>,
+    /// θ of every scene at the first start.
+    pub theta_start: Vec<Vec<f64>>,
     /// Optimiser used.
     pub optimizer: Optimizer,
     /// What the fit found.
@@ -152,17 +158,22 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     check(experiments)?;
     let spec = specs(first).expect("every scene was just found to have a [fit]");
-    let usual = Tolerance::default();
+    let stated = Tolerance::default();
     let settings = Settings {
         iterations: options.iterations.unwrap_or(spec.iterations),
         starts: options.starts.unwrap_or(spec.starts),
         seed: options.seed.unwrap_or(spec.seed),
         errors: errors(experiments),
-        tolerance: Tolerance { cost: options.tolerance.unwrap_or(usual.cost), ..usual },
-        ..Settings::new(options.optimizer.unwrap_or(spec.optimizer))
+        tolerance: Tolerance { cost: options.tolerance.unwrap_or(stated.cost), ..stated },
+        ..Settings::new(Optimizer::GaussNewton)
     };
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
-    let backend = options.backend.resolve_for(first.plan(), &demand(&free, 0, settings.optimizer, settings.starts)).0;
+    let asked = options.optimizer.or(spec.optimizer);
+    let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free, true)), settings.starts);
+    let backend = options.backend.resolve_for(first.plan(), &trial).0;
+    let (optimizer, chosen) =
+        optimizer(asked, &free, backend).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
+    let settings = Settings { optimizer, ..settings };
     let threads = options.threads.unwrap_or(spec.threads);
     let mut scenes = Vec::new();
     for (s, e) in experiments.iter().enumerate() {
@@ -182,7 +193,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
     let mut told = options.on_iteration.take();
     let settings = &settings;
-    type Done = (FitResult, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>, Vec<String>);
+    type Done = (FitResult, Vec<Vec<f64>>, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>, Vec<String>);
     let done: Result<Done, Error> = with_threads(threads, || {
         let mut hear = |p: &Progress| {
             history.push(p.clone());
@@ -215,9 +226,11 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         // Whoever stops does not want to wait for what is only compared with.
         let before = |(e, t): (&Experiment, &Vec<f64>)| if interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
         let before = experiments.iter().zip(&theta_before).map(before).collect();
-        Ok((result, before, after, notes))
+        Ok((result, theta_before, before, after, notes))
     })?;
-    let (result, before, after, notes) = done?;
+    let (result, theta_start, before, after, notes) = done?;
+    let (fields, free): (Vec<FreeNumber>, Vec<FreeNumber>) =
+        numbers.into_iter().partition(|n| result.fields.iter().any(|f| f.path == n.label()));
     let cut = interrupt.is_urgent();
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
@@ -225,7 +238,10 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let interrupted = cut || result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
-        free: numbers,
+        free,
+        fields,
+        chosen,
+        theta_start,
         optimizer: settings.optimizer,
         result,
         history,
@@ -275,19 +291,51 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-/// A number that reaches θ: its place, θ per unit, and what is typical of it.
-fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot)> {
+/// A number or field that reaches θ: its first place with θ per unit, and how many values it has.
+fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot, usize)> {
     let plan = experiment.plan();
     // The mass of the body is its density times its volume on the grid.
     let (path, factor) = if path == "material.mass" { ("material.density", 1.0 / plan.body.volume) } else { (path, 1.0) };
-    let place = (0..plan.layout.len()).find(|p| plan.layout.keys[*p].spec().path == path)?;
-    Some((plan.layout.keys[place], Slot { scene, place, factor }))
+    let places = plan.layout.resolve(path);
+    let key = plan.layout.keys.get(places.start).filter(|_| !places.is_empty())?;
+    Some((*key, Slot { scene, place: places.start, factor }, places.len()))
 }
 
-/// Sets one free number in a scene's θ.
-pub(crate) fn set(experiment: &Experiment, theta: &mut [f64], path: &str, value: f64) {
-    if let Some((_, s)) = slot(experiment, 0, path) {
-        theta[s.place] = value * s.factor;
+/// The optimiser where nobody names one: with more values than sensitivities are computed of, one that does without them.
+pub(crate) fn usual(free: &[FreeParameter], products: bool) -> Optimizer {
+    match (values(free) > MOST_SENSITIVITIES, products) {
+        (false, _) => Optimizer::GaussNewton,
+        (true, true) => Optimizer::GaussNewtonCg,
+        (true, false) => Optimizer::Lbfgs,
+    }
+}
+
+fn values(free: &[FreeParameter]) -> usize {
+    free.iter().map(|f| f.count).sum()
+}
+
+/// The optimiser of a fit and, where it was not asked for and is not Gauss–Newton, why.
+fn optimizer(asked: Option<Optimizer>, free: &[FreeParameter], backend: Backend) -> Result<(Optimizer, Option<String>), String> {
+    let (count, products) = (values(free), backend.has_products());
+    let name = backend.name();
+    match asked {
+        Some(Optimizer::GaussNewton) if count > MOST_SENSITIVITIES => Err(format!(
+            "\"gauss-newton\" computes sensitivities by {MOST_SENSITIVITIES} values at most, {count} are free; choose \"gauss-newton-cg\" or \"lbfgs\""
+        )),
+        Some(Optimizer::GaussNewtonCg) if !products => Err(format!(
+            "\"gauss-newton-cg\" needs products with the Gauss-Newton matrix, which backend {name} has not; choose \"lbfgs\" or --backend cpu"
+        )),
+        Some(asked) => Ok((asked, None)),
+        None => {
+            let usual = usual(free, products);
+            let why = || {
+                format!(
+                    "optimizer {}: {count} values are free, sensitivities are computed of {MOST_SENSITIVITIES} at most",
+                    usual.name()
+                )
+            };
+            Ok((usual, (usual != Optimizer::GaussNewton).then(why)))
+        }
     }
 }
 
@@ -299,7 +347,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
     for (scene, e) in experiments.iter().enumerate() {
         let file = |s: usize| experiments[s].scene().path.as_path();
         for p in specs(e).iter().flat_map(|f| &f.parameters) {
-            let (key, slot) = slot(e, scene, &p.path).ok_or_else(|| {
+            let (key, slot, count) = slot(e, scene, &p.path).ok_or_else(|| {
                 Error::scene(file(scene), "fit.parameter", format!("\"{}\" is not a number of this scene", p.path))
             })?;
             let own = p.per_scene && experiments.len() > 1;
@@ -322,6 +370,14 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                     );
                     return Err(Error::scene(file(scene), &p.path, message));
                 }
+                if f.count != count {
+                    let message = format!(
+                        "has {count} values here and {} in {}; share a field between bodies of the same cells, or say per_scene = true",
+                        f.count,
+                        file(f.slots[0].scene).display()
+                    );
+                    return Err(Error::scene(file(scene), &p.path, message));
+                }
                 f.slots.push(slot);
                 continue;
             }
@@ -337,6 +393,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                 typical: spec.typical / slot.factor,
                 bounds: p.bounds,
                 start: p.start,
+                count,
                 slots: vec![slot],
             });
             numbers.push(number);
@@ -372,8 +429,8 @@ pub(crate) fn errors(experiments: &[Experiment]) -> ErrorModel {
 
 /// What a fit asks of a scene's backend. Starts that are fixed are all the same, and one is run.
 pub(crate) fn demand(free: &[FreeParameter], scene: usize, optimizer: Optimizer, starts: usize) -> Demand {
-    let slots = free.iter().flat_map(|f| &f.slots).filter(|s| s.scene == scene);
-    let mut places: Vec<usize> = slots.map(|s| s.place).collect();
+    let slots = free.iter().flat_map(|f| f.slots.iter().map(move |s| (f, s))).filter(|(_, s)| s.scene == scene);
+    let mut places: Vec<usize> = slots.flat_map(|(f, s)| s.place..s.place + f.count).collect();
     places.sort_unstable();
     let fixed = free.iter().all(|f| f.start.0 == f.start.1);
     Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places, compared: true }
@@ -397,5 +454,16 @@ impl Evaluate for Counted {
             self.interrupt.count();
         }
         self.inner.evaluate(theta, request)
+    }
+
+    fn has_products(&self) -> bool {
+        self.inner.has_products()
+    }
+
+    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        if self.first {
+            self.interrupt.count();
+        }
+        self.inner.product(theta, v, wanted)
     }
 }

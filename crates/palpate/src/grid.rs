@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, free_parameters};
 use palpate_fit::{FitScene, Problem, Want};
+use palpate_model::params::fields::{Basis, FieldSpec};
 
 /// Change of every free parameter (order of `fitted.free`) that cells and time step divided by `factor` would bring: the
 /// Gauss–Newton step of the finer problem at the coarse optimum. One evaluation instead of a fit; good to second order in the
@@ -14,6 +15,10 @@ use palpate_fit::{FitScene, Problem, Want};
 /// The finer simulation fails or does not determine every parameter.
 pub fn grid_shift(experiments: &[Experiment], fitted: &Fitted, factor: f64, backend: Backend) -> Result<Vec<f64>, Error> {
     let (_, free, _) = free_parameters(experiments)?;
+    let on_grid = |f: &FieldSpec| !matches!(f.basis, Basis::Regions(..));
+    if experiments.iter().any(|e| e.scene().fields.iter().any(on_grid)) {
+        return Err(Error::Failed("a field by cells or nodes has no counterpart on a finer grid".into()));
+    }
     let finer = experiments.iter().map(|e| e.finer(factor)).collect::<Result<Vec<_>, _>>()?;
     let mut scenes = Vec::new();
     for (e, theta) in finer.iter().zip(&fitted.result.theta) {

@@ -40,6 +40,7 @@ mod embed;
 mod engine;
 mod error;
 mod experiment;
+mod fields;
 mod fingerprint;
 mod fitting;
 mod grid;

@@ -1,6 +1,6 @@
 //! How many simulations of a fit run at once, and how much memory they take.
 
-use palpate_engine::{Request, Wanted};
+use palpate_engine::{MOST_SENSITIVITIES, Request, Wanted};
 use palpate_fit::{Want, want};
 use palpate_gpu::{AdapterReport, Choice, GpuError, Load};
 use palpate_model::params::ParamKey;
@@ -52,8 +52,11 @@ impl Demand {
         }
     }
 
-    /// What is asked once, at the best point, for standard errors.
+    /// What is asked once, at the best point, for standard errors; nothing of very many numbers.
     fn last(&self) -> Request {
+        if self.places.len() > MOST_SENSITIVITIES {
+            return Request::default();
+        }
         Request { gradient: Wanted::Nothing, sensitivities: self.places.clone() }
     }
 

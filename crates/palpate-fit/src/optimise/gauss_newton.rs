@@ -3,7 +3,10 @@
 //! Damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed. 2004,
 //! eq. 2.21 and algorithm 3.16). A step may also not exceed a length in z: parameters far from their optimum otherwise jump
 //! into regions where a simulation fails.
+//!
+//! The model of the cost is a matrix from forward sensitivities, or products with it ([`super::conjugate`]): the way is the same.
 
+use super::conjugate::{self, Model};
 use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 
@@ -18,7 +21,28 @@ const SAME_COST: f64 = 1e-6;
 /// So many rejected steps in a row that changed nothing, where nothing is promised either, are the end: shorter ones only follow rounding.
 const LEVEL: u32 = 2;
 
-pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
+/// How the curvature of the cost is known.
+enum Curvature {
+    /// As the matrix of every sample.
+    Matrix,
+    /// By products; its size along the first gradient stands for the largest diagonal entry.
+    Products { size: f64, steepest: f64 },
+}
+
+/// With the curvature of forward sensitivities.
+pub fn minimise(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, Stop> {
+    walk(search, z, at, &Curvature::Matrix)
+}
+
+/// With products by tangent and adjoint, for very many parameters.
+pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, Stop> {
+    let g = search.projected_gradient(&z, &at.gradient);
+    let square = dot(&g, &g);
+    let size = if square > 0.0 { dot(&g, &search.product(&z, &g)?) / square } else { 0.0 };
+    walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt() })
+}
+
+fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
     let q = z.len();
     let tolerance = search.settings.tolerance.clone();
     let mut damping = None;
@@ -26,7 +50,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
     let mut level = 0;
     let mut longest = search.settings.max_step.min(search.settings.first_step);
     loop {
-        if at.curvature.len() != q * q {
+        if matches!(curvature, Curvature::Matrix) && at.curvature.len() != q * q {
             return Ok(Status::Failed("no sensitivities were computed".into()));
         }
         if search.is_flat(&z, &at) {
@@ -35,12 +59,15 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         if search.out_of_iterations() {
             return Ok(Status::IterationLimit);
         }
-        let scale = (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i]));
+        let scale = match curvature {
+            Curvature::Matrix => (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i])),
+            Curvature::Products { size, .. } => *size,
+        };
         if scale <= 0.0 {
             return Ok(Status::Stalled);
         }
         let lambda = *damping.get_or_insert(FIRST_DAMPING * scale);
-        let Some(p) = step(search, &z, &at, lambda + FLOOR * scale, longest) else {
+        let Some((p, promised)) = step(search, &z, &at, curvature, lambda + FLOOR * scale, longest)? else {
             damping = Some(lambda.max(FLOOR * scale) * growth);
             growth *= 2.0;
             if growth > 1e30 {
@@ -49,9 +76,8 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
             continue;
         };
         let length = max_abs(&p);
-        let promised = promise(&at, &p);
         if length <= tolerance.step || promised <= tolerance.cost * at.cost {
-            return Ok(if settled(search, &z, &at, scale) { Status::Converged } else { Status::Stalled });
+            return Ok(if settled(search, &z, &at, curvature, scale)? { Status::Converged } else { Status::Stalled });
         }
         let trial_z = search.project(&(0..q).map(|i| z[i] + p[i]).collect::<Vec<_>>());
         let trial = search.evaluate(&trial_z)?;
@@ -67,7 +93,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
             level = 0;
         } else {
             level = if trial.cost <= at.cost * (1.0 + SAME_COST) { level + 1 } else { 0 };
-            if level == LEVEL && settled(search, &z, &at, scale) {
+            if level == LEVEL && settled(search, &z, &at, curvature, scale)? {
                 return Ok(Status::Converged);
             }
             damping = Some(lambda * growth);
@@ -80,25 +106,36 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
     }
 }
 
-/// Minimiser of the damped model within the box and the longest step.
-fn step(search: &Search, z: &[f64], at: &Sample, damping: f64, longest: f64) -> Option<Vec<f64>> {
+/// Minimiser of the damped model within the box and the longest step, and the decrease that the undamped model promises for it; `None`
+/// where the model is not positive definite.
+fn step(
+    search: &mut Search,
+    z: &[f64],
+    at: &Sample,
+    curvature: &Curvature,
+    damping: f64,
+    longest: f64,
+) -> Result<Option<(Vec<f64>, f64)>, Stop> {
     let q = z.len();
+    if let Curvature::Products { steepest, .. } = curvature {
+        let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest };
+        return conjugate::step(search, &model).map(Some);
+    }
     let mut h = at.curvature.clone();
     (0..q).for_each(|i| h[i * q + i] += damping);
     let lower: Vec<f64> = (0..q).map(|i| (search.lower[i] - z[i]).clamp(-longest, 0.0)).collect();
     let upper: Vec<f64> = (0..q).map(|i| (search.upper[i] - z[i]).clamp(0.0, longest)).collect();
-    box_step(&h, &at.gradient, &lower, &upper)
-}
-
-/// Decrease that the undamped model promises for a step.
-fn promise(at: &Sample, p: &[f64]) -> f64 {
-    let q = p.len();
-    let hp: Vec<f64> = (0..q).map(|i| dot(&at.curvature[i * q..(i + 1) * q], p)).collect();
-    -dot(&at.gradient, p) - 0.5 * dot(p, &hp)
+    let promise = |p: Vec<f64>| {
+        let hp: Vec<f64> = (0..q).map(|i| dot(&at.curvature[i * q..(i + 1) * q], &p)).collect();
+        let promised = -dot(&at.gradient, &p) - 0.5 * dot(&p, &hp);
+        (p, promised)
+    };
+    Ok(box_step(&h, &at.gradient, &lower, &upper).map(promise))
 }
 
 /// True if even a free step would gain next to nothing.
-fn settled(search: &Search, z: &[f64], at: &Sample, scale: f64) -> bool {
-    let full = step(search, z, at, 1e-9 * scale, search.settings.max_step);
-    full.is_some_and(|p| max_abs(&p) <= search.settings.tolerance.step || promise(at, &p) <= COST_NOISE * at.cost)
+fn settled(search: &mut Search, z: &[f64], at: &Sample, curvature: &Curvature, scale: f64) -> Result<bool, Stop> {
+    let full = step(search, z, at, curvature, 1e-9 * scale, search.settings.max_step)?;
+    let tolerance = search.settings.tolerance.step;
+    Ok(full.is_some_and(|(p, promised)| max_abs(&p) <= tolerance || promised <= COST_NOISE * at.cost))
 }

@@ -1,5 +1,6 @@
 //! Optimisers over z: each walks a [`Search`], which counts, guards against failures and keeps the best point.
 
+mod conjugate;
 mod descent;
 mod gauss_newton;
 mod lbfgs;
@@ -121,14 +122,18 @@ pub fn want(optimizer: Optimizer) -> Want {
     match optimizer {
         Optimizer::GaussNewton => Want::Curvature,
         Optimizer::NelderMead => Want::Cost,
-        Optimizer::Rprop | Optimizer::GradientDescent | Optimizer::Lbfgs => Want::Gradient,
+        Optimizer::Rprop | Optimizer::GradientDescent | Optimizer::Lbfgs | Optimizer::GaussNewtonCg => Want::Gradient,
     }
 }
+
+/// From z and a direction, both `[q]`, to the product with the Gauss–Newton matrix at z.
+type Product<'a> = dyn FnMut(&[f64], &[f64]) -> Result<Vec<f64>, Stop> + 'a;
 
 /// A search from one start.
 pub struct Search<'a> {
     evaluate: &'a mut dyn FnMut(&[f64]) -> Result<Sample, Stop>,
     progress: &'a mut dyn FnMut(usize, f64, &[f64]),
+    product: Option<&'a mut Product<'a>>,
     /// Smallest z `[q]`; may be −∞.
     pub lower: &'a [f64],
     /// Largest z `[q]`; may be ∞.
@@ -140,6 +145,7 @@ pub struct Search<'a> {
     best: Option<(Vec<f64>, Sample)>,
     start_cost: f64,
     evaluations: usize,
+    products: usize,
     iterations: usize,
 }
 
@@ -156,6 +162,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// Evaluations used.
     pub evaluations: usize,
+    /// Products with the Gauss–Newton matrix used.
+    pub products: usize,
     /// Longest step that Gauss–Newton would try next, for [`Settings::first_step`] of a search that goes on from here.
     pub reach: f64,
     /// How it ended.
@@ -176,6 +184,7 @@ impl<'a> Search<'a> {
         Search {
             evaluate,
             progress,
+            product: None,
             lower,
             upper,
             settings,
@@ -183,8 +192,15 @@ impl<'a> Search<'a> {
             best: None,
             start_cost: f64::INFINITY,
             evaluations: 0,
+            products: 0,
             iterations: 0,
         }
+    }
+
+    /// The same search with products for [`Optimizer::GaussNewtonCg`].
+    #[must_use]
+    pub fn with_products(self, product: &'a mut Product<'a>) -> Search<'a> {
+        Search { product: Some(product), ..self }
     }
 
     /// Runs an optimiser from `z`.
@@ -198,6 +214,7 @@ impl<'a> Search<'a> {
                 (self.progress)(0, first.cost, &start);
                 let walk = match optimizer {
                     Optimizer::GaussNewton => gauss_newton::minimise(&mut self, start.clone(), first),
+                    Optimizer::GaussNewtonCg => gauss_newton::minimise_by_products(&mut self, start.clone(), first),
                     Optimizer::Rprop => rprop::minimise(&mut self, start.clone(), first),
                     Optimizer::GradientDescent => descent::minimise(&mut self, start.clone(), first),
                     Optimizer::Lbfgs => lbfgs::minimise(&mut self, start.clone(), first),
@@ -206,10 +223,10 @@ impl<'a> Search<'a> {
                 walk.unwrap_or_else(Status::from)
             }
         };
-        let Search { start_cost, iterations, evaluations, reach, best, .. } = self;
+        let Search { start_cost, iterations, evaluations, products, reach, best, .. } = self;
         let (z, sample) = best.map_or((start, None), |(z, s)| (z, Some(s)));
         let cost = sample.as_ref().map_or(f64::INFINITY, |s| s.cost);
-        Outcome { z, cost, start_cost, iterations, evaluations, reach, status, sample }
+        Outcome { z, cost, start_cost, iterations, evaluations, products, reach, status, sample }
     }
 
     /// Evaluates a point. Whatever is not a number counts as a failed point with infinite cost.
@@ -225,6 +242,13 @@ impl<'a> Search<'a> {
             }
         }
         Ok(sample)
+    }
+
+    /// The product of the Gauss–Newton matrix at z with a direction.
+    fn product(&mut self, z: &[f64], direction: &[f64]) -> Result<Vec<f64>, Stop> {
+        let product = self.product.as_mut().ok_or_else(|| Stop::Broken("this search has no products".into()))?;
+        self.products += 1;
+        product(z, direction)
     }
 
     /// Counts an iteration that ended at z.

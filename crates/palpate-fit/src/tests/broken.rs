@@ -3,7 +3,7 @@
 use super::fits::{ALL, settings};
 use super::models::*;
 use crate::*;
-use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, ParamBatch, Request};
+use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, ParamBatch, Request, Wanted};
 use std::path::Path;
 
 /// Physics that breaks once, in its call number `calls`: the members from `from` on have no result.
@@ -28,6 +28,14 @@ impl Evaluate for Fragile {
             all.iter_mut().skip(self.from).for_each(|e| *e = Evaluation::failed(failure.clone()));
         }
         all
+    }
+
+    fn has_products(&self) -> bool {
+        self.inner.has_products()
+    }
+
+    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        self.inner.product(theta, v, wanted)
     }
 }
 

@@ -7,8 +7,14 @@ use palpate_model::params::Transform;
 use palpate_model::scene::Optimizer;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-pub const ALL: [Optimizer; 5] =
-    [Optimizer::Rprop, Optimizer::GradientDescent, Optimizer::Lbfgs, Optimizer::GaussNewton, Optimizer::NelderMead];
+pub const ALL: [Optimizer; 6] = [
+    Optimizer::Rprop,
+    Optimizer::GradientDescent,
+    Optimizer::Lbfgs,
+    Optimizer::GaussNewton,
+    Optimizer::GaussNewtonCg,
+    Optimizer::NelderMead,
+];
 
 pub fn settings(optimizer: Optimizer) -> Settings {
     Settings { iterations: 200, ..Settings::new(optimizer) }

@@ -1,5 +1,6 @@
 //! Tests on cheap physics.
 
+mod blocks;
 mod broken;
 mod errors;
 mod fits;

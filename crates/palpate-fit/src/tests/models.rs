@@ -1,7 +1,7 @@
 //! Cheap physics: least squares of a few residual functions.
 
 use crate::{FitScene, FreeParameter, Problem, Slot};
-use palpate_engine::{Curvature, Evaluate, Evaluation, Failure, FailureKind, ParamBatch, Request};
+use palpate_engine::{Curvature, Evaluate, Evaluation, Failure, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
 
 /// Residuals r(θ) over σ; `None` where the model fails.
@@ -68,6 +68,22 @@ impl Evaluate for LeastSquares {
         self.batches.lock().expect("no test panics while it holds the lock").push(theta.members());
         (0..theta.members()).map(|b| self.one(theta.row(b), request)).collect()
     }
+
+    fn has_products(&self) -> bool {
+        true
+    }
+
+    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        let mask = wanted.mask(self.parameters);
+        let places: Vec<usize> = (0..self.parameters).filter(|p| mask[*p]).collect();
+        let e = self.one(theta, &Request { sensitivities: places.clone(), ..Request::default() });
+        let c = e.curvature.ok_or_else(|| e.failure.expect("it failed, or has curvature"))?;
+        let mut out = vec![0.0; self.parameters];
+        for (a, p) in places.iter().enumerate() {
+            out[*p] = places.iter().enumerate().map(|(b, p)| c.matrix[a * places.len() + b] * v[*p]).sum();
+        }
+        Ok(out)
+    }
 }
 
 pub fn scene(base: &[f64], model: LeastSquares) -> FitScene<'static> {
@@ -83,6 +99,7 @@ pub fn parameter(place: usize, transform: Transform, bounds: (f64, f64), start: 
         bounds,
         start,
         slots: vec![Slot { scene: 0, place, factor: 1.0 }],
+        count: 1,
         direction: None,
     }
 }

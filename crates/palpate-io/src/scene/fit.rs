@@ -4,6 +4,7 @@ use crate::document::Table;
 use crate::error::{InputError, number};
 use crate::keys::suggest;
 use palpate_model::effects::{ALL, Unstated};
+use palpate_model::params::fields::Basis;
 use palpate_model::params::{ParamKey, Transform};
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene};
@@ -11,7 +12,8 @@ use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene};
 /// One number of a scene that can be fitted.
 struct Target {
     path: String,
-    value: f64,
+    /// What the scene states: one value, or the range of a field's.
+    value: (f64, f64),
     lower: f64,
     upper: f64,
     positive: bool,
@@ -22,13 +24,38 @@ fn targets(scene: &Scene) -> Vec<Target> {
     let mut out = Vec::new();
     for key in scene.layout().keys.into_iter().filter(|k| !is_choice(*k)) {
         let spec = key.spec();
-        let (path, value, lower, upper) = match (key, scene.material.inertia) {
+        let (path, stated, lower, upper) = match (key, scene.material.inertia) {
             (ParamKey::Density, Inertia::Mass(m)) => ("material.mass".to_string(), m, 1e-9, 1e6),
             _ => (spec.path.clone(), value(scene, key), spec.lower, spec.upper),
         };
-        out.push(Target { path, value, lower, upper, positive: spec.transform == Transform::Log });
+        out.push(Target { path, value: (stated, stated), lower, upper, positive: spec.transform == Transform::Log });
     }
     out
+}
+
+/// What a path means in the scene's fields: every region of one, all values of one by cells or nodes, or a single value. How many cells
+/// or nodes there are only a body knows.
+fn field_targets(path: &str, scene: &Scene) -> Option<Vec<Target>> {
+    let mut parts = path.strip_prefix("field.")?.split('.').map(str::parse::<usize>);
+    let (Some(Ok(i)), place, None) = (parts.next(), parts.next().transpose().ok()?, parts.next()) else { return None };
+    let field = scene.fields.get(i)?;
+    let target = |k: Option<usize>, value: (f64, f64)| {
+        let spec = ParamKey::Field { field: i as u16, index: k.unwrap_or(0) as u32 }.spec();
+        let path = if k.is_some() { spec.path } else { format!("field.{i}") };
+        Target { path, value, lower: spec.lower, upper: spec.upper, positive: spec.transform == Transform::Log }
+    };
+    match (&field.basis, &field.values, place) {
+        (Basis::Regions(regions, _), _, None) => {
+            Some(regions.iter().enumerate().map(|(k, r)| target(Some(k), (r.value, r.value))).collect())
+        }
+        (Basis::Regions(regions, _), _, Some(k)) => Some(vec![target(Some(k), regions.get(k).map(|r| (r.value, r.value))?)]),
+        (_, Some(values), Some(k)) => Some(vec![target(Some(k), values.get(k).map(|v| (*v, *v))?)]),
+        (_, Some(values), None) => {
+            let range = values.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), v| (a.min(*v), b.max(*v)));
+            Some(vec![target(None, range)])
+        }
+        (_, None, k) => Some(vec![target(k, (1.0, 1.0))]),
+    }
 }
 
 /// True for numbers that choose one thing among several.
@@ -69,13 +96,6 @@ fn value(scene: &Scene, key: ParamKey) -> f64 {
 
 pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputError> {
     let Some(t) = root.optional_table("fit")? else { return Ok(None) };
-    let optimizers = [
-        ("rprop", Optimizer::Rprop),
-        ("gradient-descent", Optimizer::GradientDescent),
-        ("lbfgs", Optimizer::Lbfgs),
-        ("gauss-newton", Optimizer::GaussNewton),
-        ("nelder-mead", Optimizer::NelderMead),
-    ];
     let known = targets(scene);
     let mut parameters: Vec<FitParameter> = Vec::new();
     for p in t.tables("parameter")? {
@@ -84,7 +104,7 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
         {
             return Err(p.error("path", format!("{path} chooses one thing among several and cannot be fitted; state it")));
         }
-        for parameter in parameter(&p, &known)? {
+        for parameter in parameter(&p, scene, &known)? {
             if parameters.iter().any(|o| o.path == parameter.path) {
                 return Err(p.error("path", format!("{} is given twice", parameter.path)));
             }
@@ -92,7 +112,7 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
         }
     }
     Ok(Some(FitSpec {
-        optimizer: t.optional_choice("optimizer", &optimizers)?.unwrap_or(Optimizer::GaussNewton),
+        optimizer: t.optional_choice("optimizer", &Optimizer::ALL)?,
         iterations: t.optional_count("iterations", 0..=1_000_000)?.unwrap_or(50) as usize,
         starts: t.optional_count("starts", 1..=1_000_000)?.unwrap_or(1) as usize,
         seed: t.optional_count("seed", 0..=u64::MAX)?.unwrap_or(1),
@@ -101,20 +121,26 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
     }))
 }
 
-/// One `[[fit.parameter]]`: a number, or the three components of a vector.
-fn parameter(t: &Table, known: &[Target]) -> Result<Vec<FitParameter>, InputError> {
+/// One `[[fit.parameter]]`: a number, the three components of a vector, or a field, whose values share one start and one pair of bounds.
+fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParameter>, InputError> {
     let path = t.optional_str("path")?.ok_or_else(|| t.missing("path", "the dotted path of a number in this file"))?;
     let component = |k: &Target| k.path.strip_prefix(path).is_some_and(|r| matches!(r, "" | ".x" | ".y" | ".z"));
-    let chosen: Vec<&Target> = known.iter().filter(|k| component(k)).collect();
+    let of_field = field_targets(path, scene);
+    let chosen: Vec<&Target> =
+        of_field.as_ref().map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
     if chosen.is_empty() {
-        return Err(t.error("path", unknown_path(path, known)));
+        return Err(t.error("path", unknown_path(path, scene, known)));
     }
-    let starts = t.optional_ranges("start", chosen.len())?;
-    let bounds = t.optional_ranges("bounds", chosen.len())?;
+    let ranges = |key| match of_field {
+        Some(_) => t.optional_ranges(key, 1).map(|r| r.map(|r| vec![r[0]; chosen.len()])),
+        None => t.optional_ranges(key, chosen.len()),
+    };
+    let starts = ranges("start")?;
+    let bounds = ranges("bounds")?;
     let per_scene = t.optional_bool("per_scene")?.unwrap_or(false);
     let mut out = Vec::new();
     for (i, k) in chosen.iter().enumerate() {
-        let start = starts.as_ref().map_or((k.value, k.value), |s| s[i]);
+        let start = starts.as_ref().map_or(k.value, |s| s[i]);
         let bounds = bounds.as_ref().map_or((k.lower, k.upper), |b| b[i]);
         let path = &k.path;
         let (low, high) = (number(bounds.0), number(bounds.1));
@@ -147,12 +173,20 @@ fn parameter(t: &Table, known: &[Target]) -> Result<Vec<FitParameter>, InputErro
     Ok(out)
 }
 
-fn unknown_path(path: &str, known: &[Target]) -> String {
+fn unknown_path(path: &str, scene: &Scene, known: &[Target]) -> String {
     if path == "material.density" {
         return "this scene gives material.mass; fit \"material.mass\" or state the density".to_string();
     }
     if path == "material.mass" {
         return "this scene gives material.density; fit \"material.density\" or state the mass".to_string();
+    }
+    if let Some(i) = path.strip_prefix("field.").and_then(|r| r.split('.').next()).and_then(|i| i.parse::<usize>().ok()) {
+        return match scene.fields.get(i).map(|f| (&f.basis, &f.values)) {
+            None => format!("\"{path}\": this scene has no [[field]] number {i} (they are counted from 0)"),
+            Some((Basis::Regions(r, _), _)) => format!("\"{path}\": field {i} has {} regions (they are counted from 0)", r.len()),
+            Some((basis, Some(v))) => format!("\"{path}\": field {i} has {} {} (they are counted from 0)", v.len(), basis.noun()),
+            Some((basis, None)) => format!("\"{path}\": say \"field.{i}\", or \"field.{i}.3\" for one of its {}", basis.noun()),
+        };
     }
     for (table, noun) in [("plane.", "[[plane]]"), ("mass.", "[[mass]]"), ("effect.", "[[effect]]")] {
         let index = path.strip_prefix(table).and_then(|r| r.split('.').next()).and_then(|i| i.parse::<usize>().ok());

@@ -1,6 +1,7 @@
 //! Format `scene/1`: one TOML file ↔ [`Scene`].
 
 mod effects;
+mod fields;
 mod fit;
 mod motion;
 mod object;
@@ -9,7 +10,7 @@ pub(crate) mod scale;
 mod tests;
 mod write;
 
-pub use write::{append_effects, write_scene};
+pub use write::{append_effects, name_field_files, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
@@ -82,7 +83,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         planes: planes(&root)?,
         masses: masses(&root)?,
         effects: effects::effects(&root)?,
-        fields: Vec::new(),
+        fields: fields::fields(&root)?,
         time: time(&root, initial.state)?,
         initial,
         solver: solver(&root)?,

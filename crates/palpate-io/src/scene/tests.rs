@@ -56,7 +56,7 @@ fn absent_keys_take_the_documented_defaults() {
     assert_eq!(o.costs, [ReadingKind::Marker, ReadingKind::Depth]);
     assert_eq!((o.from, o.to), (f64::NEG_INFINITY, f64::INFINITY));
     let f = s.fit.unwrap();
-    assert_eq!((f.optimizer, f.iterations, f.starts, f.seed, f.threads), (Optimizer::GaussNewton, 50, 1, 1, 0));
+    assert_eq!((f.optimizer, f.iterations, f.starts, f.seed, f.threads), (None, 50, 1, 1, 0));
 }
 
 #[test]

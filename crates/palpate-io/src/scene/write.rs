@@ -4,6 +4,7 @@
 use crate::error::InputError;
 use glam::DVec3;
 use palpate_model::effects::Effect;
+use palpate_model::params::fields::Basis;
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::Scene;
 use std::path::{Component, Path, PathBuf};
@@ -39,6 +40,13 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 let i: usize = i.parse().map_err(|_| unknown())?;
                 set(row(&mut doc, "mass", i).ok_or_else(unknown)?, "mass", Value::from(*value));
             }
+            ["field", i, k] if region(scene, i, k).is_some() => {
+                let (i, k) = region(scene, i, k).ok_or_else(unknown)?;
+                let table = row(&mut doc, "field", i).ok_or_else(unknown)?;
+                set(entry(table, "regions", k).ok_or_else(unknown)?, "value", Value::from(*value));
+            }
+            // Values of cells and nodes go into a file, which `name_field_files` names.
+            ["field", i] | ["field", i, _] if i.parse().is_ok_and(|i: usize| i < scene.fields.len()) => {}
             ["effect", i, key] => {
                 let i: usize = i.parse().map_err(|_| unknown())?;
                 set(row(&mut doc, "effect", i).ok_or_else(unknown)?, key, Value::from(*value));
@@ -101,6 +109,32 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
     Ok(doc.to_string())
 }
 
+/// The field and region that a path's numbers name, where there are such.
+fn region(scene: &Scene, field: &str, place: &str) -> Option<(usize, usize)> {
+    let (i, k) = (field.parse::<usize>().ok()?, place.parse::<usize>().ok()?);
+    match &scene.fields.get(i)?.basis {
+        Basis::Regions(regions, _) if k < regions.len() => Some((i, k)),
+        _ => None,
+    }
+}
+
+/// The text of a scene whose fields by cells or nodes read their values from other files: number of the field, file as seen from the
+/// text's folder, and name of the array.
+///
+/// # Errors
+/// A text that is no TOML or lacks the field.
+pub fn name_field_files(text: &str, scene: &Scene, files: &[(usize, String, &str)]) -> Result<String, InputError> {
+    let wrong = |key: String, message: String| InputError { key, ..InputError::file(&scene.path, message) };
+    let mut doc: DocumentMut =
+        text.parse().map_err(|e: toml_edit::TomlError| wrong(String::new(), format!("not valid TOML: {}", e.message())))?;
+    for (i, file, array) in files {
+        let table = row(&mut doc, "field", *i).ok_or_else(|| wrong(format!("field.{i}"), "not in the file".into()))?;
+        set(table, "file", Value::from(file.as_str()));
+        set(table, "array", Value::from(*array));
+    }
+    Ok(doc.to_string())
+}
+
 /// The text of a scene with effects appended to it, each with every value that it states.
 ///
 /// # Errors
@@ -153,7 +187,12 @@ fn section<'a>(doc: &'a mut DocumentMut, key: &str) -> Option<&'a mut dyn TableL
 
 /// Table `i` of a top-level array of tables.
 fn row<'a>(doc: &'a mut DocumentMut, key: &str, i: usize) -> Option<&'a mut dyn TableLike> {
-    match doc.get_mut(key)? {
+    entry(doc.as_table_mut(), key, i)
+}
+
+/// Table `i` of an array of tables.
+fn entry<'a>(table: &'a mut dyn TableLike, key: &str, i: usize) -> Option<&'a mut dyn TableLike> {
+    match table.get_mut(key)? {
         Item::ArrayOfTables(a) => a.get_mut(i).map(|t| t as &mut dyn TableLike),
         Item::Value(Value::Array(a)) => a.get_mut(i)?.as_inline_table_mut().map(|t| t as &mut dyn TableLike),
         _ => None,
@@ -224,10 +263,12 @@ fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
         fix(t, "recording");
     }
-    let mut i = 0;
-    while let Some(t) = row(doc, "clamp", i) {
-        fix(t, "motion");
-        i += 1;
+    for (rows, key) in [("clamp", "motion"), ("field", "file")] {
+        let mut i = 0;
+        while let Some(t) = row(doc, rows, i) {
+            fix(t, key);
+            i += 1;
+        }
     }
 }
 

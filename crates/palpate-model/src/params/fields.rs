@@ -26,6 +26,14 @@ impl Varied {
     pub fn path(self) -> &'static str {
         Varied::ALL.iter().find(|v| v.1 == self).map_or("", |v| v.0)
     }
+
+    /// Rest positions of the places where it varies [m].
+    pub fn places(self, body: &Body) -> Vec<DVec3> {
+        match self {
+            Varied::Modulus => body.middles().collect(),
+            Varied::Density => body.nodes.clone(),
+        }
+    }
 }
 
 /// How factors follow from values between places.
@@ -142,7 +150,7 @@ impl Field {
     /// # Errors
     /// A region that holds no node.
     pub fn new(spec: &FieldSpec, body: &Body) -> Result<Field, String> {
-        let places = places(spec.varied, body);
+        let places = spec.varied.places(body);
         let rows: Vec<Vec<(u32, f64)>> = match &spec.basis {
             Basis::Cells => match spec.varied {
                 Varied::Modulus => (0..places.len() as u32).map(|e| vec![(e, 1.0)]).collect(),
@@ -222,14 +230,6 @@ impl Field {
                 };
             }
         }
-    }
-}
-
-/// Rest positions of the places that a field varies [m].
-fn places(varied: Varied, body: &Body) -> Vec<DVec3> {
-    match varied {
-        Varied::Modulus => body.middles().collect(),
-        Varied::Density => body.nodes.clone(),
     }
 }
 
@@ -358,7 +358,7 @@ mod tests {
             if let Basis::Regions(regions, _) = &spec.basis {
                 let factors = field.factors(&spec.start(&body).unwrap());
                 for r in regions {
-                    let at = places(spec.varied, &body);
+                    let at = spec.varied.places(&body);
                     let near = (0..at.len()).min_by(|a, b| (at[*a] - r.center).length().total_cmp(&(at[*b] - r.center).length()));
                     let factor = factors[near.unwrap()];
                     // The nearest place may lie half a cell off the centre, an eighth of the way to the next region.

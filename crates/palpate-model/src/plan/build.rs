@@ -106,9 +106,8 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         .collect::<Vec<_>>();
     let (mut fields, mut starts) = (Vec::new(), Vec::new());
     for (i, spec) in scene.fields.iter().enumerate() {
-        let wrong = |m: String| error(format!("field.{i}"), m);
-        fields.push(Field::new(spec, &body).map_err(wrong)?);
-        starts.push(spec.start(&body).map_err(wrong)?);
+        fields.push(Field::new(spec, &body).map_err(|m| error(format!("field.{i}.regions"), m))?);
+        starts.push(spec.start(&body).map_err(|m| error(format!("field.{i}.file"), m))?);
     }
     let layout = scene.layout_with(&fields.iter().map(|f| f.count).collect::<Vec<_>>());
     Ok(Plan {

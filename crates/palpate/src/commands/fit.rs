@@ -4,7 +4,8 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters};
+use crate::fields::{self, files_of, write_fields};
+use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters, usual};
 use crate::grid::grid_shift;
 use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
@@ -87,6 +88,7 @@ enum OptimizerName {
     GradientDescent,
     Lbfgs,
     GaussNewton,
+    GaussNewtonCg,
     NelderMead,
 }
 
@@ -97,6 +99,7 @@ impl From<OptimizerName> for Optimizer {
             OptimizerName::GradientDescent => Optimizer::GradientDescent,
             OptimizerName::Lbfgs => Optimizer::Lbfgs,
             OptimizerName::GaussNewton => Optimizer::GaussNewton,
+            OptimizerName::GaussNewtonCg => Optimizer::GaussNewtonCg,
             OptimizerName::NelderMead => Optimizer::NelderMead,
         }
     }
@@ -108,6 +111,7 @@ const JOURNAL: &str = "journal.jsonl";
 fn keep_previous(folder: &Path, scenes: usize, resume: bool) -> Result<Option<PathBuf>, Error> {
     let mut names = vec!["result.json".to_string(), "history.csv".into(), "report.html".into(), "model.toml".into()];
     names.extend((1..=scenes.max(64)).map(|n| format!("model-{n}.toml")));
+    names.extend(fields::names(folder));
     if !resume {
         names.push(JOURNAL.into());
     }
@@ -150,19 +154,8 @@ fn command(scenes: &[PathBuf], a: &Choices, fitted: &Fitted) -> String {
 type Pair = (Vec<FramePicture>, Vec<FramePicture>);
 
 fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, count: usize, scale: f64) -> Result<Pair, Error> {
-    let start = &fitted.result.runs[0].start;
-    let mut theta = fitted.result.theta[s].clone();
-    let values: Vec<(String, f64)> = fitted
-        .free
-        .iter()
-        .zip(start)
-        .filter(|(n, _)| n.scene.is_none_or(|o| o == s))
-        .map(|(n, v)| (n.path.clone(), *v))
-        .collect();
-    for (path, value) in values {
-        crate::fitting::set(e, &mut theta, &path, value);
-    }
-    let before = pictures(e, backend, &theta, count, scale).unwrap_or_default();
+    let theta = &fitted.theta_start[s];
+    let before = pictures(e, backend, theta, count, scale).unwrap_or_default();
     Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale)?))
 }
 
@@ -175,13 +168,15 @@ fn write_all(
     backend: Backend,
 ) -> Result<FitDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
-    let result = fit_document(fitted, experiments);
+    let found = write_fields(folder, experiments, fitted)?;
+    let result = fit_document(fitted, experiments, found);
     // Results first: a report that fails must not cost them.
     results::write(folder.join("result.json"), &result)?;
     text("history.csv", &history_csv(fitted))?;
     for (s, e) in experiments.iter().enumerate() {
         let values = fitted.values_of(s, e);
         let model = palpate_io::write_scene(e.text(), e.scene(), &values, folder)?;
+        let model = palpate_io::name_field_files(&model, e.scene(), &files_of(&result.fields, s, e))?;
         let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
         text(&name, &model)?;
     }
@@ -194,7 +189,14 @@ fn write_all(
         n => scene_pictures(e, fitted, s, backend, n, scale),
     });
     let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
-    let page = fit_html(&ReportInput { fitted, experiments, pictures, scale, command: command(scenes, a, fitted) });
+    let page = fit_html(&ReportInput {
+        fitted,
+        experiments,
+        fields: &result.fields,
+        pictures,
+        scale,
+        command: command(scenes, a, fitted),
+    });
     text("report.html", &page)?;
     Ok(result)
 }
@@ -221,7 +223,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if console.json() {
         console.print(&results::line(&result));
     } else {
-        console.print(&format!("{}\n  report: {}", summary(&fitted), folder.join("report.html").display()));
+        console.print(&format!("{}\n  report: {}", summary(&fitted, &result.fields), folder.join("report.html").display()));
     }
     if let Some(why) = &fitted.result.broken {
         return Err(Error::BrokenOff { why: why.clone(), kept: "the best so far", folder });
@@ -233,8 +235,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
 pub fn choose(a: &Choices, experiments: &[Experiment]) -> Result<(Backend, Option<String>), Error> {
     let (first, spec) = (&experiments[0], experiments[0].scene().fit.as_ref());
     let starts = a.starts.map_or(spec.map_or(1, |f| f.starts), |n| n as usize);
-    let optimizer = a.optimizer.map(Optimizer::from).or(spec.map(|f| f.optimizer)).unwrap_or(Optimizer::GaussNewton);
     let (_, free, _) = free_parameters(experiments)?;
+    let asked = a.optimizer.map(Optimizer::from).or(spec.and_then(|f| f.optimizer));
+    let optimizer = asked.unwrap_or_else(|| usual(&free, true));
     a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts))
 }
 

@@ -17,7 +17,7 @@ use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, Sequence, read_recording};
 use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
-use palpate_model::scene::{BodySource, Optimizer};
+use palpate_model::scene::BodySource;
 use std::path::{Path, PathBuf};
 
 const AFTER_HELP: &str = "\
@@ -95,15 +95,10 @@ fn demand(e: &Experiment) -> (Demand, String) {
     let one = || (Demand::forward(1), "one simulation".to_string());
     let Some(fit) = e.scene().fit.as_ref().filter(|f| !f.parameters.is_empty()) else { return one() };
     let Ok((_, free, _)) = free_parameters(std::slice::from_ref(e)) else { return one() };
-    let demand = fitting::demand(&free, 0, fit.optimizer, fit.starts);
+    let optimizer = fit.optimizer.unwrap_or_else(|| fitting::usual(&free, true));
+    let demand = fitting::demand(&free, 0, optimizer, fit.starts);
     let numbers = demand.places.len();
-    let name = match fit.optimizer {
-        Optimizer::Rprop => "rprop",
-        Optimizer::GradientDescent => "gradient-descent",
-        Optimizer::Lbfgs => "lbfgs",
-        Optimizer::GaussNewton => "gauss-newton",
-        Optimizer::NelderMead => "nelder-mead",
-    };
+    let name = optimizer.name();
     (demand, format!("{name}, {numbers} free number{}", if numbers == 1 { "" } else { "s" }))
 }
 

@@ -9,7 +9,7 @@ use palpate_fit::{FreeParameter, Slot};
 use palpate_model::effects::field::{Field, Spot};
 use palpate_model::effects::{ALL, Site, Unstated};
 use palpate_model::params::{ParamKey, Transform};
-use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer};
+use palpate_model::scene::{FitParameter, FitSpec, Inertia};
 
 /// Changed experiments and their free numbers: those of the scenes first, then change by change.
 pub(super) struct Prepared {
@@ -57,7 +57,12 @@ pub(super) fn held(experiments: &[Experiment]) -> Vec<String> {
 pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepared, Error> {
     let several = base.len() > 1;
     let mut experiments = base.to_vec();
-    let (known, _, _) = free_parameters(base)?;
+    let (known, freed, _) = free_parameters(base)?;
+    if let Some(field) = freed.iter().find(|f| f.count > 1) {
+        let message =
+            format!("{}: a diagnosis weighs numbers one by one; take the field out of [fit], or give it regions", field.path);
+        return Err(Error::scene(&base[0].scene().path, "fit.parameter", message));
+    }
     let given = known.len();
     let mut order: Vec<String> = known.iter().map(FreeNumber::label).collect();
     for change in changes {
@@ -66,9 +71,12 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
                 for (s, e) in experiments.iter_mut().enumerate() {
                     let number = e.scene.effects.len();
                     e.scene.effects.push(effect.clone());
-                    e.plan.layout = e.scene.layout();
+                    // Fields come behind the effects.
+                    let fields: Vec<usize> = e.plan.fields.iter().map(|f| f.count).collect();
+                    let end = e.plan.layout.fields().next().map_or(e.plan.theta.len(), |f| f.start);
+                    e.plan.layout = e.scene.layout_with(&fields);
                     let center = e.plan.body.center;
-                    e.plan.theta.extend((0..effect.values.len()).map(|slot| effect.value(slot, center)));
+                    e.plan.theta.splice(end..end, (0..effect.values.len()).map(|slot| effect.value(slot, center)));
                     for slot in change.free_slots() {
                         let key = ParamKey::Effect { effect: number as u16, law: effect.law as u16, slot: slot as u16 };
                         let path = key.spec().path;
@@ -138,8 +146,7 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
     }
     let middle = 0.0f64.clamp(bounds.0, bounds.1);
     let parameter = FitParameter { path, start: (middle, middle), bounds, per_scene };
-    let empty =
-        || FitSpec { optimizer: Optimizer::GaussNewton, iterations: 50, starts: 1, seed: 1, threads: 0, parameters: Vec::new() };
+    let empty = || FitSpec { optimizer: None, iterations: 50, starts: 1, seed: 1, threads: 0, parameters: Vec::new() };
     e.scene.fit.get_or_insert_with(empty).parameters.push(parameter);
 }
 

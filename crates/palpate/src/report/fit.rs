@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
-use crate::results::fit::{Cost, FitDocument, Parameter, Residual, ResidualBefore, Run};
+use crate::results::fit::{Cost, FieldReference, FitDocument, Parameter, Residual, ResidualBefore, Run};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
@@ -51,7 +51,8 @@ fn parameter(fitted: &Fitted, i: usize) -> Parameter {
 }
 
 fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
-    let labelled = |values: &[f64]| fitted.free.iter().zip(values).map(|(n, v)| (n.label(), finite(*v))).collect();
+    let named = || fitted.free.iter().zip(&fitted.result.parameters);
+    let labelled = |values: &[f64]| named().filter_map(|(n, p)| Some((n.label(), finite(*values.get(p.index)?)))).collect();
     Run {
         start: labelled(&run.start),
         end: labelled(&run.end),
@@ -59,12 +60,13 @@ fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
         cost: finite(run.cost),
         iterations: run.iterations,
         evaluations: run.evaluations,
+        products: run.products,
         status: run.status.name().into(),
     }
 }
 
-/// What `result.json` says of a fit of these experiments.
-pub fn fit_document(fitted: &Fitted, experiments: &[Experiment]) -> FitDocument {
+/// What `result.json` says of a fit of these experiments, whose fields lie beside it.
+pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<FieldReference>) -> FitDocument {
     let r = &fitted.result;
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
@@ -74,9 +76,11 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment]) -> FitDocument 
         backend: fitted.backend.into(),
         scene: scenes.first().cloned(),
         scenes,
+        optimizer: fitted.optimizer.name().into(),
         status: fitted.status(),
         error: r.broken.clone(),
         parameters: (0..fitted.free.len()).map(|i| parameter(fitted, i)).collect(),
+        fields,
         correlation: r.correlation.iter().map(|row| row.iter().map(|c| finite(*c)).collect()).collect(),
         cost: Cost { initial: finite(r.initial_cost), last: finite(r.cost) },
         reduced_chi_square: finite(r.reduced_chi_square),
@@ -97,14 +101,14 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment]) -> FitDocument 
     }
 }
 
-/// One row per run and iteration: `run,iteration,cost,<one column per parameter>`; full precision.
+/// One row per run and iteration: `run,iteration,cost,<one column per number>`; full precision. Fields are left out.
 pub fn history_csv(fitted: &Fitted) -> String {
     let mut csv = csv::Writer::from_writer(Vec::new());
     let mut rows = vec![["run", "iteration", "cost"].map(str::to_string).to_vec()];
     rows[0].extend(fitted.free.iter().map(|n| n.label()));
     let row = |p: &Progress| {
         let mut row = vec![p.start.to_string(), p.iteration.to_string(), format!("{:?}", p.cost)];
-        row.extend(p.values.iter().map(|v| format!("{v:?}")));
+        row.extend(fitted.result.parameters.iter().map(|found| format!("{:?}", p.values[found.index])));
         row
     };
     rows.extend(fitted.history.iter().map(row));
@@ -124,8 +128,25 @@ pub fn number(x: f64) -> String {
     }
 }
 
+/// A found field in a line.
+pub(super) fn field_line(f: &FieldReference) -> String {
+    let text = |x: Option<f64>| x.map_or("?".into(), number);
+    format!(
+        "{} of {}, {} {}: factors {} to {}, median {}; {}, {}",
+        f.path,
+        f.varies,
+        f.count,
+        f.basis,
+        text(f.min),
+        text(f.max),
+        text(f.median),
+        f.file,
+        f.grid
+    )
+}
+
 /// Short table for the terminal.
-pub fn summary(fitted: &Fitted) -> String {
+pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     let width = fitted.free.iter().map(|n| n.label().chars().count()).max().unwrap_or(0);
     let row = |(i, (n, p)): (usize, (&FreeNumber, &FittedParameter))| {
         let unit = unit_behind(&p.unit);
@@ -135,6 +156,8 @@ pub fn summary(fitted: &Fitted) -> String {
         format!("  {:width$}  {}{unit}{unsure}{shift}\n", n.label(), stated(p.value, p.standard_error))
     };
     let mut text: String = fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row).collect();
+    fields.iter().for_each(|f| text += &format!("  {}\n", field_line(f)));
+    text += &fitted.chosen.as_ref().map_or(String::new(), |c| format!("  {c}\n"));
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let before = before.map_or(String::new(), |b| format!("{:.3} mm before, ", total(&b, |r| r.rms) * 1e3));

@@ -16,13 +16,19 @@ pub struct FitDocument {
     pub scene: Option<String>,
     /// Files of all scenes.
     pub scenes: Vec<String>,
+    /// Name of the optimiser.
+    #[serde(default)]
+    pub optimizer: String,
     /// How it ended.
     pub status: FitStatus,
     /// Why it broke off, if it did.
     pub error: Option<String>,
     /// The numbers found.
     pub parameters: Vec<Parameter>,
-    /// Correlation matrix of their errors `[q][q]`, of the logarithms where these are fitted.
+    /// The fields found; their values lie in array files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<FieldReference>,
+    /// Correlation matrix of the numbers' errors `[q][q]`, of the logarithms where these are fitted.
     pub correlation: Vec<Vec<Option<f64>>>,
     /// Cost per scalar residual at the first start and at the best point.
     pub cost: Cost,
@@ -84,6 +90,33 @@ pub struct Parameter {
     pub at_bound: Option<AtBound>,
 }
 
+/// A found field: what it is, and where its values lie.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FieldReference {
+    /// Path of the field in the scene file, `field.0`.
+    pub path: String,
+    /// Path of the number that it varies.
+    pub varies: String,
+    /// What its values belong to: `cells`, `nodes` or `regions`.
+    pub basis: String,
+    /// Number of values.
+    pub count: usize,
+    /// The NPZ file beside this document.
+    pub file: String,
+    /// Name of its array of values; others are `factor` and `place` (of every cell or node) and, where errors are known, `standard_error`.
+    pub array: String,
+    /// The VTU file beside this document with the fields on the grid.
+    pub grid: String,
+    /// Smallest value, a factor.
+    pub min: Option<f64>,
+    /// Median of the values.
+    pub median: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+    /// The scene that it belongs to, from 0.
+    pub scene: usize,
+}
+
 /// Cost per scalar residual, half a mean square in units of noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
@@ -132,8 +165,15 @@ pub struct Run {
     pub iterations: usize,
     /// Simulations used.
     pub evaluations: usize,
+    /// Products with the Gauss–Newton matrix used, a tangent and an adjoint each.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub products: usize,
     /// How it ended: `converged`, `iteration-limit`, `stalled`, `failed`, `interrupted` or `broken-off`.
     pub status: String,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 #[cfg(test)]
@@ -164,7 +204,9 @@ mod tests {
             scenes: vec!["a.toml".into(), "b.toml".into()],
             status: FitStatus::BrokenOff,
             error: Some("the device was \"lost\"".into()),
+            optimizer: "gauss-newton".into(),
             parameters: vec![plain, held],
+            fields: vec![FieldReference { path: "field.0".into(), min: Some(0.5), max: None, ..FieldReference::default() }],
             correlation: vec![vec![Some(1.0), None], vec![None, Some(1.0)]],
             cost: Cost { initial: None, last: Some(0.5) },
             reduced_chi_square: Some(1.1),
@@ -179,6 +221,7 @@ mod tests {
                 cost: Some(0.5),
                 iterations: 3,
                 evaluations: 7,
+                products: 3,
                 status: "stalled".into(),
             }],
             warnings: vec!["mind the ±".into()],
@@ -196,8 +239,10 @@ mod tests {
             "cost",
             "error",
             "evaluations",
+            "fields",
             "format",
             "independent_readings",
+            "optimizer",
             "parameters",
             "reduced_chi_square",
             "residual",

@@ -3,10 +3,11 @@
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
-use crate::report::fit::{number, worth};
+use crate::report::fit::{field_line, number, worth};
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
+use crate::results::fit::FieldReference;
 use maud::{Markup, html};
 
 /// What a report is made of.
@@ -15,6 +16,8 @@ pub struct ReportInput<'a> {
     pub fitted: &'a Fitted,
     /// Its scenes.
     pub experiments: &'a [Experiment],
+    /// The fields found.
+    pub fields: &'a [FieldReference],
     /// Pictures scene by scene: at the first start, and with the values found.
     pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
     /// Residual at which colours are saturated [m].
@@ -33,6 +36,7 @@ pub fn fit_html(input: &ReportInput) -> String {
         (ending(fitted))
         (distances(fitted))
         (parameters(fitted))
+        (fields(input))
         (warnings(fitted))
         (correlation(fitted))
         (progress(fitted))
@@ -99,6 +103,18 @@ fn parameters(fitted: &Fitted) -> Markup {
                 }
                 "."
             }
+        }
+    }
+}
+
+/// Fields by their extent; the values lie in files.
+fn fields(input: &ReportInput) -> Markup {
+    html! {
+        @for f in input.fields {
+            p { (field_line(f)) "." }
+        }
+        @if let Some(why) = &input.fitted.chosen {
+            p { (why) "." }
         }
     }
 }
@@ -182,7 +198,8 @@ fn scene(input: &ReportInput, s: usize, e: &Experiment) -> Markup {
 
 fn runs(fitted: &Fitted) -> Markup {
     use Column::{Number, Text};
-    let list = |v: &[f64]| v.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+    let found = &fitted.result.parameters;
+    let list = |v: &[f64]| found.iter().filter_map(|p| v.get(p.index)).map(|x| number(*x)).collect::<Vec<_>>().join(", ");
     let columns = [("run", Text), ("start", Text), ("end", Text), ("cost", Number), ("iterations", Number), ("status", Text)];
     html! {
         h2 { "Runs" }

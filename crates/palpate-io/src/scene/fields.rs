@@ -1,0 +1,102 @@
+//! `[[field]]`: numbers that vary over the body, by cells, nodes or regions.
+
+use crate::document::Table;
+use crate::error::{InputError, number};
+use crate::npy::read_array;
+use crate::vtk::read_vtu_array;
+use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
+use std::path::Path;
+
+/// Every field of a scene, in the order of the file.
+pub(super) fn fields(root: &Table) -> Result<Vec<FieldSpec>, InputError> {
+    root.tables("field")?.iter().map(field).collect()
+}
+
+/// The three bases by name.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Cells,
+    Nodes,
+    Regions,
+}
+
+fn field(t: &Table) -> Result<FieldSpec, InputError> {
+    let paths = Varied::ALL.map(|v| (v.0, v.1));
+    let allowed = || paths.map(|p| format!("\"{}\"", p.0)).join(" or ");
+    let varied = t.optional_choice("path", &paths)?.ok_or_else(|| t.missing("path", &allowed()))?;
+    let kinds = [("cells", Kind::Cells), ("nodes", Kind::Nodes), ("regions", Kind::Regions)];
+    let kind = t.optional_choice("basis", &kinds)?.ok_or_else(|| t.missing("basis", "\"cells\", \"nodes\" or \"regions\""))?;
+    let scales = [("log", Scale::Log), ("linear", Scale::Linear)];
+    let scale = t.optional_choice("scale", &scales)?.unwrap_or(Scale::Log);
+    let (with_regions, without): (&[&str], &[&str]) = (&["regions", "blend"], &["file", "array"]);
+    let (foreign, belongs) = match kind {
+        Kind::Regions => (without, "basis = \"cells\" or \"nodes\"; regions state their own value"),
+        _ => (with_regions, "basis = \"regions\""),
+    };
+    if let Some(key) = foreign.iter().find(|k| t.has(k)) {
+        return Err(t.error(key, format!("belongs to {belongs}")));
+    }
+    let basis = match kind {
+        Kind::Cells => Basis::Cells,
+        Kind::Nodes => Basis::Nodes,
+        Kind::Regions => {
+            let blends = [("harmonic", Blend::Harmonic), ("axis", Blend::Axis), ("nearest", Blend::Nearest)];
+            let blend = t.optional_choice("blend", &blends)?.unwrap_or(Blend::Harmonic);
+            Basis::Regions(regions(t, blend)?, blend)
+        }
+    };
+    let values = values(t, kind)?;
+    Ok(FieldSpec { varied, basis, scale, values })
+}
+
+fn regions(t: &Table, blend: Blend) -> Result<Vec<Region>, InputError> {
+    let wanted = "regions = [{ center = [x, y, z], radius = r, value = v }, …]";
+    let mut regions: Vec<Region> = Vec::new();
+    for r in t.tables("regions")? {
+        let radius = r.f64_where("radius", |x| x > 0.0, "is not allowed: must be > 0 (m)")?;
+        let value = r.f64_where("value", |x| x > 0.0, "is not allowed: a factor must be > 0 (1 = unchanged)")?;
+        let region = Region {
+            center: r.vec3("center")?,
+            radius: radius.ok_or_else(|| r.missing("radius", "a number > 0 (m)"))?,
+            value: value.unwrap_or(1.0),
+        };
+        if let (Blend::Axis, Some(last)) = (blend, regions.last())
+            && last.center == region.center
+        {
+            return Err(r.error("center", "is that of the region before; blend = \"axis\" needs a way from one to the next"));
+        }
+        regions.push(region);
+    }
+    if regions.is_empty() { Err(t.missing("regions", wanted)) } else { Ok(regions) }
+}
+
+/// Values from the field's file, if it names one.
+fn values(t: &Table, kind: Kind) -> Result<Option<Vec<f64>>, InputError> {
+    let array = t.optional_str("array")?;
+    let Some(file) = t.optional_file("file")? else {
+        return if array.is_some() { Err(t.error("array", "names an array of file, which is missing")) } else { Ok(None) };
+    };
+    let values = read(t, &file, array, kind)?;
+    match values.iter().position(|v| !(v.is_finite() && *v > 0.0)) {
+        Some(k) => Err(t.error(
+            "file",
+            format!("{}: value {k} is {}; a factor must be > 0 (1 = unchanged)", file.display(), number(values[k])),
+        )),
+        None => Ok(Some(values)),
+    }
+}
+
+fn read(t: &Table, file: &Path, array: Option<&str>, kind: Kind) -> Result<Vec<f64>, InputError> {
+    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("npy" | "npz") => {
+            let found = read_array(file, array)?;
+            match found.shape[..] {
+                [_] => Ok(found.values),
+                _ => Err(t.error("file", format!("{}: has shape {}; expected one axis", file.display(), found.shape_text()))),
+            }
+        }
+        Some("vtu") => read_vtu_array(file, array, kind == Kind::Cells),
+        _ => Err(t.error("file", format!("{}: is not an .npy, .npz or .vtu file", file.display()))),
+    }
+}

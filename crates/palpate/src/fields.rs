@@ -1,0 +1,177 @@
+//! Found fields as arrays: NPZ and VTU files beside a result, and what the result says of them.
+
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::fitting::Fitted;
+use crate::results::finite;
+use crate::results::fit::FieldReference;
+use palpate_io::npy::{Array, write_npz};
+use palpate_io::vtk::write_vtu_scalars;
+use palpate_model::params::fields::{Basis, Varied};
+use palpate_model::params::{On, ParamKey};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Name of the array of values in an NPZ file.
+const ARRAY: &str = "values";
+
+/// A field of a scene with the values found.
+struct Found<'a> {
+    experiment: &'a Experiment,
+    /// Number of the scene, and of the field in it.
+    scene: usize,
+    field: usize,
+    /// Values `[count]`.
+    values: Vec<f64>,
+    /// Factor at every place.
+    factors: Vec<f64>,
+    /// Standard errors `[count]`, NaN where there is none; `None` where there are none at all.
+    errors: Option<Vec<f64>>,
+}
+
+/// Standard errors of the free values of a scene, by the path of its fields: `field.0.3`, or the first of `field.0`.
+fn errors_of(fitted: &Fitted, scene: usize) -> BTreeMap<&str, Vec<Option<f64>>> {
+    let own = |n: &crate::FreeNumber| n.scene.is_none_or(|s| s == scene);
+    let numbers = fitted.free.iter().zip(&fitted.result.parameters).map(|(n, p)| (n, vec![p.standard_error]));
+    let fields = fitted.fields.iter().zip(&fitted.result.fields).map(|(n, f)| (n, f.standard_errors.clone()));
+    numbers.chain(fields).filter(|(n, _)| own(n)).map(|(n, e)| (n.path.as_str(), e)).collect()
+}
+
+/// Every field of a scene of which something was free.
+fn found<'a>(experiment: &'a Experiment, fitted: &Fitted, scene: usize) -> Vec<Found<'a>> {
+    let (plan, theta) = (experiment.plan(), &fitted.result.theta[scene]);
+    let free = errors_of(fitted, scene);
+    let named = |path: &str| experiment.scene().fit.iter().flat_map(|f| &f.parameters).any(|p| p.path == path);
+    let mut errors = vec![f64::NAN; plan.layout.len()];
+    let mut fields = vec![false; plan.fields.len()];
+    for (path, known) in free.iter().filter(|(path, _)| named(path)) {
+        let places = plan.layout.resolve(path);
+        let Some(On::Field(field)) = plan.layout.keys.get(places.start).map(|k: &ParamKey| k.on()) else { continue };
+        fields[usize::from(field)] = true;
+        places.zip(known).for_each(|(p, e)| errors[p] = e.unwrap_or(f64::NAN));
+    }
+    let all = plan.layout.fields().zip(&plan.fields).enumerate().filter(|(field, _)| fields[*field]);
+    all.map(|(field, (places, f))| {
+        let values = theta[places.clone()].to_vec();
+        let own = errors[places].to_vec();
+        let errors = own.iter().any(|e| e.is_finite()).then_some(own);
+        Found { experiment, scene, field, factors: f.factors(&values), values, errors }
+    })
+    .collect()
+}
+
+/// Names of files of fields that lie in a folder.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let names = entries.filter_map(Result::ok).map(|e| e.file_name().to_string_lossy().into_owned());
+    let is_own = |n: &String| n.starts_with("field") && (n.ends_with(".npz") || n.ends_with(".vtu"));
+    let mut own: Vec<String> = names.filter(is_own).collect();
+    own.sort();
+    own
+}
+
+/// Writes the fields of a fit into a folder, an NPZ file each and a VTU file a scene, and says where they are.
+///
+/// # Errors
+/// A file cannot be written.
+pub(crate) fn write_fields(folder: &Path, experiments: &[Experiment], fitted: &Fitted) -> Result<Vec<FieldReference>, Error> {
+    let mut references = Vec::new();
+    for (scene, e) in experiments.iter().enumerate() {
+        let found = found(e, fitted, scene);
+        if found.is_empty() {
+            continue;
+        }
+        let ending = if experiments.len() == 1 { String::new() } else { format!("-scene-{}", scene + 1) };
+        let grid = format!("fields{ending}.vtu");
+        write_grid(&folder.join(&grid), e, &fitted.result.theta[scene], &found)?;
+        for f in found {
+            let file = format!("field-{}{ending}.npz", f.field);
+            f.write(&folder.join(&file))?;
+            references.push(f.reference(file, grid.clone()));
+        }
+    }
+    Ok(references)
+}
+
+/// For every field by cells or nodes of a scene, its number, file and array.
+pub(crate) fn files_of(fields: &[FieldReference], scene: usize, experiment: &Experiment) -> Vec<(usize, String, &'static str)> {
+    let number = |f: &FieldReference| f.path.strip_prefix("field.").and_then(|i| i.parse::<usize>().ok());
+    let of_scene = fields.iter().filter(|f| f.scene == scene).filter_map(|f| Some((number(f)?, f.file.clone(), ARRAY)));
+    of_scene.filter(|(i, ..)| !matches!(experiment.scene().fields[*i].basis, Basis::Regions(..))).collect()
+}
+
+impl Found<'_> {
+    fn write(&self, path: &Path) -> Result<(), Error> {
+        let places = self.varied().places(&self.experiment.plan().body);
+        let one = |values: &[f64]| Array { shape: vec![values.len()], values: values.to_vec() };
+        let place = Array { shape: vec![places.len(), 3], values: places.iter().flat_map(|p| p.to_array()).collect() };
+        let (values, factors) = (one(&self.values), one(&self.factors));
+        let errors = self.errors.as_ref().map(|e| one(e));
+        let mut arrays = vec![(ARRAY, &values), ("factor", &factors), ("place", &place)];
+        arrays.extend(errors.iter().map(|e| ("standard_error", e)));
+        Ok(write_npz(path, &arrays)?)
+    }
+
+    fn varied(&self) -> Varied {
+        self.experiment.plan().fields[self.field].varied
+    }
+
+    /// Standard error of the factor at every place, where every place has its own value.
+    fn errors_by_place(&self) -> Option<&[f64]> {
+        let own = matches!(
+            (&self.experiment.scene().fields[self.field].basis, self.varied()),
+            (Basis::Cells, Varied::Modulus) | (Basis::Nodes, Varied::Density)
+        );
+        self.errors.as_deref().filter(|_| own)
+    }
+
+    fn reference(&self, file: String, grid: String) -> FieldReference {
+        let mut sorted = self.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let (n, at) = (sorted.len(), |k: usize| sorted.get(k).copied());
+        let median = at(n / 2).zip(at(n.saturating_sub(1) / 2)).map(|(a, b)| 0.5 * (a + b));
+        FieldReference {
+            path: format!("field.{}", self.field),
+            varies: self.varied().path().into(),
+            basis: self.experiment.scene().fields[self.field].basis.noun().into(),
+            count: n,
+            file,
+            array: ARRAY.into(),
+            grid,
+            min: at(0).and_then(finite),
+            median: median.and_then(finite),
+            max: sorted.last().copied().and_then(finite),
+            scene: self.scene,
+        }
+    }
+}
+
+/// The fields on the grid: `E` by cells or `density` by nodes with all fields of it, the `factor` of each, and `E_sd` or `density_sd`
+/// where a value of one field is that of a place.
+fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Result<(), Error> {
+    let plan = e.plan();
+    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
+    for (varied, key, name) in [(Varied::Modulus, ParamKey::YoungsModulus, "E"), (Varied::Density, ParamKey::Density, "density")]
+    {
+        let out = if varied == Varied::Modulus { &mut cells } else { &mut nodes };
+        let mut number = vec![theta[plan.layout.index(key)]; varied.places(&plan.body).len()];
+        for (places, f) in plan.layout.fields().zip(&plan.fields).filter(|(_, f)| f.varied == varied) {
+            number.iter_mut().zip(f.factors(&theta[places])).for_each(|(n, factor)| *n *= factor);
+        }
+        let own: Vec<&Found> = found.iter().filter(|f| f.varied() == varied).collect();
+        for f in &own {
+            out.push((format!("factor_{}", f.field), f.factors.clone()));
+        }
+        if let [f] = &own[..]
+            && let Some(errors) = f.errors_by_place()
+        {
+            let sd = number.iter().zip(errors.iter().zip(&f.factors)).map(|(n, (e, factor))| n * e / factor);
+            out.push((format!("{name}_sd"), sd.collect()));
+        }
+        if !own.is_empty() {
+            out.push((name.to_string(), number));
+        }
+    }
+    let hexes: Vec<[u32; 8]> = plan.body.cells.iter().map(|c| c.nodes).collect();
+    Ok(write_vtu_scalars(path, &plan.body.nodes, &hexes, &nodes, &cells)?)
+}
