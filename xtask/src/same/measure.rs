@@ -2,7 +2,8 @@
 
 use super::cases::Case;
 use palpate::{Backend, FitOptions, report};
-use palpate_engine::{Evaluation, ParamBatch, Request, Snapshot, Wanted};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Evaluation, ParamBatch, Request, ResidualRow, Rollout, Snapshot, Wanted};
 use palpate_model::plan::Plan;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -13,8 +14,10 @@ use std::ops::ControlFlow;
 pub struct Quantity {
     /// What the numbers belong to, sorted: paths of parameters `[K]`. Empty where all belong together.
     pub keys: Vec<String>,
-    /// The numbers: `[K]`, `[K, K]`, or any where there are no keys.
+    /// The numbers: any where there are no keys, else as many for each key `[K, R]`.
     pub numbers: Vec<f64>,
+    /// True where the numbers of a key belong to keys themselves `[K, K]`.
+    pub square: bool,
     /// Numbers that tell how far a change goes, by key or by a name. Those of one entry have the same size.
     pub values: BTreeMap<String, Vec<f64>>,
 }
@@ -22,13 +25,25 @@ pub struct Quantity {
 impl Quantity {
     /// Numbers without keys.
     fn plain(numbers: Vec<f64>, values: BTreeMap<String, Vec<f64>>) -> Quantity {
-        Quantity { keys: Vec::new(), numbers, values }
+        Quantity { numbers, values, ..Quantity::default() }
     }
 
     /// One number per key.
     fn keyed(numbers: BTreeMap<String, f64>) -> Quantity {
         let values = numbers.iter().map(|(k, v)| (k.clone(), vec![*v])).collect();
-        Quantity { keys: numbers.keys().cloned().collect(), numbers: numbers.into_values().collect(), values }
+        Quantity { keys: numbers.keys().cloned().collect(), numbers: numbers.into_values().collect(), square: false, values }
+    }
+
+    /// A column of a matrix `[R, K]` per key, the keys in any order.
+    fn columns(keys: &[String], numbers: &[f64]) -> Quantity {
+        let column = |i: usize| numbers.iter().skip(i).step_by(keys.len()).copied().collect::<Vec<f64>>();
+        let sorted: BTreeMap<&String, Vec<f64>> = keys.iter().enumerate().map(|(i, k)| (k, column(i))).collect();
+        Quantity {
+            keys: sorted.keys().map(|k| k.to_string()).collect(),
+            values: sorted.iter().map(|(k, c)| (k.to_string(), extent(c))).collect(),
+            numbers: sorted.into_values().flatten().collect(),
+            square: false,
+        }
     }
 
     /// A square matrix `[K, K]` by its keys in any order.
@@ -40,6 +55,7 @@ impl Quantity {
             keys: order.iter().map(|i| keys[*i].clone()).collect(),
             numbers: order.iter().flat_map(|i| order.iter().map(move |j| numbers[i * n + j])).collect(),
             values: (0..n).map(|i| (keys[i].clone(), vec![numbers[i * n + i]])).collect(),
+            square: true,
         }
     }
 
@@ -47,10 +63,12 @@ impl Quantity {
     pub fn hash(&self, wanted: impl Fn(&str) -> bool) -> String {
         let n = self.keys.len();
         let kept: Vec<usize> = (0..n).filter(|i| wanted(&self.keys[*i])).collect();
-        let numbers: Vec<f64> = match self.numbers.len() {
-            _ if n == 0 => self.numbers.clone(),
-            len if len == n => kept.iter().map(|i| self.numbers[*i]).collect(),
-            _ => kept.iter().flat_map(|i| kept.iter().map(move |j| self.numbers[i * n + j])).collect(),
+        let row = self.numbers.len().checked_div(n).unwrap_or(0);
+        let beside: Vec<usize> = if self.square { kept.clone() } else { (0..row).collect() };
+        let numbers: Vec<f64> = if n == 0 {
+            self.numbers.clone()
+        } else {
+            kept.iter().flat_map(|i| beside.iter().map(move |j| self.numbers[i * row + j])).collect()
         };
         let bytes = numbers.iter().flat_map(|x| x.to_bits().to_le_bytes());
         let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
@@ -82,6 +100,9 @@ pub fn measure(case: &Case, backend: Backend) -> Result<Measured, String> {
         let whose = if case.members == 1 { String::new() } else { format!(" of member {b}") };
         derivatives(&keys, adjoint, forward, &whose, &mut all);
     }
+    if backend == Backend::Cpu {
+        rows(&plan, &keys, &mut all).map_err(|e| format!("{}: {e}", case.name))?;
+    }
     if case.is_fitted() && backend == Backend::Cpu {
         let experiment = case.experiment()?;
         let fitted = experiment.fit(FitOptions { backend, ..FitOptions::default() }).map_err(wrong)?;
@@ -112,6 +133,29 @@ fn derivatives(keys: &[String], adjoint: &Evaluation, forward: &Evaluation, whos
         all.insert(format!("gradient by tangents{whose}"), by_key(&c.gradient));
         all.insert(format!("Gauss-Newton matrix{whose}"), Quantity::matrix(keys, &c.matrix));
     }
+}
+
+/// Every residual by itself, without and with its derivatives, as a diagnosis reads them.
+fn rows(plan: &Plan, keys: &[String], all: &mut Measured) -> Result<(), String> {
+    let mut rollout = Rollout::new(CpuBackend, plan, 1).map_err(|e| e.to_string())?;
+    let every: Vec<usize> = (0..keys.len()).collect();
+    for (name, along) in [("residuals", &[][..]), ("residuals with derivatives", &every)] {
+        let lin = rollout.linearise(&plan.theta, along).map_err(|e| e.to_string())?;
+        let part = |of: fn(&ResidualRow) -> f64| lin.rows.residuals.iter().map(of).collect::<Vec<f64>>();
+        // A point that meets nothing has no value; no distance is ever infinite.
+        let parts = [
+            ("value", part(|r| r.value.unwrap_or(f64::MAX))),
+            ("weight", part(|r| r.weight)),
+            ("sight", part(|r| r.along_sight)),
+        ];
+        let values =
+            parts.iter().map(|(n, x)| (n.to_string(), extent(&x.iter().map(|x| x.min(1e3)).collect::<Vec<_>>()))).collect();
+        all.insert(name.into(), Quantity::plain(parts.into_iter().flat_map(|p| p.1).collect(), values));
+        if !along.is_empty() {
+            all.insert("derivatives of residuals".into(), Quantity::columns(keys, &lin.rows.sensitivity));
+        }
+    }
+    Ok(())
 }
 
 /// u and v of the first, the middle and the last state.

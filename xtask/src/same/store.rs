@@ -218,6 +218,7 @@ mod tests {
             keys: vec!["a".into(), "e".into()],
             numbers: vec![1.0, e],
             values: [("a".into(), vec![1.0]), ("e".into(), vec![e])].into(),
+            square: false,
         };
         let part = part(&[("gradient".into(), of(2.0))].into());
         let rows = part.compare("spin", "cpu", &[("gradient".into(), of(2.002))].into());
@@ -234,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_file_is_read_as_it_was_written() {
-        let q = Quantity { keys: Vec::new(), numbers: vec![0.1], values: [("x".into(), vec![0.1, -1e-300])].into() };
+        let q = Quantity { numbers: vec![0.1], values: [("x".into(), vec![0.1, -1e-300])].into(), ..Quantity::default() };
         let store = Store { backends: [("cpu".into(), part(&[("cost".into(), q)].into()))].into() };
         let file = tempfile::NamedTempFile::new().unwrap();
         store.write(file.path()).unwrap();
