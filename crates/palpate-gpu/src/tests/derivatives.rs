@@ -10,6 +10,7 @@ use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
 use palpate_model::params::ParamKey;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
+use palpate_model::scene::Scene;
 
 /// Weights of the last displacement and velocity in the test's cost; smooth, so that no node stands out.
 fn weights(plan: &Plan) -> (Vec<DVec3>, Vec<DVec3>) {
@@ -167,20 +168,40 @@ fn every_parameter_of_a_falling_ball() {
     check(&GpuBackend::on(gpu), &plan(&ball(0.03)), 2);
 }
 
-#[test]
-fn every_parameter_of_balls_whose_modulus_and_density_vary() {
-    let Some(gpu) = device(None) else { return };
+/// A plan whose modulus varies from cell to cell and whose density from node to node.
+fn varied(mut scene: Scene) -> Plan {
     let field = |varied, basis, scale, count: usize| {
         let values = Some((0..count).map(|k| 1.0 + 0.3 * (2.0 * k as f64).sin()).collect());
         FieldSpec { varied, basis, scale, values }
     };
-    for mut scene in [ball(0.05), held(0.05)] {
-        let body = plan(&scene).body;
-        scene.fields = vec![
-            field(Varied::Modulus, Basis::Cells, Scale::Log, body.cells.len()),
-            field(Varied::Density, Basis::Nodes, Scale::Linear, body.nodes.len()),
-        ];
-        check(&GpuBackend::on(gpu.clone()), &plan(&scene), 1);
+    let body = plan(&scene).body;
+    scene.fields = vec![
+        field(Varied::Modulus, Basis::Cells, Scale::Log, body.cells.len()),
+        field(Varied::Density, Basis::Nodes, Scale::Linear, body.nodes.len()),
+    ];
+    plan(&scene)
+}
+
+#[test]
+fn every_parameter_of_a_falling_ball_of_uneven_material() {
+    let Some(gpu) = device(None) else { return };
+    check(&GpuBackend::on(gpu), &varied(ball(0.05)), 1);
+}
+
+#[test]
+fn fields_of_a_held_ball() {
+    let Some(gpu) = device(None) else { return };
+    let plan = varied(held(0.05));
+    let theta = std::slice::from_ref(&plan.theta);
+    let (adjoint, tangent) = gradients(&GpuBackend::on(gpu), &plan, theta);
+    let slopes = exact(&plan, &theta[0]);
+    let of_fields = |places: Vec<usize>| -> Vec<usize> {
+        places.into_iter().filter(|p| matches!(plan.layout.keys[*p], ParamKey::Field { .. })).collect()
+    };
+    for gradient in [&adjoint[0], &tangent[0]] {
+        assert_eq!(of_fields(wrong(gradient, &slopes)), []);
+        let scaled: Vec<f64> = gradient.iter().map(|g| 1.01 * g).collect();
+        assert!(of_fields(wrong(&scaled, &slopes)).len() > 20, "1 % is not seen");
     }
 }
 

@@ -50,7 +50,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 13] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 14] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
@@ -61,12 +61,13 @@ impl Most {
             ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
             // Once for each input, all planes together, and once for each of a plane's own numbers.
             ("pull_patch_laws", 1000 * self.pressed.max(1) + 700),
+            ("pull_patches", (9 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 40),
             ("pull_holds", 2 * (27 * self.grips + 60) + self.aging + 100),
             // Rotations by Jacobi's method at up to three states, and sums over the corners of a cell.
             ("pull_cells", 2600 + self.aging),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
             ("push_nodes", 60 + self.row + 20 * self.masses),
-            ("push_cells", 2600 + self.supports + self.aging),
+            ("push_cells", 2600 + 2 * self.supports + self.aging),
             ("push_holds", 2 * (2 * self.grips + 10 * self.grips + 60) + self.aging + 60),
         ]
     }
