@@ -2,6 +2,7 @@
 
 mod batch;
 mod effects;
+mod fields;
 mod fitting;
 mod usage;
 

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod effects;
+mod fields;
 mod gradients;
 mod measurement;
 mod rows;

@@ -390,6 +390,10 @@ impl Backend for CpuBackend {
             .iter()
             .map(|t| {
                 let mut e = t.evaluation.clone();
+                if let Some(gradient) = &t.gradient {
+                    // Frames add by every number that they depend on.
+                    e.gradient.iter_mut().zip(&gradient.wanted).filter(|(_, w)| !**w).for_each(|(g, _)| *g = 0.0);
+                }
                 if t.failed() {
                     e.cost = f64::INFINITY;
                 }

@@ -71,6 +71,7 @@ pub fn run(tiny: bool) -> Result<Report, String> {
         adapter: Some(gpu.name.clone()),
         copy: None,
         fit: Some(fit),
+        fields: None,
         lines: Vec::new(),
         left_out: Vec::new(),
     })

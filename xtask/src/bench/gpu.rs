@@ -136,6 +136,7 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
         adapter: Some(gpu.name.clone()),
         copy: Some(copy),
         fit: None,
+        fields: None,
         lines: Vec::new(),
         left_out: Vec::new(),
     };

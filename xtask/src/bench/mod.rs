@@ -1,5 +1,6 @@
 //! Time and memory of one step, forward and back, of the CPU backend: the paper's dragon, and balls and blocks of growing size.
 
+pub mod fields;
 pub mod fit;
 pub mod gpu;
 pub mod report;
@@ -52,6 +53,7 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         adapter: None,
         copy: None,
         fit: None,
+        fields: None,
         lines: Vec::new(),
         left_out: Vec::new(),
     };
@@ -87,6 +89,11 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
                 add(one(&name, &placed(shape), 0.2 / across, &[])?);
             }
         }
+    }
+    if wanted("fields") {
+        let fields = fields::run()?;
+        println!("{}", fields.text());
+        report.fields = Some(fields);
     }
     Ok(report)
 }

@@ -81,6 +81,9 @@ pub struct Report {
     /// A whole fit, if one was timed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<super::fit::Fit>,
+    /// Gradients by fields, if they were timed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fields: Option<super::fields::Fields>,
     /// Bodies.
     pub lines: Vec<Line>,
     /// What was asked for and is not among them, with the reason.
@@ -306,6 +309,7 @@ mod tests {
             adapter: Some("a device".into()),
             copy: Some(1e10),
             fit: None,
+            fields: None,
             lines,
             left_out: Vec::new(),
         }

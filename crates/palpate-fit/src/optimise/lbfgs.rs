@@ -8,8 +8,10 @@ use super::{Sample, Search, Status, Stop, line};
 use crate::dense::{dot, max_abs};
 use std::collections::VecDeque;
 
-/// Curvature pairs kept; parameters are few.
-const MEMORY: usize = 8;
+/// Curvature pairs kept where parameters are few, and of fields: beside a simulation the recursion costs nothing.
+const MEMORY: [usize; 2] = [8, 40];
+/// So many parameters are few.
+const FEW: usize = 256;
 /// First step in z, before any curvature is known.
 const FIRST: f64 = 0.3;
 
@@ -46,7 +48,7 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         let gained = at.cost - trial.cost;
         if dot(&s, &y) > 1e-12 * dot(&s, &s).sqrt() * dot(&y, &y).sqrt() {
             pairs.push_back((s.clone(), y));
-            if pairs.len() > MEMORY {
+            if pairs.len() > MEMORY[usize::from(q > FEW)] {
                 pairs.pop_front();
             }
         }

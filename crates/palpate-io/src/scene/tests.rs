@@ -2,6 +2,7 @@
 
 use super::*;
 use palpate_model::observation::ReadingKind;
+use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::FitParameter;
 
 const BASE: &str = r#"format = "scene/1"
@@ -272,4 +273,119 @@ fn errors_found_later_still_name_the_line() {
         let e = scene_error(Path::new("scene.toml"), BASE, key, "no");
         assert_eq!((e.line, e.key.as_str()), (line, key));
     }
+}
+
+fn fields(text: &str) -> Result<Vec<FieldSpec>, String> {
+    read(&format!("[[field]]\n{text}")).map(|s| s.value.fields).map_err(|e| e.to_string())
+}
+
+const REGIONS: &str = "path = \"material.youngs_modulus\"\nbasis = \"regions\"\nregions = [{ center = [0, 0, 0], radius = 0.01, value = 2 }, \
+     { center = [0.1, 0, 0], radius = 0.02 }]\n";
+
+#[test]
+fn fields_are_read_with_their_defaults() {
+    let f = fields(REGIONS).unwrap().remove(0);
+    let regions = [(0.0, 0.01, 2.0), (0.1, 0.02, 1.0)];
+    let regions = regions.map(|(x, radius, value)| Region { center: DVec3::new(x, 0.0, 0.0), radius, value });
+    assert_eq!((f.varied, f.scale, f.values), (Varied::Modulus, Scale::Log, None));
+    assert_eq!(f.basis, Basis::Regions(regions.to_vec(), Blend::Harmonic));
+    let two = "path = \"material.density\"\nbasis = \"nodes\"\nscale = \"linear\"\n[[field]]\npath = \"material.density\"\nbasis = \"cells\"\n";
+    let f = fields(two).unwrap();
+    assert_eq!((f[0].scale, &f[0].basis, &f[1].basis), (Scale::Linear, &Basis::Nodes, &Basis::Cells));
+}
+
+#[test]
+fn impossible_fields_are_refused_with_what_is_allowed() {
+    for (text, wanted) in [
+        ("basis = \"cells\"", "field.0.path: is missing"),
+        ("path = \"material.poisson_ratio\"", "allowed: \"material.youngs_modulus\", \"material.density\""),
+        ("path = \"material.density\"", "field.0.basis: is missing"),
+        ("path = \"material.density\"\nbasis = \"modes\"", "allowed: \"cells\", \"nodes\", \"regions\""),
+        ("path = \"material.density\"\nbasis = \"regions\"", "field.0.regions: is missing"),
+        ("path = \"material.density\"\nbasis = \"cells\"\nblend = \"axis\"", "field.0.blend: belongs to basis = \"regions\""),
+        ("path = \"material.density\"\nbasis = \"cells\"\nfile = \"none.npy\"", "field.0.file: there is no file"),
+        ("path = \"material.density\"\nbasis = \"cells\"\narray = \"a\"", "names an array of file, which is missing"),
+        (&format!("{REGIONS}file = \"a.npy\""), "field.0.file: belongs to basis = \"cells\" or \"nodes\""),
+        (&REGIONS.replace("value = 2", "value = 0"), "a factor must be > 0"),
+        (&REGIONS.replace("radius = 0.02", "radius = -1"), "field.0.regions.1.radius"),
+        (&REGIONS.replace("0.1", "0").replace("regions = [", "blend = \"axis\"\nregions = ["), "is that of the region before"),
+        (&format!("{REGIONS}bases = 1"), "did you mean \"basis\"?"),
+    ] {
+        let e = fields(text).expect_err(text);
+        assert!(e.contains(wanted), "{text}: {e}");
+    }
+}
+
+#[test]
+fn values_of_fields_come_from_arrays_and_grids() {
+    use crate::npy::{Array, write_npz};
+    let folder = tempfile::tempdir().unwrap();
+    let read = |text: &str| {
+        let text = format!("{BASE}[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"cells\"\n{text}");
+        parse_scene(&text, folder.path().join("scene.toml"))
+            .map(|s| s.value.fields[0].values.clone().unwrap())
+            .map_err(|e| e.to_string())
+    };
+    let array = |values: &[f64]| Array { shape: vec![values.len()], values: values.to_vec() };
+    let (good, bad) = (array(&[0.5, 2.0]), array(&[0.5, -2.0]));
+    let square = Array { shape: vec![1, 2], ..good.clone() };
+    write_npz(folder.path().join("a.npz"), &[("good", &good), ("bad", &bad), ("square", &square)]).unwrap();
+    assert_eq!(read("file = \"a.npz\"\narray = \"good\"\n").unwrap(), [0.5, 2.0]);
+    for (text, wanted) in [
+        ("file = \"a.npz\"", "holds 3 arrays"),
+        ("file = \"a.npz\"\narray = \"goood\"", "did you mean \"good\"?"),
+        ("file = \"a.npz\"\narray = \"bad\"", "value 1 is -2; a factor must be > 0"),
+        ("file = \"a.npz\"\narray = \"square\"", "has shape (1, 2); expected one axis"),
+        ("file = \"scene.txt\"", "is not an .npy, .npz or .vtu file"),
+    ] {
+        std::fs::write(folder.path().join("scene.txt"), "").unwrap();
+        let e = read(text).expect_err(text);
+        assert!(e.contains(wanted), "{text}: {e}");
+    }
+    let (points, hex) = (vec![DVec3::ZERO; 8], [0, 1, 2, 3, 4, 5, 6, 7]);
+    let cells = [("E".to_string(), vec![3.0, 4.0]), ("other".to_string(), vec![1.0, 1.0])];
+    crate::vtk::write_vtu_scalars(folder.path().join("a.vtu"), &points, &[hex, hex], &[], &cells).unwrap();
+    assert_eq!(read("file = \"a.vtu\"\narray = \"E\"\n").unwrap(), [3.0, 4.0]);
+    assert!(read("file = \"a.vtu\"\n").unwrap_err().contains("has 2 cell arrays (E, other)"));
+    assert!(read("file = \"a.vtu\"\narray = \"F\"\n").unwrap_err().contains("has no cell array \"F\""));
+}
+
+#[test]
+fn a_field_is_fitted_as_a_whole_or_value_by_value() {
+    let fit = |field: &str, parameter: &str| {
+        let text = format!("[[field]]\n{field}[fit]\n[[fit.parameter]]\n{parameter}");
+        read(&text).map(|s| s.value.fit.unwrap().parameters).map_err(|e| e.to_string())
+    };
+    let cells = "path = \"material.youngs_modulus\"\nbasis = \"cells\"\n";
+    let p = fit(cells, "path = \"field.0\"\nstart = [0.5, 2]\nbounds = [0.1, 10]\n").unwrap();
+    assert_eq!((p.len(), p[0].path.as_str(), p[0].start, p[0].bounds), (1, "field.0", (0.5, 2.0), (0.1, 10.0)));
+    let p = fit(cells, "path = \"field.0.17\"\n").unwrap();
+    assert_eq!((p[0].path.as_str(), p[0].start, p[0].bounds), ("field.0.17", (1.0, 1.0), (1e-6, 1e6)));
+    let p = fit(REGIONS, "path = \"field.0\"\nbounds = [0.1, 10]\n").unwrap();
+    let all: Vec<_> = p.iter().map(|p| (p.path.as_str(), p.start.0, p.bounds)).collect();
+    assert_eq!(all, [("field.0.0", 2.0, (0.1, 10.0)), ("field.0.1", 1.0, (0.1, 10.0))]);
+    for (field, path, wanted) in [
+        (cells, "field.1", "this scene has no [[field]] number 1"),
+        (REGIONS, "field.0.2", "field 0 has 2 regions"),
+        (cells, "field.0.x", "say \"field.0\", or \"field.0.3\" for one of its cells"),
+    ] {
+        let e = fit(field, &format!("path = \"{path}\"\n")).expect_err(path);
+        assert!(e.contains(wanted), "{path}: {e}");
+    }
+    assert!(fit(cells, "path = \"field.0\"\nbounds = [0, 10]\n").unwrap_err().contains("must be > 0"));
+}
+
+#[test]
+fn found_regions_are_written_in_place_and_files_are_named() {
+    let text = format!("{BASE}[[field]]\n{REGIONS}[[field]]\npath = \"material.density\"\nbasis = \"nodes\"\n");
+    let scene = parse_scene(&text, "some/scene.toml").unwrap().value;
+    let values = [("field.0.0".to_string(), 0.25), ("field.0.1".to_string(), 4.5), ("field.1.7".to_string(), 3.0)];
+    let written = write_scene(&text, &scene, &values, Path::new("some")).unwrap();
+    let Basis::Regions(regions, _) = parse_scene(&written, "some/model.toml").unwrap().value.fields.remove(0).basis else {
+        panic!()
+    };
+    assert_eq!(regions.iter().map(|r| r.value).collect::<Vec<_>>(), [0.25, 4.5]);
+    let named = name_field_files(&written, &scene, &[(1, "field-1.npz".into(), "values")]).unwrap();
+    assert!(named.contains("file = \"field-1.npz\"\narray = \"values\""), "{named}");
+    assert!(name_field_files(&written, &scene, &[(2, "field-2.npz".into(), "values")]).is_err());
 }
