@@ -103,7 +103,9 @@ fn hundreds_of_cells_reach_the_noise_by_either_method() {
     let cells = "\n[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"cells\"\n";
     let folder = recorded(0.0101, cells);
     let mut costs = Vec::new();
-    for (options, name) in [(&["--iterations", "20"][..], "gauss-newton-cg"), (&["--optimizer", "lbfgs", "--iterations", "250"][..], "lbfgs")] {
+    for (options, name) in
+        [(&["--iterations", "20"][..], "gauss-newton-cg"), (&["--optimizer", "lbfgs", "--iterations", "250"][..], "lbfgs")]
+    {
         let (r, text) = found(folder.path(), options);
         println!("{text}\n{}", r["runs"][0]);
         assert_eq!(r["optimizer"], name);
