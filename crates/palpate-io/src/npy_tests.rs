@@ -1,3 +1,5 @@
+//! NPY and NPZ files made by hand: every layout that is read, and what is refused.
+
 use super::*;
 
 /// The bytes of an `.npy` file of version 1.0 with this description and data.

@@ -298,7 +298,7 @@ impl Layout {
         }
         let matches = |spec: &str| spec == path || spec.strip_prefix(path).is_some_and(|r| matches!(r, ".x" | ".y" | ".z"));
         let mut found = (0..self.fields[0]).filter(|&p| matches(&self.keys[p].spec().path));
-        found.next().map_or(0..0, |first| first..found.last().unwrap_or(first) + 1)
+        found.next().map_or(0..0, |first| first..found.next_back().unwrap_or(first) + 1)
     }
 }
 
