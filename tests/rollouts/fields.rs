@@ -30,13 +30,13 @@ fn check(plan: &Plan, name: &str) {
     let places = plan.layout.resolve("field.0");
     let mut rollout = Rollout::new(CpuBackend, plan, 4).unwrap();
     let wanted = Request { gradient: Wanted::Places(places.clone().collect()), ..Request::default() };
-    let gradient = evaluate(&mut rollout, &[plan.theta.clone()], &wanted).remove(0).gradient;
+    let gradient = evaluate(&mut rollout, std::slice::from_ref(&plan.theta), &wanted).remove(0).gradient;
     let outside = (0..gradient.len()).filter(|p| !places.contains(p)).all(|p| gradient[p] == 0.0);
     let largest = gradient[places.clone()].iter().fold(0.0, |m: f64, g| m.max(g.abs()));
     assert!(outside && largest > 0.0, "{name}: zero where nothing is wanted");
     let some: Vec<usize> = places.clone().step_by(places.len().div_ceil(12)).collect();
     let request = Request { sensitivities: some.clone(), ..Request::default() };
-    let forward = evaluate(&mut rollout, &[plan.theta.clone()], &request).remove(0).curvature.unwrap().gradient;
+    let forward = evaluate(&mut rollout, std::slice::from_ref(&plan.theta), &request).remove(0).curvature.unwrap().gradient;
     let mut along: Vec<Direction> = Direction::parameters(&some);
     let mut all = vec![0.0; plan.layout.len()];
     places.clone().for_each(|p| all[p] = (0.9 * p as f64).cos());
