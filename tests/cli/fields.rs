@@ -144,7 +144,7 @@ fn a_field_that_does_not_fit_its_body_is_refused_with_its_line() {
     let array = palpate_io::npy::Array { shape: vec![3], values: vec![1.0; 3] };
     palpate_io::npy::write_npz(folder.path().join("three.npz"), &[("values", &array)]).unwrap();
     let e = refused("\n[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"cells\"\nfile = \"three.npz\"\n");
-    assert!(e.contains("scene.toml:26: field.0.file: has 3 values; the body has 32 cells"), "{e}");
+    assert!(e.contains("scene.toml:26: field.0.file: has 3 values; the body has 36 cells"), "{e}");
     let e = refused(&parts(1.0, 1.0).replace("\"axis\"", "\"harmonic\"").replace("[0.12,", "[0.32,"));
     assert!(e.contains("field.0.regions: region 1 around ") && e.contains("holds no node"), "{e}");
 }

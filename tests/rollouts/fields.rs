@@ -71,6 +71,10 @@ fn gradients_by_regions_are_those_of_differences() {
     let region = |x: f64, value| Region { center: glam::DVec3::new(x, 0.0, 0.06), radius: 0.02, value };
     for (blend, scale) in [(Blend::Harmonic, Scale::Log), (Blend::Axis, Scale::Linear)] {
         let basis = Basis::Regions(vec![region(-0.03, 0.6), region(0.03, 1.8)], blend);
-        check(&with_field(Varied::Modulus, basis, scale), &format!("{blend:?}"));
+        let plan = with_field(Varied::Modulus, basis, scale);
+        // Without depth: a point that turns away from its camera between two differences makes the cost jump.
+        let mut seen = (*plan.observation).clone();
+        seen.frames.iter_mut().for_each(|f| f.points.clear());
+        check(&Plan { observation: seen.into(), ..plan }, &format!("{blend:?}"));
     }
 }
