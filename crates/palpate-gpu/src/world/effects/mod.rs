@@ -8,7 +8,8 @@ mod rests;
 use crate::device::pipelines::shared::laws;
 use crate::device::pipelines::shared::points::{AT_CELLS, AT_CONTACT, AT_NODES, AT_SURFACE};
 use crate::device::pipelines::shared::structs::{
-    FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, MATERIAL_AT, NONE, SCALARS_AT,
+    FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, MATERIAL_AT, NONE,
+    SCALARS_AT,
 };
 use crate::device::{GpuError, Maker};
 use crate::layout::EffectSite;
