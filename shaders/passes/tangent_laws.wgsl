@@ -9,14 +9,15 @@ var<storage, read> newton: array<Newton>;
 var<storage, read_write> tangents: array<vec4<f32>>;
 var<storage, read_write> law_modes: array<vec4<f32>>;
 
-// The material's first derivatives, and its second ones along a change that is this lane's own.
-fn material_row(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>) -> Answer {
+// The material's first derivatives, and its second ones along a change that is this lane's own. What a material is softer than a linear one
+// can be more than a cut cell's matrix has: where the convex part is wanted, the cell stays linear.
+fn material_row(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, convex: bool) -> Answer {
     var r: Answer;
     for (var i = 0u; i < SCALARS; i++) {
         strain_input(s, along_scalar(i), ds);
         let v = material_beyond(number(c.m.lame.x), number(c.m.lame.y));
         r.first[i] = v.y;
-        r.bend[i] = v.w;
+        r.bend[i] = select(v.w, 0.0, convex);
     }
     return r;
 }
@@ -33,14 +34,15 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let row = min(c.number, n - 1u);
     var ds = nowhere();
     ds[row] = 1.0;
+    let convex = newton[c.member].convex != 0u;
     var r = ask(c, ENERGY_PART, fresh.s, ds);
     if material() != 0u {
-        add_answer(&r, material_row(c, fresh.s, ds));
+        add_answer(&r, material_row(c, fresh.s, ds, convex));
     }
     let loss = loss_of(c, w, old, vec2(1.0, 0.0));
     let scale = c.young * (c.mix.fresh * r.first[0] + loss.y);
     let y = c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd);
-    let half = rank_six(fresh.pose, stiffness_of(c), c.number, c.sign, scale, centred(y), newton[c.member].convex != 0u);
+    let half = rank_six(fresh.pose, stiffness_of(c), c.number, c.sign, scale, centred(y), convex);
     let turned = fresh.pose.r * half;
     let unit = c.young / volume_of(c);
     let at = mode_at(c.member, c.cell, n);

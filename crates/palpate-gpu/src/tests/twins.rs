@@ -72,6 +72,11 @@ fn laws_and_their_twins_state_the_same_constants() {
         laws += 1;
         named += constants(&law_of(&own)).len();
     }
+    for model in palpate_model::materials::ALL.iter().filter(|m| !m.is_linear) {
+        let name = model.name.replace('-', "_");
+        let own = read(&format!("crates/palpate-model/src/materials/{name}.rs"));
+        assert_eq!(differences(&name, &own, &read(&format!("shaders/materials/{name}.wgsl"))), Vec::<String>::new(), "{name}");
+    }
     println!("{laws} laws with {named} constants");
     assert!(laws >= 14 && named >= 5, "{laws} {named}");
     // Of contact the rest comes from the host.
