@@ -222,6 +222,8 @@ fn broker(
         }
         let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
         let mut stop = broken.clone().map(Stop::Broken).or(interrupted.then_some(Stop::Interrupted));
+        // Samples wait for the starts that still want products, so that they are computed together.
+        let wait = asked.iter().any(|a| matches!(a, Some(Ask::Product(..))));
         for (ask, answer) in asked.iter_mut().zip(answers) {
             let Some(Ask::Product(z, v)) = ask else { continue };
             let product = match &stop {
@@ -238,6 +240,9 @@ fn broker(
             *ask = None;
             // A start that no longer listens has ended and said so.
             let _ = answer.send(product);
+        }
+        if wait {
+            continue;
         }
         let z_of = |s: usize| match &asked[s] {
             Some(Ask::Sample(z)) => Some(z),
