@@ -10,14 +10,15 @@ use crate::residuals::ResidualSummary;
 use crate::results::fit::FitStatus;
 use crate::scatter::Excess;
 use palpate_engine::{Evaluate, Evaluation, Failure, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
-use palpate_fit::{
-    ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Slot, Tolerance,
-};
+use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
 use palpate_io::InputError;
 use palpate_model::observation::ReadingKind;
-use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
+
+mod free;
+
+pub(crate) use free::free_parameters;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -291,16 +292,6 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-/// A number or field that reaches θ: its first place with θ per unit, and how many values it has.
-fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot, usize)> {
-    let plan = experiment.plan();
-    // The mass of the body is its density times its volume on the grid.
-    let (path, factor) = if path == "material.mass" { ("material.density", 1.0 / plan.body.volume) } else { (path, 1.0) };
-    let places = plan.layout.resolve(path);
-    let key = plan.layout.keys.get(places.start).filter(|_| !places.is_empty())?;
-    Some((*key, Slot { scene, place: places.start, factor }, places.len()))
-}
-
 /// The optimiser where nobody names one: with more values than sensitivities are computed of, one that does without them.
 pub(crate) fn usual(free: &[FreeParameter], products: bool) -> Optimizer {
     match (values(free) > MOST_SENSITIVITIES, products) {
@@ -337,80 +328,6 @@ fn optimizer(asked: Option<Optimizer>, free: &[FreeParameter], backend: Backend)
             Ok((usual, (usual != Optimizer::GaussNewton).then(why)))
         }
     }
-}
-
-type Free = (Vec<FreeNumber>, Vec<FreeParameter>, Vec<String>);
-
-pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error> {
-    let (mut numbers, mut free): (Vec<FreeNumber>, Vec<FreeParameter>) = (Vec::new(), Vec::new());
-    let mut warnings = Vec::new();
-    for (scene, e) in experiments.iter().enumerate() {
-        let file = |s: usize| experiments[s].scene().path.as_path();
-        for p in specs(e).iter().flat_map(|f| &f.parameters) {
-            let (key, slot, count) = slot(e, scene, &p.path).ok_or_else(|| {
-                Error::scene(file(scene), "fit.parameter", format!("\"{}\" is not a number of this scene", p.path))
-            })?;
-            let own = p.per_scene && experiments.len() > 1;
-            let known = numbers.iter().position(|n| n.path == p.path && n.scene.is_none());
-            if let (false, Some(k)) = (own, known) {
-                let f = &mut free[k];
-                if f.bounds != p.bounds || f.start != p.start {
-                    let message = format!(
-                        "has start [{}, {}] and bounds [{}, {}], {} has [{}, {}] and [{}, {}]; a shared parameter has the same in \
-                         both, or say per_scene = true",
-                        p.start.0,
-                        p.start.1,
-                        p.bounds.0,
-                        p.bounds.1,
-                        file(f.slots[0].scene).display(),
-                        f.start.0,
-                        f.start.1,
-                        f.bounds.0,
-                        f.bounds.1
-                    );
-                    return Err(Error::scene(file(scene), &p.path, message));
-                }
-                if f.count != count {
-                    let message = format!(
-                        "has {count} values here and {} in {}; share a field between bodies of the same cells, or say per_scene = true",
-                        f.count,
-                        file(f.slots[0].scene).display()
-                    );
-                    return Err(Error::scene(file(scene), &p.path, message));
-                }
-                f.slots.push(slot);
-                continue;
-            }
-            let spec = key.spec();
-            let is_mass = p.path == "material.mass";
-            let number = FreeNumber { path: p.path.clone(), scene: own.then_some(scene) };
-            let vector = |path| FreeNumber { path, scene: number.scene }.label();
-            free.push(FreeParameter {
-                direction: key.direction().map(vector),
-                path: number.label(),
-                unit: if is_mass { "kg".into() } else { spec.unit.into() },
-                transform: spec.transform,
-                typical: spec.typical / slot.factor,
-                bounds: p.bounds,
-                start: p.start,
-                count,
-                slots: vec![slot],
-            });
-            numbers.push(number);
-        }
-    }
-    for (n, f) in numbers.iter().zip(&free).filter(|(n, _)| n.scene.is_none() && n.path.starts_with("material.")) {
-        for (s, e) in experiments.iter().enumerate() {
-            if !f.slots.iter().any(|slot| slot.scene == s) {
-                warnings.push(format!(
-                    "{} is free in another scene but keeps its own value in {}; name it in its [fit] to share it",
-                    n.path,
-                    e.scene().path.display()
-                ));
-            }
-        }
-    }
-    Ok((numbers, free, warnings))
 }
 
 /// What the recordings say of errors that do not average out. Every camera, and every marker, has its own; tracked points share one.

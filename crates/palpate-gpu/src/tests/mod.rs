@@ -15,6 +15,7 @@ mod labels;
 mod lanes;
 mod limits;
 mod loops;
+mod material_passes;
 mod materials;
 mod memory;
 mod passes;
