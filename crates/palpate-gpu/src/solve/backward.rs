@@ -22,7 +22,7 @@ pub(crate) fn step_adjoint(
     world.enter(stage);
     let mixed = world.room_to_mix(past);
     let now = mixed.as_ref().unwrap_or(past[0]);
-    let share = world.lend(2);
+    let share = world.lend(2 * mixed.iter().len() as u64);
     world.record(|r| {
         let mut s = Passes::of_stage(world, r, stage, past, now, next, tally);
         s.linearise();
@@ -140,7 +140,7 @@ pub(crate) fn step_tangent(
     let room = ColumnRoom::new(world, new.parts.len());
     let flight = &world.buffers["trial"];
     let all: Vec<_> = new.parts.iter().zip(&*new.rates).enumerate().collect();
-    let (sum, share) = (world.lend(2), world.lend(2));
+    let [sum, share] = [(); 2].map(|()| world.lend(2 * mixed.iter().len() as u64));
     // Tangents of the past states with their weights, by direction.
     let weighted = |place: usize| -> Vec<(f32, &wgpu::Buffer)> {
         stage.from.iter().zip(old).map(|(f, t)| (f.1 as f32, &t.parts[place].buffer)).collect()
