@@ -108,7 +108,11 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
         // Several past states have a weighted sum beside them; so have their adjoints and tangents.
         states: vectors(3 * (kept.max(2) + several)) + if request.gradient.any() { vectors(4 + 4 * several) } else { 0 },
         tangents: of_rates
-            + vectors((4 + 2 * several) * q as u64 + 4 * several * q.min(1) as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
+            + vectors(
+                (4 + 2 * several) * q as u64
+                    + 4 * several * q.min(1) as u64
+                    + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 },
+            ),
         largest,
     })
 }
