@@ -1,6 +1,6 @@
 //! Derivatives by what acts in cells: the modulus of each, Poisson's ratio, stiffness damping, numbers of changes in time; and what the
 //! stress-free shape gets through the cells' corners, for pull_rest.
-// use shared/corner
+// use shared/past
 // use shared/guard
 // use shared/pulls
 
@@ -23,7 +23,7 @@ fn pull_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let u1 = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
     let old = pose_of(u0, c.sign);
     let fresh = pose_of(u1, c.sign);
-    let q0 = from_rest(old.q, c.at);
+    let q0 = past_q(c, old.q);
     let q1 = from_rest(fresh.q, c.at);
     // z · ∇(y · q) is y · dq with dq the change of q along z.
     let dq0 = strain_rate(old, z, c.sign);

@@ -1,6 +1,6 @@
 //! Change of the cells' force along a direction: by the modulus of every cell, Poisson's ratio, stiffness damping and the stress-free shape;
 //! with what the passes of clamps and planes left.
-// use shared/corner
+// use shared/past
 // use shared/guard
 // use shared/rates
 // use shared/supports
@@ -19,7 +19,7 @@ fn push_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let u1 = (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz);
     let old = pose_of(u0, c.sign);
     let fresh = pose_of(u1, c.sign);
-    let q0 = from_rest(old.q, c.at);
+    let q0 = past_q(c, old.q);
     let q1 = from_rest(fresh.q, c.at);
     let matrix = matrix_at(c.m.slot, 0u, cells[c.cell].kind);
     let young = young_rate(c.m, c.member, c.cell);

@@ -2,7 +2,7 @@
 //! palpate-cpu/src/terms/elastic_cells/laws.rs and palpate-model/src/effects/cell.rs. Laws are the files of `effects/`; the build script links
 //! them with `cell_law`, which calls the one of a number, and with the sizes of the input. All laws of a plan act at once, and the material
 //! where it is not linear, as one more.
-// use shared/corner
+// use shared/past
 // use materials/all
 // use shared/effect_site
 
@@ -53,7 +53,7 @@ fn scalars() -> u32 {
 
 // Number of the plan's material, 0 where it is linear.
 fn material() -> u32 {
-    return shape.fields >> MATERIAL_AT;
+    return (shape.fields >> MATERIAL_AT) & MOST_MATERIALS;
 }
 
 // Laws of cells that the plan has.
@@ -204,10 +204,10 @@ fn mean(c: Corner, a: vec3<f32>, b: vec3<f32>) -> f32 {
     return sum8(vec3(dot(a, b), 0.0, 0.0)).x / volume_of(c);
 }
 
-fn side_at(c: Corner, u: vec3<f32>) -> Side {
+fn side_at(c: Corner, pose: Pose, q: vec3<f32>) -> Side {
     var s: Side;
-    s.pose = pose_of(u, c.sign);
-    s.q = from_rest(s.pose.q, c.at);
+    s.pose = pose;
+    s.q = q;
     s.kq = stiff(stiffness_of(c), c.number, s.q);
     s.s = strains(c, s.q);
     s.s[0] = max(0.5 * mean(c, s.q, s.kq), 0.0);
@@ -215,11 +215,13 @@ fn side_at(c: Corner, u: vec3<f32>) -> Side {
 }
 
 fn new_side(c: Corner) -> Side {
-    return side_at(c, (next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz));
+    let pose = pose_of((next[c.node].xyz - next[c.first].xyz) + (next[part(1u) + c.node].xyz - next[part(1u) + c.first].xyz), c.sign);
+    return side_at(c, pose, from_rest(pose.q, c.at));
 }
 
 fn old_side(c: Corner) -> Side {
-    return side_at(c, (now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz));
+    let pose = pose_of((now[c.node].xyz - now[c.first].xyz) + (now[part(1u) + c.node].xyz - now[part(1u) + c.first].xyz), c.sign);
+    return side_at(c, pose, past_q(c, pose.q));
 }
 
 // Σ V ∇s_k c_k at this corner: the body-frame force for E = 1 that goes with coefficients c.

@@ -208,7 +208,7 @@ fn prepare(effect: EffectSite, member: u32, m: Member, mix: Mix) {
         z[GRAVITY_AT + i] = number(m.gravity[i]);
     }
     z[STIFFNESS_AT] = number(DEFAULT_STIFFNESS * m.young / shape.h);
-    z[TIME_AT] = number(m.start + f32(call.step + call.mode) * shape.dt);
+    z[TIME_AT] = number(m.start + f32(call.mode) * shape.time);
 }
 
 fn place_point(origin: vec3<f32>, whole: vec3<f32>, rest: vec3<f32>, old_whole: vec3<f32>, old_rest: vec3<f32>, v: vec3<f32>) {

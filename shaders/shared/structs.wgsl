@@ -33,7 +33,7 @@ struct Shape { // mirrored
     quantum: f32,
     ghosts: u32,
     fields: u32,
-    pad: u32,
+    time: f32,
     contact_width: f32,
     aging_rows: u32,
     point_groups: u32,
@@ -119,6 +119,10 @@ const LAWS_AT = 12u;
 const MOST_COUNT = 255u;
 // From this bit on the number of the material, 0 where it is linear.
 const MATERIAL_AT = 20u;
+const MOST_MATERIALS = 255u;
+// Some stages start from several states; this one does: `now` is their weighted sum.
+const FIELD_MIXES = 0x40000000u;
+const FIELD_SEVERAL = 0x80000000u;
 
 // Vectors that tangent_cells keeps of a cell.
 const TANGENT_VECTORS = 30u;

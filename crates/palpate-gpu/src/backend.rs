@@ -7,7 +7,7 @@ use crate::{costs, read, solve};
 use glam::DVec3;
 use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::plan::Plan;
-use palpate_model::plan::scheme::{self, Stage};
+use palpate_model::plan::scheme::Stage;
 use std::sync::Arc;
 
 /// The GPU backend.
@@ -82,13 +82,6 @@ impl Backend for GpuBackend {
                 hint: "use --backend cpu, or a surface mesh, which is cut out of a lattice".into(),
             });
         }
-        let scheme = plan.clock.scheme;
-        if *scheme != scheme::ALL[0] {
-            return Err(BuildError {
-                message: format!("the GPU backend cannot take steps of the scheme \"{}\"", scheme.name),
-                hint: format!("use --backend cpu, or scheme = \"{}\"", scheme::ALL[0].name),
-            });
-        }
         self.world(plan, members).map_err(|e| BuildError { message: e.to_string(), hint: e.hint_for(self.alone) })
     }
 
@@ -132,7 +125,7 @@ impl Backend for GpuBackend {
     }
 
     fn step(&self, world: &mut World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
-        forward::step(world, stage.step, past[0], next, tally);
+        forward::step(world, stage, past, next, tally);
     }
 
     fn observe(&self, world: &World, k: usize, now: &State, next: &State, tally: &mut Tally) {
@@ -165,7 +158,7 @@ impl Backend for GpuBackend {
         adj_past: &mut [Adjoint],
         tally: &mut Tally,
     ) {
-        backward::step_adjoint(world, stage.step, past[0], next, adj, &adj_past[0], tally);
+        backward::step_adjoint(world, stage, past, next, adj, adj_past, tally);
     }
 
     fn start_adjoint(&self, world: &mut World, first: &State, adj: &Adjoint, tally: &mut Tally) {
@@ -190,7 +183,7 @@ impl Backend for GpuBackend {
         tangent_next: &mut Tangent,
         tally: &mut Tally,
     ) {
-        backward::step_tangent(world, stage.step, past[0], next, tangent_past[0], tangent_next, tally);
+        backward::step_tangent(world, stage, past, next, tangent_past, tangent_next, tally);
     }
 
     fn observe_tangent(

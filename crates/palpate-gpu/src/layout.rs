@@ -45,11 +45,11 @@ pub struct Shape {
     pub parameters: u32,
     /// Classes of cells that share element matrices.
     pub classes: u32,
-    /// Steps of the clock.
+    /// Stages: solves of all steps.
     pub steps: u32,
     /// Edge of a cell [m].
     pub h: f32,
-    /// Time step [s].
+    /// Length of the stage [s].
     pub dt: f32,
     /// Weight of the new state.
     pub theta: f32,
@@ -71,8 +71,8 @@ pub struct Shape {
     pub ghosts: u32,
     /// What effects change, and numbers of the laws of cells: bits of `shared/structs.wgsl`.
     pub fields: u32,
-    /// Fills up.
-    pub pad: u32,
+    /// Time of the new state since the start [s].
+    pub time: f32,
     /// Half width of contact [m].
     pub contact_width: f32,
     /// Numbers of effects that change the stiffness in time.

@@ -1,6 +1,7 @@
 //! How much device memory an evaluation takes, known before a device is asked for it: the same code that makes buffers counts them.
 
 use crate::costs;
+use crate::device::pipelines::shared::structs::FIELD_MIXES;
 use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::world::rates;
@@ -95,7 +96,8 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     space.extend(sums.iter().flat_map(|s| s.sizes(shape, &geometry.effects, b)).map(|s| s.1));
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;
     // A static start keeps a state at rest beside the first one.
-    let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 };
+    let several = u64::from(shape.fields & FIELD_MIXES != 0);
+    let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 + several };
     let all = |sizes: &[u64]| sizes.iter().map(|s| whole(*s)).sum();
     let of_rates: u64 = request.sensitivities.iter().map(|p| all(&rates::sizes(&geometry, plan, *p, b))).sum();
     // Each state is a buffer of three vectors.
@@ -103,9 +105,14 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     Ok(Memory {
         constants: all(&constants),
         work: all(&space),
-        states: vectors(3 * kept.max(2)) + if request.gradient.any() { vectors(4) } else { 0 },
+        // Several past states have a weighted sum beside them; so have their adjoints and tangents.
+        states: vectors(3 * (kept.max(2) + several)) + if request.gradient.any() { vectors(4 + 4 * several) } else { 0 },
         tangents: of_rates
-            + vectors(4 * q as u64 + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 }),
+            + vectors(
+                (4 + 2 * several) * q as u64
+                    + 4 * several * q.min(1) as u64
+                    + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 },
+            ),
         largest,
     })
 }

@@ -4,6 +4,7 @@ use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::{roster, structs};
 use crate::device::recorder::{Args, Named, Recorder, Size};
 use crate::world::{KINDS, State, Tally, World};
+use palpate_model::plan::scheme::Stage;
 
 /// Sections of the roster: all, or those at one stage.
 pub(crate) const ALL: u32 = structs::IDLE;
@@ -31,8 +32,10 @@ pub(crate) enum Per {
 pub(crate) struct Passes<'a, 'r> {
     pub(crate) world: &'a World,
     pub(crate) recorder: &'a mut Recorder<'r>,
-    /// Step number; `None` = static.
+    /// Stage number; `None` = static.
     pub(crate) step: Option<usize>,
+    /// Past states with their weights, the newest first, of a stage that starts from several.
+    pub(crate) past: Vec<(f32, &'a wgpu::Buffer)>,
     /// Names of this balance's own buffers.
     pub(crate) own: Vec<(&'static str, &'a wgpu::Buffer)>,
     /// Columns of each member that the roster lists: more than one while several are solved for at the same time.
@@ -56,7 +59,57 @@ impl<'a, 'r> Passes<'a, 'r> {
             // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
             ("probe", &world.buffers["direction"]),
         ];
-        Passes { world, recorder, step, own, columns: 1 }
+        Passes { world, recorder, step, past: Vec::new(), own, columns: 1 }
+    }
+
+    /// A stage from past states, whose weighted sum goes to `now` where they are several.
+    pub(crate) fn of_stage(
+        world: &'a World,
+        recorder: &'a mut Recorder<'r>,
+        stage: &Stage,
+        past: &[&'a State],
+        now: &'a State,
+        next: &'a State,
+        tally: &'a Tally,
+    ) -> Passes<'a, 'r> {
+        let mut s = Passes::new(world, recorder, Some(stage.number), now, next, tally);
+        if past.len() > 1 {
+            s.past = stage.from.iter().zip(past).map(|(f, state)| (f.1 as f32, &state.0.buffer)).collect();
+        }
+        s
+    }
+
+    /// Puts the weighted sum of several past states in place.
+    pub(crate) fn mix_states(&mut self) {
+        if let [(_, newer), (weight, older)] = self.past[..]
+            && let Some((_, now)) = self.own.iter().find(|b| b.0 == "now")
+        {
+            let named = [("newer", newer), ("older", older), ("mixed", *now)];
+            self.run_with(pass::MIX_STATES, ALL, Per::Node, weight.to_bits(), &named);
+        }
+    }
+
+    /// Adds up the cells' deformations in several past states.
+    pub(crate) fn mix_deformations(&mut self) {
+        if !self.past.is_empty() {
+            self.recorder.clear(&self.world.buffers["old_q"]);
+        }
+        for (weight, state) in self.past.clone() {
+            self.run_with(pass::MIX_DEFORMATIONS, ALL, Per::Cell, weight.to_bits(), &[("now", state)]);
+        }
+    }
+
+    /// Σ factor · addend → `total`, derivatives by displacements and velocities.
+    pub(crate) fn add_scaled(&mut self, parts: &[(f32, &wgpu::Buffer)], total: &wgpu::Buffer) {
+        self.recorder.clear(total);
+        for (factor, addend) in parts {
+            self.accumulate(*factor, addend, total);
+        }
+    }
+
+    /// Adds factor · addend to `total`.
+    pub(crate) fn accumulate(&mut self, factor: f32, addend: &wgpu::Buffer, total: &wgpu::Buffer) {
+        self.run_with(pass::ADD_SCALED, ALL, Per::Node, factor.to_bits(), &[("addend", addend), ("total", total)]);
     }
 
     /// One dispatch over the members of a section of the roster.

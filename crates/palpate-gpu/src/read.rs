@@ -56,7 +56,8 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
         FailureKind::NewtonStalled | FailureKind::LinearSolve if h.step == 0 => FailureKind::NoEquilibrium,
         kind => kind,
     };
-    let time = f64::from(h.step) * world.plan.clock.step;
+    let stages = world.plan.clock.stages();
+    let time = (h.step as usize).checked_sub(1).and_then(|k| stages.get(k)).map_or(0.0, |s| s.time);
     Some(Failure::new(kind, time, what).with_values(&world.plan.layout, &world.batch.theta[member]))
 }
 

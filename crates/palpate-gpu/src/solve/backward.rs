@@ -6,22 +6,70 @@ use crate::device::pipelines::shared::points::{BACK, BY_OLD};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::columns;
 use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
+use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::InitialShape;
 
-/// Adjoint of step k: adds to dJ/d(now) and to dJ/dθ.
-pub(crate) fn step_adjoint(world: &World, k: usize, now: &State, next: &State, adj: &Adjoint, adj_now: &Adjoint, tally: &Tally) {
+/// Adjoint of a stage: adds to dJ/d(past states) and to dJ/dθ.
+pub(crate) fn step_adjoint(
+    world: &World,
+    stage: &Stage,
+    past: &[&State],
+    next: &State,
+    adj: &Adjoint,
+    adj_past: &[Adjoint],
+    tally: &Tally,
+) {
+    world.enter(stage);
+    let mixed = world.room_to_mix(past);
+    let now = mixed.as_ref().unwrap_or(past[0]);
+    let share = world.lend(2 * mixed.iter().len() as u64);
     world.record(|r| {
-        let mut s = Passes::new(world, r, Some(k), now, next, tally);
+        let mut s = Passes::of_stage(world, r, stage, past, now, next, tally);
         s.linearise();
         s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
         s.solve();
         s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
-        s.couple_patches(BACK, &[]);
-        s.couple_cells(asks::TRANSPOSED, &[]);
-        s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
-        s.press_nodes(ALL, BACK, None, &adj_now.0.buffer, &[]);
+        if s.past.is_empty() {
+            s.back(&now.0.buffer, &adj.0.buffer, &adj_past[0].0.buffer);
+        }
+        // Of several past states each has its own deformation, and the weight of its share in their sum.
+        for ((weight, state), to) in s.past.clone().into_iter().zip(adj_past) {
+            s.recorder.clear(&share.buffer);
+            s.back(state, &adj.0.buffer, &share.buffer);
+            s.accumulate(weight, &share.buffer, &to.0.buffer);
+        }
         s.pull(tally);
     });
+}
+
+impl Passes<'_, '_> {
+    /// dJ/d(old state) from the solution of the adjoint's system, added to `to`; the cells' old deformation is that of `state`.
+    fn back(&mut self, state: &wgpu::Buffer, adj: &wgpu::Buffer, to: &wgpu::Buffer) {
+        self.couple_patches(BACK, &[]);
+        self.couple_cells(asks::TRANSPOSED, &[("now", state)]);
+        self.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", adj), ("adj_now", to)]);
+        self.press_nodes(ALL, BACK, None, to, &[]);
+    }
+
+    /// The weighted sum of the past states' tangents, in `sum` where they are several.
+    fn mixed_tangent<'b>(&mut self, parts: &[(f32, &'b wgpu::Buffer)], sum: &'b wgpu::Buffer) -> &'b wgpu::Buffer {
+        if let [(_, single)] = parts {
+            return single;
+        }
+        self.add_scaled(parts, sum);
+        sum
+    }
+
+    /// Adds −T du to a tangent's right-hand side, and for the first of several past states the column; the cells' old deformation is that
+    /// of `state`, `probe` holds du.
+    fn along_old(&mut self, state: &wgpu::Buffer, probe: &wgpu::Buffer, first: bool) {
+        let named = [("probe", probe)];
+        self.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &named);
+        self.couple_patches(BY_OLD, &named);
+        self.couple_cells(asks::ALONG, &[("probe", probe), ("now", state)]);
+        self.run_with(pass::SUM_OLD, ALL, Per::Node, u32::from(!first), &named);
+        self.press_nodes(ALL, BY_OLD, None, &self.world.buffers["rhs"], &named);
+    }
 }
 
 /// Adjoint of the start.
@@ -76,31 +124,51 @@ pub(crate) fn start_tangent(world: &World, first: &State, tangent: &Tangent, tal
     });
 }
 
-/// Tangent of step k.
-pub(crate) fn step_tangent(world: &World, k: usize, now: &State, next: &State, old: &Tangent, new: &Tangent, tally: &Tally) {
-    let room = ColumnRoom::new(world, old.parts.len());
+/// Tangent of a stage.
+pub(crate) fn step_tangent(
+    world: &World,
+    stage: &Stage,
+    past: &[&State],
+    next: &State,
+    old: &[&Tangent],
+    new: &Tangent,
+    tally: &Tally,
+) {
+    world.enter(stage);
+    let mixed = world.room_to_mix(past);
+    let now = mixed.as_ref().unwrap_or(past[0]);
+    let room = ColumnRoom::new(world, new.parts.len());
     let flight = &world.buffers["trial"];
-    let all: Vec<_> = old.parts.iter().zip(&new.parts).zip(&*old.rates).collect();
+    let all: Vec<_> = new.parts.iter().zip(&*new.rates).enumerate().collect();
+    let [sum, share] = [(); 2].map(|()| world.lend(2 * mixed.iter().len() as u64));
+    // Tangents of the past states with their weights, by direction.
+    let weighted = |place: usize| -> Vec<(f32, &wgpu::Buffer)> {
+        stage.from.iter().zip(old).map(|(f, t)| (f.1 as f32, &t.parts[place].buffer)).collect()
+    };
     world.record(|r| {
-        let mut s = Passes::new(world, r, Some(k), now, next, tally);
+        let mut s = Passes::of_stage(world, r, stage, past, now, next, tally);
         room.lend_to(&mut s);
         s.linearise();
         for together in all.chunks(room.columns) {
-            for (q, ((from, _), rates)) in together.iter().enumerate() {
-                let from = &from.buffer;
+            for (q, (place, (_, rates))) in together.iter().enumerate() {
+                let parts = weighted(*place);
+                let from = s.mixed_tangent(&parts, &sum.buffer);
                 s.push(rates);
                 s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
                 s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
-                s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &[("probe", from)]);
-                s.couple_patches(BY_OLD, &[("probe", from)]);
-                s.couple_cells(asks::ALONG, &[("probe", from)]);
-                s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
-                s.press_nodes(ALL, BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
+                if s.past.is_empty() {
+                    s.along_old(&now.0.buffer, from, true);
+                }
+                for (k, (part, (_, state))) in parts.iter().zip(s.past.clone()).enumerate() {
+                    s.add_scaled(&[*part], &share.buffer);
+                    s.along_old(state, &share.buffer, k == 0);
+                }
                 s.begin_column(q);
             }
             s.solve_columns(together.len());
-            for (q, ((from, to), _)) in together.iter().enumerate() {
-                let ends = [("tangent", &from.buffer), ("tangent_next", &to.buffer)];
+            for (q, (place, (to, _))) in together.iter().enumerate() {
+                let parts = weighted(*place);
+                let ends = [("tangent", s.mixed_tangent(&parts, &sum.buffer)), ("tangent_next", &to.buffer)];
                 s.run_with(pass::LAND_TANGENT, ALL, Per::Node, q as u32, &ends);
             }
         }

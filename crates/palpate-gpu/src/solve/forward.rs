@@ -5,6 +5,7 @@ use crate::device::recorder::{Args, Size};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{State, Tally, World};
 use palpate_model::plan::STATIC_ITERATIONS;
+use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::InitialShape;
 
 /// Newton iterations of a static problem: half of what the CPU allows. Every round that is allowed is recorded, whether a member takes it or
@@ -48,7 +49,12 @@ fn world_steps(world: &World) {
     }
 }
 
-/// Step k.
-pub(crate) fn step(world: &World, k: usize, now: &State, next: &mut State, tally: &mut Tally) {
-    world.record(|r| Passes::new(world, r, Some(k), now, next, tally).newton(world.plan.solver.newton_iterations));
+/// One stage.
+pub(crate) fn step(world: &World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
+    world.enter(stage);
+    let mixed = world.room_to_mix(past);
+    let now = mixed.as_ref().unwrap_or(past[0]);
+    world.record(|r| {
+        Passes::of_stage(world, r, stage, past, now, next, tally).newton(world.plan.solver.newton_iterations);
+    });
 }

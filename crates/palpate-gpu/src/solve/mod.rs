@@ -41,6 +41,7 @@ impl<'a> Passes<'a, '_> {
     /// Newton's method from free flight.
     pub(crate) fn newton(&mut self, iterations: usize) {
         self.list();
+        self.mix_states();
         self.prepare();
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.list();
@@ -119,6 +120,7 @@ impl<'a> Passes<'a, '_> {
     pub(crate) fn linearise(&mut self) {
         self.list();
         self.run(pass::PREDICT, ALL, Per::Node, 0);
+        self.mix_states();
         self.prepare();
         self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
         self.assemble(ALL);

@@ -19,6 +19,7 @@ impl Passes<'_, '_> {
         }
         // The clamps' old force; its weight is zero where it does not act.
         self.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_OLD);
+        self.mix_deformations();
         self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
         self.laws(pass::PRESS_LAWS, ALL, Per::Cell, 1, &[]);
         self.run(pass::GATHER_OLD, ALL, Per::Node, 0);

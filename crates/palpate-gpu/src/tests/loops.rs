@@ -49,6 +49,8 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("i < count; i += 256u") => most.nodes.div_ceil(32 * 256),
         () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),
         () if has("< KINDS") => KINDS as u64,
+        // H, λ and μ.
+        () if has("< MATERIAL_INPUTS") => 11,
         () if has("< INPUTS") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
         () if has("i = SCALARS; i < CELL_INPUTS") => palpate_model::effects::cell::MOST as u64,
         () if has("< CELL_INPUTS") => (palpate_model::effects::cell::ENERGY + palpate_model::effects::cell::MOST) as u64,

@@ -142,6 +142,8 @@ fn predicted_memory_is_within_a_tenth_of_what_is_made() {
     check(&gpu, &seen(&scene), 3, &all);
     scene.time.steps = 5;
     check(&gpu, &plan(&scene), 1, &Request { gradient: Wanted::All, sensitivities: Vec::new() });
+    scene.time.scheme = &palpate_model::plan::scheme::ALL[1];
+    check(&gpu, &plan(&scene), 2, &all);
     let mut held = held(0.03);
     held.time.steps = 1;
     // What effects keep per node, cell and clamp.

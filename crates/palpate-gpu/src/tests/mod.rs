@@ -21,6 +21,7 @@ mod memory;
 mod passes;
 mod products;
 pub(crate) mod scenes;
+mod schemes;
 mod sizes;
 mod twins;
 mod wgsl;

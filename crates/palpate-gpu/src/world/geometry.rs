@@ -2,7 +2,7 @@
 
 use super::effects::Effects;
 use super::limits::{LOOPS, Most, check_loops};
-use crate::device::pipelines::shared::structs::FIELD_COUPLED;
+use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
 use crate::device::{GpuError, Maker};
 use crate::layout::{Cell, Mass, Patch, Shape};
 use palpate_model::cutcells::elements::Classes;
@@ -57,7 +57,9 @@ impl Geometry {
     ) -> Result<Geometry, GpuError> {
         let effects = Effects::new(plan)?;
         let touched = !plan.planes.is_empty() || effects.on_patches();
-        let along = !plan.planes.is_empty() && palpate_model::mechanics::contact::acts_along(plan.clock.theta);
+        let stages = plan.clock.stages();
+        let along = !plan.planes.is_empty() && stages.iter().any(|s| palpate_model::mechanics::contact::acts_along(s.theta));
+        let mixes = stages.iter().any(|s| s.from.len() > 1);
         let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();
@@ -150,7 +152,7 @@ impl Geometry {
             masses: masses.len() as u32,
             parameters: plan.layout.len() as u32,
             classes: classes.parts.len() as u32,
-            steps: plan.clock.steps as u32,
+            steps: stages.len() as u32,
             h: body.grid.h as f32,
             dt: plan.clock.step as f32,
             theta: plan.clock.theta as f32,
@@ -162,8 +164,8 @@ impl Geometry {
             most: MOST_ITERATIONS as u32,
             quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
-            fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 },
-            pad: 0,
+            fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
+            time: plan.clock.step as f32,
             aging_rows: effects.aging_rows,
             point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
             rate_numbers,

@@ -31,12 +31,15 @@ pub(crate) use {
 };
 
 use crate::costs::Observer;
+use crate::device::pipelines::shared::structs::FIELD_SEVERAL;
 use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
 use crate::device::{Gpu, GpuError, Maker as _};
+use crate::layout::Shape;
 use members::Batch;
 use palpate_engine::{Direction, ParamBatch};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -164,6 +167,27 @@ impl World {
         if let Some(buffer) = self.buffers.get("shape") {
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&self.geometry.shape));
         }
+    }
+
+    /// Tells the kernels of the stage that comes next.
+    pub(crate) fn enter(&self, stage: &Stage) {
+        let base = self.geometry.shape;
+        let shape = Shape {
+            iterations: self.plan.solver.newton_iterations as u32,
+            dt: stage.length as f32,
+            theta: stage.theta as f32,
+            time: stage.time as f32,
+            fields: base.fields | if stage.from.len() > 1 { FIELD_SEVERAL } else { 0 },
+            ..base
+        };
+        if let Some(buffer) = self.buffers.get("shape") {
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&shape));
+        }
+    }
+
+    /// Room for the weighted sum of several past states; a single one needs none.
+    pub(crate) fn room_to_mix(&self, past: &[&State]) -> Option<State> {
+        (past.len() > 1).then(|| State(self.lend(3)))
     }
 
     /// Runs `record` and hands what it recorded to the device.

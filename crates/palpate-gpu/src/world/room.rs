@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 20] = [
+const WORK: [Work; 21] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -30,6 +30,7 @@ const WORK: [Work; 20] = [
     ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
     ("cell_support", |s| 8 * s.cells, VECTOR),
     ("old_stress", |s| 8 * s.cells, VECTOR),
+    ("old_q", |s| if s.fields & structs::FIELD_MIXES == 0 { 0 } else { 8 * s.cells }, VECTOR),
     ("touches", |s| 3 * s.patches, VECTOR),
     ("hold_forces", |s| 8 * s.holds, VECTOR),
 ];

@@ -51,6 +51,11 @@ pub(super) fn matrix_rows(plan: &Plan, rows: &[[usize; 2]]) -> Vec<usize> {
     (0..rows.len()).filter(|r| changes(&physics, rows[*r]) || changes(&beyond, rows[*r])).collect()
 }
 
+/// Times since the start of the start and of every stage's end [s].
+fn instants(plan: &Plan) -> Vec<f64> {
+    std::iter::once(0.0).chain(plan.clock.stages().iter().map(|s| s.time)).collect()
+}
+
 impl Effects {
     /// True when some effect acts on clamps: then every member has its own clamp matrices.
     pub(crate) fn on_clamps(&self) -> bool {
@@ -77,11 +82,10 @@ impl Effects {
         576 * self.matrix_rows.len() * holds
     }
 
-    /// Poses of a member's clamps at the start and at the end of every step, `[steps + 1][clamps]`.
+    /// Poses of a member's clamps at the start and at the end of every stage, `[stages + 1][clamps]`.
     pub(crate) fn poses(&self, plan: &Plan, physics: &Physics, out: &mut Vec<ClampPose>) {
         let grips = Grips::new(plan, physics, 0.0);
-        for k in 0..=plan.clock.steps {
-            let elapsed = k as f64 * plan.clock.step;
+        for elapsed in instants(plan) {
             let (time, now) = (physics.start + elapsed, grips.after(elapsed));
             out.extend(plan.clamps.iter().enumerate().map(|(i, clamp)| {
                 if self.on_clamps() {
@@ -93,14 +97,13 @@ impl Effects {
         }
     }
 
-    /// Derivatives of the poses, `[rows][B][steps + 1][clamps]` of [`HoldSlope`].
+    /// Derivatives of the poses, `[rows][B][stages + 1][clamps]` of [`HoldSlope`].
     pub(super) fn hold_slopes(&self, plan: &Plan, batch: &[Physics]) -> Vec<f32> {
         let mut out: Vec<HoldSlope> = Vec::new();
         for [effect, slot] in &self.grip_rows {
             for physics in batch {
                 let grips = Grips::new(plan, physics, 0.0);
-                for k in 0..=plan.clock.steps {
-                    let elapsed = k as f64 * plan.clock.step;
+                for elapsed in instants(plan) {
                     let (time, now) = (physics.start + elapsed, grips.after(elapsed));
                     out.extend((0..plan.clamps.len()).map(|i| {
                         let slope = now.pose_slope(i, time, *effect, *slot);

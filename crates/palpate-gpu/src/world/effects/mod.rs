@@ -42,7 +42,7 @@ pub(crate) struct Effects {
     grip_rows: Vec<[usize; 2]>,
     /// Those among them that change the clamps' matrices, by their row.
     matrix_rows: Vec<usize>,
-    /// Steps of the clock.
+    /// Stages: solves of all steps.
     steps: usize,
     stride: u32,
     rows: u32,
@@ -54,7 +54,7 @@ impl Effects {
     /// # Errors
     /// One of them has no place on the device.
     pub(crate) fn new(plan: &Plan) -> Result<Effects, GpuError> {
-        let mut e = Effects { steps: plan.clock.steps, ..Effects::default() };
+        let mut e = Effects { steps: plan.clock.stages().len(), ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let mut row = None;
@@ -235,9 +235,8 @@ impl Effects {
     /// Factor on the stiffness and its derivatives, `[1 + rows][B][steps + 1]`, at the start and at the instant that each step's forces
     /// are taken at.
     fn agings(&self, plan: &Plan, batch: &[Physics]) -> Vec<f32> {
-        let clock = &plan.clock;
-        let times: Vec<f64> =
-            (0..=clock.steps).map(|i| if i == 0 { 0.0 } else { (i as f64 - 1.0 + clock.theta) * clock.step }).collect();
+        let stages = plan.clock.stages();
+        let times: Vec<f64> = std::iter::once(0.0).chain(stages.iter().map(|s| s.time - (1.0 - s.theta) * s.length)).collect();
         let mut out = Vec::new();
         for physics in batch {
             out.extend(times.iter().map(|t| changes::aging(plan, physics, *t) as f32));
