@@ -184,7 +184,10 @@ fn everywhere(check: impl Fn(&At)) {
     for model in materials::ALL {
         let mut drag = Effect::absent(find("air-drag").unwrap());
         drag.values[0] = Some(5.0);
-        check_all(Plan { model, ..plan_of(tetrahedra(), vec![drag]) }, &check);
+        let mut p = Plan { model, ..plan_of(tetrahedra(), vec![drag]) };
+        // At random displacements springs as stiff as these would drown all other forces in their rounding.
+        p.clamps.iter_mut().flat_map(|c| &mut c.nodes).for_each(|n| n.1 *= 1e-6);
+        check_all(p, &check);
     }
 }
 

@@ -103,7 +103,7 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("radius = 0.05", "radius = 0.05, centre = [0, 0, 0]").contains("did you mean \"center\"?"));
     assert!(error_with("mass = 0.05", "mas = 0.05").starts_with("scene.toml:14: mass.0.mas: unknown key"));
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
-    assert!(error_with("cell_size", "zzz").contains("known: mesh, pose, cell_size, cells, shape"));
+    assert!(error_with("cell_size", "zzz").contains("known: mesh, volume_mesh, pose, cell_size, cells, shape"));
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));
 }
@@ -129,7 +129,7 @@ fn numbers_out_of_range_say_what_is_allowed() {
         ("cell_size = 0.01", "cell_size = 0.01\nmesh = \"a.obj\"", "exclude each other"),
         ("radius = 0.05", "radius = 60", "in millimetres? lengths are in metres: scale by 0.001"),
         ("density = 1000", "density = 1000\nmass = 1", "exclude each other"),
-        ("density = 1000", "model = \"neo-hookean\"\ndensity = 1000", "allowed: \"corotated-linear\""),
+        ("density = 1000", "model = \"mooney\"\ndensity = 1000", "allowed: \"corotated-linear\", \"neo-hookean\""),
         ("[time]", "[[effect]]\nkind = \"coulomb-frction\"\n[time]", "did you mean \"coulomb-friction\""),
         ("[time]", "[[effect]]\ncoefficient = 0.3\n[time]", "kind: missing"),
         ("[time]", "[[effect]]\nkind = \"coulomb-friction\"\ncoeficient = 0.3\n[time]", "did you mean \"coefficient\""),
