@@ -61,7 +61,8 @@ fn a_hanging_bar_stretches_by_its_weight() {
 
 #[test]
 fn a_spin_neither_strains_nor_brakes_a_free_body() {
-    for (scheme, close) in [("theta", 1e-3), ("tr-bdf2", 1e-3), ("bdf2", 5e-3)] {
+    // Chords instead of arcs take a part of (ωΔt)² a step from a spin, whatever the scheme; a damper that saw the turn would stop it.
+    for (scheme, close) in [("theta", 5e-3), ("tr-bdf2", 5e-3), ("bdf2", 5e-3)] {
         let mut s = column(&materials::ALL[1]);
         (s.clamps, s.gravity) = (Vec::new(), DVec3::ZERO);
         s.material.youngs_modulus = 1e7;
