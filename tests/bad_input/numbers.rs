@@ -29,7 +29,7 @@ fn bounds_that_exclude_the_start() {
 #[test]
 fn unknown_optimiser() {
     let e = scene_fault("gauss-newton", "adam", 20);
-    let known = "\"rprop\", \"gradient-descent\", \"lbfgs\", \"gauss-newton\", \"nelder-mead\"";
+    let known = "\"rprop\", \"gradient-descent\", \"lbfgs\", \"gauss-newton\", \"gauss-newton-cg\", \"nelder-mead\"";
     assert_eq!(e, format!("fit.optimizer: \"adam\" is not known; allowed: {known}"));
 }
 

@@ -259,6 +259,8 @@ pub fn step(
     for i in 0..next.u.len() {
         next.u[i] = from.u[i] + length * from.v[i] + fall;
     }
+    // Nothing that flies a thousand body lengths in a step is caught by what it may meet.
+    check(shared, next)?;
     let solver = shared.plan.solver;
     let mut effort = member.effort;
     with_matrix(member, |member, matrix| {

@@ -245,9 +245,12 @@ impl Term for PointLaws<'_> {
     }
 
     fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
-        for (a, numbers) in self.c.effects.iter().zip(&rates.physics.effects) {
+        let p = &rates.physics;
+        let planes = p.planes.iter().flatten().any(|r| *r != 0.0);
+        let inputs = planes || p.gravity != DVec3::ZERO || p.start != 0.0 || p.youngs_modulus != 0.0;
+        for (a, numbers) in self.c.effects.iter().zip(&p.effects) {
             let own = numbers.iter().any(|r| *r != 0.0);
-            if a.absent && !own {
+            if !own && (a.absent || !inputs) {
                 continue;
             }
             self.points(a, u1, |at| {
