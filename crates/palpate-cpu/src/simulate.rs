@@ -103,12 +103,12 @@ fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut Matrix) -> T
 }
 
 fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
-    if !is_finite(&s.u) || !is_finite(&s.v) {
+    let far = s.u.iter().map(|u| u.length()).fold(0.0, f64::max);
+    if !far.is_finite() || !is_finite(&s.u) || !is_finite(&s.v) {
         return Err((FailureKind::NotFinite, "displacement or velocity of a node".into()));
     }
     let body = &shared.plan.body;
     let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
-    let far = s.u.iter().map(|u| u.length()).fold(0.0, f64::max);
     if far > WORLD_SIZE * size {
         return Err((
             FailureKind::FellOut,

@@ -4,7 +4,7 @@ use super::report::{Line, Report, Times};
 use super::{BAND, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
 use crate::table;
 use glam::DVec3;
-use palpate_engine::{Backend, Direction, ParamBatch, Request};
+use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
 use palpate_gpu::{Choice, Gpu, GpuBackend, World};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -214,7 +214,8 @@ fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[us
     let steps = stages.len();
     let wait = || backend.gpu().wait().map_err(|e| e.to_string());
     let mut seconds = [Vec::new(), Vec::new(), Vec::new()];
-    let mut tally = backend.new_tally(world, &Request::default());
+    let request = Request { gradient: Wanted::All, ..Request::default() };
+    let mut tally = backend.new_tally(world, &request);
     let mut tape = vec![backend.new_state(world)];
     backend.start(world, &mut tape[0], &mut tally);
     wait()?;

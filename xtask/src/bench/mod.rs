@@ -8,7 +8,7 @@ pub mod report;
 use crate::table;
 use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
-use palpate_engine::{Backend, ParamBatch, Request};
+use palpate_engine::{Backend, ParamBatch, Request, Wanted};
 use palpate_model::effects::{self, Effect, Family};
 use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::{Layout, ParamKey};
@@ -231,7 +231,8 @@ struct Seconds {
 fn there_and_back(plan: &Plan, world: &mut World, taken: &mut Seconds) -> Option<String> {
     let backend = CpuBackend;
     backend.set_params(world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-    let mut tally = backend.new_tally(world, &Request::default());
+    let request = Request { gradient: Wanted::All, ..Request::default() };
+    let mut tally = backend.new_tally(world, &request);
     let mut now = backend.new_state(world);
     backend.start(world, &mut now, &mut tally);
     let mut tape = Vec::new();
