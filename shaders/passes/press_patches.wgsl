@@ -1,12 +1,9 @@
 //! What an effect does to every surface patch, at every plane where it is one of contact, added to `touches` of touch_patches.
 //! call.extra as of press_nodes. No effect of patches reads the old velocity, so that BACK has nothing to say of it.
 // use effects/points
+// use shared/patch_way
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
 var<storage, read> newton: array<Newton>;
 var<storage, read_write> touches: array<vec4<f32>>;
@@ -22,24 +19,15 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let what = asked_question();
     let m = members[p.member];
     let site = patches[p.item];
-    var whole = vec3(0.0);
-    var rest = vec3(0.0);
-    var old_whole = vec3(0.0);
-    var old_rest = vec3(0.0);
+    let way = patch_way(p.member, p.item, vec3(0.0), true);
     var mean = vec3(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        let a = at_node(p.member, cells[site.cell].nodes[i]);
-        let w = site.weights[i];
-        whole += w * next[a].xyz;
-        rest += w * next[part(1u) + a].xyz;
-        old_whole += w * now[a].xyz;
-        old_rest += w * now[part(1u) + a].xyz;
-        if what == BACK || what == BY_OLD {
-            mean += w * probe[a].xyz;
+    if what == BACK || what == BY_OLD {
+        for (var i = 0u; i < 8u; i++) {
+            mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
         }
     }
     prepare(effect, p.member, m, mix_of(m));
-    place_point(site.point.xyz, whole, rest, old_whole, old_rest, vec3(0.0));
+    place_point(site.point.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
     measure = number(site.point.w);
     let at = 3u * (p.member * shape.patches + p.item);
     var force = vec4(0.0);

@@ -1,11 +1,8 @@
 //! The same of an effect on patches, at every plane where it is one of contact.
 // use shared/pull_point
+// use shared/patch_way
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
 
 @compute @workgroup_size(64)
@@ -15,22 +12,13 @@ fn pull_patch_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let effect = effects[asked_effect()];
     let m = members[p.member];
     let site = patches[min(p.item, shape.patches - 1u)];
-    var whole = vec3(0.0);
-    var rest = vec3(0.0);
-    var old_whole = vec3(0.0);
-    var old_rest = vec3(0.0);
+    let way = patch_way(p.member, min(p.item, shape.patches - 1u), vec3(0.0), true);
     var mean = vec3(0.0);
     for (var i = 0u; i < 8u; i++) {
-        let a = at_node(p.member, cells[site.cell].nodes[i]);
-        let w = site.weights[i];
-        whole += w * next[a].xyz;
-        rest += w * next[part(1u) + a].xyz;
-        old_whole += w * now[a].xyz;
-        old_rest += w * now[part(1u) + a].xyz;
-        mean += w * probe[a].xyz;
+        mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
     }
     prepare(effect, p.member, m, mix_of(m));
-    place_point(site.point.xyz, whole, rest, old_whole, old_rest, vec3(0.0));
+    place_point(site.point.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
     measure = number(site.point.w);
     aim(mean);
     let at_planes = effect.site == AT_CONTACT;

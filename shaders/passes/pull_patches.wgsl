@@ -1,13 +1,10 @@
 //! Derivatives by the planes: stiffness that follows Young's modulus, height, and both angles of each.
 // use shared/mix
 // use shared/contact
+// use shared/patch_way
 // use shared/pulls
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
 // [planes][B][workgroups]: by Young's modulus, height and angles.
 var<storage, read_write> patch_sums: array<vec4<f32>>;
@@ -19,30 +16,17 @@ fn pull_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let site = patches[min(p.item, shape.patches - 1u)];
     let theta = select(1.0, shape.theta, call.mode != 0u);
     let along = acts_along(theta);
-    var whole = site.point.xyz;
-    var rest = vec3(0.0);
-    var old_whole = site.point.xyz;
-    var old_rest = vec3(0.0);
+    let way = patch_way(p.member, min(p.item, shape.patches - 1u), site.point.xyz, along);
     var z = vec3(0.0);
     for (var i = 0u; i < 8u; i++) {
-        let a = at_node(p.member, cells[site.cell].nodes[i]);
-        let w = site.weights[i];
-        whole += w * next[a].xyz;
-        rest += w * next[part(1u) + a].xyz;
-        old_whole += w * now[a].xyz;
-        old_rest += w * now[part(1u) + a].xyz;
-        z += w * probe[a].xyz;
-    }
-    if !along {
-        old_whole = whole;
-        old_rest = rest;
+        z += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
     }
     let width = shape.contact_width;
     for (var k = 0u; k < shape.planes; k++) {
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
-        let gap = (dot(n, whole) - plane.normal.w) + dot(n, rest);
-        let old_gap = (dot(n, old_whole) - plane.normal.w) + dot(n, old_rest);
+        let gap = (dot(n, way.whole) - plane.normal.w) + dot(n, way.rest);
+        let old_gap = (dot(n, way.old_whole) - plane.normal.w) + dot(n, way.old_rest);
         let s = site.point.w * plane.stiffness;
         var by = vec4(0.0);
         for (var i = 0u; i < instant_count; i++) {
@@ -53,7 +37,7 @@ fn pull_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             let law = contact_law(gap + (1.0 - at.y) * (old_gap - gap), width);
             let pressure = s * at.x * law.pressure;
             let slope = s * at.x * law.slope;
-            let place = (whole + rest) + (1.0 - at.y) * ((old_whole - whole) + (old_rest - rest));
+            let place = (way.whole + way.rest) + (1.0 - at.y) * ((way.old_whole - way.whole) + (way.old_rest - way.rest));
             by.x += pressure * plane.scales / members[p.member].young * dot(n, z);
             by.y -= slope * dot(n, z);
             by.z += slope * dot(plane.by_theta.xyz, place) * dot(n, z) + pressure * dot(plane.by_theta.xyz, z);

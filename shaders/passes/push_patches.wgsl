@@ -2,12 +2,9 @@
 //! the vector that corner forces take with the minus sign and their shape function.
 // use shared/mix
 // use shared/contact
+// use shared/patch_way
 // use shared/rates
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
 var<storage, read_write> touches: array<vec4<f32>>;
 
@@ -20,30 +17,15 @@ fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let site = patches[p.item];
     let theta = select(1.0, shape.theta, call.mode != 0u);
-    var whole = site.point.xyz;
-    var rest = vec3(0.0);
-    var old_whole = site.point.xyz;
-    var old_rest = vec3(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        let a = at_node(p.member, cells[site.cell].nodes[i]);
-        let w = site.weights[i];
-        whole += w * next[a].xyz;
-        rest += w * next[part(1u) + a].xyz;
-        old_whole += w * now[a].xyz;
-        old_rest += w * now[part(1u) + a].xyz;
-    }
-    if !acts_along(theta) {
-        old_whole = whole;
-        old_rest = rest;
-    }
+    let way = patch_way(p.member, p.item, site.point.xyz, acts_along(theta));
     let width = shape.contact_width;
     let stiffer = rates[p.member].young / members[p.member].young;
     var vector = vec3(0.0);
     for (var k = 0u; k < shape.planes; k++) {
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
-        let gap = (dot(n, whole) - plane.normal.w) + dot(n, rest);
-        let old_gap = (dot(n, old_whole) - plane.normal.w) + dot(n, old_rest);
+        let gap = (dot(n, way.whole) - plane.normal.w) + dot(n, way.rest);
+        let old_gap = (dot(n, way.old_whole) - plane.normal.w) + dot(n, way.old_rest);
         if min(gap, old_gap) >= width {
             continue;
         }
@@ -58,7 +40,7 @@ fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             let law = contact_law(gap + (1.0 - at.y) * (old_gap - gap), width);
             let pressure = s * at.x * law.pressure;
             let slope = s * at.x * law.slope;
-            let place = (whole + rest) + (1.0 - at.y) * ((old_whole - whole) + (old_rest - rest));
+            let place = (way.whole + way.rest) + (1.0 - at.y) * ((way.old_whole - way.whole) + (way.old_rest - way.rest));
             vector += (stiffer * plane.scales * pressure + slope * (dot(turned, place) - rate.x)) * n + pressure * turned;
         }
     }

@@ -2,13 +2,10 @@
 //! function, and the patch's stiffness; or what else call.extra asks for (shared/asks).
 // use shared/mix
 // use shared/contact
+// use shared/patch_way
 // use shared/asks
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> planes: array<Plane>;
 var<storage, read_write> touches: array<vec4<f32>>;
 
@@ -23,27 +20,12 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let what = call.extra;
     let theta = select(1.0, shape.theta, call.mode != 0u);
     let along = acts_along(theta);
-    var whole = site.point.xyz;
-    var rest = vec3(0.0);
-    var old_whole = site.point.xyz;
-    var old_rest = vec3(0.0);
+    let way = patch_way(p.member, p.item, site.point.xyz, along);
     var mean = vec3(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        let a = at_node(p.member, cells[site.cell].nodes[i]);
-        let w = site.weights[i];
-        whole += w * next[a].xyz;
-        rest += w * next[part(1u) + a].xyz;
-        if along {
-            old_whole += w * now[a].xyz;
-            old_rest += w * now[part(1u) + a].xyz;
+    if what == TOUCH_OLD {
+        for (var i = 0u; i < 8u; i++) {
+            mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
         }
-        if what == TOUCH_OLD {
-            mean += w * probe[a].xyz;
-        }
-    }
-    if !along {
-        old_whole = whole;
-        old_rest = rest;
     }
     let area = site.point.w;
     let width = shape.contact_width;
@@ -57,8 +39,8 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
-        let gap = (dot(n, whole) - plane.normal.w) + dot(n, rest);
-        let old_gap = (dot(n, old_whole) - plane.normal.w) + dot(n, old_rest);
+        let gap = (dot(n, way.whole) - plane.normal.w) + dot(n, way.rest);
+        let old_gap = (dot(n, way.old_whole) - plane.normal.w) + dot(n, way.old_rest);
         if min(gap, old_gap) >= width {
             continue;
         }
