@@ -2,8 +2,6 @@
 // use shared/holds
 // use shared/asks
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read_write> hold_forces: array<vec4<f32>>;
 
@@ -32,27 +30,15 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         end = 0u;
     }
     for (var instant = first; instant < end; instant++) {
-        let weight = select(mix.fresh, mix.old, instant == 1u);
-        var at = 0u;
-        if call.mode != 0u {
-            at = call.step + 1u - instant;
-        }
-        let pose = pose_at(p.member, at, site.y);
-        var u = next[a].xyz + next[part(1u) + a].xyz;
-        if instant == 1u {
-            u = now[a].xyz + now[part(1u) + a].xyz;
-        }
-        var d = deviation(pose, u, x);
-        if has_rest() {
-            d -= rests[a].xyz;
-        }
+        let h = held_at(p.member, site.y, a, x, mix, instant);
+        var d = h.deviation;
         if what == HOLD_PROBE {
-            d = transpose(pose.turn) * probe[a].xyz;
+            d = transpose(h.pose.turn) * probe[a].xyz;
         }
         let f = hold_stiff(matrix, corner, d);
-        if weight != 0.0 {
-            total += (weight * factor) * (pose.turn * f);
-            energy += 0.5 * weight * factor * dot(d, f);
+        if h.weight != 0.0 {
+            total += (h.weight * factor) * (h.pose.turn * f);
+            energy += 0.5 * h.weight * factor * dot(d, f);
         }
     }
     if p.live {

@@ -5,8 +5,6 @@
 
 // [rows][B][steps + 1][clamps].
 var<storage, read> hold_slopes: array<HoldSlope>;
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read_write> hold_forces: array<vec4<f32>>;
 // [B][clamp cells]: by the factor on the cell's modulus.
@@ -41,35 +39,22 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     var by = vec3(0.0);
     var corners = vec3(0.0);
     for (var instant = 0u; instant < 2u; instant++) {
-        let weight = select(mix.fresh, mix.old, instant == 1u);
-        var at = 0u;
-        if call.mode != 0u {
-            at = call.step + 1u - instant;
-        }
-        let pose = pose_at(p.member, at, site.y);
-        var u = next[a].xyz + next[part(1u) + a].xyz;
-        if instant == 1u {
-            u = now[a].xyz + now[part(1u) + a].xyz;
-        }
-        var d = deviation(pose, u, x);
-        if has_rest() {
-            d -= rests[a].xyz;
-        }
-        let tz = transpose(pose.turn) * z;
+        let h = held_at(p.member, site.y, a, x, mix, instant);
+        let tz = transpose(h.pose.turn) * z;
         let matrix = grip_at(m, p.member, 0u, hold);
         let kz = hold_stiff(matrix, corner, tz);
-        let kd = hold_stiff(matrix, corner, d);
-        var own = vec3(dot(kz, d), 0.0, 0.0);
+        let kd = hold_stiff(matrix, corner, h.deviation);
+        var own = vec3(dot(kz, h.deviation), 0.0, 0.0);
         if seeks(SEEK_POISSON) {
-            own.y = dot(tz, hold_stiff(grip_at(m, p.member, 1u, hold), corner, d));
+            own.y = dot(tz, hold_stiff(grip_at(m, p.member, 1u, hold), corner, h.deviation));
         }
-        let place = u + x - pose.shift.xyz;
-        own.z = along_pose(pose.turn_rate, pose.shift_rate.xyz, pose, z, kz, kd, place);
-        by += weight * own;
-        corners -= (weight * young) * kz;
+        let place = h.u + x - h.pose.shift.xyz;
+        own.z = along_pose(h.pose.turn_rate, h.pose.shift_rate.xyz, h.pose, z, kz, kd, place);
+        by += h.weight * own;
+        corners -= (h.weight * young) * kz;
         for (var row = 0u; row < poses; row++) {
-            let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + at) * shape.clamps + site.y];
-            let along = (alive * weight * young) * along_pose(slope.turn, slope.shift.xyz, pose, z, kz, kd, place);
+            let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + h.at) * shape.clamps + site.y];
+            let along = (alive * h.weight * young) * along_pose(slope.turn, slope.shift.xyz, h.pose, z, kz, kd, place);
             let sum = sum64(local, vec4(along, 0.0, 0.0, 0.0)).x;
             if local == 0u && p.live {
                 hold_sums[row_at(HOLD_ROWS + shape.aging_rows + row, p.member, hold, shape.holds, 8u)] -= sum;
@@ -78,7 +63,7 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         for (var row = 0u; row < matrices; row++) {
             // Rows of slopes follow the members' own two matrices.
             let slope = (((2u + row) * shape.members + p.member) * shape.holds + hold) * 576u;
-            let along = (alive * weight * young) * dot(tz, hold_stiff(slope, corner, d));
+            let along = (alive * h.weight * young) * dot(tz, hold_stiff(slope, corner, h.deviation));
             let sum = sum64(local, vec4(along, 0.0, 0.0, 0.0)).x;
             if local == 0u && p.live {
                 hold_sums[row_at(HOLD_ROWS + shape.aging_rows + poses + row, p.member, hold, shape.holds, 8u)] -= sum;

@@ -8,8 +8,6 @@
 var<storage, read> hold_slopes: array<HoldSlope>;
 // [B][N]
 var<storage, read> rate_rests: array<vec4<f32>>;
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> next: array<vec4<f32>>;
 var<storage, read_write> hold_forces: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -33,44 +31,31 @@ fn push_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let matrices = call.extra >> MATRICES_AT;
     var total = vec3(0.0);
     for (var instant = 0u; instant < 2u; instant++) {
-        let weight = select(mix.fresh, mix.old, instant == 1u);
-        var at = 0u;
-        if call.mode != 0u {
-            at = call.step + 1u - instant;
-        }
-        let pose = pose_at(p.member, at, site.y);
-        var turn = r.start * pose.turn_rate;
-        var shift = r.start * pose.shift_rate.xyz;
+        let h = held_at(p.member, site.y, a, x, mix, instant);
+        var turn = r.start * h.pose.turn_rate;
+        var shift = r.start * h.pose.shift_rate.xyz;
         for (var row = 0u; row < poses; row++) {
-            let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + at) * shape.clamps + site.y];
+            let slope = hold_slopes[((row * shape.members + p.member) * (shape.steps + 1u) + h.at) * shape.clamps + site.y];
             turn += rate_numbers[numbers + row] * slope.turn;
             shift += rate_numbers[numbers + row] * slope.shift.xyz;
         }
-        var u = next[a].xyz + next[part(1u) + a].xyz;
-        if instant == 1u {
-            u = now[a].xyz + now[part(1u) + a].xyz;
-        }
-        var d = deviation(pose, u, x);
-        if has_rest() {
-            d -= rests[a].xyz;
-        }
-        var rate = transpose(turn) * (u + x - pose.shift.xyz) - transpose(pose.turn) * shift;
+        var rate = transpose(turn) * (h.u + x - h.pose.shift.xyz) - transpose(h.pose.turn) * shift;
         if with_rate(WITH_RESTS) {
             rate -= rate_rests[a].xyz;
         }
         let matrix = grip_at(m, p.member, 0u, hold);
-        var g = hold_stiff(matrix, corner, change * d + young * rate);
+        var g = hold_stiff(matrix, corner, change * h.deviation + young * rate);
         if with_rate(WITH_POISSON) {
-            g += (young * r.poisson) * hold_stiff(grip_at(m, p.member, 1u, hold), corner, d);
+            g += (young * r.poisson) * hold_stiff(grip_at(m, p.member, 1u, hold), corner, h.deviation);
         }
         for (var row = 0u; row < matrices; row++) {
             // Rows of slopes follow the members' own two matrices.
             let slope = (((2u + row) * shape.members + p.member) * shape.holds + hold) * 576u;
-            g += (young * rate_numbers[numbers + poses + row]) * hold_stiff(slope, corner, d);
+            g += (young * rate_numbers[numbers + poses + row]) * hold_stiff(slope, corner, h.deviation);
         }
-        let f = pose.turn * g + turn * (young * hold_stiff(matrix, corner, d));
-        if weight != 0.0 {
-            total += weight * f;
+        let f = h.pose.turn * g + turn * (young * hold_stiff(matrix, corner, h.deviation));
+        if h.weight != 0.0 {
+            total += h.weight * f;
         }
     }
     if p.live {

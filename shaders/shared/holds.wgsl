@@ -12,6 +12,8 @@ var<storage, read> hold_elements: array<f32>;
 // [B][steps + 1][clamps]: poses at the start and at the end of every step.
 var<storage, read> poses: array<ClampPose>;
 var<storage, read> rest: array<vec4<f32>>;
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> next: array<vec4<f32>>;
 
 fn pose_at(member: u32, instant: u32, clamp_number: u32) -> ClampPose {
     return poses[(member * (shape.steps + 1u) + instant) * shape.clamps + clamp_number];
@@ -35,4 +37,34 @@ fn hold_stiff(matrix: u32, corner: u32, v: vec3<f32>) -> vec3<f32> {
 // Aᵀ(x − b) − X without cancellation.
 fn deviation(pose: ClampPose, u: vec3<f32>, x: vec3<f32>) -> vec3<f32> {
     return transpose(pose.turn) * (u - pose.shift.xyz) + transpose(pose.excess) * x;
+}
+
+// A clamp cell's corner at one instant of a step.
+struct Held {
+    // Weight in the residual, and number of the instant.
+    weight: f32,
+    at: u32,
+    pose: ClampPose,
+    // Displacement, and what it differs by from that which the clamp wants, in the clamp's frame.
+    u: vec3<f32>,
+    deviation: vec3<f32>,
+}
+
+// Instant 0 is the new state, 1 the old one; `a` is the corner's node in all members.
+fn held_at(member: u32, clamp_number: u32, a: u32, x: vec3<f32>, mix: Mix, instant: u32) -> Held {
+    var h: Held;
+    h.weight = select(mix.fresh, mix.old, instant == 1u);
+    if call.mode != 0u {
+        h.at = call.step + 1u - instant;
+    }
+    h.pose = pose_at(member, h.at, clamp_number);
+    h.u = next[a].xyz + next[part(1u) + a].xyz;
+    if instant == 1u {
+        h.u = now[a].xyz + now[part(1u) + a].xyz;
+    }
+    h.deviation = deviation(h.pose, h.u, x);
+    if has_rest() {
+        h.deviation -= rests[a].xyz;
+    }
+    return h;
 }
