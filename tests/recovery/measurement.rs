@@ -79,17 +79,7 @@ fn record_with(sensor: Sensor, scene: &Scene, markers: Vec<(String, DVec3)>, tim
 
 /// Plan of a scene compared with a recording.
 fn plan(scene: &Scene, recording: &Recording, cost: ReadingKind) -> Result<Plan, PlanError> {
-    let spec = ObservationSpec {
-        recording: "recording".into(),
-        file: "recording.toml".into(),
-        costs: vec![cost],
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    };
+    let spec = ObservationSpec::new("recording", vec![cost]);
     let (observation, rest) = recording.observation(&spec, &mut Vec::new()).unwrap();
     let scene = Scene { observation: Some(spec), ..scene.clone() };
     build_plan(&scene, observation, &rest)

@@ -10,17 +10,7 @@ use studies::real::tracks::Sighting;
 
 /// All frames of a recording compared by one cost, in the default band.
 pub fn compared(cost: ReadingKind) -> ObservationSpec {
-    ObservationSpec {
-        recording: "recording".into(),
-        file: "recording.toml".into(),
-        costs: vec![cost],
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    }
+    ObservationSpec::new("recording", vec![cost])
 }
 
 /// [`real::open`].

@@ -320,6 +320,23 @@ pub struct ObservationSpec {
     pub markers: Vec<MarkerRest>,
 }
 
+impl ObservationSpec {
+    /// Every frame and pixel of a recording, with what holds where a scene states no more.
+    pub fn new(recording: impl Into<PathBuf>, costs: Vec<ReadingKind>) -> Self {
+        ObservationSpec {
+            recording: recording.into(),
+            file: "recording.toml".into(),
+            costs,
+            band: 4.0,
+            from: f64::NEG_INFINITY,
+            to: f64::INFINITY,
+            every: 1,
+            pixel_stride: 1,
+            markers: Vec::new(),
+        }
+    }
+}
+
 /// What is to be found out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSpec {

@@ -54,17 +54,7 @@ pub fn record(truth: &Scene, watch: &Watch) -> Result<Recording, Error> {
 /// # Errors
 /// The recording does not fit the scene.
 pub fn plan(scene: &Scene, recording: &Recording, band: f64) -> Result<Plan, Error> {
-    let spec = ObservationSpec {
-        recording: "recording".into(),
-        file: "recording.toml".into(),
-        costs: vec![ReadingKind::Depth],
-        band,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    };
+    let spec = ObservationSpec { band, ..ObservationSpec::new("recording", vec![ReadingKind::Depth]) };
     let (observation, rest) = recording.observation(&spec, &mut Vec::new()).map_err(|e| Error::Input(e.to_string()))?;
     let scene = Scene { observation: Some(spec), ..scene.clone() };
     build_plan(&scene, observation, &rest).map_err(|e| Error::Input(e.to_string()))

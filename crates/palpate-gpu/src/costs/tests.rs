@@ -125,17 +125,7 @@ pub(super) fn scene(source: Analytic, h: f64) -> Scene {
     s.object.resolution = Resolution::CellSize(h);
     s.masses.clear();
     s.time.steps = 3;
-    s.observation = Some(ObservationSpec {
-        recording: "recording".into(),
-        file: "recording.toml".into(),
-        costs: vec![ReadingKind::Depth],
-        band: 2.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    });
+    s.observation = Some(ObservationSpec { band: 2.0, ..ObservationSpec::new("recording", vec![ReadingKind::Depth]) });
     s
 }
 

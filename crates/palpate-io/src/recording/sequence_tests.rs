@@ -31,17 +31,7 @@ fn read(arrays: &[(&str, &Array)], table: &str) -> Result<Recording, String> {
 }
 
 fn spec(kind: ReadingKind) -> ObservationSpec {
-    ObservationSpec {
-        recording: "r".into(),
-        file: "recording.toml".into(),
-        costs: vec![kind],
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    }
+    ObservationSpec::new("r", vec![kind])
 }
 
 /// As equal as vectors with NaN can be.

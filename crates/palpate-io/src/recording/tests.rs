@@ -62,17 +62,7 @@ fn written() -> TempDir {
 }
 
 fn spec(costs: &[ReadingKind]) -> ObservationSpec {
-    ObservationSpec {
-        recording: PathBuf::new(),
-        file: "recording.toml".into(),
-        costs: costs.to_vec(),
-        band: 4.0,
-        from: f64::NEG_INFINITY,
-        to: f64::INFINITY,
-        every: 1,
-        pixel_stride: 1,
-        markers: Vec::new(),
-    }
+    ObservationSpec::new(PathBuf::new(), costs.to_vec())
 }
 
 /// The error after one text in a file of the sample was replaced (every time it occurs).

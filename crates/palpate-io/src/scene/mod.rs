@@ -288,34 +288,28 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     let costs = t.optional_choices("cost", &kinds)?.ok_or_else(|| {
         t.missing("cost", "\"sparse-surface\", \"markers\", \"points\", \"displacements\", or an array of these")
     })?;
-    let (mut from, mut to, mut every) = (f64::NEG_INFINITY, f64::INFINITY, 1);
+    let mut spec = ObservationSpec::new(recording, costs);
     if let Some(f) = t.optional_table("frames")? {
-        from = f.optional_f64("from")?.unwrap_or(from);
-        to = f.optional_f64("to")?.unwrap_or(to);
-        every = f.optional_count("every", 1..=u64::MAX)?.unwrap_or(1) as usize;
-        if from > to {
-            return Err(f.error("to", format!("{} lies before from = {}", number(to), number(from))));
+        spec.from = f.optional_f64("from")?.unwrap_or(spec.from);
+        spec.to = f.optional_f64("to")?.unwrap_or(spec.to);
+        spec.every = f.optional_count("every", 1..=u64::MAX)?.map_or(spec.every, |n| n as usize);
+        if spec.from > spec.to {
+            return Err(f.error("to", format!("{} lies before from = {}", number(spec.to), number(spec.from))));
         }
     }
-    let mut markers: Vec<MarkerRest> = Vec::new();
     for m in t.tables("marker")? {
         let marker = marker_rest(&m)?;
-        if markers.iter().any(|o| o.name == marker.name) {
+        if spec.markers.iter().any(|o| o.name == marker.name) {
             return Err(m.error("name", format!("\"{}\" is given twice", marker.name)));
         }
-        markers.push(marker);
+        spec.markers.push(marker);
     }
-    Ok(Some(ObservationSpec {
-        recording,
-        file: t.optional_str("file")?.unwrap_or("recording.toml").to_string(),
-        costs,
-        band: t.f64_where("band", |x| x > 0.0, "is not allowed: must be > 0 (cells)")?.unwrap_or(4.0),
-        from,
-        to,
-        every,
-        pixel_stride: t.optional_count("pixel_stride", 1..=100_000)?.unwrap_or(1) as usize,
-        markers,
-    }))
+    if let Some(file) = t.optional_str("file")? {
+        spec.file = file.to_string();
+    }
+    spec.band = t.f64_where("band", |x| x > 0.0, "is not allowed: must be > 0 (cells)")?.unwrap_or(spec.band);
+    spec.pixel_stride = t.optional_count("pixel_stride", 1..=100_000)?.map_or(spec.pixel_stride, |n| n as usize);
+    Ok(Some(spec))
 }
 
 /// `name`, `position` and perhaps `surface` of a marker at rest.
