@@ -17,7 +17,8 @@ fn value(d: &Diagnosed, end: &str) -> f64 {
 }
 
 #[test]
-// Fails: the search names a gradient of density, because both starts of the point mass stop far from the mass that a fit by hand finds.
+// Fails: the race drops both starts of the point mass after laps of 2, 3 and 8 iterations, each of which begins with a new damping. A fit
+// from the first of them comes from a cost of 38.7 to 1.45 in 14 iterations, below everything that the race keeps.
 // In the quick tier `real_data::fits::loaded_beam` fits the same load on the same recording.
 #[ignore = "slow: cargo xtask test --full"]
 fn a_load_that_the_scene_does_not_know_is_a_mass_at_the_free_end() {

@@ -1,11 +1,11 @@
 //! Small dense symmetric algebra for q free parameters (row-major `[q, q]`).
 
-use faer::{Mat, Side, prelude::Solve};
+use faer::{Mat, prelude::Solve};
 
 /// Solves `a x = b`; `None` unless `a` is positive definite and the solution finite.
 pub fn solve(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let q = b.len();
-    let llt = Mat::from_fn(q, q, |i, j| a[i * q + j]).llt(Side::Lower).ok()?;
+    let llt = Mat::from_fn(q, q, |i, j| a[i * q + j]).llt(faer::Side::Lower).ok()?;
     let x = llt.solve(&Mat::from_fn(q, 1, |i, _| b[i]));
     let x: Vec<f64> = (0..q).map(|i| x[(i, 0)]).collect();
     x.iter().all(|v| v.is_finite()).then_some(x)
@@ -16,7 +16,7 @@ pub fn eigen(a: &[f64], q: usize) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
     if a.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let eigen = Mat::from_fn(q, q, |i, j| a[i * q + j]).self_adjoint_eigen(Side::Lower).ok()?;
+    let eigen = Mat::from_fn(q, q, |i, j| a[i * q + j]).self_adjoint_eigen(faer::Side::Lower).ok()?;
     let values = (0..q).map(|k| eigen.S()[k]).collect();
     let vectors = (0..q).map(|k| (0..q).map(|i| eigen.U()[(i, k)]).collect()).collect();
     Some((values, vectors))
@@ -32,18 +32,29 @@ pub fn max_abs(a: &[f64]) -> f64 {
     a.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
+/// The bound that holds an entry of a step.
+#[derive(Clone, Copy)]
+enum Side {
+    Lower,
+    Upper,
+}
+
 /// Minimises `gᵀp + ½ pᵀHp` over `lower ≤ p ≤ upper` (0 inside) for positive definite `h`: primal active set with simple
 /// bounds (Nocedal & Wright, Numerical Optimization, 2nd ed., algorithm 16.3). `None` if `h` is not positive definite.
 pub fn box_step(h: &[f64], g: &[f64], lower: &[f64], upper: &[f64]) -> Option<Vec<f64>> {
     let q = g.len();
     let mut p = vec![0.0; q];
-    let mut held = vec![false; q];
-    for i in 0..q {
-        held[i] = (g[i] > 0.0 && lower[i] >= 0.0) || (g[i] < 0.0 && upper[i] <= 0.0);
-    }
+    // The side that holds an entry is kept, not read off p: a rounded p may lie beside its bound.
+    let mut held: Vec<Option<Side>> = (0..q)
+        .map(|i| match g[i] {
+            g if g > 0.0 && lower[i] >= 0.0 => Some(Side::Lower),
+            g if g < 0.0 && upper[i] <= 0.0 => Some(Side::Upper),
+            _ => None,
+        })
+        .collect();
     // Each pass adds one bound or lowers the model; in exact arithmetic no set of bounds comes twice.
     for _ in 0..10 * q + 10 {
-        let free: Vec<usize> = (0..q).filter(|&i| !held[i]).collect();
+        let free: Vec<usize> = (0..q).filter(|&i| held[i].is_none()).collect();
         let slope = |i: usize, p: &[f64]| g[i] + dot(&h[i * q..(i + 1) * q], p);
         let sub: Vec<f64> = free.iter().flat_map(|&i| free.iter().map(move |&j| h[i * q + j])).collect();
         let rhs: Vec<f64> = free.iter().map(|&i| -slope(i, &p)).collect();
@@ -51,25 +62,29 @@ pub fn box_step(h: &[f64], g: &[f64], lower: &[f64], upper: &[f64]) -> Option<Ve
         let mut length = 1.0;
         let mut blocking = None;
         for (&i, &di) in free.iter().zip(&d) {
-            let room = if di < 0.0 { (lower[i] - p[i]) / di } else { (upper[i] - p[i]) / di };
+            let (side, bound) = if di < 0.0 { (Side::Lower, lower[i]) } else { (Side::Upper, upper[i]) };
+            let room = (bound - p[i]) / di;
             if di != 0.0 && room < length {
                 length = room.max(0.0);
-                blocking = Some(i);
+                blocking = Some((i, side, bound));
             }
         }
         for (&i, &di) in free.iter().zip(&d) {
             p[i] = (p[i] + length * di).clamp(lower[i], upper[i]);
         }
-        if let Some(i) = blocking {
-            held[i] = true;
+        if let Some((i, side, bound)) = blocking {
+            p[i] = bound;
+            held[i] = Some(side);
             continue;
         }
         // Release the bound that the model most wants to leave.
         let scale = 1e-12 * max_abs(g);
-        let pull = |i: usize, p: &[f64]| if p[i] <= lower[i] { -slope(i, p) } else { slope(i, p) };
-        let worst = (0..q).filter(|&i| held[i]).max_by(|&a, &b| pull(a, &p).total_cmp(&pull(b, &p)));
-        match worst {
-            Some(i) if pull(i, &p) > scale => held[i] = false,
+        let pull = |i: usize| match held[i]? {
+            Side::Lower => Some((i, -slope(i, &p))),
+            Side::Upper => Some((i, slope(i, &p))),
+        };
+        match (0..q).filter_map(pull).max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((i, pull)) if pull > scale => held[i] = None,
             _ => return Some(p),
         }
     }
@@ -98,6 +113,21 @@ mod tests {
             }
         }
         assert_eq!(p[0], 1.0);
+    }
+
+    /// On the way the last entry reaches its lower bound, where a rounded step may end beside it, and has to leave it again. Bounds from 0.1
+    /// to 10: some of them round one way, some the other.
+    #[test]
+    fn an_entry_leaves_a_bound_that_it_reached_on_the_way() {
+        let h = [0.32799, 0.0096074, 0.168634, 0.0096074, 0.05184, 0.000418937, 0.168634, 0.000418937, 0.1066726];
+        let g = [-0.64144, -0.18931, -0.20338];
+        for k in 1..=100 {
+            let longest = 0.1 * f64::from(k);
+            let (g, bounds) = (g.map(|g| g * longest / 1.5), ([-longest; 3], [longest; 3]));
+            let p = box_step(&h, &g, &bounds.0, &bounds.1).expect("positive definite");
+            let slope = g[2] + dot(&h[6..], &p);
+            assert!(slope.abs() < 1e-12 * longest, "{longest}: {p:?} {slope}");
+        }
     }
 
     #[test]
