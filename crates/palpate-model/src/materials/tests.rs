@@ -70,6 +70,7 @@ fn formulas_give_what_dual_numbers_give() {
     }
     check(&neo_hookean::NeoHookean);
     check(&neo_hookean_log::NeoHookeanLog);
+    check(&stable_neo_hookean::StableNeoHookean);
 }
 
 #[test]
