@@ -9,8 +9,8 @@ var<storage, read> newton: array<Newton>;
 var<storage, read_write> tangents: array<vec4<f32>>;
 var<storage, read_write> law_modes: array<vec4<f32>>;
 
-// The material's first derivatives, and its second ones along a change that is this lane's own. What a material is softer than a linear one
-// can be more than a cut cell's matrix has: where the convex part is wanted, the cell stays linear.
+// The material's first derivatives, and its second ones along a change that is this lane's own. Where the convex
+// part is wanted, the cell stays linear: what is left of its matrix without the mean strain is convex, the material need not be.
 fn material_row(c: Corner, s: array<f32, SCALARS>, ds: array<f32, SCALARS>, convex: bool) -> Answer {
     var r: Answer;
     for (var i = 0u; i < SCALARS; i++) {

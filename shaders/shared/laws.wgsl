@@ -13,6 +13,8 @@ const LOSS_PART = 1u;
 const MOST_LAWS = 16u;
 
 var<storage, read> cell_effects: array<EffectSite>;
+// Gradient weights of the corners in the mean strain of what deforms in a cell of each class.
+var<storage, read> mean_gradients: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 
@@ -193,9 +195,15 @@ fn stiffness_of(c: Corner) -> u32 {
     return matrix_at(c.m.slot, 0u, cells[c.cell].kind);
 }
 
+// The weight of this corner.
+fn mean_gradient(c: Corner) -> vec3<f32> {
+    return mean_gradients[8u * cells[c.cell].kind + c.number].xyz;
+}
+
 // Mean strain of a deformation, in places 1 to 6.
 fn strains(c: Corner, q: vec3<f32>) -> array<f32, SCALARS> {
-    let h = gradient_of(q, c.sign);
+    let g = mean_gradient(c);
+    let h = mat3x3(sum8(q * g.x), sum8(q * g.y), sum8(q * g.z));
     return array<f32, SCALARS>(0.0, h[0].x, h[1].y, h[2].z, 0.5 * (h[1].z + h[2].y), 0.5 * (h[2].x + h[0].z), 0.5 * (h[0].y + h[1].x));
 }
 
@@ -231,7 +239,7 @@ fn stress(c: Corner, side: Side, k: array<f32, SCALARS>) -> vec3<f32> {
         vec3(0.5 * k[6], k[2], 0.5 * k[4]),
         vec3(0.5 * k[5], 0.5 * k[4], k[3]),
     );
-    return k[0] * side.kq + (volume_of(c) * 0.25 / shape.h) * (sym * c.sign);
+    return k[0] * side.kq + volume_of(c) * (sym * mean_gradient(c));
 }
 
 // Change of the scalars with a change of q.

@@ -260,6 +260,45 @@ fn tangent_stiffness_is_the_derivative_of_the_residual() {
     });
 }
 
+/// What a solve falls back on where the tangent stiffness is indefinite.
+#[test]
+fn convex_tangents_have_no_negative_eigenvalue() {
+    let indefinite = std::cell::Cell::new(0);
+    everywhere(|at| {
+        // A law of cells may be softer than nothing.
+        if at.plan.layout.effects().any(|(law, _)| matches!(law.site, Site::Cells(_))) {
+            return;
+        }
+        let n = at.u1.len();
+        // Twice as far from rest as what derivatives are compared at.
+        let u1: Vec<DVec3> = at.u1.iter().map(|u| *u * 2.0).collect();
+        let [exact, convex] = [Curvature::Exact, Curvature::Convex].map(|curvature| {
+            at.with(&at.plan.theta, &at.past, |mut e| {
+                let mut matrix = crate::linear::matrix::Matrix::default();
+                if !e.residual(&u1).iter().all(|f| f.is_finite()) {
+                    return None;
+                }
+                e.tangent(&u1, curvature, &mut matrix);
+                let packed = Packed::new(&e.context.pattern.blocks, &matrix, |v| v);
+                let mut dense = faer::Mat::<f64>::zeros(3 * n, 3 * n);
+                for k in 0..3 * n {
+                    let (mut unit, mut column) = (zeros(n), zeros(n));
+                    unit[k / 3][k % 3] = 1.0;
+                    packed.multiply(&unit, &mut column);
+                    (0..3 * n).for_each(|i| dense[(i, k)] = column[i / 3][i % 3]);
+                }
+                let values = dense.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
+                Some(values[0] / values[3 * n - 1])
+            })
+        });
+        let (Some(exact), Some(convex)) = (exact, convex) else { return };
+        indefinite.set(indefinite.get() + usize::from(exact < -1e-3));
+        assert!(convex > -1e-12, "{convex} where the exact one has {exact}");
+    });
+    println!("{} of them are indefinite", indefinite.get());
+    assert!(indefinite.get() > 5);
+}
+
 #[test]
 fn derivatives_by_the_past_and_their_transposes() {
     everywhere(|at| {

@@ -173,6 +173,8 @@ impl Geometry {
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
+        let gradients: Vec<[f32; 4]> = classes.gradients.iter().flatten().map(|g| vec4(*g, 0.0)).collect();
+        buffers.insert("mean_gradients", gpu.upload("mean_gradients", &gradients)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);
         buffers.insert("rest", gpu.upload("rest", &rest)?);
         buffers.insert("mass_sites", gpu.upload("mass_sites", &masses)?);

@@ -5,6 +5,7 @@ use crate::cutcells::held::FreePart;
 use crate::mechanics::lame::{lame, lame_by_nu};
 use crate::plan::{ClampCell, Plan};
 use crate::space::body::{Body, Cell};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Nitsche's surface penalty, in units of (λ + 2μ)/h. The mean-strain traction of a full cell needs 2; a cell that is cut down
@@ -20,6 +21,8 @@ pub struct Classes {
     pub of_cell: Vec<u32>,
     /// What deforms in the cells of each class.
     pub parts: Vec<FreePart>,
+    /// Mean of the gradients of the corners' shape functions over what deforms in the cells of each class [1/m].
+    pub gradients: Vec<[DVec3; 8]>,
     /// Fraction of every cell that deforms; where none does, and the matrix is zero, the fraction inside the body.
     pub fractions: Vec<f64>,
 }
@@ -45,7 +48,8 @@ impl Classes {
                 })
             })
             .collect();
-        Classes { of_cell, parts, fractions }
+        let gradients = parts.iter().map(|part| part.mean_gradient(plan.body.grid.h)).collect();
+        Classes { of_cell, parts, gradients, fractions }
     }
 }
 
@@ -57,6 +61,7 @@ pub struct Elements {
     /// One per class of [`Classes`].
     pub matrices: Vec<CellMatrices>,
     of_cell: Vec<u32>,
+    gradients: Vec<[DVec3; 8]>,
     /// Fraction of every cell that the laws of cells act in ([`Classes::fractions`]).
     pub fractions: Vec<f64>,
     /// Per clamp and clamp cell: Nitsche's matrix and its derivative by ν.
@@ -71,13 +76,20 @@ impl Elements {
         use rayon::prelude::*;
         let matrices = classes.parts.par_iter().map(|part| cell_matrices(plan, part, nu)).collect();
         let clamps = plan.clamps.iter().map(|s| s.cells.iter().map(|c| clamp_matrices(&plan.body, c, nu)).collect()).collect();
-        let (of_cell, fractions) = (classes.of_cell.clone(), classes.fractions.clone());
-        Elements { nu, matrices, of_cell, fractions, clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
+        let (of_cell, gradients, fractions) = (classes.of_cell.clone(), classes.gradients.clone(), classes.fractions.clone());
+        Elements { nu, matrices, of_cell, gradients, fractions, clamps, shear: [lame(1.0, nu).1, lame_by_nu(1.0, nu).1] }
     }
 
     /// Matrices of cell e.
     pub fn cell(&self, e: usize) -> &CellMatrices {
         &self.matrices[self.of_cell[e] as usize]
+    }
+
+    /// Gradient weights of cell e's mean strain [1/m]. Modes that an element adds have no mean strain, so its energy is at least that of the
+    /// mean strain (Jensen's inequality), and the matrix without it is still positive semi-definite.
+    #[inline(always)]
+    pub fn gradient(&self, e: usize) -> &[DVec3; 8] {
+        &self.gradients[self.of_cell[e] as usize]
     }
 }
 
@@ -126,7 +138,7 @@ fn clamp_matrix(c: &ClampCell, h: f64, free: f64, lambda: f64, mu: f64) -> [f64;
 /// layer and for 1 Pa. The surface's mean normal stands for the surface, which never overestimates the term.
 pub fn layer_matrix(c: &ClampCell, free: f64, nu: f64) -> [Box<[f64; 576]>; 2] {
     let fade = (free / 0.1).min(1.0);
-    let normal: glam::DVec3 = c.surface_normal.iter().sum();
+    let normal: DVec3 = c.surface_normal.iter().sum();
     let area: f64 = c.surface_mass.iter().flatten().sum();
     let ((l, m), (dl, dm)) = (lame(1.0, nu), lame_by_nu(1.0, nu));
     // Rows r of the traction by corner displacements, per square root of area.

@@ -1,7 +1,7 @@
 //! Laws of a whole cell: energy and dissipation per volume as functions of a few scalars of its deformation.
 //!
 //! With q the cell's deformation without rotation (see [`crate::cutcells::corotation`]), K its matrix for E = 1, V its volume:
-//! a = ½ qᵀKq/V is the energy density over E, ε the mean strain (symmetric gradient at the cell's centre), and
+//! a = ½ qᵀKq/V is the energy density over E, ε the mean strain (symmetric gradient, averaged over the part of the cell that deforms), and
 //! d = ½ (q₁−q₀)ᵀK(q₁−q₀)/V measures the strain increment of a step. All are objective. A law adds V·E·ψ(a, ε) to the
 //! elastic energy, weighted in time like it, and V·E·φ(d, a₀) to the incremental potential, with what is not conservative
 //! taken at the old state a₀, so that all second derivatives stay symmetric.

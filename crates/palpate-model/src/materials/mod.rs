@@ -4,9 +4,10 @@
 //! A material is written for any number type in the displacement gradient H = F − I, in an order that cancels nothing: so its derivatives
 //! are exact also at strains of 1e-5 in single precision, where |F|² − 3 has lost half its digits.
 //!
-//! On cut cells a material adds to the enhanced, corotated linear element V [ψ(U − I) − ψ_lin(U − I)]
-//! with U − I the mean strain, the stretch of the gradient at the centre. Bending modes stay the linear ones, so nothing locks, and weights of
-//! cut cells that are negative do no harm. At points of stencils ψ is taken at F itself.
+//! On cut cells a material adds to the enhanced, corotated linear element V [ψ(ε) − ψ_lin(ε)] with ε the mean strain over the part of the cell
+//! that deforms, U − I where F is uniform. What ψ_lin takes away is no more than the element has
+//! ([`crate::cutcells::elements::Elements::gradient`]). Bending modes stay the linear ones, so nothing locks, and weights of cut cells that are
+//! negative do no harm. At points of stencils ψ is taken at F itself.
 
 mod corotated_linear;
 mod neo_hookean;

@@ -11,7 +11,6 @@ mod material;
 use super::{Cells, Corners, dot24 as dot, pick};
 use glam::DVec3;
 use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply};
-use palpate_model::cutcells::grid::SIGNS;
 use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
 use palpate_model::materials::Solid;
@@ -111,8 +110,8 @@ struct Local<'a> {
     young: f64,
     /// Number of scalars that any law depends on.
     n: usize,
-    /// 1/(4h): factor of the corner signs in the mean strain.
-    gradient: f64,
+    /// Gradient weights of the corners in the mean strain [1/m].
+    gradient: &'a [DVec3; 8],
     new: Side,
     old: Option<Side>,
     /// K(q₁ − q₀).
@@ -129,12 +128,12 @@ fn add(a: &mut V24, factor: f64, b: &V24) {
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [2, 0], [0, 1]];
 
 /// Gradient of mean strain component c by q.
-fn strain_row(c: usize, gradient: f64) -> V24 {
+fn strain_row(c: usize, gradient: &[DVec3; 8]) -> V24 {
     let [a, b] = PAIRS[c];
     let mut row = [0.0; 24];
     for i in 0..8 {
-        row[3 * i + a] += 0.5 * gradient * SIGNS[i][b];
-        row[3 * i + b] += 0.5 * gradient * SIGNS[i][a];
+        row[3 * i + a] += 0.5 * gradient[i][b];
+        row[3 * i + b] += 0.5 * gradient[i][a];
     }
     row
 }
@@ -246,7 +245,7 @@ impl<'a> CellLaws<'a> {
         self.rate > 0.0 && self.laws.iter().any(|l| l.law.needs(self.loss_part()) > 0)
     }
 
-    fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: f64) -> Side {
+    fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: &[DVec3; 8]) -> Side {
         let kq = multiply(k, &q);
         let mut s = [0.0; ENERGY];
         s[0] = 0.5 * dot(&q, &kq) / volume;
@@ -285,9 +284,9 @@ impl<'a> CellLaws<'a> {
         self.cells.c.elements.fractions[e] * self.cells.body().grid.h.powi(3)
     }
 
-    /// Factor of the corner signs in the mean strain [1/m].
-    fn gradient(&self) -> f64 {
-        0.25 / self.cells.body().grid.h
+    /// Gradient weights of the corners in a cell's mean strain [1/m].
+    fn gradient(&self, e: usize) -> &'a [DVec3; 8] {
+        self.cells.c.elements.gradient(e)
     }
 
     /// The past's pose and q̃, where anything sees it.
@@ -308,7 +307,7 @@ impl<'a> CellLaws<'a> {
     /// The same with at least `n` scalars.
     fn local_with(&self, n: usize, e: usize, u1: &[DVec3]) -> Local<'a> {
         let cells = &self.cells;
-        let (k, volume, gradient) = (cells.stiffness(e), self.volume(e), self.gradient());
+        let (k, volume, gradient) = (cells.stiffness(e), self.volume(e), self.gradient(e));
         let pose = cells.pose(e, u1);
         let new = self.side(k, volume, pose, pose.q, n, gradient);
         let old = self.past(e).map(|(pose, q)| self.side(k, volume, pose, q, n, gradient));
@@ -374,9 +373,9 @@ impl<'a> CellLaws<'a> {
     }
 
     /// Adds the part of the tangent of cell e that no matrix K has: Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ, world frame, blocks
-    /// (i, j ≥ i) of the symmetric 24 × 24 matrix.
-    pub(super) fn add_upper_tangent(&self, e: usize, pose: &CellPose, state: &LawState, out: &mut M24) {
-        let (volume, gradient) = (self.volume(e), self.gradient());
+    /// (i, j ≥ i) of the symmetric 24 × 24 matrix. `convex` is the factor on K [Pa] where the sum with K must be positive semi-definite.
+    pub(super) fn add_upper_tangent(&self, e: usize, pose: &CellPose, state: &LawState, convex: Option<f64>, out: &mut M24) {
+        let (volume, gradient) = (self.volume(e), self.gradient(e));
         let mut rank_one = |c: f64, a: &V24, b: &V24| {
             for i in 0..24 {
                 let s = c * a[i];
@@ -391,10 +390,11 @@ impl<'a> CellLaws<'a> {
             _ => strain_row(k - 1, gradient).map(|v| volume * v),
         };
         let first = if state.second[0].iter().any(|v| *v != 0.0) { 0 } else { 1 };
+        let second = convex.map_or(state.second, |scale| self.convex(state.second, scale / volume));
         let rows: Vec<V24> = (first..n).map(|k| flatten(&pose.force(&row(k)))).collect();
         for (k, a) in rows.iter().enumerate() {
             let mut b = [0.0; 24];
-            rows.iter().enumerate().for_each(|(l, other)| add(&mut b, state.second[first + k][first + l], other));
+            rows.iter().enumerate().for_each(|(l, other)| add(&mut b, second[first + k][first + l], other));
             rank_one(1.0, a, &b);
         }
         if state.loss.1 != 0.0 {

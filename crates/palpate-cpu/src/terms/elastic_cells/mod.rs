@@ -212,7 +212,7 @@ impl<'a> ElasticCells<'a> {
             (Some(laws), Some(state)) => {
                 let both = std::array::from_fn(|i| stress[i] + state.stress[i]);
                 pose.upper_hessian(self.cells.stiffness(e), scale + state.scale, (!convex).then_some(&both), out);
-                laws.add_upper_tangent(e, pose, state, out);
+                laws.add_upper_tangent(e, pose, state, convex.then_some(scale + state.scale), out);
             }
             _ => pose.upper_hessian(self.cells.stiffness(e), scale, (!convex).then_some(stress), out),
         }

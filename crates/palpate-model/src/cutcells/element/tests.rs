@@ -4,6 +4,7 @@ use super::enhanced::REGULARISATION;
 use super::*;
 use crate::cutcells::corotation::{V24, multiply};
 use crate::cutcells::grid::{SIGNS, shape_gradients};
+use crate::cutcells::held::FreePart;
 use crate::mechanics::lame::lame;
 use crate::mechanics::rotation::tests::Noise;
 use glam::{DMat3, DVec3};
@@ -73,6 +74,44 @@ fn energy(k: &M24, u: &V24) -> f64 {
 /// Corner values of a field given at rest positions relative to the centre.
 fn field(f: impl Fn(DVec3) -> DVec3) -> V24 {
     std::array::from_fn(|i| f(DVec3::from_array(SIGNS[i / 3]) * (0.5 * H))[i % 3])
+}
+
+/// Modes that an element adds are free of their mean, so its energy is at least that of the mean strain: what a law of the mean strain puts in
+/// the place of the linear one's takes away no more than the element has.
+#[test]
+fn a_matrix_without_the_linear_energy_of_the_mean_strain_is_positive_semi_definite() {
+    for (w, f) in cuts() {
+        let gradient = FreePart { weights: w, fraction: f }.mean_gradient(H);
+        let centre: [DVec3; 8] = std::array::from_fn(|i| DVec3::from_array(SIGNS[i]) * (0.25 / H));
+        for element in ALL {
+            for nu in [0.0, 0.3, 0.49] {
+                let m = CellMatrices::new(element, H, &w, f, nu);
+                let least = |gradient: &[DVec3; 8]| {
+                    let mut left = m.k.clone();
+                    take_mean_strain(&mut left, gradient, f * H.powi(3), lame(1.0, nu));
+                    let values = eigenvalues(&left);
+                    values[0] / eigenvalues(&m.k)[23]
+                };
+                assert!(least(&gradient) > -1e-12, "{element:?} nu {nu} fraction {f}: {}", least(&gradient));
+                // The strain at the centre of the cell is no mean of what a cut cell holds.
+                assert!(f == 1.0 || least(&centre) < -1e-3, "{element:?} nu {nu} fraction {f}: {}", least(&centre));
+            }
+        }
+    }
+}
+
+/// Subtracts V BᵀCB, with B ε the strain by the corners.
+fn take_mean_strain(k: &mut M24, gradient: &[DVec3; 8], volume: f64, (lambda, mu): (f64, f64)) {
+    for (i, g) in gradient.iter().enumerate() {
+        for (j, h) in gradient.iter().enumerate() {
+            for a in 0..3 {
+                for b in 0..3 {
+                    let same = if a == b { mu * g.dot(*h) } else { 0.0 };
+                    k[24 * (3 * i + a) + 3 * j + b] -= volume * (lambda * g[a] * h[b] + mu * g[b] * h[a] + same);
+                }
+            }
+        }
+    }
 }
 
 /// Eigenvalues in increasing order, by cyclic Jacobi rotations.

@@ -19,7 +19,28 @@ fn linear_stress([a, b]: [usize; 2], strain: f64, trace: f64, (lambda, mu): (f64
     if a == b { lambda * trace + 2.0 * mu * strain } else { 4.0 * mu * strain }
 }
 
+/// Derivative of that by another component.
+fn linear_tangent(c: usize, d: usize, (lambda, mu): (f64, f64)) -> f64 {
+    let normal = |c: usize| PAIRS[c][0] == PAIRS[c][1];
+    match (normal(c) && normal(d), c == d) {
+        (true, same) => lambda + if same { 2.0 * mu } else { 0.0 },
+        (false, true) => 4.0 * mu,
+        (false, false) => 0.0,
+    }
+}
+
 impl CellLaws<'_> {
+    /// Second derivatives by the strains such that the sum with the linear material's, `scale` times those for E = 1, has no negative
+    /// eigenvalue. That much of the mean strain's energy is in K, so the cell's tangent then has none either.
+    pub(super) fn convex(&self, second: [[f64; ENERGY]; ENERGY], scale: f64) -> [[f64; ENERGY]; ENERGY] {
+        let linear = |c: usize, d: usize| scale * linear_tangent(c, d, self.lame[0]);
+        let mut sum: [[f64; 6]; 6] = std::array::from_fn(|c| std::array::from_fn(|d| second[1 + c][1 + d] + linear(c, d)));
+        crate::linear::dense::without_negative_eigenvalues(&mut sum);
+        let mut out = second;
+        (0..6).for_each(|c| (0..6).for_each(|d| out[1 + c][1 + d] = sum[c][d] - linear(c, d)));
+        out
+    }
+
     /// Adds the material's energy density over E beyond the linear one's, with its derivatives, by the mean strain in `s`.
     pub(super) fn add_material(&self, law: &dyn Solid, s: &[f64; ENERGY], slopes: &mut Slopes) {
         let (lambda, mu) = self.lame[0];
@@ -31,11 +52,7 @@ impl CellLaws<'_> {
             let (own, linear) = (entries(*pair), linear_stress(*pair, s[1 + c], trace, (lambda, mu)));
             slopes.first[1 + c] += own.clone().map(|k| stress[k]).sum::<f64>() - linear;
             for (d, other) in PAIRS.iter().enumerate() {
-                let of_linear = match (pair[0] == pair[1], other[0] == other[1]) {
-                    (true, true) => lambda + if c == d { 2.0 * mu } else { 0.0 },
-                    _ if c == d => 4.0 * mu,
-                    _ => 0.0,
-                };
+                let of_linear = linear_tangent(c, d, (lambda, mu));
                 let both = own.clone().flat_map(|a| entries(*other).map(move |b| (a, b)));
                 slopes.second[1 + c][1 + d] += both.map(|(a, b)| tangent[a][b]).sum::<f64>() - of_linear;
             }
