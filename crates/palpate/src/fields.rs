@@ -172,6 +172,6 @@ fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Re
             out.push((name.to_string(), number));
         }
     }
-    let hexes: Vec<[u32; 8]> = plan.body.cells.iter().map(|c| c.nodes).collect();
+    let hexes: Vec<[u32; 8]> = plan.body.cells().iter().map(|c| c.nodes).collect();
     Ok(write_vtu_scalars(path, &plan.body.nodes, &hexes, &nodes, &cells)?)
 }

@@ -262,7 +262,7 @@ impl<'a> Equation<'a> {
             terms.push(Box::new(ElasticPoints::new(context)));
             terms.push(Box::new(HeldNodes { c: context }));
         }
-        if !context.plan.body.ghosts.is_empty() {
+        if !context.plan.body.ghosts().is_empty() {
             terms.push(Box::new(Ghost { c: context }));
         }
         if !context.plan.clamps.is_empty() {

@@ -70,7 +70,7 @@ impl Pattern {
         let n = body.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
         let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
-        for (e, cell) in body.cells.iter().enumerate() {
+        for (e, cell) in body.cells().iter().enumerate() {
             for (i, &a) in cell.nodes.iter().enumerate() {
                 neighbours[a as usize].extend_from_slice(&cell.nodes);
                 cells[a as usize].push((e as u32, i as u8));
@@ -79,7 +79,7 @@ impl Pattern {
         for nodes in body.points.stencils.iter().map(|s| s.nodes) {
             nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(nodes));
         }
-        for ghost in &body.ghosts {
+        for ghost in body.ghosts() {
             for a in ghost.nodes {
                 neighbours[a as usize].extend_from_slice(&ghost.nodes);
             }
@@ -132,7 +132,7 @@ impl Places {
     /// Looks every place up once.
     pub fn new(plan: &Plan, pattern: &Pattern) -> Places {
         Places {
-            cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
+            cells: plan.body.cells().iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
             ghosts: ghosts(&plan.body, pattern),
             points: Squares::new(pattern, &plan.body.points.stencils),
             patches: Squares::new(pattern, &plan.body.surface),
@@ -169,7 +169,7 @@ impl Squares {
 fn ghosts(body: &Body, pattern: &Pattern) -> Vec<(u32, f64)> {
     const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
     let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
-    for line in &body.ghosts {
+    for line in body.ghosts() {
         for (i, a) in line.nodes.iter().enumerate() {
             for (j, b) in line.nodes.iter().enumerate() {
                 *sums.entry(pattern.blocks.find(*a, *b) as u32).or_default() += line.weight * STENCIL[i] * STENCIL[j];

@@ -122,7 +122,7 @@ impl Writer<'_> {
                 Format::Vtu => {
                     let body = &self.experiment.plan().body;
                     let points: Vec<DVec3> = body.nodes.iter().zip(&state.displacement).map(|(x, u)| *x + *u).collect();
-                    let fractions: Vec<f64> = body.cells.iter().map(|c| c.fraction).collect();
+                    let fractions: Vec<f64> = body.cells().iter().map(|c| c.fraction).collect();
                     palpate_io::write_vtu(
                         file,
                         &points,
@@ -159,7 +159,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     make_folder(&folder)?;
     let clock = Instant::now();
     let plan = experiment.plan();
-    let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+    let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
 
     // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
@@ -192,7 +192,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     }
     let mut writer = Writer {
         camera: camera(&experiment, &extent),
-        hexes: plan.body.cells.iter().map(|c| c.nodes).collect(),
+        hexes: plan.body.cells().iter().map(|c| c.nodes).collect(),
         experiment: &experiment,
         folder: folder.clone(),
         formats,

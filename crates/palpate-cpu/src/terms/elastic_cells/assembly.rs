@@ -46,7 +46,7 @@ fn fill(term: &ElasticCells, curvature: Curvature, part: usize, values: &mut [DM
     let mut spill: Spill = vec![Vec::new(); pattern.parts.len()];
     let mut h = [0.0; 576];
     values.fill(DMat3::ZERO);
-    for (e, cell) in c.plan.body.cells.iter().enumerate() {
+    for (e, cell) in c.plan.body.cells().iter().enumerate() {
         if !rows.contains(&(cell.nodes[0] as usize)) {
             continue;
         }
