@@ -6,7 +6,7 @@
 //!
 //! Clamps are weighted in time like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
-use super::elastic_cells::assembly::block;
+use super::elastic_cells::blocks::block;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;

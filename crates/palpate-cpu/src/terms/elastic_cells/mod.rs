@@ -5,16 +5,18 @@
 //! `E [θ ½ q₁ᵀKq₁ + (β/2ℓ) (q₁−q̃)ᵀK(q₁−q̃)] + (1−θ) f(x₀)·x₁`, q̃ = Σ w q(x_past),
 //! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
 
-pub mod assembly;
 mod before;
+pub mod blocks;
 mod derivatives;
 pub mod laws;
 
+use super::assembly::assemble;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, Weights, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::simd::wide;
 use crate::linear::vector::Nodes;
 use before::Before;
+use blocks::Tangents;
 use faer::{Mat, Side};
 use glam::DVec3;
 use laws::{CellLaws, LawState};
@@ -276,7 +278,7 @@ impl Term for ElasticCells<'_> {
     }
 
     fn tangent(&self, _u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
-        assembly::assemble(self, curvature, matrix);
+        assemble(&Tangents { term: self, curvature }, self.cells.c.pattern, matrix);
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
