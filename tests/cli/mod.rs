@@ -4,6 +4,7 @@ mod batch;
 mod effects;
 mod fields;
 mod fitting;
+mod tets;
 mod usage;
 
 use support::command::{arg, succeed};

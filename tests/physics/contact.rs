@@ -24,7 +24,7 @@ fn contact_force_of_a_resting_body_is_its_weight() {
         let plane = PlaneNow {
             normal: [DVec3::Z; 3],
             height: 0.0,
-            stiffness: contact::DEFAULT_STIFFNESS * 5000.0 / plan.body.grid.h,
+            stiffness: contact::DEFAULT_STIFFNESS * 5000.0 / plan.body.length,
             scales: true,
         };
         // At rest both states of a step are the same.

@@ -1,6 +1,6 @@
 //! The same answer whatever the solver, the number of threads and the company in a batch.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::observation::{Channel, Frame, Observation, ObservedDisplacement, ReadingKind};
@@ -27,6 +27,23 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
     });
     let noise = Observation { channels: vec![Channel::new(ReadingKind::Displacement, 1e-3)], ..Observation::default() };
     build_plan(&s, Observation { frames: frames.to_vec(), ..noise }, &[]).unwrap()
+}
+
+/// The same of a brick of 2646 tetrahedra that flies and spins.
+fn plan_of_tets() -> Plan {
+    let mut s = scenes::body(Analytic::Ball { radius: 0.01, center: DVec3::ZERO }, 0.01);
+    s.object =
+        Object { source: support::tets::bar(0.01, [9, 7, 7]), pose: DAffine3::from_rotation_x(0.3), resolution: Resolution::Own };
+    s.initial.angular_velocity = DVec3::new(0.0, 3.0, 0.0);
+    s.material.stiffness_damping = 0.002;
+    s.time = Time { step: 0.01, steps: 2, start: 0.0, theta: 0.6, ..Time::default() };
+    let nodes = scenes::plan(&s).body.nodes.len();
+    // Several parts of rows, several tasks of points and of nodes.
+    assert!(nodes > 600, "{nodes}");
+    let displacements = ObservedDisplacement::of_all(vec![DVec3::new(0.0, 0.0, -0.01); nodes]);
+    let frames = vec![Frame { time: 0.015, displacements, ..Frame::default() }];
+    let channels = vec![Channel::new(ReadingKind::Displacement, 1e-3)];
+    build_plan(&s, Observation { frames, channels, ..Observation::default() }, &[]).unwrap()
 }
 
 fn request() -> Request {
@@ -67,16 +84,17 @@ fn direct_and_iterative_solvers_agree() {
 
 #[test]
 fn same_bits_on_any_number_of_threads_and_in_any_batch() {
-    let plan = plan(LinearSolver::Auto, 0.06);
-    let rows = rows(&plan);
-    let pool = |threads: usize| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| evaluate(&plan, &rows, 3))
-    };
-    let one = pool(1);
-    assert!(one.iter().all(|e| e.failure.is_none()));
-    assert_eq!(one, pool(3));
-    let alone: Vec<Evaluation> = rows.iter().map(|r| evaluate(&plan, std::slice::from_ref(r), 1).remove(0)).collect();
-    assert_eq!(one, alone);
+    for plan in [plan(LinearSolver::Auto, 0.06), plan_of_tets()] {
+        let rows = rows(&plan);
+        let pool = |threads: usize| {
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| evaluate(&plan, &rows, 3))
+        };
+        let one = pool(1);
+        assert!(one.iter().all(|e| e.failure.is_none()));
+        assert_eq!(one, pool(3));
+        let alone: Vec<Evaluation> = rows.iter().map(|r| evaluate(&plan, std::slice::from_ref(r), 1).remove(0)).collect();
+        assert_eq!(one, alone);
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@
 use glam::{DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, ResidualRow, Rollout, Wanted};
+use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{
     Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker, ObservedPoint, ReadingKind,
@@ -13,7 +14,6 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
-use palpate_model::space::body::SUBDIVISIONS;
 use support::scenes;
 
 pub(super) fn ball() -> Scene {
@@ -97,7 +97,7 @@ fn away_from_kinks(plan: Plan) -> Plan {
     let body = &plan.body;
     let rows = Rollout::new(CpuBackend, &plan, 1).unwrap().linearise(&plan.theta, &[0]).unwrap().rows.residuals;
     let far = |rest: DVec3| {
-        let place = (rest - body.grid.position([0; 3])) * (SUBDIVISIONS as f64 / body.grid.h);
+        let place = (rest - body.cut().grid.position([0; 3])) * (SUBDIVISIONS as f64 / body.length);
         (place - place.round()).abs().min_element() > 0.02
     };
     let mut observation = (*plan.observation).clone();

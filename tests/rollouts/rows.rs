@@ -59,7 +59,7 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
         for i in 0..rows.len() {
             if let (Some(x), Some(y)) = (plus[i].value, minus[i].value) {
                 // A point on the edge of two band cells may change sides, where the distance has a kink.
-                if plus[i].rest.distance(minus[i].rest) < 1e-3 * plan.body.grid.h {
+                if plus[i].rest.distance(minus[i].rest) < 1e-3 * plan.body.length {
                     worst = worst.max(((x - y) / (2.0 * step) - lin.rows.sensitivity[i * q + a]).abs());
                 }
             }

@@ -9,12 +9,12 @@ use palpate_model::scene::Scene;
 /// Elastic energy of cells and ghost penalty at displacement u [J]; clamps are left out.
 pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
     let body = &plan.body;
-    let h = body.grid.h;
+    let h = body.length;
     let (mut k, mut k_nu) = (Box::new([0.0; 576]), Box::new([0.0; 576]));
     let mut last: Option<[f64; 27]> = None;
     let shear = scene.material.youngs_modulus / (2.0 * (1.0 + scene.material.poisson_ratio));
     let ghost: f64 = body
-        .ghosts
+        .ghosts()
         .iter()
         .map(|g| {
             let [a, b, c] = g.nodes.map(|n| u[n as usize]);
@@ -22,7 +22,7 @@ pub fn elastic(plan: &Plan, scene: &Scene, u: &[DVec3]) -> f64 {
         })
         .sum();
     let cells: f64 = body
-        .cells
+        .cells()
         .iter()
         .map(|cell| {
             if last != Some(cell.weights) {

@@ -8,3 +8,4 @@ pub mod measured;
 pub mod modes;
 pub mod run;
 pub mod scenes;
+pub mod tets;

@@ -123,8 +123,8 @@ fn derivatives_of_a_crushed_step_agree() {
         }
         simulate::step(shared, member, &stages[k], &[&now], &mut next).unwrap();
     }
-    let pose = |e: usize| CellPose::new(&corners(&plan.body, e, &next.u), plan.body.grid.h);
-    let guarded = (0..plan.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count();
+    let pose = |e: usize| CellPose::new(&corners(&plan.body, e, &next.u), plan.body.cut().grid.h);
+    let guarded = (0..plan.body.cells().len()).filter(|e| pose(*e).guard().is_some()).count();
     assert!(guarded > 0, "no cell is turned inside out far enough");
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
     let rates = Arc::new(simulate::rates(shared, member, &Direction::parameters(&directions)));

@@ -219,11 +219,11 @@ const CLOSE: f64 = 2e-7;
 fn one_of_the_states_is_guarded_against_inversion() {
     let p = plan(Vec::new());
     let u = inverted(&p);
-    let pose = |e: usize| CellPose::new(&corners(&p.body, e, &u), p.body.grid.h);
-    let guarded = (0..p.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count();
+    let pose = |e: usize| CellPose::new(&corners(&p.body, e, &u), p.body.length);
+    let guarded = (0..p.body.cells().len()).filter(|e| pose(*e).guard().is_some()).count();
     assert!(guarded > 0);
     // Clear of the jump itself, where nothing has a derivative.
-    assert!((0..p.body.cells.len()).all(|e| pose(e).distance() > 0.01));
+    assert!((0..p.body.cells().len()).all(|e| pose(e).distance() > 0.01));
 }
 
 #[test]

@@ -5,10 +5,10 @@ use crate::terms::elastic_cells::POSED;
 use glam::{DMat3, DVec3};
 use palpate_engine::Request;
 use palpate_model::cutcells::corotation::V24;
+use palpate_model::cutcells::domain::BandCell;
 use palpate_model::cutcells::elements::Classes;
 use palpate_model::observation::ObservedPoint;
 use palpate_model::plan::Plan;
-use palpate_model::space::body::{BandCell, Cell};
 use palpate_model::space::pattern::Pattern;
 
 /// Vectors over all nodes that a solve keeps at a time: forces, directions, conjugate gradients.
@@ -55,16 +55,16 @@ pub struct Sizes<'a> {
 impl<'a> Sizes<'a> {
     /// Of a plan.
     pub fn new(plan: &'a Plan) -> Sizes<'a> {
-        let (body, band) = (&plan.body, &plan.body.band);
+        let (body, band) = (&plan.body, plan.body.band());
         let pattern = Pattern::new(body);
         let blocks = pattern.blocks.columns.len();
         let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
         let points: usize = plan.observation.frames.iter().map(|f| f.points.len()).sum();
-        let tables = body.cells.len() * size_of::<Cell>()
+        let tables = size_of_val(body.cells())
             + band.cells.len() * size_of::<BandCell>()
             + band.nodes.len() * size_of::<DVec3>()
             + band.columns.len() * (size_of::<u32>() + size_of::<f64>())
-            + 4 * body.grid.len()
+            + 4 * body.cut.as_ref().map_or(0, |c| c.grid.len())
             + 8 * pattern.cell_list.len()
             + 4 * blocks
             + points * (size_of::<ObservedPoint>() + 8);
@@ -75,7 +75,7 @@ impl<'a> Sizes<'a> {
     /// the `ratios` different Poisson's ratios in the batch.
     pub fn memory(&self, members: usize, ratios: usize, threads: usize, request: &Request) -> Memory {
         let Sizes { plan, tables, blocks, matrices } = *self;
-        let (nodes, cells) = (plan.body.nodes.len(), plan.body.cells.len());
+        let (nodes, cells) = (plan.body.nodes.len(), plan.body.cells().len());
         let vector = nodes * size_of::<DVec3>();
         let factor = (8.0 * FILL * (nodes as f64).powf(4.0 / 3.0)) as usize;
         // A copy is padded to vector registers. With many right-hand sides larger bodies are factorised as well.

@@ -108,7 +108,7 @@ fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
         return Err((FailureKind::NotFinite, "displacement or velocity of a node".into()));
     }
     let body = &shared.plan.body;
-    let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
+    let size = body.size();
     if far > WORLD_SIZE * size {
         return Err((
             FailureKind::FellOut,

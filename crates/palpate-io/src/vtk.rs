@@ -4,6 +4,7 @@ use crate::error::{InputError, OutputError};
 use crate::keys::suggest;
 use crate::output::write_file;
 use glam::DVec3;
+use palpate_model::space::body::Body;
 use std::path::Path;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, Piece, UnstructuredGridPiece, Version, VertexNumbers,
@@ -14,103 +15,80 @@ use vtkio::model::{
 /// which runs around the bottom and then around the top (VTK User's Guide, `VTK_HEXAHEDRON`).
 const VTK_ORDER: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// Writes hexahedra with data: `points` [m] shape `[N]`; `hexes` in the order of `palpate_model::cutcells::grid::CORNERS`; vectors per
-/// point, shape `[N]` each; numbers per cell, shape `[cells]` each.
+/// Elements of a grid, as VTK counts them.
+#[derive(Clone, Debug, Default)]
+pub struct Elements {
+    /// Points of all elements, one after another.
+    connectivity: Vec<u64>,
+    /// End of every element in it.
+    offsets: Vec<u64>,
+    types: Vec<CellType>,
+}
+
+impl Elements {
+    /// The elements of a body: its cells as hexahedra (VTK's type 12), or its tetrahedra (type 10), in the body's order.
+    pub fn of(body: &Body) -> Elements {
+        let mut all = Elements::default();
+        body.cells().iter().for_each(|c| all.push(CellType::Hexahedron, VTK_ORDER.map(|i| c.nodes[i])));
+        // Linear tetrahedra count their corners as VTK does: the fourth lies on the side that the first three turn around.
+        body.points.stencils.iter().for_each(|s| all.push(CellType::Tetra, s.nodes.iter().copied()));
+        all
+    }
+
+    /// Triangles.
+    pub fn triangles(triangles: &[[u32; 3]]) -> Elements {
+        let mut all = Elements::default();
+        triangles.iter().for_each(|t| all.push(CellType::Triangle, *t));
+        all
+    }
+
+    fn push(&mut self, kind: CellType, points: impl IntoIterator<Item = u32>) {
+        self.connectivity.extend(points.into_iter().map(u64::from));
+        self.offsets.push(self.connectivity.len() as u64);
+        self.types.push(kind);
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.types.len()
+    }
+
+    /// True without elements.
+    pub fn is_empty(&self) -> bool {
+        self.types.is_empty()
+    }
+}
+
+/// Values of an array: one a point `[N]`, or one an element `[E]`.
+#[derive(Clone, Copy, Debug)]
+pub enum Values<'a> {
+    /// Vectors.
+    Vectors(&'a [DVec3]),
+    /// Numbers.
+    Numbers(&'a [f64]),
+}
+
+/// Arrays by name.
+pub type Arrays<'a> = [(&'a str, Values<'a>)];
+
+/// Writes a grid with data: `points` [m] shape `[N]`, its elements, arrays by point and arrays by element.
 ///
 /// # Errors
 /// The file that could not be written and why; an array of the wrong length.
 pub fn write_vtu(
     path: impl AsRef<Path>,
     points: &[DVec3],
-    hexes: &[[u32; 8]],
-    point_data: &[(&str, &[DVec3])],
-    cell_data: &[(&str, &[f64])],
-) -> Result<(), OutputError> {
-    let connectivity = hexes.iter().flat_map(|h| VTK_ORDER.map(|i| u64::from(h[i]))).collect();
-    let vectors = vectors(path.as_ref(), point_data, points.len())?;
-    let scalars = scalars(path.as_ref(), cell_data.iter().copied(), hexes.len())?;
-    write_grid(path.as_ref(), points, connectivity, (8, CellType::Hexahedron), hexes.len(), vectors, scalars)
-}
-
-/// Writes hexahedra with numbers per point `[N]` and per cell `[cells]`.
-///
-/// # Errors
-/// As [`write_vtu`].
-pub fn write_vtu_scalars(
-    path: impl AsRef<Path>,
-    points: &[DVec3],
-    hexes: &[[u32; 8]],
-    point_data: &[(String, Vec<f64>)],
-    cell_data: &[(String, Vec<f64>)],
+    elements: &Elements,
+    of_points: &Arrays,
+    of_elements: &Arrays,
 ) -> Result<(), OutputError> {
     let path = path.as_ref();
-    let connectivity = hexes.iter().flat_map(|h| VTK_ORDER.map(|i| u64::from(h[i]))).collect();
-    let borrowed =
-        |data: &'_ [(String, Vec<f64>)], wanted| scalars(path, data.iter().map(|(n, d)| (n.as_str(), d.as_slice())), wanted);
-    let (of_points, of_cells) = (borrowed(point_data, points.len())?, borrowed(cell_data, hexes.len())?);
-    write_grid(path, points, connectivity, (8, CellType::Hexahedron), hexes.len(), of_points, of_cells)
-}
-
-/// Writes a triangle surface with vectors per vertex as a VTU file.
-///
-/// # Errors
-/// As [`write_vtu`].
-pub fn write_vtu_surface(
-    path: impl AsRef<Path>,
-    mesh: &palpate_model::shape::TriMesh,
-    point_data: &[(&str, &[DVec3])],
-) -> Result<(), OutputError> {
-    let connectivity = mesh.triangles.iter().flatten().map(|v| u64::from(*v)).collect();
-    let vectors = vectors(path.as_ref(), point_data, mesh.vertices.len())?;
-    write_grid(path.as_ref(), &mesh.vertices, connectivity, (3, CellType::Triangle), mesh.triangles.len(), vectors, Vec::new())
-}
-
-fn flat(v: &[DVec3]) -> Vec<f64> {
-    v.iter().flat_map(|p| p.to_array()).collect()
-}
-
-/// An error where an array has another number of entries than it should.
-fn check(path: &Path, name: &str, found: usize, wanted: usize) -> Result<(), OutputError> {
-    match found == wanted {
-        true => Ok(()),
-        false => Err(OutputError::new(path, format!("data \"{name}\" has {found} entries, {wanted} are needed"))),
-    }
-}
-
-fn vectors(path: &Path, data: &[(&str, &[DVec3])], wanted: usize) -> Result<Vec<Attribute>, OutputError> {
-    let one = |(name, d): &(&str, &[DVec3])| {
-        check(path, name, d.len(), wanted)?;
-        Ok(Attribute::DataArray(DataArray::vectors(*name).with_data(flat(d))))
-    };
-    data.iter().map(one).collect()
-}
-
-fn scalars<'a>(
-    path: &Path,
-    data: impl Iterator<Item = (&'a str, &'a [f64])>,
-    wanted: usize,
-) -> Result<Vec<Attribute>, OutputError> {
-    let one = |(name, d): (&str, &[f64])| {
-        check(path, name, d.len(), wanted)?;
-        Ok(Attribute::DataArray(DataArray::scalars(name, 1).with_data(d.to_vec())))
-    };
-    data.map(one).collect()
-}
-
-fn write_grid(
-    path: &Path,
-    points: &[DVec3],
-    connectivity: Vec<u64>,
-    (corners, kind): (u64, CellType),
-    cells: usize,
-    point: Vec<Attribute>,
-    cell: Vec<Attribute>,
-) -> Result<(), OutputError> {
-    let data = Attributes { point, cell };
-    let offsets = (1..=cells as u64).map(|i| corners * i).collect();
+    let data =
+        Attributes { point: attributes(path, of_points, points.len())?, cell: attributes(path, of_elements, elements.len())? };
+    let Elements { connectivity, offsets, types } = elements.clone();
     let piece = UnstructuredGridPiece {
         points: flat(points).into(),
-        cells: Cells { cell_verts: VertexNumbers::XML { connectivity, offsets }, types: vec![kind; cells] },
+        cells: Cells { cell_verts: VertexNumbers::XML { connectivity, offsets }, types },
         data,
     };
     let vtk = Vtk {
@@ -121,6 +99,25 @@ fn write_grid(
         file_path: None,
     };
     write_file(path, |out| vtk.write_xml(out).map_err(std::io::Error::other))
+}
+
+fn flat(v: &[DVec3]) -> Vec<f64> {
+    v.iter().flat_map(|p| p.to_array()).collect()
+}
+
+/// Arrays as VTK holds them; each must have as many entries as there are places.
+fn attributes(path: &Path, arrays: &Arrays, wanted: usize) -> Result<Vec<Attribute>, OutputError> {
+    let one = |(name, values): &(&str, Values)| {
+        let (found, array) = match values {
+            Values::Vectors(v) => (v.len(), DataArray::vectors(*name).with_data(flat(v))),
+            Values::Numbers(v) => (v.len(), DataArray::scalars(*name, 1).with_data(v.to_vec())),
+        };
+        match found == wanted {
+            true => Ok(Attribute::DataArray(array)),
+            false => Err(OutputError::new(path, format!("data \"{name}\" has {found} entries, {wanted} are needed"))),
+        }
+    };
+    arrays.iter().map(one).collect()
 }
 
 /// Writes a time series: a time [s] and a file (relative to the PVD) per frame.
@@ -175,24 +172,30 @@ pub fn read_vtu_array(path: &Path, name: Option<&str>, of_cells: bool) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::cutcells::grid::CORNERS;
+    use glam::DAffine3;
+    use palpate_model::scene::Analytic;
+    use palpate_model::shape::Placed;
 
-    /// One unit cell with a displacement per corner.
-    fn cell() -> (Vec<DVec3>, [u32; 8]) {
-        let points = CORNERS.iter().map(|c| DVec3::new(f64::from(c[0]), f64::from(c[1]), f64::from(c[2]))).collect();
-        (points, [0, 1, 2, 3, 4, 5, 6, 7])
+    /// The unit cube as one cell.
+    fn cell() -> Body {
+        let cube = Analytic::Box { min: DVec3::ZERO, max: DVec3::ONE };
+        let body = Body::build(&Placed::new(cube, DAffine3::IDENTITY), 1.0, 0.0, 2).unwrap();
+        assert_eq!((body.cells().len(), body.nodes.len()), (1, 8));
+        body
     }
 
     #[test]
     fn a_cell_comes_back_with_its_data_in_the_order_of_vtk() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.vtu");
-        let (points, hex) = cell();
+        let body = cell();
+        let (points, elements) = (&body.nodes, Elements::of(&body));
         let moved: Vec<DVec3> = points.iter().map(|p| *p * 0.1).collect();
-        write_vtu(&path, &points, &[hex], &[("displacement", &moved)], &[("fraction", &[0.25])]).unwrap();
+        let (vectors, numbers) = ([("displacement", Values::Vectors(&moved))], [("fraction", Values::Numbers(&[0.25]))]);
+        write_vtu(&path, points, &elements, &vectors, &numbers).unwrap();
         let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(&path).unwrap().data else { panic!("a grid was written") };
         let Piece::Inline(piece) = &pieces[0] else { panic!("one file holds all") };
-        assert_eq!(piece.points.cast_into::<f64>().unwrap(), flat(&points));
+        assert_eq!(piece.points.cast_into::<f64>().unwrap(), flat(points));
         assert_eq!(piece.cells.types, [CellType::Hexahedron]);
         let VertexNumbers::XML { connectivity, offsets } = &piece.cells.cell_verts else { panic!("an XML file") };
         assert_eq!(offsets, &[8]);
@@ -215,8 +218,9 @@ mod tests {
     #[test]
     fn lengths_are_checked_and_series_list_their_files() {
         let folder = tempfile::tempdir().unwrap();
-        let (points, hex) = cell();
-        let e = write_vtu(folder.path().join("a.vtu"), &points, &[hex], &[("u", &points[1..])], &[]).unwrap_err();
+        let body = cell();
+        let short = [("u", Values::Vectors(&body.nodes[1..]))];
+        let e = write_vtu(folder.path().join("a.vtu"), &body.nodes, &Elements::of(&body), &short, &[]).unwrap_err();
         assert!(e.to_string().contains("\"u\" has 7 entries, 8 are needed"), "{e}");
         let path = folder.path().join("a.pvd");
         write_pvd(&path, &[(0.0, "f0.vtu".into()), (0.1, "a&b.vtu".into())]).unwrap();

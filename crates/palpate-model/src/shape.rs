@@ -15,6 +15,18 @@ use crate::scene::{BodySource, Object};
 use glam::DVec3;
 use std::sync::Arc;
 
+/// Longest side from which on an object may be one in another unit [m]: soft bodies in front of cameras are smaller.
+pub const LARGE: f64 = 3.0;
+
+/// What is added to an error about too many cells where the object's longest side [m] says that its unit is to blame, not its cells.
+pub fn unit_hint(longest: f64) -> &'static str {
+    if longest < LARGE {
+        ""
+    } else {
+        "; is the object in millimetres or centimetres? convert it to metres (scale by 0.001 or 0.01)"
+    }
+}
+
 /// A closed body given by its signed distance.
 pub trait Shape: Send + Sync + std::fmt::Debug {
     /// Signed distance to the surface [m], negative inside.

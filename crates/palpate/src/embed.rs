@@ -1,7 +1,6 @@
 //! A fine surface carried by the coarse grid: points of the rest configuration as weights of simulation nodes.
 
 use glam::DVec3;
-use palpate_model::cutcells::grid::shape_functions;
 use palpate_model::space::body::Body;
 use palpate_model::space::stencil::Stencils;
 use rayon::prelude::*;
@@ -18,28 +17,15 @@ pub struct Embedding {
 }
 
 impl Embedding {
-    /// Finds the active cell of every point. A point outside all of them follows the nearest one, whose trilinear field is
-    /// continued to it (exact for affine motion).
+    /// Finds the element of every point. A point outside all of them follows the nearest one, whose field is continued to it (exact for
+    /// affine motion).
     pub fn new(body: &Body, rest: Vec<DVec3>) -> Embedding {
+        let carrier = body.carrier();
         let mut places = Stencils::default();
         let mut farthest: f64 = 0.0;
-        if !body.points.is_empty() {
-            for (place, outside) in rest.par_iter().map(|p| body.points.carry(&body.nodes, *p)).collect::<Vec<_>>() {
-                farthest = farthest.max(outside);
-                places.push(&place.nodes, &place.value);
-            }
-            return Embedding { rest, places, farthest };
-        }
-        let grid = &body.grid;
-        let mut cell_at = vec![u32::MAX; grid.len()];
-        for (number, cell) in body.cells.iter().enumerate() {
-            cell_at[grid.index(cell.lattice)] = number as u32;
-        }
-        for p in &rest {
-            let (number, distance) = nearest_cell(body, &cell_at, *p);
-            farthest = farthest.max(distance);
-            let cell = &body.cells[number];
-            places.push(&cell.nodes, &shape_functions((*p - grid.position(cell.lattice)) / grid.h));
+        for (place, outside) in rest.par_iter().map(|p| carrier.carry(*p)).collect::<Vec<_>>() {
+            farthest = farthest.max(outside);
+            places.push(&place.nodes, &place.value);
         }
         Embedding { rest, places, farthest }
     }
@@ -55,56 +41,12 @@ impl Embedding {
     }
 }
 
-/// Number of the active cell nearest to a point, and its distance [m]; the lowest number among equals.
-fn nearest_cell(body: &Body, cell_at: &[u32], p: DVec3) -> (usize, f64) {
-    let grid = &body.grid;
-    let distance = |number: usize| {
-        let low = grid.position(body.cells[number].lattice);
-        (p - p.clamp(low, low + DVec3::splat(grid.h))).length()
-    };
-    if let Some((ijk, _)) = grid.locate(p) {
-        let own = cell_at[grid.index(ijk)];
-        if own != u32::MAX {
-            return (own as usize, 0.0);
-        }
-        // Rings of cells around the point's own, until no farther ring can hold a nearer one.
-        let reach = *grid.size.iter().max().expect("a grid has three sides");
-        let mut best: Option<(usize, f64)> = None;
-        for ring in 1..=reach {
-            if best.is_some_and(|(_, d)| d <= (ring as f64 - 1.0) * grid.h) {
-                break;
-            }
-            let range = |a: usize| ijk[a].saturating_sub(ring)..=(ijk[a] + ring).min(grid.size[a] - 1);
-            for k in range(2) {
-                for j in range(1) {
-                    for i in range(0) {
-                        let on_ring = [i, j, k].iter().zip(ijk).any(|(c, o)| c.abs_diff(o) == ring);
-                        let number = cell_at[grid.index([i, j, k])];
-                        if !on_ring || number == u32::MAX {
-                            continue;
-                        }
-                        let d = distance(number as usize);
-                        if best.is_none_or(|(n, e)| d < e || (d == e && (number as usize) < n)) {
-                            best = Some((number as usize, d));
-                        }
-                    }
-                }
-            }
-        }
-        if let Some(best) = best {
-            return best;
-        }
-    }
-    // Outside the lattice altogether: look at every cell.
-    (0..body.cells.len()).map(|n| (n, distance(n))).min_by(|a, b| a.1.total_cmp(&b.1)).expect("a body has at least one cell")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::DMat3;
+    use palpate_model::cutcells::domain::{Band, Cell, CutCells};
     use palpate_model::cutcells::grid::{CORNERS, Grid};
-    use palpate_model::space::body::{Band, Cell};
 
     /// Two cells in a row, side 0.1.
     fn body() -> Body {
@@ -125,14 +67,12 @@ mod tests {
         }
         Body {
             node_volume: vec![0.0; nodes.len()],
+            length: grid.h,
             nodes,
-            grid,
-            cells,
+            cut: Some(CutCells { grid, cells, ghosts: vec![], band: Band::default() }),
             patches: vec![],
             surface: Default::default(),
             points: Default::default(),
-            ghosts: vec![],
-            band: Band::default(),
             volume: 0.002,
             area: 0.1,
             center: DVec3::new(0.1, 0.05, 0.05),
@@ -162,7 +102,8 @@ mod tests {
     #[test]
     fn a_point_outside_takes_the_nearest_cell() {
         let e = Embedding::new(&body(), vec![DVec3::new(0.12, 0.13, 0.05), DVec3::new(0.08, 0.13, 0.05)]);
-        let cells = body().cells;
+        let body = body();
+        let cells = body.cells();
         assert_eq!([0, 1].map(|k| e.places.get(k).nodes.to_vec()), [1, 0].map(|k| cells[k].nodes.to_vec()));
         assert!((e.farthest - 0.03).abs() < 1e-12);
     }

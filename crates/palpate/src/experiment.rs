@@ -161,7 +161,7 @@ impl Experiment {
         let body = &self.plan.body;
         for (i, plane) in self.scene.planes.iter().enumerate() {
             let depth = body.patches.iter().map(|p| plane.normal.dot(plane.point - p.point)).fold(0.0, f64::max);
-            if depth > CUT * body.grid.h {
+            if depth > CUT * body.length {
                 self.warnings.push(format!(
                     "{}: plane.{i} cuts {} m deep into the body at rest: contact pushes it out from the first step on; move the plane or the \
                      body, or start from initial.state = \"static-equilibrium\"",
@@ -236,7 +236,7 @@ impl Experiment {
             snapshots.push(s);
             std::ops::ControlFlow::Continue(())
         })?;
-        let (surface, triangles) = self.surface(0.5 * self.plan.body.grid.h);
+        let (surface, triangles) = self.surface(0.5 * self.plan.body.length);
         Ok(Simulation { snapshots, surface, triangles })
     }
 
@@ -275,7 +275,7 @@ impl Experiment {
 
     fn with_finer_grid(&self, factor: f64, observation: Option<ObservationSpec>) -> Result<Experiment, Error> {
         let mut scene = Scene { observation, ..self.scene.clone() };
-        scene.object.resolution = palpate_model::scene::Resolution::CellSize(self.plan.body.grid.h / factor);
+        scene.object.resolution = palpate_model::scene::Resolution::CellSize(self.plan.body.length / factor);
         let steps = (scene.time.steps as f64 * factor).round() as usize;
         if steps > 0 {
             scene.time.step *= scene.time.steps as f64 / steps as f64;

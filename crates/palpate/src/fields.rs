@@ -6,9 +6,10 @@ use crate::fitting::Fitted;
 use crate::results::finite;
 use crate::results::fit::FieldReference;
 use palpate_io::npy::{Array, write_npz};
-use palpate_io::vtk::write_vtu_scalars;
+use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::params::fields::{Basis, Varied};
 use palpate_model::params::{On, ParamKey};
+use palpate_model::plan::Plan;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -146,32 +147,64 @@ impl Found<'_> {
     }
 }
 
-/// The fields on the grid: `E` by cells or `density` by nodes with all fields of it, the `factor` of each, and `E_sd` or `density_sd`
-/// where a value of one field is that of a place.
+/// The fields on the grid, and `E_sd` or `density_sd` where a value of one field is that of a place.
 fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Result<(), Error> {
     let plan = e.plan();
-    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
-    for (varied, key, name) in [(Varied::Modulus, ParamKey::YoungsModulus, "E"), (Varied::Density, ParamKey::Density, "density")]
-    {
-        let out = if varied == Varied::Modulus { &mut cells } else { &mut nodes };
-        let mut number = vec![theta[plan.layout.index(key)]; varied.places(&plan.body).len()];
-        for (places, f) in plan.layout.fields().zip(&plan.fields).filter(|(_, f)| f.varied == varied) {
-            number.iter_mut().zip(f.factors(&theta[places])).for_each(|(n, factor)| *n *= factor);
-        }
+    let shown: Vec<usize> = found.iter().map(|f| f.field).collect();
+    let mut grid = OnGrid::new(plan, theta, &shown);
+    for varied in [Varied::Modulus, Varied::Density] {
         let own: Vec<&Found> = found.iter().filter(|f| f.varied() == varied).collect();
-        for f in &own {
-            out.push((format!("factor_{}", f.field), f.factors.clone()));
+        let [f] = &own[..] else { continue };
+        let Some(errors) = f.errors_by_place() else { continue };
+        let (name, arrays) = grid.of(varied);
+        let number = arrays.iter().find(|a| a.0 == name).map(|a| a.1.clone()).unwrap_or_default();
+        let sd = number.iter().zip(errors.iter().zip(&f.factors)).map(|(n, (e, factor))| n * e / factor);
+        arrays.push((format!("{name}_sd"), sd.collect()));
+    }
+    let body = &plan.body;
+    Ok(write_vtu(path, &body.nodes, &Elements::of(body), &named(&grid.nodes), &named(&grid.elements))?)
+}
+
+/// Fields of a scene as arrays by element and by node.
+#[derive(Debug, Default)]
+pub(crate) struct OnGrid {
+    /// `E` [Pa] with all fields of it, and `factor_K` of field K.
+    pub(crate) elements: Vec<(String, Vec<f64>)>,
+    /// `density` [kg/m³], and `factor_K`.
+    pub(crate) nodes: Vec<(String, Vec<f64>)>,
+}
+
+impl OnGrid {
+    /// The fields numbered `shown` at parameters θ `[P]`; nothing of a number that none of them varies.
+    pub(crate) fn new(plan: &Plan, theta: &[f64], shown: &[usize]) -> OnGrid {
+        let mut all = OnGrid::default();
+        for (varied, key) in [(Varied::Modulus, ParamKey::YoungsModulus), (Varied::Density, ParamKey::Density)] {
+            let mut number = vec![theta[plan.layout.index(key)]; varied.places(&plan.body).len()];
+            let (name, out) = all.of(varied);
+            for (k, (places, f)) in plan.layout.fields().zip(&plan.fields).enumerate().filter(|(_, (_, f))| f.varied == varied) {
+                let factors = f.factors(&theta[places]);
+                number.iter_mut().zip(&factors).for_each(|(n, factor)| *n *= factor);
+                if shown.contains(&k) {
+                    out.push((format!("factor_{k}"), factors));
+                }
+            }
+            if !out.is_empty() {
+                out.push((name.into(), number));
+            }
         }
-        if let [f] = &own[..]
-            && let Some(errors) = f.errors_by_place()
-        {
-            let sd = number.iter().zip(errors.iter().zip(&f.factors)).map(|(n, (e, factor))| n * e / factor);
-            out.push((format!("{name}_sd"), sd.collect()));
-        }
-        if !own.is_empty() {
-            out.push((name.to_string(), number));
+        all
+    }
+
+    /// Name of the number that varies, and its arrays.
+    fn of(&mut self, varied: Varied) -> (&'static str, &mut Vec<(String, Vec<f64>)>) {
+        match varied {
+            Varied::Modulus => ("E", &mut self.elements),
+            Varied::Density => ("density", &mut self.nodes),
         }
     }
-    let hexes: Vec<[u32; 8]> = plan.body.cells.iter().map(|c| c.nodes).collect();
-    Ok(write_vtu_scalars(path, &plan.body.nodes, &hexes, &nodes, &cells)?)
+}
+
+/// Arrays as a VTU file takes them.
+pub(crate) fn named(arrays: &[(String, Vec<f64>)]) -> Vec<(&str, Values<'_>)> {
+    arrays.iter().map(|(name, values)| (name.as_str(), Values::Numbers(values))).collect()
 }

@@ -16,7 +16,7 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
     let mut eat = |x: u64| hash = fnv1a(hash, &x.to_le_bytes());
     let o = &plan.observation;
     let noise: Vec<f64> = o.channels.iter().flat_map(|c| [c.kind as usize as f64, c.noise, c.systematic]).collect();
-    let numbers = [plan.band, plan.clock.step, plan.clock.theta, plan.body.grid.h, plan.body.volume];
+    let numbers = [plan.band, plan.clock.step, plan.clock.theta, plan.body.length, plan.body.volume];
     noise.iter().chain(&numbers).for_each(|x| eat(x.to_bits()));
     [plan.clock.steps, plan.body.nodes.len(), plan.clamps.len(), plan.masses.len()].iter().for_each(|n| eat(*n as u64));
     plan.body.nodes.iter().chain([&plan.pivot]).for_each(|p| p.to_array().iter().for_each(|x| eat(x.to_bits())));

@@ -17,7 +17,7 @@ use crate::scatter::{Excess, Scatter};
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Misfit, Snapshot};
 use palpate_io::recording::RecordedCamera;
-use palpate_model::cutcells::distances::interpolate;
+use palpate_model::cutcells::band_lookup::BandLookup;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{Observation, ReadingKind};
 use palpate_model::params::ParamKey;
@@ -98,7 +98,7 @@ impl ResidualSummary {
         let with_points: Vec<usize> =
             (0..observation.frames.len()).filter(|f| !observation.frames[*f].points.is_empty()).collect();
         let wanted = spread(&with_points, INCIDENCE_FRAMES);
-        let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+        let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
         let mut frames = BTreeMap::new();
         let (mut cos2, mut seen) = (0.0, 0usize);
         let mut scatter = Scatter::default();
@@ -219,19 +219,11 @@ fn incidence(experiment: &Experiment, frame: usize, vertices: &[DVec3], triangle
 
 /// Root mean square of the interpolated signed distance at the rest surface [m].
 fn grid_error(plan: &Plan, surface: &Embedding) -> f64 {
-    let grid = &plan.body.grid;
-    let mut cell_at = vec![u32::MAX; grid.len()];
-    for (n, c) in plan.body.band.cells.iter().enumerate() {
-        cell_at[grid.index(c.lattice)] = n as u32;
-    }
+    let lookup = BandLookup::new(&plan.body);
     let (mut sum, mut n) = (0.0, 0usize);
-    for p in &surface.rest {
-        let Some((ijk, xi)) = grid.locate(*p) else { continue };
-        let number = cell_at[grid.index(ijk)];
-        if number != u32::MAX {
-            sum += interpolate(&plan.body.band.cells[number as usize].sdf, xi).0.powi(2);
-            n += 1;
-        }
+    for (distance, _) in surface.rest.iter().filter_map(|p| lookup.distance(&plan.body, *p)) {
+        sum += distance.powi(2);
+        n += 1;
     }
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }

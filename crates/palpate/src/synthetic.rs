@@ -72,7 +72,7 @@ pub fn observe(
     check_choices(&experiment.scene().effects, observers.cameras.len(), observers.markers.len())
         .map_err(|(key, message)| experiment.fault(&key, message))?;
     let errors = Errors::new(experiment, observers)?;
-    let (surface, triangles) = experiment.surface(0.25 * plan.body.grid.h);
+    let (surface, triangles) = experiment.surface(0.25 * plan.body.length);
     let tracked = Embedding::new(&plan.body, observers.markers.iter().map(|m| m.1).collect());
     let points = Embedding::new(&plan.body, observers.points.clone());
     let (mut tracked_points, mut displaced) = (Sequence::default(), Sequence::default());

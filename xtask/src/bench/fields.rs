@@ -5,11 +5,12 @@ use super::{BAND, placed, plan};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::params::Layout;
 use palpate_model::params::fields::{Basis, Field, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::scene::Analytic;
-use palpate_model::space::body::{Body, SUBDIVISIONS};
+use palpate_model::space::body::Body;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 

@@ -9,13 +9,14 @@ use crate::table;
 use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch, Request, Wanted};
+use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::{self, Effect, Family};
 use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
 use palpate_model::scene::{Analytic, InitialShape, Solver};
 use palpate_model::shape::{Placed, Shape};
-use palpate_model::space::body::{Body, SUBDIVISIONS};
+use palpate_model::space::body::Body;
 use peak_alloc::PeakAlloc;
 use report::{Line, Report, Times};
 use std::collections::BTreeSet;
@@ -159,7 +160,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),
-        band: BAND * body.grid.h,
+        band: BAND * body.length,
         solver: Solver::default(),
         body: Arc::new(body),
     }
@@ -169,8 +170,8 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
 pub(super) fn blocks(body: &Body) -> usize {
     let mut pairs = BTreeSet::new();
     let mut add = |nodes: &[u32]| nodes.iter().for_each(|a| pairs.extend(nodes.iter().map(|b| (*a, *b))));
-    body.cells.iter().for_each(|c| add(&c.nodes));
-    body.ghosts.iter().for_each(|g| add(&g.nodes));
+    body.cells().iter().for_each(|c| add(&c.nodes));
+    body.ghosts().iter().for_each(|g| add(&g.nodes));
     pairs.len()
 }
 
@@ -193,8 +194,8 @@ pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, laws: &[usize]) -> Resu
     Ok(Line {
         name: name.into(),
         nodes: body.nodes.len(),
-        cells: body.cells.len(),
-        band_nodes: body.band.nodes.len(),
+        cells: body.cells().len(),
+        band_nodes: body.band().nodes.len(),
         build,
         forward: Times::of(taken.forward),
         cost: Times::of(taken.cost),

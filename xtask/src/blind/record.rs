@@ -46,7 +46,7 @@ fn truth(scene: &Scene, maker: &Maker) -> Result<Experiment, Error> {
     // A plane that states no stiffness gets one that follows the grid: the ground is the same for every grid.
     let coarse = Experiment::new(scene.clone(), String::new(), Vec::new())?;
     let default =
-        palpate_model::mechanics::contact::DEFAULT_STIFFNESS * scene.material.youngs_modulus / coarse.plan().body.grid.h;
+        palpate_model::mechanics::contact::DEFAULT_STIFFNESS * scene.material.youngs_modulus / coarse.plan().body.length;
     scene.planes.iter_mut().for_each(|p| {
         p.stiffness.get_or_insert(default);
     });

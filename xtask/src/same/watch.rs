@@ -33,7 +33,7 @@ pub fn watched(scene: &Scene, seen: Seen, times: &[f64]) -> Result<Plan, PlanErr
     let rests = scene.observation.as_ref().map_or(Vec::new(), |o| o.markers.clone());
     let body = build_plan(scene, Observation::default(), &[])?.body;
     let motion = Motion::of(scene, body.center);
-    let surface = shape_of(&scene.object).surface(SPACING * body.grid.h).vertices;
+    let surface = shape_of(&scene.object).surface(SPACING * body.length).vertices;
     // One on each side: every point is seen by the camera nearest to it.
     let cameras: Vec<Camera> =
         DVec3::AXES.into_iter().flat_map(|a| [a, -a]).map(|a| Camera { center: body.center + a, axis: -a }).collect();

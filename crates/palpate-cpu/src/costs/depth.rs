@@ -1,10 +1,11 @@
 //! Depth points: signed distance φ from the deformed surface, under a robust kernel (sparse surface inversion).
 
-use super::matching::{BandLookup, Match, PointHash, Seen, extend, extend_transposed, match_points};
+use super::matching::{Match, PointHash, Seen, extend, extend_transposed, match_points};
 use super::{Along, Cost, Look, Residuals, Sums};
 use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_engine::{Misfit, ReadingResidual, ResidualRow, Source};
+use palpate_model::cutcells::band_lookup::BandLookup;
 use palpate_model::observation::{Camera, ObservedPoint, ReadingKind, Sensor, kernel};
 use palpate_model::plan::Plan;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ pub struct Depth {
 impl Depth {
     /// Hashes the points of every frame.
     pub fn new(plan: &Plan) -> Depth {
-        let hash = |points: &[ObservedPoint]| PointHash::new(points, plan.body.grid.h);
+        let hash = |points: &[ObservedPoint]| PointHash::new(points, plan.body.length);
         Depth { lookup: BandLookup::new(&plan.body), hashes: plan.observation.frames.iter().map(|f| hash(&f.points)).collect() }
     }
 
@@ -32,7 +33,7 @@ impl Depth {
         if points.is_empty() {
             Vec::new()
         } else if let Some(moved) = look.sensors.points(&obs.cameras, points) {
-            let hash = PointHash::new(&moved, body.grid.h);
+            let hash = PointHash::new(&moved, body.length);
             let seen = Seen { points: &moved, cameras: &look.sensors.cameras(&obs.cameras), recorded };
             match_points(body, &extend(body, u), &hash, seen, &self.lookup, reach)
         } else {
@@ -121,7 +122,7 @@ impl Residuals for Distances {
             return;
         }
         let body = &*look.plan.body;
-        let mut extended = vec![DVec3::ZERO; out.len() + body.band.nodes.len()];
+        let mut extended = vec![DVec3::ZERO; out.len() + body.band().nodes.len()];
         for m in &self.matches {
             let (nodes, weights) = m.stencil(body);
             let g = -factors[m.point as usize] * m.place.gradient;
@@ -163,7 +164,7 @@ fn bare(look: Look, point: u32) -> ResidualRow {
 }
 
 fn row(look: Look, m: &Match) -> ResidualRow {
-    let (grid, band) = (&look.plan.body.grid, &look.plan.body.band);
+    let (grid, band) = (&look.plan.body.cut().grid, look.plan.body.band());
     let seen = &look.seen().points[m.point as usize];
     let sight = DVec3::from_array(look.sensors.truth(camera(look, seen), seen).ray()).normalize_or_zero();
     ResidualRow {

@@ -5,35 +5,13 @@
 
 use crate::terms::elastic_cells::Corners;
 use glam::DVec3;
-use palpate_model::cutcells::distances::interpolate;
+use palpate_model::cutcells::band_lookup::BandLookup;
 use palpate_model::cutcells::front::Sight;
 use palpate_model::cutcells::grid::shape_functions;
 use palpate_model::cutcells::pullback::{NOISE_REACH, Pullback, TURNED_AWAY, pull_back};
 use palpate_model::observation::{Camera, ObservedPoint};
 use palpate_model::space::body::Body;
 use rayon::prelude::*;
-
-/// Numbers of the band cells by lattice cell (linear number of the lowest node), for looking up places in the rest shape.
-#[derive(Clone, Debug)]
-pub struct BandLookup(Vec<u32>);
-
-impl BandLookup {
-    /// Looks every band cell up once.
-    pub fn new(body: &Body) -> BandLookup {
-        let mut cells = vec![u32::MAX; body.grid.len()];
-        for (c, cell) in body.band.cells.iter().enumerate() {
-            cells[body.grid.index(cell.lattice)] = c as u32;
-        }
-        BandLookup(cells)
-    }
-
-    /// Distance of a place of the rest configuration from the surface [m] with its derivative by ξ, in the band.
-    fn distance(&self, body: &Body, place: DVec3) -> Option<(f64, DVec3)> {
-        let (ijk, xi) = body.grid.locate(place)?;
-        let cell = self.0[body.grid.index(ijk)];
-        (cell != u32::MAX).then(|| interpolate(&body.band.cells[cell as usize].sdf, xi))
-    }
-}
 
 /// Points sorted by the hash of the cube they lie in.
 #[derive(Clone, Debug, Default)]
@@ -103,13 +81,13 @@ pub struct Match {
 impl Match {
     /// Extended nodes and shape functions of the place.
     pub fn stencil<'a>(&self, body: &'a Body) -> (&'a [u32; 8], [f64; 8]) {
-        (&body.band.cells[self.cell as usize].nodes, shape_functions(self.place.xi))
+        (&body.band().cells[self.cell as usize].nodes, shape_functions(self.place.xi))
     }
 }
 
 /// Displacements of all extended nodes `[N + M]`: those of the body, then those extended to the band.
 pub fn extend(body: &Body, u: &[DVec3]) -> Vec<DVec3> {
-    let band = &body.band;
+    let band = body.band();
     let mut all = Vec::with_capacity(u.len() + band.nodes.len());
     all.extend_from_slice(u);
     all.par_extend((0..band.nodes.len()).into_par_iter().with_min_len(1024).map(|p| {
@@ -126,7 +104,7 @@ pub fn extend(body: &Body, u: &[DVec3]) -> Vec<DVec3> {
 /// Transpose of [`extend`]: folds a gradient on the extended nodes back onto the body.
 pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
     let n = body.nodes.len();
-    let band = &body.band;
+    let band = body.band();
     let mut out = extended[..n].to_vec();
     for p in 0..band.nodes.len() {
         let g = extended[n + p];
@@ -162,7 +140,7 @@ pub fn match_points(
     (band, noise): (f64, f64),
 ) -> Vec<Match> {
     let n = body.nodes.len();
-    let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
+    let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band().nodes[a as usize - n] };
     let corners = |nodes: &[u32; 8]| -> Corners { nodes.map(|a| rest(a) + u[a as usize]) };
     let line = |(points, cameras): (&[ObservedPoint], &[Camera]), p: u32| {
         let seen = &points[p as usize];
@@ -170,7 +148,7 @@ pub fn match_points(
     };
     let moved = (seen.points, seen.cameras);
     let candidates: Vec<Vec<(bool, Match)>> = body
-        .band
+        .band()
         .cells
         .par_iter()
         .with_min_len(256)
@@ -205,12 +183,12 @@ pub fn match_points(
         if faces {
             return Some(m);
         }
-        let cell = &body.band.cells[m.cell as usize];
-        let (x, lowest) = (corners(&cell.nodes), body.grid.position(cell.lattice));
-        let distance = |xi: DVec3| lookup.distance(body, lowest + body.grid.h * xi);
+        let cell = &body.band().cells[m.cell as usize];
+        let (x, lowest) = (corners(&cell.nodes), body.cut().grid.position(cell.lattice));
+        let distance = |xi: DVec3| lookup.distance(body, lowest + body.cut().grid.h * xi);
         let way = 1.5 * m.place.phi.abs() + NOISE_REACH * noise;
         let sight = Sight { x: &x, point: seen.points[m.point as usize].position, direction: line(seen.recorded, m.point) };
-        let place = sight.side(m.place, way, (body.grid.h, band), distance)?;
+        let place = sight.side(m.place, way, (body.cut().grid.h, band), distance)?;
         Some(Match { place, ..m })
     };
     best.into_par_iter().with_min_len(1024).filter_map(side).collect()
@@ -219,9 +197,9 @@ pub fn match_points(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_model::cutcells::build::SUBDIVISIONS;
     use palpate_model::scene::Analytic;
     use palpate_model::shape::Placed;
-    use palpate_model::space::body::SUBDIVISIONS;
 
     /// Cells of the band, and how many points they are handed and how many lie in their boxes, over the number of points.
     fn asked(h: f64, band: f64) -> (usize, f64, f64) {
@@ -236,9 +214,9 @@ mod tests {
         let points: Vec<ObservedPoint> = (0..2000).map(|k| ObservedPoint { position: place(k), camera: 0 }).collect();
         let hash = PointHash::new(&points, h);
         let n = body.nodes.len();
-        let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
+        let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band().nodes[a as usize - n] };
         let (mut handed, mut held) = (0usize, 0usize);
-        for cell in &body.band.cells {
+        for cell in &body.band().cells {
             let x = cell.nodes.map(rest);
             let (min, max) = (x.into_iter().fold(x[0], DVec3::min), x.into_iter().fold(x[0], DVec3::max));
             hash.visit(min, max, |p| {
@@ -247,7 +225,7 @@ mod tests {
                 held += usize::from(at.cmpge(min).all() && at.cmple(max).all());
             });
         }
-        (body.band.cells.len(), handed as f64 / 2000.0, held as f64 / 2000.0)
+        (body.band().cells.len(), handed as f64 / 2000.0, held as f64 / 2000.0)
     }
 
     #[test]

@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::collapse_tests::scene;
+use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::{Effect, find};
 use palpate_model::observation::*;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, BodySource};
-use palpate_model::space::body::SUBDIVISIONS;
 
 /// Numbers in [-1, 1], reproducible.
 pub(crate) struct Noise(pub(crate) u64);
@@ -109,7 +109,7 @@ fn derivatives_of_every_residual_are_those_of_differences() {
         costs.compare(look, moved).rows(look, Along { directions: &along, du: &du })
     };
     let far = |rest: DVec3| {
-        let place = (rest - plan.body.grid.position([0; 3])) * (SUBDIVISIONS as f64 / plan.body.grid.h);
+        let place = (rest - plan.body.cut().grid.position([0; 3])) * (SUBDIVISIONS as f64 / plan.body.cut().grid.h);
         (place - place.round()).abs().min_element() > 0.02
     };
     for q in 0..2 {

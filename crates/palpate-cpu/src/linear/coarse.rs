@@ -34,7 +34,7 @@ impl Coarsening {
     /// Groups the nodes of a body into cubes of `across` nodes.
     pub fn new(body: &Body, pattern: &Pattern, across: i64) -> Result<Coarsening, String> {
         let n = body.nodes.len();
-        let h = body.grid.h;
+        let h = body.length;
         let mut cubes: BTreeMap<[i64; 3], u32> = BTreeMap::new();
         let mut group_of: Vec<u32> = body
             .nodes

@@ -21,10 +21,10 @@ pub struct Altered {
 impl Altered {
     /// Of one member.
     pub fn new(plan: &Plan, coefficients: &Coefficients, elements: &Elements) -> Altered {
-        let (body, h, physics) = (&plan.body, plan.body.grid.h, &coefficients.physics);
+        let (body, physics) = (&plan.body, &coefficients.physics);
         let rest = coefficients.changes.rest.as_ref().map(|w| {
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
-            body.cells.iter().map(|c| CellPose::new(&c.nodes.map(at), h)).collect()
+            body.cells().iter().map(|c| CellPose::new(&c.nodes.map(at), body.length)).collect()
         });
         Altered { rest, grips: Grip::all(plan, physics, elements), laws: cell_laws(plan, physics) }
     }

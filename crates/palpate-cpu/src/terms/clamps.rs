@@ -6,7 +6,7 @@
 //!
 //! Clamps are weighted in time like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
-use super::elastic_cells::assembly::block;
+use super::elastic_cells::blocks::block;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;
@@ -78,14 +78,14 @@ impl<'a> Clamped<'a> {
     /// Displacement of a held cell's corners from where the clamp wants them, in the clamp's frame: Aᵀ(x − b) − X − W.
     fn deviation(&self, c: &ClampCell, (a, b): Pose, u: &[DVec3]) -> V24 {
         let (body, rest) = (&self.c.plan.body, self.c.coefficients.changes.rest.as_deref());
-        flatten(&body.cells[c.cell as usize].nodes.map(|n| {
+        flatten(&body.cells()[c.cell as usize].nodes.map(|n| {
             let x = body.nodes[n as usize];
             a.transpose() * (x + u[n as usize] - b) - x - rest.map_or(DVec3::ZERO, |w| w[n as usize])
         }))
     }
 
     fn nodes(&self, c: &ClampCell) -> &'a [u32; 8] {
-        &self.c.plan.body.cells[c.cell as usize].nodes
+        &self.c.plan.body.cells()[c.cell as usize].nodes
     }
 
     /// Hands every held cell with the force on its corners, for 1 Pa and without the instant's weight, to `visit`.

@@ -51,7 +51,7 @@ pub fn touches<'s>(
     theta: f64,
     [u1, u0]: [&'s [DVec3]; 2],
 ) -> impl Iterator<Item = (&'s Patch, Touch<'s>)> {
-    let width = contact::WIDTH * body.grid.h;
+    let width = contact::WIDTH * body.length;
     let instants = contact::instants(theta);
     let along = contact::acts_along(theta);
     body.patches.iter().enumerate().filter_map(move |(number, patch)| {

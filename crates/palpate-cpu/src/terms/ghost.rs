@@ -10,7 +10,7 @@ use palpate_model::space::body::Body;
 
 /// Adds scale · Σ weight (u_a − 2u_b + u_c) of the ghost lines: the product with their matrix.
 pub fn ghost_product(body: &Body, scale: f64, u: &[DVec3], out: &mut [DVec3]) {
-    for g in &body.ghosts {
+    for g in body.ghosts() {
         let [a, b, c] = g.nodes.map(|n| n as usize);
         let s = scale * g.weight * (u[a] - 2.0 * u[b] + u[c]);
         out[a] += s;
@@ -22,11 +22,11 @@ pub fn ghost_product(body: &Body, scale: f64, u: &[DVec3], out: &mut [DVec3]) {
 /// a · (product with `b`) for a unit scale.
 fn form(body: &Body, a: &[DVec3], b: &[DVec3]) -> f64 {
     let second = |u: &[DVec3], n: [usize; 3]| u[n[0]] - 2.0 * u[n[1]] + u[n[2]];
-    let line = |g: &palpate_model::space::body::GhostLine| {
+    let line = |g: &palpate_model::cutcells::domain::GhostLine| {
         let n = g.nodes.map(|n| n as usize);
         g.weight * second(a, n).dot(second(b, n))
     };
-    body.ghosts.iter().map(line).sum()
+    body.ghosts().iter().map(line).sum()
 }
 
 /// The term.
@@ -38,7 +38,7 @@ pub struct Ghost<'a> {
 impl Ghost<'_> {
     /// Factor of the lines for a shear modulus [Pa]: energies per squared metre.
     fn scale(&self, shear: f64) -> f64 {
-        self.c.plan.solver.ghost * self.c.plan.body.grid.h * shear
+        self.c.plan.solver.ghost * self.c.plan.body.cut().grid.h * shear
     }
 
     fn own_scale(&self) -> f64 {

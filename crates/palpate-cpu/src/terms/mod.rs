@@ -5,6 +5,7 @@
 //! `r(u₁) = M[(u₁−ũ)/(θℓ²) − ṽ/(θℓ)] + αM(u₁−ũ)/ℓ + cells + ghost + clamps + contact − weight + laws`.
 //! A static problem is the same sum without inertia.
 
+mod assembly;
 pub mod clamps;
 pub mod contact;
 pub mod elastic_cells;
@@ -256,13 +257,12 @@ pub struct Equation<'a> {
 impl<'a> Equation<'a> {
     /// All terms that act.
     pub fn new(context: Context<'a>) -> Equation<'a> {
-        // The cells come first: their tangent overwrites the matrix.
-        let mut terms: Vec<Box<dyn Term + 'a>> = vec![Box::new(ElasticCells::new(context))];
-        if !context.plan.body.points.is_empty() {
-            terms.push(Box::new(ElasticPoints::new(context)));
-            terms.push(Box::new(HeldNodes { c: context }));
-        }
-        if !context.plan.body.ghosts.is_empty() {
+        // The elements come first: their tangent overwrites the matrix.
+        let mut terms: Vec<Box<dyn Term + 'a>> = match context.plan.body.cut {
+            Some(_) => vec![Box::new(ElasticCells::new(context))],
+            None => vec![Box::new(ElasticPoints::new(context)), Box::new(HeldNodes { c: context })],
+        };
+        if !context.plan.body.ghosts().is_empty() {
             terms.push(Box::new(Ghost { c: context }));
         }
         if !context.plan.clamps.is_empty() {

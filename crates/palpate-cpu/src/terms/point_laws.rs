@@ -92,12 +92,12 @@ impl<'a> PointLaws<'a> {
         z[COMMON..].copy_from_slice(&acting.values);
         put(z, GRAVITY, self.c.physics().gravity);
         z[TIME] = self.c.time;
-        z[STIFFNESS] = contact::DEFAULT_STIFFNESS * self.c.physics().youngs_modulus / body.grid.h;
+        z[STIFFNESS] = contact::DEFAULT_STIFFNESS * self.c.physics().youngs_modulus / body.length;
         let place = Place {
             rest: DVec3::ZERO,
             normal: DVec3::ZERO,
             measure: 0.0,
-            width: contact::WIDTH * body.grid.h,
+            width: contact::WIDTH * body.length,
             rate: self.c.inertia.map_or(0.0, |t| t.rate),
             inertia: self.c.inertia.map_or(0.0, |t| t.displacement),
             momentum: self.c.inertia.map_or(0.0, |t| t.velocity),
@@ -166,7 +166,7 @@ impl<'a> PointLaws<'a> {
 
     /// Default contact stiffness per Pa of Young's modulus [1/m].
     fn stiffness_by_young(&self) -> f64 {
-        contact::DEFAULT_STIFFNESS / self.c.plan.body.grid.h
+        contact::DEFAULT_STIFFNESS / self.c.plan.body.length
     }
 
     /// Adds what derivatives by a point's input, from GRAVITY on, make of the coefficients.

@@ -8,17 +8,17 @@ use crate::tests::scenes::device;
 use glam::DVec3;
 use palpate_cpu::costs::{Costs, Look, blend};
 use palpate_engine::{Backend, Misfit, ParamBatch};
+use palpate_model::cutcells::domain::Band;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::instant::instants;
 use palpate_model::observation::{Observation, ReadingKind};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Analytic;
-use palpate_model::space::body::Body;
 use std::sync::Arc;
 
-fn body(plan: &mut Plan) -> &mut Body {
-    Arc::make_mut(&mut plan.body)
+fn band(plan: &mut Plan) -> &mut Band {
+    &mut Arc::make_mut(&mut plan.body).cut.as_mut().expect("the ball is made of cells").band
 }
 
 fn seen(plan: &mut Plan) -> &mut Observation {
@@ -31,8 +31,8 @@ fn noise(plan: &mut Plan, kind: ReadingKind) {
 
 /// Faults of the comparison; the first three act on points and displacements, too.
 pub(super) const FAULTS: [Fault; 6] = [
-    ("weights of the extension", |p| body(p).band.values.iter_mut().for_each(|w| *w *= 1.01)),
-    ("distances", |p| body(p).band.cells.iter_mut().for_each(|c| c.sdf.iter_mut().for_each(|d| *d *= 1.01))),
+    ("weights of the extension", |p| band(p).values.iter_mut().for_each(|w| *w *= 1.01)),
+    ("distances", |p| band(p).cells.iter_mut().for_each(|c| c.sdf.iter_mut().for_each(|d| *d *= 1.01))),
     ("width of the kernel", |p| p.band *= 1.01),
     ("noise of markers", |p| noise(p, ReadingKind::Marker)),
     ("noise of depth", |p| noise(p, ReadingKind::Depth)),

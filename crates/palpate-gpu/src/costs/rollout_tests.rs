@@ -41,7 +41,7 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     let theta = bare.theta.clone();
     let visit = |_: usize, s: palpate_engine::Snapshot, _: Vec<palpate_engine::FrameResiduals>| {
         let mut point = |(p, place): (&Patch, Stencil)| ObservedPoint {
-            position: p.point + place.at(&s.displacement) + off * body.grid.h * noise.vector(),
+            position: p.point + place.at(&s.displacement) + off * body.length * noise.vector(),
             camera: u32::from(p.normal.x < 0.0),
         };
         let points = body.pieces().map(&mut point).collect();
@@ -52,7 +52,7 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     cpu.visit(&theta, visit).unwrap_or_else(|e| panic!("{e}"));
     let side = |x: f64| Camera { center: DVec3::new(x, 0.1, 0.2), axis: DVec3::new(-x.signum(), 0.0, 0.0) };
     let cameras = vec![side(1.0), side(-1.0)];
-    let h = body.grid.h;
+    let h = body.length;
     let observation =
         Observation { cameras, frames, channels: vec![Channel::new(ReadingKind::Depth, 0.1 * h)], ..Observation::default() };
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))

@@ -26,7 +26,7 @@ pub(crate) fn apart(a: &Linearised, b: &Linearised, plan: &Plan) -> [f64; 3] {
         };
         let kind = (x.weight - y.weight).abs().max((x.along_sight - y.along_sight).abs()).max((x.by_place - y.by_place).length());
         worst[0] = worst[0].max(value).max(kind);
-        worst[1] = worst[1].max((x.rest - y.rest).length() / plan.body.grid.h);
+        worst[1] = worst[1].max((x.rest - y.rest).length() / plan.body.length);
     }
     for k in 0..q {
         let column = |l: &Linearised| -> Vec<f64> { l.rows.sensitivity.iter().skip(k).step_by(q).copied().collect() };

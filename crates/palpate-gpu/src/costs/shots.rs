@@ -70,7 +70,7 @@ impl Shots {
             let origin = points.iter().map(|p| p.position).sum::<DVec3>() / points.len().max(1) as f64;
             [shot.shift, shot.shift_rest] = split(origin - plan.body.center);
             let from: Vec<[f32; 3]> = points.iter().map(|p| (p.position - origin).as_vec3().to_array()).collect();
-            let cubes = Cubes::new(&from, plan.body.grid.h as f32);
+            let cubes = Cubes::new(&from, plan.body.length as f32);
             (shot.cubes, shot.low, shot.inverse_edge) = (cubes.size, cubes.low, cubes.inverse_edge);
             all.cube_starts.extend(cubes.starts.iter().map(|s| s + shot.point_start));
             for &i in &cubes.order {

@@ -60,7 +60,7 @@ pub(super) fn observed(scene: &Scene, rest: &[MarkerRest], per_patch: usize) -> 
     let mut noise = Noise(7);
     let centers = [DVec3::new(2.3, 0.3, 1.2), DVec3::new(0.4, -0.9, 0.9), DVec3::new(1.2, 0.5, -0.7)];
     let cameras = centers.map(|center| Camera { center, axis: (DVec3::new(1.3, -0.2, 0.4) - center).normalize() }).to_vec();
-    let h = body.grid.h;
+    let h = body.cut().grid.h;
     let points = |time: f64, noise: &mut Noise| -> Vec<ObservedPoint> {
         let at = time - 0.05;
         let mut all = Vec::new();
@@ -241,7 +241,7 @@ fn single(v: DVec3) -> [f32; 4] {
 pub(super) fn upload(world: &World, k: usize) -> State {
     let state = State(world.lend(3));
     let plan = &world.plan;
-    let quantum = (0.25 * plan.body.grid.h).log2().floor().exp2();
+    let quantum = (0.25 * plan.body.cut().grid.h).log2().floor().exp2();
     let mut parts = [Vec::new(), Vec::new(), Vec::new()];
     for (_, size) in &MEMBERS[..world.members()] {
         for x in &plan.body.nodes {

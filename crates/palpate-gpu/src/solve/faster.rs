@@ -34,7 +34,7 @@ impl Tuning {
     pub(crate) fn measured(gpu: &Arc<Gpu>, plan: &Plan, choices: &Choices) -> Result<Tuning, GpuError> {
         static KNOWN: Known = Mutex::new(None);
         let ways = [usize::MAX, 0].map(|many_from| Tuning { many_from, product: None });
-        let (nodes, cells, parameters) = (plan.body.nodes.len(), plan.body.cells.len(), plan.layout.len());
+        let (nodes, cells, parameters) = (plan.body.nodes.len(), plan.body.cells().len(), plan.layout.len());
         let key = format!("{}: {nodes} nodes, {cells} cells, {parameters} parameters", device(gpu));
         let chosen = once(&key, WORKGROUPS, choices, &KNOWN, || {
             let iteration = |way| {

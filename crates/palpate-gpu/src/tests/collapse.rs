@@ -36,8 +36,8 @@ fn right_and_stiffer() -> Option<[Arc<Gpu>; 2]> {
 
 /// Cells that the barrier acts in.
 fn guarded(plan: &Plan, u: &[DVec3]) -> usize {
-    let pose = |e: usize| CellPose::new(&corners(&plan.body, e, u), plan.body.grid.h);
-    (0..plan.body.cells.len()).filter(|e| pose(*e).guard().is_some()).count()
+    let pose = |e: usize| CellPose::new(&corners(&plan.body, e, u), plan.body.cut().grid.h);
+    (0..plan.body.cells().len()).filter(|e| pose(*e).guard().is_some()).count()
 }
 
 /// A step that turns a ball inside out along z, far enough for the barrier in some cells and not quite in others.
@@ -57,7 +57,7 @@ fn passes_agree_where_the_barrier_acts_and_one_percent_shows() {
     let plan = plan(&scene);
     let u: Vec<DVec3> = plan.body.nodes.iter().map(|x| turned_inside_out(*x)).map(|[u, _, w]| u + w).collect();
     let count = guarded(&plan, &u);
-    assert!(count > 5 && count < plan.body.cells.len(), "{count} of {}", plan.body.cells.len());
+    assert!(count > 5 && count < plan.body.cells().len(), "{count} of {}", plan.body.cells().len());
     let right = Exact::new(&plan, turned_inside_out);
     let mut off = apart(&found(&GpuBackend::on(gpu), &plan, &right), &right);
     // The barrier makes single cells many times stiffer than their neighbours: solves keep fewer digits than elsewhere.

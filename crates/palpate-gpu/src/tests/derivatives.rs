@@ -176,7 +176,7 @@ fn varied(mut scene: Scene) -> Plan {
     };
     let body = plan(&scene).body;
     scene.fields = vec![
-        field(Varied::Modulus, Basis::Cells, Scale::Log, body.cells.len()),
+        field(Varied::Modulus, Basis::Cells, Scale::Log, body.cells().len()),
         field(Varied::Density, Basis::Nodes, Scale::Linear, body.nodes.len()),
     ];
     plan(&scene)

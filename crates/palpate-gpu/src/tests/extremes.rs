@@ -71,7 +71,7 @@ fn a_body_with_slivers() {
     scene.masses.clear();
     scene.initial.velocity.z = -1.5;
     let body = plan(&scene).body;
-    let count = |most: f64| body.cells.iter().filter(|c| c.fraction < most).count();
+    let count = |most: f64| body.cells().iter().filter(|c| c.fraction < most).count();
     assert!(count(0.011) > 15 && count(1.1e-4) > 5, "{} {}", count(0.011), count(1.1e-4));
     check(&scene, SLIVERS, &but(&["point mass"]));
 }

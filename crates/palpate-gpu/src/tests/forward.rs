@@ -62,7 +62,7 @@ fn batches_one_cell_and_two_planes_agree_with_the_cpu_and_one_percent_shows() {
     one.object.source = BodySource::Analytic(Analytic::Box { min, max });
     one.planes[0].point.z = 0.06;
     one.masses.clear();
-    assert_eq!(plan(&one).body.cells.len(), 1);
+    assert_eq!(plan(&one).body.cells().len(), 1);
     let mut two = busy(ball(0.027));
     two.initial.velocity.z = -1.5;
     two.planes.push(palpate_model::scene::Plane { point: DVec3::new(-0.045, 0.0, 0.0), normal: DVec3::X, stiffness: Some(1e6) });

@@ -198,7 +198,7 @@ fn states_of_every_material_agree_and_one_percent_of_any_modulus_or_another_mate
 
 /// Cells whose mean strain leaves no volume where the body flies freely from a state.
 fn outside(plan: &Plan, u: &[DVec3], v: &[DVec3]) -> usize {
-    let (dt, h) = (plan.clock.step, plan.body.grid.h);
+    let (dt, h) = (plan.clock.step, plan.body.length);
     let flown: Vec<_> = u.iter().zip(v).map(|(u, v)| *u + *v * dt).collect();
     let volume = |e: usize| {
         let q = CellPose::new(&corners(&plan.body, e, &flown), h).q;
@@ -211,7 +211,7 @@ fn outside(plan: &Plan, u: &[DVec3], v: &[DVec3]) -> usize {
         }
         glam::DMat3::from_cols_array_2d(&f).determinant()
     };
-    (0..plan.body.cells.len()).filter(|e| volume(*e) <= 0.0).count()
+    (0..plan.body.cells().len()).filter(|e| volume(*e) <= 0.0).count()
 }
 
 #[test]

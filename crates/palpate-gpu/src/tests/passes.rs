@@ -121,7 +121,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
     let potential = |r: &[[f32; 4]]| r.iter().map(|v| f64::from(v[3])).sum::<f64>();
     let half = potential(&trial(0.5));
     let residual = trial(1.0);
-    let forces = three(&get("cell_force", 8 * plan.body.cells.len()));
+    let forces = three(&get("cell_force", 8 * plan.body.cells().len()));
     step(world, &now, &next, &tally, |s| s.assemble(ALL));
     let placed: Vec<[f32; 4]> = world.gpu.download(&next.0.buffer, 2 * n).unwrap_or_else(|e| panic!("{e}"));
     let u1: Vec<DVec3> = vectors(&placed[..n]).iter().zip(vectors(&placed[n..])).map(|(a, b)| *a + b).collect();
@@ -222,9 +222,9 @@ impl Exact {
         let free = Context { plan: &bare, planes: &[], effects: &[], ..fresh };
         let residual = |c: Context| Equation::new(c).residual(u1);
         let supports: Vec<f64> = residual(fresh).iter().zip(residual(free)).flat_map(|(a, b)| (*a - b).to_array()).collect();
-        let (body, h) = (&plan.body, plan.body.grid.h);
+        let (body, h) = (&plan.body, plan.body.cut().grid.h);
         let mut cells = Vec::new();
-        for e in 0..body.cells.len() {
+        for e in 0..body.cells().len() {
             let mut poses = [u1, c.past.u].map(|u| CellPose::new(&corners(body, e, u), h));
             if let Some(rest) = &altered.rest {
                 poses.iter_mut().for_each(|p| p.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w));
@@ -234,7 +234,7 @@ impl Exact {
             let y = std::array::from_fn(|i| physics.youngs_modulus * ((weights.new + weights.rate) * a[i] - weights.rate * b[i]));
             let mut force = flat(&poses[0].force(&y));
             if let Some(guard) = poses[0].guard() {
-                let unit = weights.new * physics.youngs_modulus * body.cells[e].fraction * h.powi(3);
+                let unit = weights.new * physics.youngs_modulus * body.cells()[e].fraction * h.powi(3);
                 force.iter_mut().zip(flat(&guard.force())).for_each(|(f, g)| *f += unit * g);
             }
             cells.extend(force);

@@ -72,7 +72,7 @@ impl Geometry {
         let mut holds: Vec<(usize, u32)> = plan.clamps.iter().enumerate().flat_map(reach).collect();
         holds.sort_by_key(|(i, cell)| (*cell, *i));
         let cells: Vec<Cell> = body
-            .cells
+            .cells()
             .iter()
             .enumerate()
             .map(|(e, cell)| {
@@ -138,7 +138,6 @@ impl Geometry {
         };
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
-        let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
         let [rate_effects, rate_numbers] = effects.rate_places(plan);
         let shape = Shape {
             members: 0,
@@ -153,24 +152,24 @@ impl Geometry {
             parameters: plan.layout.len() as u32,
             classes: classes.parts.len() as u32,
             steps: stages.len() as u32,
-            h: body.grid.h as f32,
+            h: body.length as f32,
             dt: plan.clock.step as f32,
             theta: plan.clock.theta as f32,
-            world: (WORLD_SIZE * size) as f32,
+            world: (WORLD_SIZE * body.size()) as f32,
             pivot: [plan.pivot.x as f32, plan.pivot.y as f32, plan.pivot.z as f32],
             tolerance: plan.solver.tolerance.max(FINEST) as f32,
             iterations: 0,
             chunk: chunk as u32,
             most: MOST_ITERATIONS as u32,
-            quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
-            ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
+            quantum: (0.25 * body.length).log2().floor().exp2() as f32,
+            ghosts: u32::from(!body.ghosts().is_empty() && plan.solver.ghost != 0.0),
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
             time: plan.clock.step as f32,
             aging_rows: effects.aging_rows,
             point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
             rate_numbers,
             rate_effects,
-            contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
+            contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
         let gradients: Vec<[f32; 4]> = classes.gradients.iter().flatten().map(|g| vec4(*g, 0.0)).collect();

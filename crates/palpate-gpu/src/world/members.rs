@@ -47,7 +47,7 @@ impl Batch {
         let mut all_planes: Vec<Plane> = Vec::new();
         let mut poses: Vec<ClampPose> = Vec::new();
         let mut masses: Vec<f32> = Vec::new();
-        let unit = plan.solver.ghost * plan.body.grid.h;
+        let unit = plan.solver.ghost * plan.body.length;
         for p in &self.physics {
             let slot = slots.iter().position(|nu| *nu == p.poisson_ratio).unwrap_or_else(|| {
                 slots.push(p.poisson_ratio);

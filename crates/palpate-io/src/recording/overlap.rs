@@ -4,7 +4,7 @@ use crate::mesh::bounds;
 use crate::scene::scale::FAR_SMALLER;
 use glam::DVec3;
 use palpate_model::observation::{Frame, Observation};
-use palpate_model::space::body::LARGE;
+use palpate_model::shape::LARGE;
 
 fn positions(frame: &Frame) -> impl Iterator<Item = DVec3> {
     frame.points.iter().map(|p| p.position).chain(frame.markers.iter().map(|m| m.position))

@@ -8,7 +8,7 @@ use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
 use palpate_model::shape::Repaired;
-use palpate_model::space::body::unit_hint;
+use palpate_model::shape::unit_hint;
 use std::path::PathBuf;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {

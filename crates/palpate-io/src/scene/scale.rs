@@ -6,8 +6,8 @@ use crate::error::InputError;
 use crate::mesh::bounds;
 use glam::DVec3;
 use palpate_model::scene::{BodySource, Clamp, Inertia, Plane, Scene};
+use palpate_model::shape::LARGE;
 use palpate_model::shape::{Shape, shape_of};
-use palpate_model::space::body::LARGE;
 
 /// What is smaller than this part of the object's width is in another unit than the object: millimetres read as metres make everything
 /// else a thousandth of it, and nobody holds a body by a hundredth of its width.

@@ -1,6 +1,7 @@
 //! Scenes read and written, and refused with what is wrong.
 
 use super::*;
+use crate::vtk::{Elements, Values, write_vtu};
 use palpate_model::observation::ReadingKind;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::FitParameter;
@@ -342,9 +343,9 @@ fn values_of_fields_come_from_arrays_and_grids() {
         let e = read(text).expect_err(text);
         assert!(e.contains(wanted), "{text}: {e}");
     }
-    let (points, hex) = (vec![DVec3::ZERO; 8], [0, 1, 2, 3, 4, 5, 6, 7]);
-    let cells = [("E".to_string(), vec![3.0, 4.0]), ("other".to_string(), vec![1.0, 1.0])];
-    crate::vtk::write_vtu_scalars(folder.path().join("a.vtu"), &points, &[hex, hex], &[], &cells).unwrap();
+    let elements = Elements::triangles(&[[0, 1, 2], [0, 2, 1]]);
+    let cells = [("E", Values::Numbers(&[3.0, 4.0])), ("other", Values::Numbers(&[1.0, 1.0]))];
+    write_vtu(folder.path().join("a.vtu"), &[DVec3::ZERO; 3], &elements, &[], &cells).unwrap();
     assert_eq!(read("file = \"a.vtu\"\narray = \"E\"\n").unwrap(), [3.0, 4.0]);
     assert!(read("file = \"a.vtu\"\n").unwrap_err().contains("has 2 cell arrays (E, other)"));
     assert!(read("file = \"a.vtu\"\narray = \"F\"\n").unwrap_err().contains("has no cell array \"F\""));

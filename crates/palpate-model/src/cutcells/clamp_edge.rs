@@ -3,11 +3,12 @@
 //! The integrals are those of the plan itself ([`crate::cutcells::cut`]), exact for the body's piecewise flat surface. So each is a piecewise cubic of
 //! the shift, smooth but where a face of the box passes a face of the lattice, and there the sum over cells is smooth.
 
+use crate::cutcells::build::world_cell;
 use crate::cutcells::cut::{ClipBox, HeldMoments, Lattice, Pieces};
 use crate::cutcells::held::Pins;
 use crate::plan::ClampCell;
 use crate::shape::Shape;
-use crate::space::body::{Body, world_cell};
+use crate::space::body::Body;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -87,7 +88,7 @@ impl Edge {
 
     /// The cells held when the edge is moved by `shift` [m], in increasing order; `own` are those held at 0.
     pub fn cells(&self, body: &Body, own: &[ClampCell], shift: f64) -> Vec<Held> {
-        let h = body.grid.h;
+        let h = body.cut().grid.h;
         let step = STEP * h;
         // Half a cell's diagonal, with a little slack for rounding: beyond it a face cannot reach the cell.
         let radius = 0.5 * 3f64.sqrt() * h * 1.01;
@@ -189,13 +190,13 @@ impl Edge {
         self.sources.get_or_init(|| {
             let source = |from: [usize; 3], cell: u32| Source {
                 cell,
-                from: world_cell(&body.grid, from),
-                basis: world_cell(&body.grid, body.cells[cell as usize].lattice),
-                middle: body.grid.position(from) + 0.5 * body.grid.h,
+                from: world_cell(&body.cut().grid, from),
+                basis: world_cell(&body.cut().grid, body.cells()[cell as usize].lattice),
+                middle: body.cut().grid.position(from) + 0.5 * body.cut().grid.h,
                 alone: !self.merged.iter().any(|m| m.1 == cell),
                 pieces: OnceLock::new(),
             };
-            let cells = body.cells.iter().enumerate().map(|(n, c)| source(c.lattice, n as u32));
+            let cells = body.cells().iter().enumerate().map(|(n, c)| source(c.lattice, n as u32));
             cells.chain(self.merged.iter().map(|(from, to)| source(*from, *to))).collect()
         })
     }

@@ -1,10 +1,11 @@
 //! Element and clamp matrices of a plan at one Poisson ratio: the one truth that every backend reads.
 
+use crate::cutcells::domain::Cell;
 use crate::cutcells::element::CellMatrices;
 use crate::cutcells::held::FreePart;
 use crate::mechanics::lame::{lame, lame_by_nu};
 use crate::plan::{ClampCell, Plan};
-use crate::space::body::{Body, Cell};
+use crate::space::body::Body;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -32,12 +33,12 @@ impl Classes {
     pub fn new(plan: &Plan) -> Classes {
         let mut known: BTreeMap<Vec<u64>, u32> = BTreeMap::new();
         let mut parts = Vec::new();
-        let mut free: Vec<FreePart> = plan.body.cells.iter().map(FreePart::of).collect();
+        let mut free: Vec<FreePart> = plan.body.cells().iter().map(FreePart::of).collect();
         for c in plan.clamps.iter().flat_map(|site| &site.cells) {
             free[c.cell as usize].take(&c.held);
         }
         let fraction = |(cell, part): (&Cell, &FreePart)| if part.fraction > 0.0 { part.fraction } else { cell.fraction };
-        let fractions = plan.body.cells.iter().zip(&free).map(fraction).collect();
+        let fractions = plan.body.cells().iter().zip(&free).map(fraction).collect();
         let of_cell = free
             .into_iter()
             .map(|part| {
@@ -48,7 +49,7 @@ impl Classes {
                 })
             })
             .collect();
-        let gradients = parts.iter().map(|part| part.mean_gradient(plan.body.grid.h)).collect();
+        let gradients = parts.iter().map(|part| part.mean_gradient(plan.body.cut().grid.h)).collect();
         Classes { of_cell, parts, gradients, fractions }
     }
 }
@@ -95,12 +96,12 @@ impl Elements {
 
 /// Matrices of the part of a cell that deforms, for E = 1 Pa.
 pub fn cell_matrices(plan: &Plan, part: &FreePart, nu: f64) -> CellMatrices {
-    CellMatrices::new(plan.solver.element, plan.body.grid.h, &part.weights, part.fraction, nu)
+    CellMatrices::new(plan.solver.element, plan.body.cut().grid.h, &part.weights, part.fraction, nu)
 }
 
 /// Nitsche's matrix of one clamp cell for E = 1 Pa, and its derivative by ν.
 pub fn clamp_matrices(body: &Body, c: &ClampCell, nu: f64) -> CellMatrices {
-    let (h, free) = (body.grid.h, c.free(body).fraction);
+    let (h, free) = (body.cut().grid.h, c.free(body).fraction);
     let make = |(l, m)| Box::new(clamp_matrix(c, h, free, l, m));
     CellMatrices { k: make(lame(1.0, nu)), k_nu: make(lame_by_nu(1.0, nu)) }
 }

@@ -4,9 +4,10 @@
 //! Rigid motion (and any affine motion) is therefore continued exactly, and the adjoint is the transposed weights.
 
 use crate::cutcells::distances::{SAMPLES, STEPS, place};
+use crate::cutcells::domain::{Band, BandCell};
 use crate::cutcells::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::Shape;
-use crate::space::body::{Band, BandCell, Body};
+use crate::space::body::Body;
 use crate::space::stencil::StencilBuf;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -25,10 +26,10 @@ pub struct NodeLookup {
 impl NodeLookup {
     /// The lookup of a body.
     pub fn new(body: &Body) -> NodeLookup {
-        let mut number = vec![u32::MAX; body.grid.len()];
-        for c in &body.cells {
+        let mut number = vec![u32::MAX; body.cut().grid.len()];
+        for c in body.cells() {
             for (i, o) in CORNERS.iter().enumerate() {
-                number[body.grid.index(std::array::from_fn(|a| c.lattice[a] + o[a] as usize))] = c.nodes[i];
+                number[body.cut().grid.index(std::array::from_fn(|a| c.lattice[a] + o[a] as usize))] = c.nodes[i];
             }
         }
         NodeLookup { number }
@@ -53,8 +54,8 @@ struct AffineFit {
 impl AffineFit {
     /// Fits around `center` [m] with a kernel of the given radius [m], grown until the nodes span all directions.
     fn new(body: &Body, lookup: &NodeLookup, center: DVec3, radius: f64) -> AffineFit {
-        let h = body.grid.h;
-        let reach = (body.grid.size.iter().max().copied().unwrap_or(1)) as f64 * 2.0 * h + radius;
+        let h = body.cut().grid.h;
+        let reach = (body.cut().grid.size.iter().max().copied().unwrap_or(1)) as f64 * 2.0 * h + radius;
         let mut r = radius.max(h);
         while r < reach {
             if let Some(fit) = AffineFit::within(body, lookup, center, r, true) {
@@ -68,7 +69,7 @@ impl AffineFit {
     }
 
     fn within(body: &Body, lookup: &NodeLookup, center: DVec3, radius: f64, by_volume: bool) -> Option<AffineFit> {
-        let grid = &body.grid;
+        let grid = &body.cut().grid;
         let h = grid.h;
         let bound = |s: f64, a: usize| ((s / h).round() as i64 - i64::from(grid.offset[a])).clamp(0, grid.size[a] as i64 - 1);
         let lo: [usize; 3] = std::array::from_fn(|a| bound(center[a] - radius, a) as usize);
@@ -139,7 +140,7 @@ pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f6
     let mut position_weights = vec![0.0; nodes.len()];
     match active_cell(body, point) {
         Some((cell, xi)) => {
-            for (n, w) in body.cells[cell].nodes.iter().zip(shape_functions(xi)) {
+            for (n, w) in body.cells()[cell].nodes.iter().zip(shape_functions(xi)) {
                 match nodes.iter().position(|m| m == n) {
                     Some(k) => position_weights[k] += w,
                     None => {
@@ -157,8 +158,10 @@ pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f6
 
 /// The active cell that holds a point of the rest configuration [m], with local coordinates; on a shared face either of the two.
 pub fn active_cell(body: &Body, point: DVec3) -> Option<(usize, DVec3)> {
-    let (c, xi) = body.grid.locate(point)?;
-    let find = |c: [usize; 3]| body.cells.binary_search_by_key(&body.grid.index(c), |cell| body.grid.index(cell.lattice)).ok();
+    let (c, xi) = body.cut().grid.locate(point)?;
+    let find = |c: [usize; 3]| {
+        body.cells().binary_search_by_key(&body.cut().grid.index(c), |cell| body.cut().grid.index(cell.lattice)).ok()
+    };
     if let Some(n) = find(c) {
         return Some((n, xi));
     }
@@ -187,12 +190,12 @@ pub fn active_cell(body: &Body, point: DVec3) -> Option<(usize, DVec3)> {
 
 /// The band of width `width` [m] around a body: its cells, their signed distances, and the extension to its nodes.
 pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
-    let grid = &body.grid;
+    let grid = &body.cut().grid;
     let h = grid.h;
     let width = width.max(0.0);
     let lookup = NodeLookup::new(body);
     let mut active = vec![false; grid.len()];
-    for c in &body.cells {
+    for c in body.cells() {
         active[grid.index(c.lattice)] = true;
     }
     // No point of a cell is farther than this from its middle, or (over the steps) from the nearest of its samples.

@@ -23,7 +23,7 @@ fn shapes() -> Vec<Placed> {
 fn affine_fields_are_continued_exactly() {
     for shape in shapes() {
         let body = Body::build(&shape, 0.07, 0.28, 4).unwrap();
-        let band = &body.band;
+        let band = body.band();
         assert!(!band.nodes.is_empty() && band.rows.len() == band.nodes.len() + 1);
         for (m, x) in band.nodes.iter().enumerate() {
             let row = band.rows[m] as usize..band.rows[m + 1] as usize;
@@ -40,7 +40,7 @@ fn weights_stay_moderate() {
     // like 1 + c L/R; at four cells and R = 2.5 that is below 20 even on the thin bodies.
     for shape in shapes() {
         let body = Body::build(&shape, 0.07, 0.28, 4).unwrap();
-        let band = &body.band;
+        let band = body.band();
         for m in 0..band.nodes.len() {
             let row = band.rows[m] as usize..band.rows[m + 1] as usize;
             let size: f64 = band.values[row].iter().map(|v| v.abs()).sum();
@@ -54,8 +54,9 @@ fn band_holds_every_point_near_the_surface() {
     for shape in shapes() {
         let (h, width) = (0.07, 0.15);
         let body = Body::build(&shape, h, width, 4).unwrap();
-        let band = &body.band;
-        let find = |c: [usize; 3]| band.cells.binary_search_by_key(&body.grid.index(c), |b| body.grid.index(b.lattice)).ok();
+        let band = body.band();
+        let find =
+            |c: [usize; 3]| band.cells.binary_search_by_key(&body.cut().grid.index(c), |b| body.cut().grid.index(b.lattice)).ok();
         let (lo, hi) = shape.bounds();
         let mut inside = 0;
         for i in 0..4000 {
@@ -63,7 +64,7 @@ fn band_holds_every_point_near_the_surface() {
             let u = DVec3::new((t * 0.618_034).fract(), (t * 0.754_877).fract(), (t * 0.569_840).fract());
             let p = lo - 0.25 + (hi - lo + 0.5) * u;
             if shape.signed_distance(p) < width {
-                let (c, xi) = body.grid.locate(p).unwrap();
+                let (c, xi) = body.cut().grid.locate(p).unwrap();
                 let cell = &band.cells[find(c).expect("a point in the band lies in a band cell")];
                 inside += 1;
                 // The nearest of the samples is off by at most the distance to it.
@@ -75,7 +76,7 @@ fn band_holds_every_point_near_the_surface() {
         assert!(inside > 200);
         for c in &band.cells {
             for (i, o) in CORNERS.iter().enumerate() {
-                let x = body.grid.position(std::array::from_fn(|a| c.lattice[a] + o[a] as usize));
+                let x = body.cut().grid.position(std::array::from_fn(|a| c.lattice[a] + o[a] as usize));
                 let n = c.nodes[i] as usize;
                 let y = if n < body.nodes.len() { body.nodes[n] } else { band.nodes[n - body.nodes.len()] };
                 assert_eq!(x, y);

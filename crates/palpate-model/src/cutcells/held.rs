@@ -6,9 +6,10 @@
 //! pinned.
 
 use crate::cutcells::cut::POINTS27;
+use crate::cutcells::domain::Cell;
 use crate::cutcells::grid::shape_gradients;
 use crate::plan::ClampCell;
-use crate::space::body::{Body, Cell};
+use crate::space::body::Body;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -65,9 +66,9 @@ impl Pins {
     /// The pins of a clamp that holds `cells`.
     pub fn new<'a>(body: &Body, cells: impl Iterator<Item = &'a ClampCell> + Clone) -> Pins {
         let free: BTreeMap<u32, f64> =
-            cells.clone().map(|c| (c.cell, c.free(body).fraction / body.cells[c.cell as usize].fraction)).collect();
-        let mut pins: BTreeMap<u32, f64> = cells.flat_map(|c| body.cells[c.cell as usize].nodes).map(|n| (n, 1.0)).collect();
-        for (e, cell) in body.cells.iter().enumerate() {
+            cells.clone().map(|c| (c.cell, c.free(body).fraction / body.cells()[c.cell as usize].fraction)).collect();
+        let mut pins: BTreeMap<u32, f64> = cells.flat_map(|c| body.cells()[c.cell as usize].nodes).map(|n| (n, 1.0)).collect();
+        for (e, cell) in body.cells().iter().enumerate() {
             let free = free.get(&(e as u32)).unwrap_or(&1.0);
             for n in cell.nodes {
                 if let Some(pin) = pins.get_mut(&n) {
@@ -80,6 +81,6 @@ impl Pins {
 
     /// The pins of the nodes of one of the clamp's cells.
     pub fn of(&self, body: &Body, cell: u32) -> [f64; 8] {
-        body.cells[cell as usize].nodes.map(|n| self.0[&n])
+        body.cells()[cell as usize].nodes.map(|n| self.0[&n])
     }
 }

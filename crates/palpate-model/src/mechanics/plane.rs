@@ -25,7 +25,7 @@ pub fn planes(plan: &Plan, physics: &Physics) -> Vec<PlaneNow> {
         .map(|(site, [height, theta, phi])| PlaneNow {
             normal: site.normal(*theta, *phi),
             height: *height,
-            stiffness: site.stiffness.unwrap_or(contact::DEFAULT_STIFFNESS * physics.youngs_modulus / plan.body.grid.h),
+            stiffness: site.stiffness.unwrap_or(contact::DEFAULT_STIFFNESS * physics.youngs_modulus / plan.body.length),
             scales: site.stiffness.is_none(),
         })
         .collect()

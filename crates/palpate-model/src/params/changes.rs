@@ -32,13 +32,13 @@ impl Spot {
     /// A spot of a plan's body, at its centre and at the start.
     pub fn of(plan: &Plan) -> Spot {
         let body = &plan.body;
-        let size = 0.5 * (body.corners.1 - body.corners.0).max_element().max(body.grid.h);
+        let size = 0.5 * body.size();
         let anchor = plan.clamps.first().map_or(body.center, |c| {
-            let middle = |cell: u32| body.grid.position(body.cells[cell as usize].lattice) + 0.5 * body.grid.h;
+            let middle = |cell: u32| body.cut().middle(&body.cells()[cell as usize]);
             let nodes = c.nodes.iter().map(|n| body.nodes[n.0 as usize]);
             (c.cells.iter().map(|c| middle(c.cell)).chain(nodes)).sum::<DVec3>() / (c.cells.len() + c.nodes.len()) as f64
         });
-        Spot { rest: body.center, center: body.center, anchor, size, cell: body.grid.h, elapsed: 0.0 }
+        Spot { rest: body.center, center: body.center, anchor, size, cell: body.length, elapsed: 0.0 }
     }
 }
 

@@ -319,9 +319,9 @@ fn harmonic(regions: &[Region], body: &Body) -> Result<Vec<Vec<(u32, f64)>>, Str
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutcells::build::SUBDIVISIONS;
     use crate::scene::{Analytic, BodySource, Object, Resolution};
     use crate::shape::shape_of;
-    use crate::space::body::SUBDIVISIONS;
 
     fn bar() -> Body {
         let shape = Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.2, 0.04, 0.04) };

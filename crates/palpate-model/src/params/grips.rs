@@ -86,7 +86,7 @@ impl<'a> Grips<'a> {
     fn layered(&self, c: &ClampCell, cell: &CellMatrices, nu: f64) -> CellMatrices {
         let hold = changes::hold(self.plan, self.physics, &self.spot);
         let [k3, k3_nu] = self.layer(c, nu);
-        let make = |k: &M24, k3: &M24| Box::new(layered(k, k3, self.plan.body.grid.h, hold[1], false).map(|v| hold[0] * v));
+        let make = |k: &M24, k3: &M24| Box::new(layered(k, k3, self.plan.body.cut().grid.h, hold[1], false).map(|v| hold[0] * v));
         CellMatrices { k: make(&cell.k, &k3), k_nu: make(&cell.k_nu, &k3_nu) }
     }
 
@@ -96,7 +96,7 @@ impl<'a> Grips<'a> {
         if slope[0] == 0.0 && slope[1] == 0.0 {
             return None;
         }
-        let (hold, h) = (changes::hold(self.plan, self.physics, &self.spot), self.plan.body.grid.h);
+        let (hold, h) = (changes::hold(self.plan, self.physics, &self.spot), self.plan.body.cut().grid.h);
         let [k3, _] = self.layer(c, nu);
         let (own, by_layer) = (layered(k, &k3, h, hold[1], false), layered(k, &k3, h, hold[1], true));
         Some(Box::new(std::array::from_fn(|i| slope[0] * own[i] + hold[0] * slope[1] * by_layer[i])))

@@ -5,23 +5,22 @@ mod tets;
 
 pub use sites::marker_sites;
 
+use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
+use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
-use crate::cutcells::cut::{ClipBox, HeldMoments, Lattice, held_moments};
-use crate::cutcells::extension::active_cell;
-use crate::cutcells::grid::shape_functions;
-use crate::cutcells::held::Pins;
+use crate::cutcells::cut::ClipBox;
 use crate::effects::check_choices;
 use crate::mechanics::contact;
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
-use crate::plan::{ClampCell, ClampSite, Clock, Plan, PlaneSite};
+use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
 use crate::scene::{BodySource, Clamp, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
-use crate::space::body::{self, Body, BodyError, Parts, SUBDIVISIONS};
+use crate::space::body::Body;
 use crate::space::stencil::Stencils;
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use std::sync::Arc;
 
 /// Why a scene gives no plan.
@@ -57,7 +56,7 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
         Resolution::Own => return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into())),
     };
-    let mut parts = body::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
+    let mut parts = cutting::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
         let key = if matches!(e, BodyError::Empty { .. }) { "object" } else { key };
         error(key, e.to_string())
     })?;
@@ -83,13 +82,8 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     let mut masses = Stencils::default();
     for (i, m) in scene.masses.iter().enumerate() {
         let key = format!("mass.{i}.point");
-        if !body.points.is_empty() {
-            let place = tets::place(&key, m.point, &body)?;
-            masses.push(&place.nodes, &place.value);
-            continue;
-        }
-        let (nodes, weights) = mass_site(&key, m.point, &body)?;
-        masses.push(&nodes, &weights);
+        let place = sites::mass_site(&key, m.point, &body)?;
+        masses.push(&place.nodes, &place.value);
     }
     observation.markers = marker_sites(marker_rest, &body, shape.as_ref())?;
     observation.markers.extend(sites::track_sites(&observation.tracks, &body, shape.as_ref())?);
@@ -122,7 +116,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         initial: scene.initial.state,
         pivot: scene.initial.pivot.unwrap_or(body.center),
         observation: Arc::new(observation),
-        band: band_cells(scene) * body.grid.h,
+        band: band_cells(scene) * body.length,
         solver: scene.solver,
         body,
     })
@@ -160,32 +154,9 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
     if !body.points.is_empty() {
         return tets::clamp_site(i, clamp, scene, body, shape);
     }
-    let (grid, h) = (&body.grid, body.grid.h);
     let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
     let region = ClipBox { to_frame, min: clamp.min, max: clamp.max };
-    let distance = |p: DVec3| shape.signed_distance(p);
-    let lattice = Lattice { distance: &distance, h, subdivisions: SUBDIVISIONS };
-    let misses = |c: [usize; 3]| region.misses(grid.position(c) + 0.5 * h, 0.5 * 3f64.sqrt() * h * 1.01);
-
-    let mut held: Vec<Option<HeldMoments>> = vec![None; body.cells.len()];
-    for (n, cell) in body.cells.iter().enumerate().filter(|(_, c)| !misses(c.lattice)) {
-        let world = body::world_cell(grid, cell.lattice);
-        // A full cell may still have surface on its faces; only cells away from the surface take the short way.
-        let deep = shape.signed_distance(grid.position(cell.lattice) + 0.5 * h) < -0.5 * 3f64.sqrt() * h * 1.01;
-        held_moments(&lattice, world, world, deep, &region, held[n].get_or_insert_default());
-    }
-    for &(from, to) in parts.merged.iter().filter(|(c, _)| !misses(*c)) {
-        let (cell, basis) = (body::world_cell(grid, from), body::world_cell(grid, body.cells[to as usize].lattice));
-        held_moments(&lattice, cell, basis, false, &region, held[to as usize].get_or_insert_default());
-    }
-    let mut cells: Vec<ClampCell> = held
-        .into_iter()
-        .enumerate()
-        .filter_map(|(n, m)| Some((n, m?)))
-        // Rounding of a box that only touches a cell's face holds nothing.
-        .filter(|(_, m)| m.area() > 1e-9 * h * h || m.volume() > 1e-9 * h.powi(3))
-        .map(|(n, m)| ClampCell::new(body, n as u32, &m))
-        .collect();
+    let cells = held_cells(&region, parts, shape.as_ref());
     if cells.is_empty() {
         let (lo, hi) = shape.bounds();
         return Err(error(
@@ -199,30 +170,8 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
             ),
         ));
     }
-    let pins = Pins::new(body, cells.iter());
-    cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
     Ok(ClampSite { cells, nodes: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
-}
-
-fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<([u32; 8], [f64; 8]), PlanError> {
-    if let Some((cell, xi)) = active_cell(body, point) {
-        return Ok((body.cells[cell].nodes, shape_functions(xi)));
-    }
-    let h = body.grid.h;
-    let local = |c: &body::Cell| (point - body.grid.position(c.lattice)) / h;
-    let gap = |c: &body::Cell| (local(c) - local(c).clamp(DVec3::ZERO, DVec3::ONE)).length();
-    let nearest = body.cells.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)));
-    match nearest {
-        Some(c) if gap(c) <= 1.0 => Ok((c.nodes, shape_functions(local(c).clamp(DVec3::ZERO, DVec3::ONE)))),
-        _ => Err(error(
-            key,
-            format!(
-                "{point} m lies {:.4} m away from the body; a point mass must lie on it or within one cell ({h} m)",
-                nearest.map_or(f64::INFINITY, gap) * h
-            ),
-        )),
-    }
 }
 
 #[cfg(test)]

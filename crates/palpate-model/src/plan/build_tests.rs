@@ -3,8 +3,9 @@
 use super::*;
 use crate::cutcells::clamp_edge::{Held, slope};
 use crate::mechanics::motion::RigidMotion;
+use crate::plan::ClampCell;
 use crate::scene::*;
-use glam::{DMat3, DQuat};
+use glam::{DMat3, DQuat, DVec3};
 use std::path::PathBuf;
 
 /// A beam 0.2 × 0.05 × 0.04 m on the lattice of h = 0.01 m, unless posed.
@@ -80,7 +81,7 @@ fn clamps_hold_what_their_box_cuts_out_of_the_body() {
                 assert!(c.mean_gradient == [DVec3::ZERO; 8]);
                 continue;
             }
-            let nodes = plan.body.cells[c.cell as usize].nodes;
+            let nodes = plan.body.cells()[c.cell as usize].nodes;
             let mut f = DMat3::ZERO;
             for i in 0..8 {
                 let (x, g) = (plan.body.nodes[nodes[i] as usize], c.mean_gradient[i]);
@@ -156,7 +157,7 @@ fn point_masses_sit_on_or_near_the_body() {
 fn resolution_errors_name_their_key() {
     let mut scene = scene();
     scene.object.resolution = Resolution::Cells(40);
-    assert!((build_body(&scene).unwrap().0.grid.h - 0.005).abs() < 1e-17);
+    assert!((build_body(&scene).unwrap().0.length - 0.005).abs() < 1e-17);
     scene.object.resolution = Resolution::CellSize(1.0);
     let message = build_body(&scene).unwrap_err().to_string();
     assert!(message.starts_with("object.cell_size: ") && message.contains("0.2000 × 0.0500 × 0.0400"), "{message}");
@@ -222,7 +223,7 @@ fn a_shifted_edge_holds_what_a_larger_box_would() {
     };
     let stated = boxed(0.031);
     let (body, site) = (&stated.body, &stated.clamps[0]);
-    let h = body.grid.h;
+    let h = body.length;
     // The lateral faces lie 0.1 mm outside and 0.2 mm inside the beam: beside it, so that they stay.
     for shift in [0.0, 0.004, 0.023, -0.007, -0.026, 0.1] {
         let held = site.edge.cells(body, &site.cells, shift);

@@ -3,9 +3,8 @@
 pub mod build;
 pub mod scheme;
 
+pub use crate::cutcells::clamp_cell::ClampCell;
 use crate::cutcells::clamp_edge::Edge;
-use crate::cutcells::cut::HeldMoments;
-use crate::cutcells::held::FreePart;
 use crate::materials::Model;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::Observation;
@@ -26,7 +25,7 @@ pub const STATIC_ITERATIONS: usize = 200;
 /// A batch's common part: geometry, clock, observations. Members differ only in θ.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The body on its grid.
+    /// The body.
     pub body: Arc<Body>,
     /// Material model.
     pub model: &'static Model,
@@ -82,54 +81,6 @@ impl std::fmt::Debug for ClampSite {
     /// Without the edge, which follows from the rest and the body.
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.debug_struct("ClampSite").field("cells", &self.cells).field("nodes", &self.nodes).field("motion", &self.motion).finish()
-    }
-}
-
-/// One cell of a held region.
-#[derive(Clone, Debug)]
-pub struct ClampCell {
-    /// Number of the cell in [`Body::cells`].
-    pub cell: u32,
-    /// ∫_Γ N_i n dS over the faces of the region inside the body [m²]; n points into the region.
-    pub surface_normal: [DVec3; 8],
-    /// ∫_Γ N_i N_j dS over them [m²].
-    pub surface_mass: [[f64; 8]; 8],
-    /// ∫ N_i N_j dV over the held part of the cell [m³].
-    pub volume_mass: [[f64; 8]; 8],
-    /// How much each node is pinned, 0 to 1 ([`crate::cutcells::held`]): the volume is held as far as both nodes are.
-    pub pins: [f64; 8],
-    /// Gauss weights of the held part of the cell; they sum to the fraction of the cell that is held.
-    pub held: [f64; 27],
-    /// Mean of ∇N_i over the free part of the body in the cell [1/m]; traction is taken from the mean strain.
-    pub mean_gradient: [DVec3; 8],
-}
-
-impl ClampCell {
-    /// The held part of a cell among a clamp's, which stand in increasing order.
-    pub fn find(held: &[ClampCell], cell: u32) -> Option<&ClampCell> {
-        held.binary_search_by_key(&cell, |c| c.cell).ok().map(|i| &held[i])
-    }
-
-    /// A held part of a cell; all of its nodes are pinned.
-    pub(crate) fn new(body: &Body, cell: u32, m: &HeldMoments) -> ClampCell {
-        let mut c = ClampCell {
-            cell,
-            surface_normal: m.surface_normal,
-            surface_mass: m.surface_mass,
-            volume_mass: m.volume_mass,
-            pins: [1.0; 8],
-            held: m.weights(),
-            mean_gradient: [DVec3::ZERO; 8],
-        };
-        c.mean_gradient = c.free(body).mean_gradient(body.grid.h);
-        c
-    }
-
-    /// The part of the body in the cell that is not held.
-    pub fn free(&self, body: &Body) -> FreePart {
-        let mut free = FreePart::of(&body.cells[self.cell as usize]);
-        free.take(&self.held);
-        free
     }
 }
 

@@ -1,39 +1,29 @@
-//! The body on its grid: active cells, nodes, weights, surface patches, ghost penalty, the band around it.
+//! The body: nodes with their shares of its volume, the surface, and one of two kinds of elastic domain, cut cells or elastic points.
 
-mod build;
-mod moments;
-
-pub use build::{BodyError, LARGE, MAX_CELLS, SUBDIVISIONS, unit_hint};
-pub(crate) use build::{Parts, build_parts, world_cell};
-
-use crate::cutcells::distances::Distances;
-use crate::cutcells::grid::Grid;
+use crate::cutcells::domain::{Band, Cell, CutCells, GhostLine};
 use crate::space::points::{Points, TetMesh};
 use crate::space::stencil::{Stencil, Stencils};
 use glam::DVec3;
 
-/// A body cut out of a lattice; constant over a simulation, in world coordinates of the rest configuration.
+/// A body; constant over a simulation, in world coordinates of the rest configuration.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// The lattice that covers body and band.
-    pub grid: Grid,
+    /// Typical size of an element [m], what lengths beside it are measured in: the edge of a lattice's cells, or the edge of the cube that
+    /// six mean tetrahedra fill.
+    pub length: f64,
     /// Rest positions of the simulation nodes [m], shape `[N]`.
     pub nodes: Vec<DVec3>,
     /// Lumped volumes [m³], shape `[N]`: ∫ N_i over the body, after [`Body::mend_moments`] times a factor near 1; their sum is `volume`,
     /// their centre `center`.
     pub node_volume: Vec<f64>,
-    /// Cells that hold some of the body.
-    pub cells: Vec<Cell>,
     /// Surface of the body in small pieces, grouped by cell in increasing order.
     pub patches: Vec<Patch>,
     /// Mean place of every patch.
     pub surface: Stencils,
-    /// Elastic points, of bodies that are not cut out of a lattice; such a body has no cells.
+    /// The cells, of bodies that are cut out of a lattice.
+    pub cut: Option<CutCells>,
+    /// Elastic points, of bodies that are not.
     pub points: Points,
-    /// Ghost penalty lines: squared second differences of u on cut cells' faces.
-    pub ghosts: Vec<GhostLine>,
-    /// The body and the cells around it, where observed points are looked up.
-    pub band: Band,
     /// Volume [m³].
     pub volume: f64,
     /// Surface area [m²].
@@ -50,19 +40,49 @@ impl Body {
         self.patches.iter().zip(self.surface.iter())
     }
 
+    /// The lattice and what is cut out of it, for rooms that only such bodies enter.
+    ///
+    /// # Panics
+    /// On a body of elastic points.
+    pub fn cut(&self) -> &CutCells {
+        self.cut.as_ref().expect("a body of elastic points has no lattice")
+    }
+
+    /// Cells; none of a body of elastic points.
+    pub fn cells(&self) -> &[Cell] {
+        self.cut.as_ref().map_or(&[], |c| &c.cells)
+    }
+
+    /// Lines of the ghost penalty; none of a body of elastic points.
+    pub fn ghosts(&self) -> &[GhostLine] {
+        self.cut.as_ref().map_or(&[], |c| &c.ghosts)
+    }
+
+    /// The band around the cells; an empty one of a body of elastic points.
+    pub fn band(&self) -> &Band {
+        static NONE: Band =
+            Band { width: 0.0, nodes: Vec::new(), rows: Vec::new(), columns: Vec::new(), values: Vec::new(), cells: Vec::new() };
+        self.cut.as_ref().map_or(&NONE, |c| &c.band)
+    }
+
+    /// Longest side of the body [m], at least one element.
+    pub fn size(&self) -> f64 {
+        (self.corners.1 - self.corners.0).max_element().max(self.length)
+    }
+
     /// Number of elements: cells, or elastic points.
     pub fn elements(&self) -> usize {
-        self.cells.len() + self.points.len()
+        self.cells().len() + self.points.len()
     }
 
     /// Nodes of every element.
     pub fn element_nodes(&self) -> impl Iterator<Item = &[u32]> + '_ {
-        self.cells.iter().map(|c| &c.nodes[..]).chain(self.points.stencils.iter().map(|s| s.nodes))
+        self.cells().iter().map(|c| &c.nodes[..]).chain(self.points.stencils.iter().map(|s| s.nodes))
     }
 
     /// Rest position of the middle of every element [m].
     pub fn middles(&self) -> impl Iterator<Item = DVec3> + '_ {
-        let cells = self.cells.iter().map(|c| self.grid.position(c.lattice) + 0.5 * self.grid.h);
+        let cells = self.cut.iter().flat_map(|cut| cut.cells.iter().map(|c| cut.middle(c)));
         cells.chain(self.points.stencils.iter().map(|s| s.at(&self.nodes)))
     }
 
@@ -85,19 +105,15 @@ impl Body {
         }
         let low = mesh.nodes.iter().copied().reduce(DVec3::min).unwrap_or(center);
         let high = mesh.nodes.iter().copied().reduce(DVec3::max).unwrap_or(center);
-        // The edge of a cube of a mean tetrahedron's six: what lengths are measured in where cells have their edge.
-        let length = (6.0 * volume / points.len() as f64).cbrt();
         Body {
-            grid: Grid::covering(low, high, length, 1),
+            length: (6.0 * volume / points.len() as f64).cbrt(),
             nodes: mesh.nodes.clone(),
             node_volume,
-            cells: Vec::new(),
             area: patches.iter().map(|p| p.area).sum(),
             patches,
             surface,
+            cut: None,
             points,
-            ghosts: Vec::new(),
-            band: Band::default(),
             volume,
             center,
             corners: (low, high),
@@ -105,29 +121,7 @@ impl Body {
     }
 }
 
-/// A cell that holds some of the body.
-#[derive(Clone, Debug)]
-pub struct Cell {
-    /// Lattice coordinates of the lowest corner, counted from the grid's node (0, 0, 0).
-    pub lattice: [usize; 3],
-    /// The eight simulation nodes, order of [`crate::cutcells::grid::CORNERS`].
-    pub nodes: [u32; 8],
-    /// Volume of the body inside, divided by h³; 1 for a full cell, a trace more if a neighbour's sliver was merged into it.
-    pub fraction: f64,
-    /// Weights of the 3 × 3 × 3 Gauss points [`crate::cutcells::cut::POINTS27`] (x fastest), divided by h³, fitted so that every
-    /// polynomial of degree ≤ 2 in each variable is integrated exactly over the part of the cell inside the
-    /// body; they sum to `fraction` and may be negative.
-    pub weights: [f64; 27],
-}
-
-impl Cell {
-    /// True when the body fills exactly the whole cell (one that also carries a merged neighbour's sliver is not full).
-    pub fn is_full(&self) -> bool {
-        (self.fraction - 1.0).abs() <= 1e-9
-    }
-}
-
-/// A piece of the surface inside one cell; forces and gaps are taken as means over it.
+/// A piece of the surface of one element; forces and gaps are taken as means over it.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// Number of the cell or element that it belongs to.
@@ -138,41 +132,4 @@ pub struct Patch {
     pub normal: DVec3,
     /// Centroid at rest [m].
     pub point: DVec3,
-}
-
-/// One line of the ghost penalty: energy ½ γ μ h `weight` |u_a − 2 u_b + u_c|² (dimensionless weight).
-#[derive(Clone, Debug, PartialEq)]
-pub struct GhostLine {
-    /// Simulation nodes a, b, c in a row along an axis.
-    pub nodes: [u32; 3],
-    /// Number of ghost faces that hold the line, divided by four.
-    pub weight: f64,
-}
-
-/// The body and a band of cells around it. Extended nodes are numbered: first the N simulation nodes, then band nodes.
-#[derive(Clone, Debug, Default)]
-pub struct Band {
-    /// Half width of the band [m]: every point closer to the surface than this lies in a band cell.
-    pub width: f64,
-    /// Rest positions of the band nodes only [m], shape `[M]` (extended number = N + row).
-    pub nodes: Vec<DVec3>,
-    /// Start of each band node's row in `columns` / `values`, shape `[M + 1]`.
-    pub rows: Vec<u32>,
-    /// Simulation nodes that a band node's displacement is extended from.
-    pub columns: Vec<u32>,
-    /// Extension weights; every row sums to one and reproduces affine fields exactly.
-    pub values: Vec<f64>,
-    /// Cells of the band, active cells included.
-    pub cells: Vec<BandCell>,
-}
-
-/// A cell in which observed points are looked up.
-#[derive(Clone, Debug)]
-pub struct BandCell {
-    /// Lattice coordinates of the lowest corner.
-    pub lattice: [usize; 3],
-    /// Extended node numbers of the eight corners.
-    pub nodes: [u32; 8],
-    /// Signed distance [m] at the lattice of [`crate::cutcells::distances`] in the cell, negative inside.
-    pub sdf: Distances,
 }

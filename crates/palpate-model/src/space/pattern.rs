@@ -15,6 +15,10 @@ pub struct Pattern {
     pub cell_rows: Vec<usize>,
     /// (cell, corner) pairs of each node, increasing.
     pub cell_list: Vec<(u32, u8)>,
+    /// Start of each node's entries in `point_list`, shape `[N + 1]`.
+    pub point_rows: Vec<usize>,
+    /// (elastic point, place in its stencil) pairs of each node, increasing.
+    pub point_list: Vec<(u32, u8)>,
     /// Row ranges that are assembled side by side; fixed by the size alone, so results do not depend on threads.
     pub parts: Vec<std::ops::Range<usize>>,
 }
@@ -70,31 +74,31 @@ impl Pattern {
         let n = body.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
         let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
-        for (e, cell) in body.cells.iter().enumerate() {
+        for (e, cell) in body.cells().iter().enumerate() {
             for (i, &a) in cell.nodes.iter().enumerate() {
                 neighbours[a as usize].extend_from_slice(&cell.nodes);
                 cells[a as usize].push((e as u32, i as u8));
             }
         }
-        for nodes in body.points.stencils.iter().map(|s| s.nodes) {
-            nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(nodes));
+        let mut points: Vec<Vec<(u32, u8)>> = vec![Vec::new(); n];
+        for (e, nodes) in body.points.stencils.iter().map(|s| s.nodes).enumerate() {
+            for (i, &a) in nodes.iter().enumerate() {
+                neighbours[a as usize].extend_from_slice(nodes);
+                points[a as usize].push((e as u32, i as u8));
+            }
         }
-        for ghost in &body.ghosts {
+        for ghost in body.ghosts() {
             for a in ghost.nodes {
                 neighbours[a as usize].extend_from_slice(&ghost.nodes);
             }
         }
         let blocks = BlockRows::new(neighbours);
-        let mut cell_rows = vec![0];
-        let mut cell_list = Vec::new();
-        for list in cells {
-            cell_list.extend(list);
-            cell_rows.push(cell_list.len());
-        }
+        let (cell_rows, cell_list) = joined(cells);
+        let (point_rows, point_list) = joined(points);
         // About 300 rows are worth a task of their own; the blocks of cells that two parts share are set aside and added afterwards.
         let count = (n / 300).clamp(1, 16);
         let parts = (0..count).map(|p| p * n / count..(p + 1) * n / count).collect();
-        Pattern { blocks, cell_rows, cell_list, parts }
+        Pattern { blocks, cell_rows, cell_list, point_rows, point_list, parts }
     }
 
     /// Number of nodes N.
@@ -111,6 +115,17 @@ impl Pattern {
     pub fn blocks8(&self, nodes: &[u32; 8]) -> [u32; 64] {
         std::array::from_fn(|k| self.blocks.find(nodes[k / 8], nodes[k % 8]) as u32)
     }
+}
+
+/// Lists in a row, and where each begins.
+fn joined(lists: Vec<Vec<(u32, u8)>>) -> (Vec<usize>, Vec<(u32, u8)>) {
+    let mut rows = vec![0];
+    let mut all = Vec::new();
+    for list in lists {
+        all.extend(list);
+        rows.push(all.len());
+    }
+    (rows, all)
 }
 
 /// Places where a plan's terms add into the matrix.
@@ -132,7 +147,7 @@ impl Places {
     /// Looks every place up once.
     pub fn new(plan: &Plan, pattern: &Pattern) -> Places {
         Places {
-            cells: plan.body.cells.iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
+            cells: plan.body.cells().iter().map(|c| pattern.blocks8(&c.nodes)).collect(),
             ghosts: ghosts(&plan.body, pattern),
             points: Squares::new(pattern, &plan.body.points.stencils),
             patches: Squares::new(pattern, &plan.body.surface),
@@ -169,7 +184,7 @@ impl Squares {
 fn ghosts(body: &Body, pattern: &Pattern) -> Vec<(u32, f64)> {
     const STENCIL: [f64; 3] = [1.0, -2.0, 1.0];
     let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
-    for line in &body.ghosts {
+    for line in body.ghosts() {
         for (i, a) in line.nodes.iter().enumerate() {
             for (j, b) in line.nodes.iter().enumerate() {
                 *sums.entry(pattern.blocks.find(*a, *b) as u32).or_default() += line.weight * STENCIL[i] * STENCIL[j];

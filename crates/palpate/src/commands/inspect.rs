@@ -161,8 +161,8 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let density = Physics::new(&plan.layout, &plan.theta).density;
     let (min, max) = e.shape().bounds();
     let size = max - min;
-    let full = body.cells.iter().filter(|c| c.is_full()).count();
-    let (all, cut, nodes) = (body.cells.len(), body.cells.len() - full, body.nodes.len());
+    let cut = body.cells().iter().filter(|c| !c.is_full()).count();
+    let (all, full, nodes) = (body.elements(), body.elements() - cut, body.nodes.len());
     content.title = title(&scene.title);
     (content.size, content.volume, content.area, content.mass) = (size.to_array(), body.volume, body.area, density * body.volume);
     lines.extend(content.title.iter().map(|t| ("title", t.clone())));
@@ -178,15 +178,17 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
         let text = if open == 0 { "0 (closed)".to_string() } else { format!("{open} in the file (closed by the repair)") };
         lines.push(("open edges", text));
     }
-    (content.cell_size, content.cells) = (body.grid.h, Cells { all, full, cut });
-    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band.cells.len());
-    lines.extend([
-        ("cell size", format!("{:.5} m", body.grid.h)),
-        ("cells", format!("{all} ({full} full, {cut} cut)")),
-        ("nodes", nodes.to_string()),
-        ("degrees of freedom", (3 * nodes).to_string()),
-        ("band cells", format!("{} of {:.4} m", body.band.cells.len(), plan.band)),
-    ]);
+    (content.cell_size, content.cells) = (body.length, Cells { all, full, cut });
+    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band().cells.len());
+    match body.cut {
+        Some(_) => lines.extend([
+            ("cell size", format!("{:.5} m", body.length)),
+            ("cells", format!("{all} ({full} full, {cut} cut)")),
+            ("band cells", format!("{} of {:.4} m", body.band().cells.len(), plan.band)),
+        ]),
+        None => lines.push(("tetrahedra", format!("{all} of about {:.5} m", body.length))),
+    }
+    lines.extend([("nodes", nodes.to_string()), ("degrees of freedom", (3 * nodes).to_string())]);
 }
 
 /// What acts on the body, and when.

@@ -148,7 +148,7 @@ fn markers(path: &Path, experiment: &Experiment) -> Result<Vec<(String, DVec3)>,
     if reader.headers().map_err(open)? != vec!["name", "x", "y", "z"] {
         return Err(InputError::line(path, 1, "the header must be name,x,y,z").into());
     }
-    let allowed = 2.0 * experiment.plan().body.grid.h;
+    let allowed = 2.0 * experiment.plan().body.length;
     let mut markers: Vec<(String, DVec3)> = Vec::new();
     for row in reader.records() {
         let row = row.map_err(open)?;
@@ -185,7 +185,7 @@ fn points(path: &Path, experiment: &Experiment) -> Result<Vec<DVec3>, Error> {
         return Err(wrong(format!("has shape {}, expected (points, 3)", array.shape_text())));
     }
     let points: Vec<DVec3> = array.values.chunks_exact(3).map(DVec3::from_slice).collect();
-    let allowed = 2.0 * experiment.plan().body.grid.h;
+    let allowed = 2.0 * experiment.plan().body.length;
     let away = |p: &DVec3| experiment.shape().signed_distance(*p);
     // What is no number is away as well.
     let far = points.iter().filter(|p| away(p).abs() > allowed || away(p).is_nan()).count();

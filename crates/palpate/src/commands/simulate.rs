@@ -4,6 +4,7 @@ use crate::cli::{Console, INTERRUPTED};
 use crate::embed::Embedding;
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::fields::{OnGrid, named};
 use crate::options::{BackendName, count, out_folder};
 use crate::render::{Pinhole, shade};
 use crate::results::simulation::SimulationDocument;
@@ -12,6 +13,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::output::{make_folder, write_file};
+use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::shape::TriMesh;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -23,8 +25,8 @@ Examples:
   palpate simulate beam.toml --format vtu,png --every 5
   palpate simulate found/model.toml --out frames       what a fit has found, simulated again
 
-obj, ply: the deformed surface; vtu: the cells with displacement and velocity, and a .pvd for the whole series;
-png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
+obj, ply: the deformed surface; vtu: the cells or tetrahedra with displacement, velocity and fields, and a .pvd for the whole
+series; png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
 formats are replaced: those that this one has no frame for are removed.";
 
 /// Simulate a scene and write its motion
@@ -99,7 +101,8 @@ struct Writer<'a> {
     formats: Vec<Format>,
     surface: Embedding,
     triangles: Vec<[u32; 3]>,
-    hexes: Vec<[u32; 8]>,
+    elements: Elements,
+    fields: OnGrid,
     camera: Pinhole,
     series: Vec<(f64, String)>,
     files: usize,
@@ -122,14 +125,15 @@ impl Writer<'_> {
                 Format::Vtu => {
                     let body = &self.experiment.plan().body;
                     let points: Vec<DVec3> = body.nodes.iter().zip(&state.displacement).map(|(x, u)| *x + *u).collect();
-                    let fractions: Vec<f64> = body.cells.iter().map(|c| c.fraction).collect();
-                    palpate_io::write_vtu(
-                        file,
-                        &points,
-                        &self.hexes,
-                        &[("displacement", &state.displacement), ("velocity", &state.velocity)],
-                        &[("fraction", &fractions)],
-                    )?;
+                    let fractions: Vec<f64> = body.cells().iter().map(|c| c.fraction).collect();
+                    let mut of_nodes = named(&self.fields.nodes);
+                    of_nodes.push(("displacement", Values::Vectors(&state.displacement)));
+                    of_nodes.push(("velocity", Values::Vectors(&state.velocity)));
+                    let mut of_elements = named(&self.fields.elements);
+                    if body.cut.is_some() {
+                        of_elements.push(("fraction", Values::Numbers(&fractions)));
+                    }
+                    write_vtu(file, &points, &self.elements, &of_nodes, &of_elements)?;
                     self.series.push((time, frame_name(number, format)));
                 }
                 Format::Png => {
@@ -159,7 +163,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     make_folder(&folder)?;
     let clock = Instant::now();
     let plan = experiment.plan();
-    let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+    let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
 
     // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
@@ -192,7 +196,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     }
     let mut writer = Writer {
         camera: camera(&experiment, &extent),
-        hexes: plan.body.cells.iter().map(|c| c.nodes).collect(),
+        elements: Elements::of(&plan.body),
+        fields: OnGrid::new(plan, &plan.theta, &(0..plan.fields.len()).collect::<Vec<_>>()),
         experiment: &experiment,
         folder: folder.clone(),
         formats,

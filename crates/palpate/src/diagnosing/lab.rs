@@ -80,7 +80,7 @@ impl<'a> Lab<'a> {
             bounds: first.shape().bounds(),
             up: first.up(),
             places: regions.centers.iter().filter_map(nearest).collect(),
-            spot: 0.5 * body.grid.h,
+            spot: 0.5 * body.length,
             cameras: most(|e| e.plan.observation.cameras.len()),
             markers: most(|e| e.plan.observation.marker_count()),
             held: held(base),

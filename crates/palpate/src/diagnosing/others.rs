@@ -24,10 +24,10 @@ pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64
     let physics = palpate_model::plan::Physics::new(&e.plan.layout, theta);
     let planes: Vec<(DVec3, f64)> =
         e.plan.planes.iter().zip(&physics.planes).map(|(site, p)| (site.normal(p[1], p[2])[0], p[0])).collect();
-    let (surface, _) = e.surface(0.5 * e.plan.body.grid.h);
+    let (surface, _) = e.surface(0.5 * e.plan.body.length);
     let step = e.plan.clock.step;
     // Where contact forces begin to act.
-    let reach = 0.05 * e.plan.body.grid.h;
+    let reach = 0.05 * e.plan.body.length;
     backend.visit(&e.plan, theta, |_, s, _| {
         let x = surface.deform(&s.displacement);
         let time = physics.start + s.time;

@@ -144,14 +144,14 @@ impl Watch {
         let o = &e.plan.observation;
         let all: Vec<usize> = (0..o.frames.len()).collect();
         let count = if e.plan.clock.steps == 0 { 1 } else { FRAMES };
-        let (surface, triangles) = e.surface(0.5 * e.plan.body.grid.h);
+        let (surface, triangles) = e.surface(0.5 * e.plan.body.length);
         Watch {
             observation: Arc::new(o.without_frames()),
             times: spread(&all, count).into_iter().map(|f| o.frames[f].time).collect(),
             surface,
             triangles,
             cameras: e.recording().iter().flat_map(|r| &r.cameras).map(|c| coarse(pinhole(c))).collect(),
-            largest: e.plan.body.grid.h,
+            largest: e.plan.body.length,
         }
     }
 

@@ -81,7 +81,7 @@ fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabErro
         let mut along: Vec<f64> = points.iter().map(|p| normal.dot(*p)).collect();
         *along.select_nth_unstable_by(BEYOND, f64::total_cmp).1
     };
-    let near = f64::max(DEPTH * noise, TOUCHING * ready.experiments[0].plan.body.grid.h);
+    let near = f64::max(DEPTH * noise, TOUCHING * ready.experiments[0].plan.body.length);
     let wall = |i: usize| {
         let z = 1.0 - 2.0 * (i as f64 + 0.5) / DIRECTIONS as f64;
         let (s, c) = (i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
@@ -125,7 +125,7 @@ fn shifts(e: &Experiment, scene: usize, readings: &Readings) -> Vec<Option<Shift
         let met: Vec<_> = rows.iter().filter_map(|r| Some((r.row, r.row.value?, r.row.by_place.length()))).collect();
         // Far from the body readings tell little of where it is.
         let away = met.iter().map(|(_, value, _)| value.abs()).sum::<f64>() / met.len().max(1) as f64;
-        if met.len() < FEWEST || 2 * met.len() < rows.len() || away > NEAR * e.plan.body.grid.h {
+        if met.len() < FEWEST || 2 * met.len() < rows.len() || away > NEAR * e.plan.body.length {
             return None;
         }
         let mut shift = Shift { center: 0.5 * (low + high), size: (high - low).length(), coefficients: Vec::new() };

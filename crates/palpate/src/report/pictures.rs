@@ -36,7 +36,7 @@ pub fn pictures(
     let plan = experiment.plan();
     let all: Vec<usize> = (0..plan.observation.frames.len()).collect();
     let wanted = spread(&all, count);
-    let (surface, triangles) = experiment.surface(0.5 * plan.body.grid.h);
+    let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let mut out = Vec::new();
     visit_frames(plan, backend, theta, |frame, displacement, residuals| {
         if wanted.contains(&frame) {

@@ -46,9 +46,9 @@ pub struct SceneInspection {
     /// Open edges of the mesh file, before its repair; absent for other shapes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub open_edges: Option<usize>,
-    /// Edge of a cell [m].
+    /// Edge of a cell [m]; of tetrahedra, edge of the cube that six mean ones fill.
     pub cell_size: f64,
-    /// Cells of the body.
+    /// Cells of the body, or its tetrahedra, which count as full.
     pub cells: Cells,
     /// Its nodes.
     pub nodes: usize,

@@ -23,7 +23,7 @@ impl Before {
         if !weights.sees_past() {
             return Before::default();
         }
-        let count = cells.body().cells.len();
+        let count = cells.body().cells().len();
         let mut q = vec![[0.0; 24]; count];
         let mut own: Vec<Corners> = vec![[DVec3::ZERO; 8]; count];
         q.par_chunks_mut(CHUNK).zip(own.par_chunks_mut(CHUNK)).enumerate().for_each(|(c, (q, own))| {

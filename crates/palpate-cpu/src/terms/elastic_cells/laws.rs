@@ -281,7 +281,7 @@ impl<'a> CellLaws<'a> {
 
     /// Volume of a cell that deforms [m³].
     fn volume(&self, e: usize) -> f64 {
-        self.cells.c.elements.fractions[e] * self.cells.body().grid.h.powi(3)
+        self.cells.c.elements.fractions[e] * self.cells.body().cut().grid.h.powi(3)
     }
 
     /// Gradient weights of the corners in a cell's mean strain [1/m].
@@ -369,7 +369,7 @@ impl<'a> CellLaws<'a> {
             }
             w
         };
-        (0..self.cells.body().cells.len()).map(cell).sum()
+        (0..self.cells.body().cells().len()).map(cell).sum()
     }
 
     /// Adds the part of the tangent of cell e that no matrix K has: Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ, world frame, blocks

@@ -5,16 +5,18 @@
 //! `E [θ ½ q₁ᵀKq₁ + (β/2ℓ) (q₁−q̃)ᵀK(q₁−q̃)] + (1−θ) f(x₀)·x₁`, q̃ = Σ w q(x_past),
 //! which is the θ-scheme of Weiss et al. 2020 (Eq. 14, with the sign corrected) written objectively: rigid motion costs nothing.
 
-pub mod assembly;
 mod before;
+pub mod blocks;
 mod derivatives;
 pub mod laws;
 
+use super::assembly::assemble;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, Weights, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::simd::wide;
 use crate::linear::vector::Nodes;
 use before::Before;
+use blocks::Tangents;
 use faer::{Mat, Side};
 use glam::DVec3;
 use laws::{CellLaws, LawState};
@@ -35,11 +37,11 @@ pub type Corners = [DVec3; 8];
 
 /// Positions of a cell's corners at displacement `u`.
 pub fn corners(body: &Body, e: usize, u: &[DVec3]) -> Corners {
-    body.cells[e].nodes.map(|n| body.nodes[n as usize] + u[n as usize])
+    body.cells()[e].nodes.map(|n| body.nodes[n as usize] + u[n as usize])
 }
 
 fn pick(body: &Body, e: usize, v: &[DVec3]) -> Corners {
-    body.cells[e].nodes.map(|n| v[n as usize])
+    body.cells()[e].nodes.map(|n| v[n as usize])
 }
 
 #[inline(always)]
@@ -96,7 +98,7 @@ impl<'a> Cells<'a> {
     /// A cell at a displacement, its deformation measured from the stress-free shape.
     #[inline(always)]
     fn pose(&self, e: usize, u: &[DVec3]) -> CellPose {
-        let mut pose = CellPose::new(&corners(self.body(), e, u), self.body().grid.h);
+        let mut pose = CellPose::new(&corners(self.body(), e, u), self.body().cut().grid.h);
         if let Some(rest) = &self.c.altered.rest {
             pose.q.iter_mut().zip(&rest[e].q).for_each(|(q, w)| *q -= w);
         }
@@ -106,12 +108,12 @@ impl<'a> Cells<'a> {
     /// E V of a cell times the weight of the new state [J]. The guard against inversion acts at the new state only, like contact.
     #[inline(always)]
     fn guard_scale(&self, e: usize) -> f64 {
-        self.c.weights.new * self.young_of(e) * self.body().cells[e].fraction * self.body().grid.h.powi(3)
+        self.c.weights.new * self.young_of(e) * self.body().cells()[e].fraction * self.body().cut().grid.h.powi(3)
     }
 
     /// A value of every cell.
     fn each_cell<T: Clone + Default + Send>(&self, cell: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        let mut values = vec![T::default(); self.body().cells.len()];
+        let mut values = vec![T::default(); self.body().cells().len()];
         values.par_chunks_mut(CHUNK).enumerate().for_each(|(c, values)| {
             wide(
                 #[inline(always)]
@@ -234,7 +236,7 @@ impl<'a> ElasticCells<'a> {
 impl Term for ElasticCells<'_> {
     fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
         let mut posed = std::mem::take(&mut self.posed);
-        let cells = self.cells.body().cells.len();
+        let cells = self.cells.body().cells().len();
         if posed.len() != cells {
             posed.clear();
             posed.resize(cells, self.posed_at(0, u1));
@@ -276,7 +278,7 @@ impl Term for ElasticCells<'_> {
     }
 
     fn tangent(&self, _u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
-        assembly::assemble(self, curvature, matrix);
+        assemble(&Tangents { term: self, curvature }, self.cells.c.pattern, matrix);
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {

@@ -198,7 +198,7 @@ impl Effects {
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<(), GpuError> {
         let body = &plan.body;
-        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells.len(), plan.clamps.len());
+        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells().len(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {

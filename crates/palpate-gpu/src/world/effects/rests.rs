@@ -30,7 +30,7 @@ impl Effects {
             let w = Changes::new(plan, physics).rest.unwrap_or_else(|| vec![DVec3::ZERO; body.nodes.len()]);
             put_nodes(&mut out[0], &w);
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
-            body.cells.iter().for_each(|c| put(&mut out[1], &CellPose::new(&c.nodes.map(at), body.grid.h).q));
+            body.cells().iter().for_each(|c| put(&mut out[1], &CellPose::new(&c.nodes.map(at), body.cut().grid.h).q));
         }
         out
     }

@@ -1,8 +1,8 @@
 //! Where markers and tracked points sit on a body, and whether displacements count its nodes.
 
 use super::{PlanError, error};
-use crate::cutcells::extension::{NodeLookup, active_cell, affine_weights};
-use crate::cutcells::grid::{shape_functions, shape_gradients};
+use crate::cutcells::extension::{NodeLookup, affine_weights};
+use crate::cutcells::places::{beside, material_point};
 use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, TrackRest};
 use crate::shape::Shape;
 use crate::space::body::Body;
@@ -22,12 +22,17 @@ const SAME_NODE: f64 = 1e-3;
 /// # Errors
 /// A marker that lies far from the surface.
 pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
-    let lookup = NodeLookup::new(body);
-    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
+    let lookup = lookup(body);
+    rest.iter().map(|m| marker_site(m, body, lookup.as_ref(), shape)).collect()
 }
 
-fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
-    let h = body.grid.h;
+/// Finds nodes by lattice place, on a body that has a lattice.
+fn lookup(body: &Body) -> Option<NodeLookup> {
+    body.cut.as_ref().map(|_| NodeLookup::new(body))
+}
+
+fn marker_site(m: &MarkerRest, body: &Body, lookup: Option<&NodeLookup>, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
+    let h = body.length;
     let surface = m.surface.unwrap_or_else(|| shape.closest_point(m.position));
     let (min, max) = shape.bounds();
     // Scans and hand-measured points are off by millimetres, not by a large part of the body.
@@ -53,10 +58,9 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Sha
     Ok(MarkerSite {
         name: m.name.clone(),
         kind: ReadingKind::Marker,
-        stencil: if body.points.is_empty() {
-            affine_weights(body, lookup, surface, MARKER_RADIUS * h)
-        } else {
-            body.points.carry(&body.nodes, surface).0
+        stencil: match lookup {
+            Some(lookup) => affine_weights(body, lookup, surface, MARKER_RADIUS * h),
+            None => body.points.carry(&body.nodes, surface).0,
         },
         stalk: m.position - surface,
     })
@@ -67,7 +71,7 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &NodeLookup, shape: &dyn Sha
 /// # Errors
 /// Points farther from the rest surface than allowed: how many, and the farthest.
 pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
-    let allowed = tracks.tolerance.unwrap_or(TRACK_REACH * body.grid.h);
+    let allowed = tracks.tolerance.unwrap_or(TRACK_REACH * body.length);
     let away: Vec<f64> = tracks.places.par_iter().map(|p| shape.signed_distance(*p).abs()).collect();
     // What is no number is away as well.
     let far: Vec<usize> = (0..away.len()).filter(|k| away[*k] > allowed || away[*k].is_nan()).collect();
@@ -85,26 +89,34 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
             ),
         ));
     }
-    let lookup = NodeLookup::new(body);
-    let site = |(number, place): (usize, &DVec3)| track_site(format!("points.{number}"), *place, body, &lookup);
+    let lookup = lookup(body);
+    let site = |(number, place): (usize, &DVec3)| MarkerSite {
+        name: format!("points.{number}"),
+        kind: ReadingKind::Track,
+        stencil: match &lookup {
+            Some(lookup) => material_point(body, lookup, *place, MARKER_RADIUS * body.length),
+            None => body.points.carry(&body.nodes, *place).0,
+        },
+        stalk: DVec3::ZERO,
+    };
     Ok(tracks.places.par_iter().enumerate().map(site).collect())
 }
 
-/// A point of the body itself: interpolated in its cell, or continued to from the nodes around it.
-fn track_site(name: String, place: DVec3, body: &Body, lookup: &NodeLookup) -> MarkerSite {
-    let stencil = match active_cell(body, place) {
-        _ if !body.points.is_empty() => body.points.carry(&body.nodes, place).0,
-        Some((cell, xi)) => {
-            let gradients = shape_gradients(xi).map(|g| g / body.grid.h);
-            StencilBuf {
-                nodes: body.cells[cell].nodes.to_vec(),
-                value: shape_functions(xi).to_vec(),
-                gradient: gradients.to_vec(),
-            }
-        }
-        None => affine_weights(body, lookup, place, MARKER_RADIUS * body.grid.h),
+/// Where a point mass sits: on the body or within one element of it.
+pub(super) fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<StencilBuf, PlanError> {
+    let (place, away) = match &body.cut {
+        Some(_) => beside(body, point),
+        None => body.points.carry(&body.nodes, point),
     };
-    MarkerSite { name, kind: ReadingKind::Track, stencil, stalk: DVec3::ZERO }
+    if away > body.length {
+        let message = format!(
+            "{point} m lies {away:.4} m away from the body; a point mass must lie on it or within one {} ({} m)",
+            if body.cut.is_some() { "cell" } else { "element" },
+            body.length
+        );
+        return Err(error(key, message));
+    }
+    Ok(place)
 }
 
 /// Compares the nodes that displacements count with those of the body.
@@ -120,12 +132,12 @@ pub(super) fn check_nodes(observation: &Observation, body: &Body) -> Result<(), 
                 "holds {} nodes, and the body has {} at cells of {} m; displacements are those of the nodes of this very scene",
                 nodes.count,
                 body.nodes.len(),
-                body.grid.h
+                body.length
             ),
         ));
     }
     let apart = |(a, b): (&DVec3, &DVec3)| a.distance(*b);
-    let allowed = SAME_NODE * body.grid.h;
+    let allowed = SAME_NODE * body.length;
     let off = nodes.places.iter().zip(&body.nodes).map(apart).enumerate().find(|(_, d)| *d > allowed || d.is_nan());
     match off {
         None => Ok(()),

@@ -1,6 +1,7 @@
 //! Plans of bodies that are made of tetrahedra.
 
 use super::{PlanError, error};
+use crate::cutcells::build::SUBDIVISIONS;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
 use crate::effects::Site;
@@ -9,8 +10,7 @@ use crate::observation::Observation;
 use crate::plan::ClampSite;
 use crate::scene::{Clamp, Scene};
 use crate::shape::Shape;
-use crate::space::body::{Body, SUBDIVISIONS};
-use crate::space::stencil::StencilBuf;
+use crate::space::body::Body;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
@@ -39,16 +39,6 @@ pub(super) fn refuse_depth(body: &Body, observation: &Observation) -> Result<(),
     Ok(())
 }
 
-/// The stencil of a place on or near the body.
-pub(super) fn place(key: &str, point: DVec3, body: &Body) -> Result<StencilBuf, PlanError> {
-    let (stencil, outside) = body.points.carry(&body.nodes, point);
-    if outside > body.grid.h {
-        let message = format!("{point} m lies {outside:.4} m away from the body; allowed is one element ({:.4} m)", body.grid.h);
-        return Err(error(key, message));
-    }
-    Ok(stencil)
-}
-
 /// The nodes inside a clamp's box, each held by a stiff spring.
 pub(super) fn clamp_site(
     i: usize,
@@ -59,13 +49,13 @@ pub(super) fn clamp_site(
 ) -> Result<ClampSite, PlanError> {
     let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
     // Nodes on the box's face count, also after rounding.
-    let slack = DVec3::splat(1e-9 * body.grid.h);
+    let slack = DVec3::splat(1e-9 * body.length);
     let inside = |x: &DVec3| {
         let x = to_frame.transform_point3(*x);
         x.cmpge(clamp.min - slack).all() && x.cmple(clamp.max + slack).all()
     };
     let (lambda, mu) = lame(scene.material.youngs_modulus, scene.material.poisson_ratio);
-    let spring = |volume: f64| HELD * (lambda + 2.0 * mu) * volume / body.grid.h.powi(2);
+    let spring = |volume: f64| HELD * (lambda + 2.0 * mu) * volume / body.length.powi(2);
     let nodes: Vec<(u32, f64)> = (0u32..)
         .zip(body.nodes.iter().zip(&body.node_volume))
         .filter(|(_, (x, _))| inside(x))

@@ -15,16 +15,16 @@ fn check(body: &Body) {
     let sum: f64 = body.node_volume.iter().sum();
     assert!((sum / body.volume - 1.0).abs() < 1e-12);
     let moment: DVec3 = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| *x * *v).sum();
-    assert!((moment / body.volume - body.center).length() < 1e-10 * body.grid.h);
-    assert!(body.cells.is_sorted_by_key(|c| body.grid.index(c.lattice)) && body.patches.is_sorted_by_key(|p| p.cell));
+    assert!((moment / body.volume - body.center).length() < 1e-10 * body.cut().grid.h);
+    assert!(body.cells().is_sorted_by_key(|c| body.cut().grid.index(c.lattice)) && body.patches.is_sorted_by_key(|p| p.cell));
     // A closed surface has no net normal, and its flux of x is three times the volume (both up to the chords of pieces: exact here,
     // as every piece of the discrete surface is flat within a tetrahedron; only the mean normal of a patch is rounded to unit length).
     for (p, s) in body.pieces() {
         assert!((s.value.iter().sum::<f64>() - 1.0).abs() < 1e-10 && (p.normal.length() - 1.0).abs() < 1e-12);
-        let cell = &body.cells[p.cell as usize];
+        let cell = &body.cells()[p.cell as usize];
         let x = s.at(&body.nodes);
         assert_eq!(s.nodes, cell.nodes);
-        assert!((x - p.point).length() < 1e-9 * body.grid.h, "weights reproduce the centroid");
+        assert!((x - p.point).length() < 1e-9 * body.cut().grid.h, "weights reproduce the centroid");
     }
 }
 
@@ -34,10 +34,10 @@ fn box_on_the_lattice_is_exact() {
         let (min, max) = (DVec3::new(-2.0, 1.0, 0.0) * h, DVec3::new(8.0, 4.0, 2.0) * h);
         let body = Body::build(&placed(Analytic::Box { min, max }), h, h, 4).unwrap();
         check(&body);
-        assert_eq!(body.cells.len(), 60);
-        assert!(body.cells.iter().all(|c| c.is_full()));
+        assert_eq!(body.cells().len(), 60);
+        assert!(body.cells().iter().all(|c| c.is_full()));
         assert_eq!(body.nodes.len(), 11 * 4 * 3);
-        assert!(body.ghosts.is_empty());
+        assert!(body.ghosts().is_empty());
         assert!((body.volume / (60.0 * h.powi(3)) - 1.0).abs() < 1e-13);
         assert!((body.area / ((30.0 + 20.0 + 6.0) * 2.0 * h * h) - 1.0).abs() < 1e-13, "{}", body.area / (h * h));
         assert!((body.center - 0.5 * (min + max)).length() < 1e-13);
@@ -51,7 +51,7 @@ fn sheet_one_cell_thick_is_exact() {
     let shape = placed(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, h) });
     let body = Body::build(&shape, h, h, 2).unwrap();
     check(&body);
-    assert_eq!(body.cells.len(), 16);
+    assert_eq!(body.cells().len(), 16);
     assert!((body.area - 3.0).abs() < 1e-13 && (body.volume - 0.25).abs() < 1e-13);
     // Half a cell thick, both faces on planes of the sub-lattice.
     let shape = placed(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, h / 2.0) });
@@ -68,7 +68,7 @@ fn slivers_are_merged_without_loss() {
     let parts = build_parts(&shape, h, h, 4).unwrap();
     let body = &parts.body;
     check(body);
-    assert_eq!(body.cells.len(), 8 * 8 * 4);
+    assert_eq!(body.cells().len(), 8 * 8 * 4);
     assert_eq!(parts.merged.len(), 64);
     // The sliver's own edge is chamfered by a sub-cube, 1e-7 cells thick: 2e-8 of its cell at most.
     assert!((body.volume / (0.64 * top) - 1.0).abs() < 1e-8, "{}", body.volume / (0.64 * top) - 1.0);
@@ -76,7 +76,7 @@ fn slivers_are_merged_without_loss() {
     // At two corners the finer lattice below and the coarser one above miss a triangle of half a sub-cube's face: 15/16 · h²/32 each.
     assert!((up / 0.64 - 1.0).abs() < 1e-3, "{up}");
     let cells: std::collections::BTreeSet<_> = parts.merged.iter().map(|m| m.1).collect();
-    assert!(cells.iter().all(|&c| !body.cells[c as usize].is_full() && body.cells[c as usize].fraction < 1.0 + 2e-6));
+    assert!(cells.iter().all(|&c| !body.cells()[c as usize].is_full() && body.cells()[c as usize].fraction < 1.0 + 2e-6));
 }
 
 /// Errors of volume, first moment (relative to volume × size) and area.
@@ -125,8 +125,8 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 fn moments(body: &Body) -> Moments {
     let over = |f: &dyn Fn(&Patch) -> DMat3| body.patches.iter().map(|p| f(p) * p.area).sum::<DMat3>();
     let first = |f: &dyn Fn(&Patch) -> DVec3| body.patches.iter().map(|p| f(p) * p.area).sum::<DVec3>();
-    let h = body.grid.h;
-    let volume_second = body.cells.iter().flat_map(|c| {
+    let h = body.cut().grid.h;
+    let volume_second = body.cells().iter().flat_map(|c| {
         let low = body.nodes[c.nodes[0] as usize];
         (0..27)
             .map(move |q| (low + h * crate::cutcells::cut::POINTS27[q], c.weights[q] * h.powi(3)))
@@ -208,17 +208,17 @@ fn moments_of_curved_bodies_converge_at_second_order() {
 fn ghost_lines_are_straight_and_counted_once_per_face() {
     let body = Body::build(&placed(Analytic::Ball { radius: 0.3, center: DVec3::splat(0.01) }), 0.1, 0.0, 4).unwrap();
     let mut weight = 0.0;
-    for g in &body.ghosts {
+    for g in body.ghosts() {
         let [a, b, c] = g.nodes.map(|n| body.nodes[n as usize]);
         assert!((a - 2.0 * b + c).length() < 1e-12 && (b - a).max_element() > 0.99 * 0.1);
         assert!(g.weight <= 1.0);
         weight += g.weight;
     }
-    assert!(body.ghosts.windows(2).all(|w| w[0].nodes < w[1].nodes));
+    assert!(body.ghosts().windows(2).all(|w| w[0].nodes < w[1].nodes));
     // Faces counted directly.
     let mut faces = 0.0;
-    for a in &body.cells {
-        for b in &body.cells {
+    for a in body.cells() {
+        for b in body.cells() {
             let d: Vec<i64> = (0..3).map(|k| b.lattice[k] as i64 - a.lattice[k] as i64).collect();
             if d.iter().sum::<i64>() == 1 && d.iter().all(|&x| x >= 0) && !(a.is_full() && b.is_full()) {
                 faces += 1.0;

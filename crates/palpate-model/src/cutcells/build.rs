@@ -1,10 +1,11 @@
 //! Builds a body from its shape: cuts every cell, numbers nodes, collects surface, ghost penalty and band.
 
-use super::{Body, Cell, GhostLine, Patch};
 use crate::cutcells::cut::{CellCut, Lattice, POINTS27, cut_cell};
+use crate::cutcells::domain::{Band, Cell, CutCells, GhostLine};
 use crate::cutcells::extension;
 use crate::cutcells::grid::{CORNERS, Grid, shape_functions};
-use crate::shape::Shape;
+use crate::shape::{Shape, unit_hint};
+use crate::space::body::{Body, Patch};
 use crate::space::stencil::Stencils;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -18,18 +19,6 @@ pub const MAX_CELLS: f64 = 5e6;
 
 /// Most cells of a body.
 pub const MAX_BODY_CELLS: f64 = 1e6;
-
-/// Longest side from which on an object may be one in another unit [m]: soft bodies in front of cameras are smaller.
-pub const LARGE: f64 = 3.0;
-
-/// What is added to an error about too many cells where the object's longest side [m] says that its unit is to blame, not its cells.
-pub fn unit_hint(longest: f64) -> &'static str {
-    if longest < LARGE {
-        ""
-    } else {
-        "; is the object in millimetres or centimetres? convert it to metres (scale by 0.001 or 0.01)"
-    }
-}
 
 /// Memory that a cell of a body takes while its plan is made [B], measured on blocks.
 const CELL_MEMORY: f64 = 2.1e3;
@@ -107,7 +96,7 @@ pub enum BodyError {
 pub(crate) struct Parts {
     /// The body.
     pub body: Body,
-    /// Cells merged into a neighbour: lattice coordinates (as in [`Cell::lattice`]) and number of the neighbour in [`Body::cells`].
+    /// Cells merged into a neighbour: lattice coordinates (as in [`Cell::lattice`]) and number of the neighbour in [`CutCells::cells`].
     pub merged: Vec<([usize; 3], u32)>,
 }
 
@@ -226,17 +215,16 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         volume: fractions * h.powi(3),
         center,
         corners,
-        grid,
+        length: h,
         nodes,
         node_volume,
-        cells: active,
         patches,
         surface,
+        cut: Some(CutCells { grid, cells: active, ghosts, band: Band::default() }),
         points: Default::default(),
-        ghosts,
-        band: super::Band::default(),
     };
-    body.band = extension::band(&body, shape, band_width);
+    let band = extension::band(&body, shape, band_width);
+    body.cut = body.cut.map(|cut| CutCells { band, ..cut });
     Ok(Parts { body, merged: slivers })
 }
 

@@ -7,8 +7,8 @@
 //! for bodies that may turn: where a clamp holds one, row sums are better, for they share a weight out as linear elements want it, and a
 //! column under its weight has the right sag at every node.
 
-use super::Body;
 use crate::cutcells::cut::POINTS27;
+use crate::space::body::Body;
 use glam::DVec3;
 
 /// Number of monomials up to degree two.
@@ -28,10 +28,10 @@ fn monomials(x: DVec3) -> [f64; MONOMIALS] {
 impl Body {
     /// Makes the second moments of `node_volume` those of the body.
     pub fn mend_moments(&mut self) {
-        let h = self.grid.h;
+        let (grid, h) = (&self.cut().grid, self.cut().grid.h);
         let of = |x: DVec3, v: f64| (x - self.center) * (x - self.center) * v;
-        let cells = self.cells.iter().flat_map(|c| {
-            let low = self.grid.position(c.lattice);
+        let cells = self.cells().iter().flat_map(|c| {
+            let low = grid.position(c.lattice);
             (0..27).map(move |q| of(low + POINTS27[q] * h, c.weights[q] * h.powi(3)))
         });
         let second = cells.sum();

@@ -2,14 +2,26 @@
 //!
 //! The potential is `V [θ ψ(F₁) + (1 − θ) P(F₀):F₁ + (β/ℓ) ψ_lin(G₁ − G̃)]` with Green's strain 2G = H + Hᵀ + HᵀH and G̃ = Σ w G(x_past): rigid
 //! motion neither stores nor dissipates.
+//!
+//! What a point gives is computed side by side and summed by the points around a node in their order, so bits do not depend on threads.
 
+mod blocks;
+
+use super::assembly::assemble;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
+use blocks::Tangents;
 use glam::{DMat3, DVec3};
 use palpate_model::materials::Gradient;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::stencil::Stencil;
+use rayon::prelude::*;
+
+/// Points that one task treats at least.
+const CHUNK: usize = 64;
+/// Nodes that one task sums at least.
+const NODES: usize = 256;
 
 /// The term.
 pub struct ElasticPoints<'a> {
@@ -20,6 +32,15 @@ pub struct ElasticPoints<'a> {
     young: f64,
     /// G̃ of every point; empty without damping.
     past: Vec<DMat3>,
+}
+
+/// A point: number, place and gradient, volume [m³], Lamé parameters [Pa].
+#[derive(Clone, Copy)]
+struct Point<'a> {
+    e: usize,
+    s: Stencil<'a>,
+    v: f64,
+    moduli: (f64, f64),
 }
 
 /// Rows of a matrix, as materials take them.
@@ -63,19 +84,31 @@ impl<'a> ElasticPoints<'a> {
         let nu = c.physics().poisson_ratio;
         let mut term = ElasticPoints { c, lame: [lame(1.0, nu), lame_by_nu(1.0, nu)], young: c.young(), past: Vec::new() };
         if c.inertia.is_some() {
-            let sum = |s: Stencil| c.past.each.iter().map(|(w, u)| green(s.gradient_of(u)) * *w).sum::<DMat3>();
-            term.past = c.plan.body.points.stencils.iter().map(sum).collect();
+            let sum = |p: Point| c.past.each.iter().map(|(w, u)| green(p.s.gradient_of(u)) * *w).sum::<DMat3>();
+            term.past = term.each(sum);
         }
         term
     }
 
-    /// Every point: number, stencil, volume, and Lamé parameters [Pa].
-    fn each(&self) -> impl Iterator<Item = (usize, Stencil<'a>, f64, (f64, f64))> + '_ {
+    fn point(&self, e: usize) -> Point<'a> {
         let points = &self.c.plan.body.points;
-        points.stencils.iter().zip(&points.volume).enumerate().map(|(e, (s, v))| {
-            let young = self.young * self.c.factor(e);
-            (e, s, *v, scaled(self.lame[0], young))
-        })
+        let moduli = scaled(self.lame[0], self.young * self.c.factor(e));
+        Point { e, s: points.stencils.get(e), v: points.volume[e], moduli }
+    }
+
+    /// A value of every point.
+    fn each<T: Send>(&self, of: impl Fn(Point<'a>) -> T + Sync + Send) -> Vec<T> {
+        (0..self.c.plan.body.points.len()).into_par_iter().with_min_len(CHUNK).map(|e| of(self.point(e))).collect()
+    }
+
+    /// Adds P g of every point to its nodes, where `of` gives P times the volume: every node's sum in the order of the points.
+    fn gather(&self, of: impl Fn(Point<'a>) -> DMat3 + Sync + Send, out: &mut [DVec3]) {
+        let (stresses, pattern, stencils) = (self.each(of), self.c.pattern, &self.c.plan.body.points.stencils);
+        out.par_iter_mut().with_min_len(NODES).enumerate().for_each(|(n, sum)| {
+            for (e, i) in &pattern.point_list[pattern.point_rows[n]..pattern.point_rows[n + 1]] {
+                *sum += stresses[*e as usize] * stencils.get(*e as usize).gradient[usize::from(*i)];
+            }
+        });
     }
 
     /// First Piola–Kirchhoff stress at a displacement, elastic [Pa].
@@ -103,9 +136,7 @@ impl<'a> ElasticPoints<'a> {
     }
 
     fn add_force(&self, u1: &[DVec3], out: &mut [DVec3]) {
-        for (e, s, v, moduli) in self.each() {
-            s.spread_gradient(self.total(e, s, u1, moduli) * v, out);
-        }
+        self.gather(|Point { e, s, v, moduli }| self.total(e, s, u1, moduli) * v, out);
     }
 
     /// ∂P/∂F : δ of the elastic stress at a displacement.
@@ -137,7 +168,7 @@ impl Term for ElasticPoints<'_> {
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
         let w = &self.c.weights;
-        let of = |(e, s, v, (lambda, mu)): (usize, Stencil, f64, (f64, f64))| {
+        let of = |Point { e, s, v, moduli: (lambda, mu) }: Point| {
             let h = s.gradient_of(u1);
             let mut psi = w.new * self.c.plan.model.law.value(&rows(h), lambda, mu);
             if w.old != 0.0 {
@@ -149,52 +180,27 @@ impl Term for ElasticPoints<'_> {
             }
             v * psi
         };
-        self.each().map(of).sum()
+        self.each(of).iter().sum()
     }
 
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
-        let w = &self.c.weights;
-        for (e, s, v, (lambda, mu)) in self.each() {
-            let h = s.gradient_of(u1);
-            let f = h + DMat3::IDENTITY;
-            let mut tangent = self.c.plan.model.law.stress(&rows(h), lambda, mu).1.map(|r| r.map(|t| t * w.new));
-            if let (Some(past), true) = (self.past.get(e), w.rate != 0.0) {
-                let held = linear_stress(green(h) - *past, (lambda, mu));
-                for l in 0..9 {
-                    let mut unit = [0.0; 9];
-                    unit[l] = 1.0;
-                    let dh = matrix_of(&unit);
-                    let change = rows(dh * held + f * linear_stress(green_rate(f, dh), (lambda, mu)));
-                    (0..9).for_each(|k| tangent[k][l] += w.rate * change[k / 3][k % 3]);
-                }
-            }
-            if curvature != Curvature::Exact {
-                crate::linear::dense::without_negative_eigenvalues(&mut tangent);
-            }
-            let places = self.c.places.points.of(e);
-            let n = s.nodes.len();
-            for (b, place) in places.iter().enumerate() {
-                let (ga, gb) = (s.gradient[b / n], s.gradient[b % n]);
-                let entry = |i: usize, j: usize| -> f64 {
-                    (0..3).map(|k| (0..3).map(|l| tangent[3 * i + k][3 * j + l] * gb[l]).sum::<f64>() * ga[k]).sum()
-                };
-                let block = DMat3::from_cols_array(&std::array::from_fn(|k| entry(k % 3, k / 3)));
-                matrix.values[*place as usize] += block * v;
-            }
-        }
+        assemble(&Tangents { term: self, u1, curvature }, self.c.pattern, matrix);
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
         let w = &self.c.weights;
         for (i, ((weight, u), d)) in self.c.past.each.iter().zip(change.each).enumerate() {
-            for (_, s, v, moduli) in self.each().filter(|_| w.sees_past()) {
+            let of = |Point { s, v, moduli, .. }: Point| {
                 let (h, dh) = (s.gradient_of(u1), s.gradient_of(d));
                 let f0 = s.gradient_of(u) + DMat3::IDENTITY;
                 let mut p = (h + DMat3::IDENTITY) * linear_stress(green_rate(f0, dh), moduli) * (-w.rate * weight);
                 if w.old != 0.0 && i == 0 {
                     p += self.stress_rate(s, u, moduli, dh) * w.old;
                 }
-                s.spread_gradient(p * v, out);
+                p * v
+            };
+            if w.sees_past() {
+                self.gather(of, out);
             }
         }
     }
@@ -202,14 +208,17 @@ impl Term for ElasticPoints<'_> {
     fn by_past_transposed(&self, u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
         let w = &self.c.weights;
         for (i, ((weight, u), to)) in self.c.past.each.iter().zip(&mut out.each).enumerate() {
-            for (_, s, v, moduli) in self.each().filter(|_| w.sees_past()) {
+            let of = |Point { s, v, moduli, .. }: Point| {
                 let (f, dz) = (s.gradient_of(u1) + DMat3::IDENTITY, s.gradient_of(z));
                 let f0 = s.gradient_of(u) + DMat3::IDENTITY;
                 let mut p = f0 * linear_stress(green_rate(f, dz), moduli) * (-w.rate * weight);
                 if w.old != 0.0 && i == 0 {
                     p += self.stress_rate(s, u, moduli, dz) * w.old;
                 }
-                s.spread_gradient(p * v, to);
+                p * v
+            };
+            if w.sees_past() {
+                self.gather(of, to);
             }
         }
     }
@@ -217,7 +226,7 @@ impl Term for ElasticPoints<'_> {
     fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
         let (ln_young, d) = (self.c.ln_young_along(rates), &rates.physics);
         let damping = d.stiffness_damping * self.c.inertia.map_or(0.0, |t| t.rate);
-        for (e, s, v, moduli) in self.each() {
+        let of = |Point { e, s, v, moduli }: Point| {
             let ln = ln_young + self.c.ln_factor_along(rates, e);
             let mut p = if ln == 0.0 { DMat3::ZERO } else { self.total(e, s, u1, moduli) * ln };
             if d.poisson_ratio != 0.0 {
@@ -226,27 +235,30 @@ impl Term for ElasticPoints<'_> {
             if damping != 0.0 {
                 p += self.viscous(e, s.gradient_of(u1), moduli) * damping;
             }
-            s.spread_gradient(p * v, out);
-        }
+            p * v
+        };
+        self.gather(of, out);
     }
 
     fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
         let rate = self.c.inertia.map_or(0.0, |t| t.rate);
-        let mut by_ln = Vec::new();
-        for (e, s, v, moduli) in self.each() {
+        // By the logarithm of the modulus, Poisson's ratio and damping.
+        let of = |Point { e, s, v, moduli }: Point| {
             let dz = s.gradient_of(z) * v;
-            if sought.modulus {
-                by_ln.push((e, contract(dz, self.total(e, s, u1, moduli))));
-            }
-            if sought.poisson {
-                gradient.physics.poisson_ratio += self.young * self.c.factor(e) * contract(dz, self.by_poisson(e, s, u1));
-            }
-            if sought.damping[1] {
-                gradient.physics.stiffness_damping += rate * contract(dz, self.viscous(e, s.gradient_of(u1), moduli));
-            }
+            let along = |wanted: bool, p: &dyn Fn() -> DMat3| if wanted { contract(dz, p()) } else { 0.0 };
+            [
+                along(sought.modulus, &|| self.total(e, s, u1, moduli)),
+                self.young * self.c.factor(e) * along(sought.poisson, &|| self.by_poisson(e, s, u1)),
+                rate * along(sought.damping[1], &|| self.viscous(e, s.gradient_of(u1), moduli)),
+            ]
+        };
+        let all = self.each(of);
+        for [_, by_poisson, by_damping] in &all {
+            gradient.physics.poisson_ratio += by_poisson;
+            gradient.physics.stiffness_damping += by_damping;
         }
         if sought.modulus {
-            self.c.pull_modulus(by_ln.into_iter(), gradient);
+            self.c.pull_modulus(all.iter().map(|g| g[0]).enumerate(), gradient);
         }
     }
 

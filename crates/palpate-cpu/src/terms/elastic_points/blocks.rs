@@ -1,0 +1,60 @@
+//! The points' tangents block by block, for the assembly of the matrix.
+
+use super::{ElasticPoints, Point, green, green_rate, linear_stress, matrix_of, rows};
+use crate::terms::Curvature;
+use crate::terms::assembly::Elements;
+use glam::{DMat3, DVec3};
+
+/// Points with what their tangents are taken at.
+pub(super) struct Tangents<'a, 'b> {
+    pub(super) term: &'b ElasticPoints<'a>,
+    pub(super) u1: &'b [DVec3],
+    pub(super) curvature: Curvature,
+}
+
+impl Elements for Tangents<'_, '_> {
+    type Scratch = ();
+
+    fn count(&self) -> usize {
+        self.term.c.plan.body.points.len()
+    }
+
+    fn nodes(&self, e: usize) -> &[u32] {
+        self.term.c.plan.body.points.stencils.get(e).nodes
+    }
+
+    fn places(&self, e: usize) -> &[u32] {
+        self.term.c.places.points.of(e)
+    }
+
+    fn scratch(&self) {}
+
+    fn blocks(&self, e: usize, _scratch: &mut (), mut put: impl FnMut(usize, usize, DMat3)) {
+        let (term, w) = (self.term, &self.term.c.weights);
+        let Point { s, v, moduli: (lambda, mu), .. } = term.point(e);
+        let h = s.gradient_of(self.u1);
+        let f = h + DMat3::IDENTITY;
+        let mut tangent = term.c.plan.model.law.stress(&rows(h), lambda, mu).1.map(|r| r.map(|t| t * w.new));
+        if let (Some(past), true) = (term.past.get(e), w.rate != 0.0) {
+            let held = linear_stress(green(h) - *past, (lambda, mu));
+            for l in 0..9 {
+                let mut unit = [0.0; 9];
+                unit[l] = 1.0;
+                let dh = matrix_of(&unit);
+                let change = rows(dh * held + f * linear_stress(green_rate(f, dh), (lambda, mu)));
+                (0..9).for_each(|k| tangent[k][l] += w.rate * change[k / 3][k % 3]);
+            }
+        }
+        if self.curvature != Curvature::Exact {
+            crate::linear::dense::without_negative_eigenvalues(&mut tangent);
+        }
+        for (i, ga) in s.gradient.iter().enumerate() {
+            for (j, gb) in s.gradient.iter().enumerate() {
+                let entry = |r: usize, c: usize| -> f64 {
+                    (0..3).map(|k| (0..3).map(|l| tangent[3 * r + k][3 * c + l] * gb[l]).sum::<f64>() * ga[k]).sum()
+                };
+                put(i, j, DMat3::from_cols_array(&std::array::from_fn(|k| entry(k % 3, k / 3))) * v);
+            }
+        }
+    }
+}

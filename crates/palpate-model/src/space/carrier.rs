@@ -1,0 +1,31 @@
+//! Which nodes a place of the rest configuration follows, whatever its body is made of.
+
+use crate::cutcells::places::CellLookup;
+use crate::space::body::Body;
+use crate::space::stencil::StencilBuf;
+use glam::DVec3;
+
+/// Finds the element that carries a place.
+pub enum Carrier<'a> {
+    /// A cell.
+    Cells(CellLookup<'a>),
+    /// An elastic point of a body without cells.
+    Points(&'a Body),
+}
+
+impl Body {
+    /// Looks every element up once.
+    pub fn carrier(&self) -> Carrier<'_> {
+        self.cut.as_ref().map_or(Carrier::Points(self), |cut| Carrier::Cells(CellLookup::new(cut)))
+    }
+}
+
+impl Carrier<'_> {
+    /// The field of the element that holds a place, or of the nearest, continued to it; and how far outside the place is [m], zero inside.
+    pub fn carry(&self, place: DVec3) -> (StencilBuf, f64) {
+        match self {
+            Carrier::Cells(cells) => cells.carry(place),
+            Carrier::Points(body) => body.points.carry(&body.nodes, place),
+        }
+    }
+}
