@@ -83,6 +83,12 @@ pub struct Shape {
     pub rate_numbers: u32,
     /// Where those of effects begin.
     pub rate_effects: u32,
+    /// Number of the first patch among the stencils.
+    pub first_patch: u32,
+    /// Number of the first point mass among them.
+    pub first_mass: u32,
+    /// Fills up.
+    pub pad: [u32; 2],
 }
 
 /// Parameters of one member.
@@ -203,28 +209,14 @@ pub struct Cell {
     pub pad: u32,
 }
 
-/// A surface patch.
+/// An entry of a stencil.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Patch {
-    /// Rest position [m] and area [m²].
-    pub point: [f32; 4],
-    /// Means of the shape functions.
-    pub weights: [f32; 8],
-    /// Cell that it lies in.
-    pub cell: u32,
-    /// Fills up.
-    pub pad: [u32; 3],
-}
-
-/// A point mass.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Mass {
-    /// Nodes that carry it.
-    pub nodes: [u32; 8],
-    /// Shape functions at the point.
-    pub weights: [f32; 8],
+pub struct Entry {
+    /// The node.
+    pub node: u32,
+    /// Its weight.
+    pub weight: f32,
 }
 
 /// Pose of a clamp at one time: x ↦ A x + b and its rate.

@@ -28,6 +28,8 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
     }
     let count = match () {
         () if has("> 0u; s /= 2u") || has("> 0u; step >>= 1u") => 8,
+        () if has("stencil_rows[mark.site") => seen.site,
+        () if has("stencil_rows[") => most.stencil,
         () if has("block_rows[") => most.row,
         () if has("node_rows[") && !has("band_") => 8,
         () if has("place_rows[") => 8,
@@ -66,7 +68,6 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("band_rows[") => seen.extension,
         () if has("fold_rows[") => seen.fold,
         () if has("node_site_rows[") => seen.sites,
-        () if has("site_rows[") => seen.site,
         () if has("mark_rows[") => seen.markers.div_ceil(64),
         // Sums that up to 256 workgroups of 64 share.
         () if has("rows_of(shot); i += 64u * call.roster") => seen.rows.div_ceil(64 * 256),
@@ -174,6 +175,7 @@ const BODY: Most = Most {
     planes: 10,
     pressed: 10,
     masses: 10,
+    stencil: 8,
     grips: 20,
     aging: 4,
     chunk: 1,
@@ -206,6 +208,7 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
         largest(many, |m, n| m.nodes = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.supports = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.masses = n, built),
+        largest(Most { nodes: 1_000_000, ..many }, |m, n| m.stencil = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.planes = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| (m.planes, m.pressed) = (n, n), built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.row = n, built),
@@ -274,6 +277,7 @@ fn a_nested_loop_is_counted_as_often_as_it_runs() {
                 planes: 0,
                 pressed: 0,
                 masses: 0,
+                stencil: 0,
                 grips: 0,
                 aging: 0,
                 chunk: 0,
