@@ -41,7 +41,8 @@ struct Shape { // mirrored
     rate_effects: u32,
     first_patch: u32,
     first_mass: u32,
-    pad: vec2<u32>,
+    elastic: u32,
+    held: u32,
 }
 
 struct Member { // mirrored

@@ -87,8 +87,10 @@ pub struct Shape {
     pub first_patch: u32,
     /// Number of the first point mass among them.
     pub first_mass: u32,
-    /// Fills up.
-    pub pad: [u32; 2],
+    /// Elastic points; they are the first stencils.
+    pub elastic: u32,
+    /// 1 where clamps hold nodes, as they do on bodies without cells.
+    pub held: u32,
 }
 
 /// Parameters of one member.
@@ -217,6 +219,28 @@ pub struct Entry {
     pub node: u32,
     /// Its weight.
     pub weight: f32,
+}
+
+/// Two entries of a stencil, which make a block of the matrix.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Pair {
+    /// The stencil.
+    pub stencil: u32,
+    /// Entry of the block's row.
+    pub row: u32,
+    /// Entry of its column.
+    pub column: u32,
+}
+
+/// A clamp that holds a node.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Holder {
+    /// Number of the clamp.
+    pub by: u32,
+    /// Stiffness of the spring [N/m].
+    pub stiffness: f32,
 }
 
 /// Pose of a clamp at one time: x ↦ A x + b and its rate.

@@ -1,6 +1,7 @@
 //! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
 
 use super::effects::Effects;
+use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
 use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
 use crate::device::{GpuError, Maker};
@@ -84,10 +85,13 @@ impl Geometry {
         let patches: Vec<[f32; 4]> = body.patches.iter().map(|p| vec4(p.point, p.area)).collect();
         let rest: Vec<[f32; 4]> = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| vec4(*x, *v)).collect();
         let mut stencils = StencilTable::default();
+        stencils.extend(body.points.stencils.iter());
         let first_patch = stencils.len() as u32;
         stencils.extend(body.surface.iter());
         let first_mass = stencils.len() as u32;
         stencils.extend(plan.masses.iter());
+        let acting = if touched { first_mass } else { first_patch };
+        let elastic = ElasticTables::new(plan, &pattern, &stencils, acting as usize);
 
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
         let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();
@@ -121,6 +125,9 @@ impl Geometry {
             pressed: if effects.on_contact() { plan.planes.len() as u64 } else { 0 },
             masses: plan.masses.len() as u64,
             stencil: stencils.longest() as u64,
+            valence: elastic.of_node.longest(),
+            pairs: elastic.of_block.longest(),
+            holders: elastic.holders.longest(),
             grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
             aging: effects.aging_rows.into(),
             chunk: 1,
@@ -162,13 +169,15 @@ impl Geometry {
             rate_effects,
             first_patch,
             first_mass,
-            pad: [0; 2],
+            elastic: body.points.len() as u32,
+            held: u32::from(elastic.holds()),
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);
         buffers.insert("rest", gpu.upload("rest", &rest)?);
         stencils.upload(gpu, buffers)?;
+        elastic.upload(gpu, buffers)?;
         buffers.insert("node_rows", gpu.upload("node_rows", &node_rows)?);
         buffers.insert("node_list", gpu.upload("node_list", &node_list)?);
         buffers.insert("block_rows", gpu.upload("block_rows", &to_u32(&pattern.blocks.rows))?);

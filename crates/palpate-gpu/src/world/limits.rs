@@ -30,6 +30,11 @@ pub(crate) struct Most {
     pub(crate) masses: u64,
     /// Entries of a stencil.
     pub(crate) stencil: u64,
+    /// Elastic points and patches that have a node, and that make a block.
+    pub(crate) valence: u64,
+    pub(crate) pairs: u64,
+    /// Clamps that hold a node.
+    pub(crate) holders: u64,
     /// Numbers of effects on clamps, those that change matrices twice.
     pub(crate) grips: u64,
     /// Numbers of effects that change the stiffness in time.
@@ -52,7 +57,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 14] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 19] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
@@ -68,6 +73,12 @@ impl Most {
             // Rotations by Jacobi's method at up to three states, and sums over the corners of a cell.
             ("pull_cells", 2600 + self.aging),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
+            ("spread_elastic", self.valence),
+            ("gather_elastic", 10 * self.pairs + 12),
+            // Nine derivatives by hyper-dual numbers, or a rotation by Jacobi's method.
+            ("tangent_elastic", 9 * 800 + 20 * self.stencil),
+            ("place_held", self.holders * (1 + self.holders)),
+            ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
             ("push_nodes", 60 + self.row + (4 + 2 * self.stencil) * self.masses),
             ("push_cells", 2600 + 2 * self.supports + self.aging),
             ("push_holds", 2 * (2 * self.grips + 10 * self.grips + 60) + self.aging + 60),

@@ -4,6 +4,7 @@ mod sites;
 mod tets;
 
 pub use sites::marker_sites;
+pub use tets::HELD;
 
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::{ClipBox, HeldMoments, Lattice, held_moments};
