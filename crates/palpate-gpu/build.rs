@@ -68,7 +68,8 @@ fn main() {
 }
 
 /// Shared files whose whole numbers Rust uses as well.
-const NUMBERED: [&str; 9] = ["asks", "directions", "laws", "points", "pulls", "rates", "reduce", "roster", "structs"];
+const NUMBERED: [&str; 10] =
+    ["asks", "directions", "elastic_asks", "laws", "points", "pulls", "rates", "reduce", "roster", "structs"];
 
 /// Whole numbers by file and name, as naga computed them.
 type Numbers = BTreeMap<(String, String), u32>;

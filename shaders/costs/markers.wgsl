@@ -1,7 +1,8 @@
 //! Markers: carried rigidly by the surface point that they are attached to, also on a stalk. Twin of
-//! palpate-cpu/src/costs/markers.rs.
+//! palpate-cpu/src/costs/markers.rs. The stencils of these passes are the sites.
 // use shared/seen
 // use shared/rotation
+// use shared/stencil
 
 struct Site { // mirrored
     // From the attachment point to the marker's centre at rest [m].
@@ -33,10 +34,6 @@ struct Carried { // mirrored
 var<storage, read> sites: array<Site>;
 // [B][sites]: how far markers sit off the places that the recording states, on the rest shape [m].
 var<storage, read> offsets: array<vec4<f32>>;
-var<storage, read> site_rows: array<u32>;
-var<storage, read> site_nodes: array<u32>;
-// Weights for the gradient [1/m] and, last, for the position.
-var<storage, read> site_weights: array<vec4<f32>>;
 var<storage, read> marks: array<Mark>;
 // [slots][most markers]
 var<storage, read_write> carried: array<Carried>;

@@ -5,6 +5,7 @@
 // use shared/precondition
 // use shared/iteration
 // use shared/first_cg
+// use shared/held
 
 var<storage, read> rhs: array<vec4<f32>>;
 var<storage, read_write> direction: array<vec4<f32>>;
@@ -15,6 +16,9 @@ var<storage, read_write> health: array<Health>;
 
 // Relative accuracy that a solve in single precision can reach with any certainty.
 const FINEST = 2e-7;
+
+// Stiffness of a held node's springs over that of its share of the body.
+override held_stiffness: f32;
 
 @compute @workgroup_size(256)
 fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -33,16 +37,24 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         cg_rest[a] = vec4(r, 0.0);
         cg_along[a] = vec4(z, 0.0);
         state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
+        if shape.held != 0u {
+            state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(i));
+        }
     }
     let s = total(local, state);
     first_cg(local, system, s.x);
+    var measured = s.x;
+    if shape.held != 0u {
+        // What stiff springs bear is settled at once. It counts by the load that it becomes on the rest of the body.
+        measured = s.z + s.w / held_stiffness;
+    }
     if local != 0u {
         return;
     }
     var n = newton[system];
     n.rz = s.x;
     n.norm = sqrt(max(s.x, 0.0));
-    n.goal = FINEST * n.norm;
+    n.goal = FINEST * sqrt(max(measured, 0.0));
     n.cg = 0u;
     n.stage = select(IDLE, WANTS_SOLVE, n.norm > 0.0);
     var broken = WELL;

@@ -12,15 +12,14 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let mark = marks[shot.marker_start + s.item];
     let site = sites[mark.site];
-    let first = site_rows[mark.site];
-    let origin = seen_at(s.slot, site_nodes[first]);
+    let first = stencil_rows[mark.site];
+    let origin = seen_at(s.slot, stencil_entries[first].node);
     var moved = vec3(0.0);
     var h = site.excess;
-    for (var k = first; k < site_rows[mark.site + 1u]; k++) {
-        let d = between(origin, seen_at(s.slot, site_nodes[k]));
-        let w = site_weights[k];
-        moved += w.w * d;
-        h += outer(d, w.xyz);
+    for (var k = first; k < stencil_rows[mark.site + 1u]; k++) {
+        let d = between(origin, seen_at(s.slot, stencil_entries[k].node));
+        moved += stencil_entries[k].weight * d;
+        h += outer(d, stencil_gradients[k].xyz);
     }
     let stalk = stalk_of(s.look.member, mark.site);
     let excess = excess_of(rotation_of(h));

@@ -2,12 +2,12 @@
 //! clamps' pass and the effects' left for the old state. Twin of `by_old` and `by_old_transposed` of the CPU backend.
 // use shared/corner
 // use shared/asks
+// use shared/patches
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> old_stress: array<vec4<f32>>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> hold_forces: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
@@ -42,7 +42,7 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     // Contact and effects on patches leave their share where contact has its force.
     if (shape.fields & FIELD_COUPLED) != 0u {
         for (var k = cells[c.cell].patch_start; k < cells[c.cell].patch_end; k++) {
-            f -= patches[k].weights[c.number] * touches[3u * (c.member * shape.patches + k)].xyz;
+            f -= corner_weight(k, c.number) * touches[3u * (c.member * shape.patches + k)].xyz;
         }
     }
     if c.live {

@@ -16,11 +16,10 @@ fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -
     var c = carrier;
     var moved = vec3(0.0);
     var df = mat3x3(vec3(0.0), vec3(0.0), vec3(0.0));
-    for (var k = site_rows[mark.site]; k < site_rows[mark.site + 1u]; k++) {
-        let d = changes[base + site_nodes[k]].xyz;
-        let w = site_weights[k];
-        moved += w.w * d;
-        df += outer(d, w.xyz);
+    for (var k = stencil_rows[mark.site]; k < stencil_rows[mark.site + 1u]; k++) {
+        let d = changes[base + stencil_entries[k].node].xyz;
+        moved += stencil_entries[k].weight * d;
+        df += outer(d, stencil_gradients[k].xyz);
     }
     let spin = c.pair * axial(transpose(c.turn) * df);
     moved += c.turn * cross(spin, stalk_of(member, mark.site));

@@ -34,10 +34,11 @@ fn pull_of(s: Seat, shot: Shot, node: u32) -> vec3<f32> {
         for (var k = node_site_rows[node]; k < node_site_rows[node + 1u]; k++) {
             let entry = node_site_list[k];
             let of_site = s.look.frame * (sight.sites + 1u) + entry.x;
-            let w = site_weights[entry.y];
+            let w = stencil_entries[entry.y].weight;
+            let slope = stencil_gradients[entry.y].xyz;
             for (var m = mark_rows[of_site]; m < mark_rows[of_site + 1u]; m++) {
                 let at = s.slot * sight.markers + m;
-                g += w.w * carried[at].pull.xyz + carried[at].turn * cross(carried[at].spin.xyz, w.xyz);
+                g += w * carried[at].pull.xyz + carried[at].turn * cross(carried[at].spin.xyz, slope);
             }
         }
     }

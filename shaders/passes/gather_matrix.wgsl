@@ -4,10 +4,10 @@
 // use shared/fields
 // use shared/inertia
 // use shared/tangents
+// use shared/patches
 
 var<storage, read> cells: array<Cell>;
 var<storage, read> elements: array<f32>;
-var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> holds: array<vec2<u32>>;
 var<storage, read> hold_elements: array<f32>;
@@ -84,7 +84,7 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
         if shape.patches != 0u {
             for (var t = cells[e].patch_start; t < cells[e].patch_end; t++) {
-                let w = patches[t].weights[i] * patches[t].weights[j];
+                let w = corner_weight(t, i) * corner_weight(t, j);
                 let s = 3u * (p.member * shape.patches + t);
                 let d = touches[s + 1u].xyz * w;
                 let o = touches[s + 2u].xyz * w;

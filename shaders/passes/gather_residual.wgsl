@@ -20,6 +20,14 @@ var<storage, read_write> residual: array<vec4<f32>>;
 // of the potential, and the node's mass with that of the points that it carries.
 var<storage, read_write> sizes: array<vec4<f32>>;
 
+fn trial_at(member: u32, stencil: u32) -> vec3<f32> {
+    var sum = vec3(0.0);
+    for (var k = stencil_rows[stencil]; k < stencil_rows[stencil + 1u]; k++) {
+        sum += stencil_entries[k].weight * trial[at_node(member, stencil_entries[k].node)].xyz;
+    }
+    return sum;
+}
+
 @compute @workgroup_size(64)
 fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                    @builtin(local_invocation_index) local: u32) {
@@ -51,19 +59,15 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     }
     var carried = mass;
     for (var s = 0u; s < shape.masses; s++) {
-        let corner = mass_corner(s, p.item);
-        if corner < 8u {
+        let entry = entry_of(mass_stencil(s), p.item);
+        if entry != NONE {
             var pull = -m.gravity.xyz;
             var twice = 2.0;
             if call.mode != 0u {
-                pull = vec3(0.0);
-                for (var j = 0u; j < 8u; j++) {
-                    pull += mass_sites[s].weights[j] * trial[at_node(p.member, mass_sites[s].nodes[j])].xyz;
-                }
-                pull *= mix.inertia;
+                pull = mix.inertia * trial_at(p.member, mass_stencil(s));
                 twice = 1.0;
             }
-            let f = mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner];
+            let f = mass_values[p.member * shape.masses + s] * stencil_entries[entry].weight;
             carried += f;
             body += f * vec4(pull, 0.5 * twice * dot(pull, w));
         }

@@ -18,9 +18,9 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let mix = mix_of(m);
     var mass = node_mass(m, p.member, p.item);
     for (var s = 0u; s < shape.masses; s++) {
-        let corner = mass_corner(s, p.item);
-        if corner < 8u {
-            let w = mass_sites[s].weights[corner];
+        let entry = entry_of(mass_stencil(s), p.item);
+        if entry != NONE {
+            let w = stencil_entries[entry].weight;
             mass += mass_values[p.member * shape.masses + s] * w * w;
         }
     }

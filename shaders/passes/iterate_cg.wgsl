@@ -3,7 +3,7 @@
 //! FOR_DERIVATIVE.
 // use shared/asks
 // use shared/mix
-// use shared/inertia
+// use shared/product
 // use shared/totals
 // use shared/precondition
 // use shared/leave_cg
@@ -45,16 +45,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
                     values[v + 6u] * x.x + values[v + 7u] * x.y + values[v + 8u] * x.z,
                 );
             }
-            for (var s = 0u; s < shape.masses; s++) {
-                let corner = mass_corner(s, i);
-                if corner < 8u {
-                    var x = vec3(0.0);
-                    for (var j = 0u; j < 8u; j++) {
-                        x += mass_sites[s].weights[j] * cg_along[at_node(p.member, mass_sites[s].nodes[j])].xyz;
-                    }
-                    q += (mix.inertia * mass_values[p.home * shape.masses + s] * mass_sites[s].weights[corner]) * x;
-                }
-            }
+            q = with_masses(q, mix.inertia, p.member, p.home, i);
             let a = at_node(p.member, i);
             cg_image[a] = vec4(q, 0.0);
             curvature.x += dot(cg_along[a].xyz, q);

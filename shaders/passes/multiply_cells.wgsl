@@ -2,9 +2,9 @@
 //! patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents
+// use shared/patches
 // use shared/asks
 
-var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> holds: array<vec2<u32>>;
 var<storage, read> hold_elements: array<f32>;
@@ -70,12 +70,12 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         for (var k = cell.patch_start; k < cell.patch_end; k++) {
             var there = vec3(0.0);
             for (var j = 0u; j < 8u; j++) {
-                there += patches[k].weights[j] * cg_along[at_node(p.member, cell.nodes[j])].xyz;
+                there += corner_weight(k, j) * cg_along[at_node(p.member, cell.nodes[j])].xyz;
             }
             let s = 3u * (p.member * shape.patches + k);
             let g = touches[s + 1u].xyz;
             let o = touches[s + 2u].xyz;
-            y += patches[k].weights[corner] * (mat3x3(vec3(g.x, o.x, o.y), vec3(o.x, g.y, o.z), vec3(o.y, o.z, g.z)) * there);
+            y += corner_weight(k, corner) * (mat3x3(vec3(g.x, o.x, o.y), vec3(o.x, g.y, o.z), vec3(o.y, o.z, g.z)) * there);
         }
     }
     if p.live {

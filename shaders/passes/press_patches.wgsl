@@ -2,8 +2,8 @@
 //! call.extra as of press_nodes. No effect of patches reads the old velocity, so that BACK has nothing to say of it.
 // use effects/points
 // use shared/patch_way
+// use shared/probed
 
-var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> planes: array<Plane>;
 var<storage, read> newton: array<Newton>;
 var<storage, read_write> touches: array<vec4<f32>>;
@@ -22,13 +22,11 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let way = patch_way(p.member, p.item, vec3(0.0), true);
     var mean = vec3(0.0);
     if what == BACK || what == BY_OLD {
-        for (var i = 0u; i < 8u; i++) {
-            mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
-        }
+        mean = probe_at(p.member, patch_stencil(p.item));
     }
     prepare(effect, p.member, m, mix_of(m));
-    place_point(site.point.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
-    measure = number(site.point.w);
+    place_point(site.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
+    measure = number(site.w);
     let at = 3u * (p.member * shape.patches + p.item);
     var force = vec4(0.0);
     var diagonal = vec3(0.0);

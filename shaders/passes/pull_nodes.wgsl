@@ -58,9 +58,9 @@ fn pull_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         node_pulls[a] -= volume * by;
         var carried = mass;
         for (var s = 0u; s < shape.masses; s++) {
-            let corner = mass_corner(s, p.item);
-            if corner < 8u {
-                carried += mass_values[p.member * shape.masses + s] * mass_sites[s].weights[corner];
+            let entry = entry_of(mass_stencil(s), p.item);
+            if entry != NONE {
+                carried += mass_values[p.member * shape.masses + s] * stencil_entries[entry].weight;
             }
         }
         gravity = vec4(-carried * z, 0.0);

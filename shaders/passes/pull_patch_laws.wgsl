@@ -1,8 +1,8 @@
 //! The same of an effect on patches, at every plane where it is one of contact.
 // use shared/pull_point
 // use shared/patch_way
+// use shared/probed
 
-var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> planes: array<Plane>;
 
 @compute @workgroup_size(64)
@@ -11,15 +11,13 @@ fn pull_patch_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let p = find_place(group, groups, local, shape.patches, 64u);
     let effect = effects[asked_effect()];
     let m = members[p.member];
-    let site = patches[min(p.item, shape.patches - 1u)];
-    let way = patch_way(p.member, min(p.item, shape.patches - 1u), vec3(0.0), true);
-    var mean = vec3(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
-    }
+    let which = min(p.item, shape.patches - 1u);
+    let site = patches[which];
+    let way = patch_way(p.member, which, vec3(0.0), true);
+    let mean = probe_at(p.member, patch_stencil(which));
     prepare(effect, p.member, m, mix_of(m));
-    place_point(site.point.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
-    measure = number(site.point.w);
+    place_point(site.xyz, way.whole, way.rest, way.old_whole, way.old_rest, vec3(0.0));
+    measure = number(site.w);
     aim(mean);
     let at_planes = effect.site == AT_CONTACT;
     for (var k = 0u; k < max(shape.planes, 1u); k++) {

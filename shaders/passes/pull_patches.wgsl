@@ -2,9 +2,9 @@
 // use shared/mix
 // use shared/contact
 // use shared/patch_way
+// use shared/probed
 // use shared/pulls
 
-var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> planes: array<Plane>;
 // [planes][B][workgroups]: by Young's modulus, height and angles.
 var<storage, read_write> patch_sums: array<vec4<f32>>;
@@ -13,21 +13,19 @@ var<storage, read_write> patch_sums: array<vec4<f32>>;
 fn pull_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
     let p = find_place(group, groups, local, shape.patches, 64u);
-    let site = patches[min(p.item, shape.patches - 1u)];
+    let which = min(p.item, shape.patches - 1u);
+    let site = patches[which];
     let theta = select(1.0, shape.theta, call.mode != 0u);
     let along = acts_along(theta);
-    let way = patch_way(p.member, min(p.item, shape.patches - 1u), site.point.xyz, along);
-    var z = vec3(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        z += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
-    }
+    let way = patch_way(p.member, which, site.xyz, along);
+    let z = probe_at(p.member, patch_stencil(which));
     let width = shape.contact_width;
     for (var k = 0u; k < shape.planes; k++) {
         let plane = planes[p.member * shape.planes + k];
         let n = plane.normal.xyz;
         let gap = (dot(n, way.whole) - plane.normal.w) + dot(n, way.rest);
         let old_gap = (dot(n, way.old_whole) - plane.normal.w) + dot(n, way.old_rest);
-        let s = site.point.w * plane.stiffness;
+        let s = site.w * plane.stiffness;
         var by = vec4(0.0);
         for (var i = 0u; i < instant_count; i++) {
             let at = instant(i, theta);

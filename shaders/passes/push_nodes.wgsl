@@ -79,14 +79,11 @@ fn push_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     }
     f -= mass * r.gravity.xyz;
     for (var s = 0u; s < shape.masses; s++) {
-        let corner = mass_corner(s, p.item);
-        if corner < 8u {
-            var sum = vec3(0.0);
-            for (var j = 0u; j < 8u; j++) {
-                sum += mass_sites[s].weights[j] * acceleration(p.member, mass_sites[s].nodes[j], m);
-            }
+        let entry = entry_of(mass_stencil(s), p.item);
+        if entry != NONE {
+            let sum = acceleration_at(p.member, mass_stencil(s), m);
             let rate = rate_numbers[numbers_at(p.member) + PLANE_NUMBERS * shape.planes + s];
-            f += mass_sites[s].weights[corner] * (rate * sum - mass_values[p.member * shape.masses + s] * r.gravity.xyz);
+            f += stencil_entries[entry].weight * (rate * sum - mass_values[p.member * shape.masses + s] * r.gravity.xyz);
         }
     }
     column[a] = vec4(f, 0.0);

@@ -17,7 +17,7 @@ fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let site = patches[p.item];
     let theta = select(1.0, shape.theta, call.mode != 0u);
-    let way = patch_way(p.member, p.item, site.point.xyz, acts_along(theta));
+    let way = patch_way(p.member, p.item, site.xyz, acts_along(theta));
     let width = shape.contact_width;
     let stiffer = rates[p.member].young / members[p.member].young;
     var vector = vec3(0.0);
@@ -31,7 +31,7 @@ fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         }
         let rate = plane_rate(p.member, k);
         let turned = rate.y * plane.by_theta.xyz + rate.z * plane.by_phi.xyz;
-        let s = site.point.w * plane.stiffness;
+        let s = site.w * plane.stiffness;
         for (var i = 0u; i < instant_count; i++) {
             let at = instant(i, theta);
             if at.x == 0.0 {

@@ -3,9 +3,9 @@
 // use shared/mix
 // use shared/contact
 // use shared/patch_way
+// use shared/probed
 // use shared/asks
 
-var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> planes: array<Plane>;
 var<storage, read_write> touches: array<vec4<f32>>;
 
@@ -20,14 +20,12 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let what = call.extra;
     let theta = select(1.0, shape.theta, call.mode != 0u);
     let along = acts_along(theta);
-    let way = patch_way(p.member, p.item, site.point.xyz, along);
+    let way = patch_way(p.member, p.item, site.xyz, along);
     var mean = vec3(0.0);
     if what == TOUCH_OLD {
-        for (var i = 0u; i < 8u; i++) {
-            mean += site.weights[i] * probe[at_node(p.member, cells[site.cell].nodes[i])].xyz;
-        }
+        mean = probe_at(p.member, patch_stencil(p.item));
     }
-    let area = site.point.w;
+    let area = site.w;
     let width = shape.contact_width;
     var vector = vec3(0.0);
     var energy = 0.0;

@@ -1,7 +1,7 @@
-//! Lumped mass of the nodes, and point masses spread over the nodes of their cells.
+//! Lumped mass of the nodes, and point masses, each a stencil.
+// use shared/stencil
 
 var<storage, read> rest: array<vec4<f32>>;
-var<storage, read> mass_sites: array<Mass>;
 // [B][masses] in kg.
 var<storage, read> mass_values: array<f32>;
 // [B][N], times the density; read only where effects vary it over the body.
@@ -15,12 +15,6 @@ fn node_mass(m: Member, member: u32, node: u32) -> f32 {
     return m.density * rest[node].w;
 }
 
-// Corner of a point mass at a node, or 8.
-fn mass_corner(site: u32, node: u32) -> u32 {
-    for (var i = 0u; i < 8u; i++) {
-        if mass_sites[site].nodes[i] == node {
-            return i;
-        }
-    }
-    return 8u;
+fn mass_stencil(which: u32) -> u32 {
+    return shape.first_mass + which;
 }

@@ -1,9 +1,8 @@
 //! The way of a surface patch's mean point in a step.
+// use shared/patches
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> patches: array<Patch>;
 
 // Place or displacement in the new and in the old state, each in two parts.
 struct PatchWay {
@@ -15,11 +14,11 @@ struct PatchWay {
 
 // Displacements are added to `start`; the old state is the new one where it is not asked for.
 fn patch_way(member: u32, patch_number: u32, start: vec3<f32>, reads_old: bool) -> PatchWay {
-    let cell = patches[patch_number].cell;
+    let stencil = patch_stencil(patch_number);
     var way = PatchWay(start, vec3(0.0), start, vec3(0.0));
-    for (var i = 0u; i < 8u; i++) {
-        let a = at_node(member, cells[cell].nodes[i]);
-        let w = patches[patch_number].weights[i];
+    for (var k = stencil_rows[stencil]; k < stencil_rows[stencil + 1u]; k++) {
+        let a = at_node(member, stencil_entries[k].node);
+        let w = stencil_entries[k].weight;
         way.whole += w * next[a].xyz;
         way.rest += w * next[part(1u) + a].xyz;
         if reads_old {

@@ -1,17 +1,28 @@
-//! What both kinds of product add to the elastic part of q = A p at a node: inertia, point masses.
+//! What products add to the elastic part of q = A p at a node: inertia, point masses.
 // use shared/inertia
 
-fn heavy_row(m: Member, inertia: f32, p: Place) -> vec3<f32> {
-    var q = (inertia * node_mass(m, p.home, p.item)) * cg_along[at_node(p.member, p.item)].xyz;
+fn along_at(member: u32, stencil: u32) -> vec3<f32> {
+    var sum = vec3(0.0);
+    for (var k = stencil_rows[stencil]; k < stencil_rows[stencil + 1u]; k++) {
+        sum += stencil_entries[k].weight * cg_along[at_node(member, stencil_entries[k].node)].xyz;
+    }
+    return sum;
+}
+
+// Adds what point masses give to a node's row.
+fn with_masses(row: vec3<f32>, inertia: f32, member: u32, home: u32, node: u32) -> vec3<f32> {
+    var q = row;
     for (var s = 0u; s < shape.masses; s++) {
-        let corner = mass_corner(s, p.item);
-        if corner < 8u {
-            var x = vec3(0.0);
-            for (var j = 0u; j < 8u; j++) {
-                x += mass_sites[s].weights[j] * cg_along[at_node(p.member, mass_sites[s].nodes[j])].xyz;
-            }
-            q += (inertia * mass_values[p.home * shape.masses + s] * mass_sites[s].weights[corner]) * x;
+        let entry = entry_of(mass_stencil(s), node);
+        if entry != NONE {
+            let x = along_at(member, mass_stencil(s));
+            q += (inertia * mass_values[home * shape.masses + s] * stencil_entries[entry].weight) * x;
         }
     }
     return q;
+}
+
+fn heavy_row(m: Member, inertia: f32, p: Place) -> vec3<f32> {
+    let own = (inertia * node_mass(m, p.home, p.item)) * cg_along[at_node(p.member, p.item)].xyz;
+    return with_masses(own, inertia, p.member, p.home, p.item);
 }

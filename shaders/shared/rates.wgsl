@@ -27,7 +27,7 @@ const PLANE_NUMBERS = 4u;
 var<storage, read> rates: array<Rate>;
 // [B]: of planes, point masses, changes in time, clamps (poses, then matrices), effects.
 var<storage, read> rate_numbers: array<f32>;
-// [B][cells]: of the factors on the cells' moduli.
+// [B][cells or elastic points]: of the factors on the cells' moduli.
 var<storage, read> rate_moduli: array<f32>;
 
 fn with_rate(what: u32) -> bool {
@@ -51,11 +51,11 @@ fn aging_numbers(member: u32) -> u32 {
 fn young_rate(m: Member, member: u32, cell: u32) -> f32 {
     var factor = 1.0;
     if (shape.fields & FIELD_MODULUS) != 0u {
-        factor = moduli[member * shape.cells + cell];
+        factor = moduli[member * (shape.cells + shape.elastic) + cell];
     }
     var rate = rates[member].young * factor;
     if with_rate(WITH_MODULI) {
-        rate += m.young * rate_moduli[member * shape.cells + cell];
+        rate += m.young * rate_moduli[member * (shape.cells + shape.elastic) + cell];
     }
     if (shape.fields & FIELD_AGING) != 0u {
         rate *= aging_at(member, 0u);

@@ -3,8 +3,8 @@
 
 const SECTIONS = 4u;
 
-// Kinds of items: the member itself, nodes, cells, blocks, patches, clamp cells, nodes in wide workgroups, and nodes with eight lanes
-// each. The host's `Per` has the same numbers.
+// Kinds of items: the member itself, nodes, cells, blocks, patches, clamp cells, nodes in wide workgroups, nodes with eight lanes
+// each, and elastic points. The host's `Per` has the same numbers.
 const PER_MEMBER = 0u;
 const PER_NODE = 1u;
 const PER_CELL = 2u;
@@ -13,9 +13,10 @@ const PER_PATCH = 4u;
 const PER_HOLD = 5u;
 const PER_WIDE = 6u;
 const PER_ROW = 7u;
-const KINDS = 8u;
+const PER_ELASTIC = 8u;
+const KINDS = 9u;
 
-// Nodes of a workgroup of the last two kinds.
+// Nodes of a workgroup of the two kinds before the last.
 const WIDE = 256u;
 const NARROW = 32u;
 

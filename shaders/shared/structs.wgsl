@@ -39,6 +39,10 @@ struct Shape { // mirrored
     point_groups: u32,
     rate_numbers: u32,
     rate_effects: u32,
+    first_patch: u32,
+    first_mass: u32,
+    elastic: u32,
+    held: u32,
 }
 
 struct Member { // mirrored
@@ -75,18 +79,6 @@ struct Cell { // mirrored
     fraction: f32,
     whole: f32,
     pad: u32,
-}
-
-struct Patch { // mirrored
-    point: vec4<f32>,
-    weights: array<f32, 8>,
-    cell: u32,
-    pad: array<u32, 3>,
-}
-
-struct Mass { // mirrored
-    nodes: array<u32, 8>,
-    weights: array<f32, 8>,
 }
 
 struct ClampPose { // mirrored

@@ -1,6 +1,6 @@
 //! What clamps and planes do to one corner of a cell, from the passes that computed them per clamp cell and per patch.
+// use shared/patches
 
-var<storage, read> patches: array<Patch>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read> hold_forces: array<vec4<f32>>;
 
@@ -12,7 +12,7 @@ fn support_of(cell: Cell, member: u32, corner: u32) -> vec4<f32> {
     }
     for (var k = cell.patch_start; k < cell.patch_end; k++) {
         let t = touches[3u * (member * shape.patches + k)];
-        let w = patches[k].weights[corner];
+        let w = corner_weight(k, corner);
         sum += vec4(-w * t.xyz, w * t.w);
     }
     return sum;

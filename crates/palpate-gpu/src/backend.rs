@@ -76,12 +76,6 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        if !plan.body.points.is_empty() {
-            return Err(BuildError {
-                message: "the GPU backend cannot compute bodies of tetrahedra".into(),
-                hint: "use --backend cpu, or a surface mesh, which is cut out of a lattice".into(),
-            });
-        }
         self.world(plan, members).map_err(|e| BuildError { message: e.to_string(), hint: e.hint_for(self.alone) })
     }
 

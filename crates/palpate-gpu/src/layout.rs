@@ -83,6 +83,14 @@ pub struct Shape {
     pub rate_numbers: u32,
     /// Where those of effects begin.
     pub rate_effects: u32,
+    /// Number of the first patch among the stencils.
+    pub first_patch: u32,
+    /// Number of the first point mass among them.
+    pub first_mass: u32,
+    /// Elastic points; they are the first stencils.
+    pub elastic: u32,
+    /// 1 where clamps hold nodes, as they do on bodies without cells.
+    pub held: u32,
 }
 
 /// Parameters of one member.
@@ -203,28 +211,36 @@ pub struct Cell {
     pub pad: u32,
 }
 
-/// A surface patch.
+/// An entry of a stencil.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Patch {
-    /// Rest position [m] and area [m²].
-    pub point: [f32; 4],
-    /// Means of the shape functions.
-    pub weights: [f32; 8],
-    /// Cell that it lies in.
-    pub cell: u32,
-    /// Fills up.
-    pub pad: [u32; 3],
+pub struct Entry {
+    /// The node.
+    pub node: u32,
+    /// Its weight.
+    pub weight: f32,
 }
 
-/// A point mass.
+/// Two entries of a stencil, which make a block of the matrix.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Mass {
-    /// Nodes that carry it.
-    pub nodes: [u32; 8],
-    /// Shape functions at the point.
-    pub weights: [f32; 8],
+pub struct Pair {
+    /// The stencil.
+    pub stencil: u32,
+    /// Entry of the block's row.
+    pub row: u32,
+    /// Entry of its column.
+    pub column: u32,
+}
+
+/// A clamp that holds a node.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Holder {
+    /// Number of the clamp.
+    pub by: u32,
+    /// Stiffness of the spring [N/m].
+    pub stiffness: f32,
 }
 
 /// Pose of a clamp at one time: x ↦ A x + b and its rate.

@@ -14,6 +14,7 @@ mod memory;
 mod passes;
 mod read;
 mod solve;
+mod stencils;
 mod terms;
 #[cfg(test)]
 mod tests;

@@ -26,6 +26,7 @@ pub(crate) enum Per {
     Wide = roster::PER_WIDE,
     /// Nodes with eight lanes each, in workgroups of 256.
     Row = roster::PER_ROW,
+    Elastic = roster::PER_ELASTIC,
 }
 
 /// One balance on the way to the device: a step, or the static problem.
@@ -121,6 +122,8 @@ impl<'a, 'r> Passes<'a, 'r> {
     pub(crate) fn run_with(&mut self, pass: usize, section: u32, per: Per, extra: u32, more: &Named) {
         let shape = &self.world.geometry.shape;
         let empty = match per {
+            Per::Cell => shape.cells == 0,
+            Per::Elastic => shape.elastic == 0,
             Per::Patch => shape.patches == 0,
             Per::Hold => shape.holds == 0,
             _ => false,

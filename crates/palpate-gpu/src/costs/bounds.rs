@@ -56,7 +56,7 @@ impl Seen {
             corners: band.corners.longest() as u64,
             rows: s.rows.into(),
             markers: s.markers.into(),
-            site: sites.nodes.longest() as u64,
+            site: sites.stencils.longest() as u64,
             sites: sites.of_node.longest() as u64,
         }
     }

@@ -76,9 +76,7 @@ pub(super) fn upload<M: Maker>(
     to.insert("sites", gpu.upload("sites", &sites.sites)?);
     to.insert("offsets", gpu.buffer("offsets", VECTOR * (members.max(1) * sites.sites.len()) as u64)?);
     to.insert("offset_places", gpu.upload("offset_places", &readings::offset_places(plan))?);
-    to.insert("site_rows", gpu.upload("site_rows", &sites.nodes.starts)?);
-    to.insert("site_nodes", gpu.upload("site_nodes", &sites.nodes.columns)?);
-    to.insert("site_weights", gpu.upload("site_weights", &sites.nodes.values)?);
+    sites.stencils.upload(gpu, to)?;
     to.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
     to.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
     Ok(())

@@ -3,6 +3,7 @@
 use crate::costs::shots::split;
 use crate::device::pipelines::shared::structs::NONE;
 use crate::layout::{BandCell, Site};
+use crate::stencils::StencilTable;
 use glam::{DMat3, DVec3};
 use palpate_model::observation::{MarkerSite, Observation, ReadingKind};
 use palpate_model::plan::Plan;
@@ -85,25 +86,22 @@ impl BandTables {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SiteTables {
     pub(crate) sites: Vec<Site>,
-    /// Rows are sites, columns nodes; values hold the gradient's weights [1/m] and the position's.
-    pub(crate) nodes: Rows<[f32; 4]>,
-    /// Rows are nodes, columns sites; values are places in `nodes`.
+    /// Places and gradients.
+    pub(crate) stencils: StencilTable,
+    /// Rows are nodes, columns sites; values are entries of `stencils`.
     pub(crate) of_node: Rows<u32>,
 }
 
 impl SiteTables {
     pub(crate) fn new(plan: &Plan) -> SiteTables {
         let mut tables = SiteTables::default();
-        let (mut entries, mut transposed) = (Vec::new(), Vec::new());
+        let mut transposed = Vec::new();
         for (s, site) in plan.observation.markers.iter().enumerate() {
             tables.sites.push(place(plan, site));
-            for (k, &node) in site.stencil.nodes.iter().enumerate() {
-                let g = site.stencil.gradient[k].as_vec3();
-                transposed.push((node, s as u32, entries.len() as u32));
-                entries.push((s as u32, node, [g.x, g.y, g.z, site.stencil.value[k] as f32]));
-            }
+            let first = tables.stencils.entries.len() as u32;
+            transposed.extend((first..).zip(&site.stencil.nodes).map(|(k, node)| (*node, s as u32, k)));
+            tables.stencils.extend(std::iter::once(site.stencil.get()));
         }
-        tables.nodes = Rows::new(tables.sites.len(), &entries);
         tables.of_node = Rows::new(plan.body.nodes.len(), &transposed);
         tables
     }

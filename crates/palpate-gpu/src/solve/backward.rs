@@ -48,6 +48,7 @@ impl Passes<'_, '_> {
         self.couple_patches(BACK, &[]);
         self.couple_cells(asks::TRANSPOSED, &[("now", state)]);
         self.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", adj), ("adj_now", to)]);
+        self.couple_elastic(asks::TRANSPOSED, to, &[("now", state)]);
         self.press_nodes(ALL, BACK, None, to, &[]);
     }
 
@@ -68,6 +69,7 @@ impl Passes<'_, '_> {
         self.couple_patches(BY_OLD, &named);
         self.couple_cells(asks::ALONG, &[("probe", probe), ("now", state)]);
         self.run_with(pass::SUM_OLD, ALL, Per::Node, u32::from(!first), &named);
+        self.couple_elastic(asks::ALONG, &self.world.buffers["rhs"], &[("probe", probe), ("now", state)]);
         self.press_nodes(ALL, BY_OLD, None, &self.world.buffers["rhs"], &named);
     }
 }

@@ -49,6 +49,7 @@ impl<'a> Passes<'a, '_> {
         let effort = self.effort();
         for round in 0..effort.rounds.min(full) {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
+            self.place_held(TRIAL);
             self.residual(TRIAL);
             self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, 0);
             self.list();

@@ -1,6 +1,7 @@
 //! The terms of a balance, one file each, and what they make together: residual, tangent, and derivatives by the old state.
 
 mod cell_laws;
+mod elastic;
 mod point_laws;
 mod pull;
 mod push;
@@ -23,6 +24,7 @@ impl Passes<'_, '_> {
         self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
         self.laws(pass::PRESS_LAWS, ALL, Per::Cell, 1, &[]);
         self.run(pass::GATHER_OLD, ALL, Per::Node, 0);
+        self.prepare_elastic();
     }
 
     /// The residual at a trial of the members of a section: forces of contact, clamps, cells and laws, summed per node with inertia.
@@ -33,6 +35,7 @@ impl Passes<'_, '_> {
         self.press_cells(section);
         self.run(pass::GATHER_RESIDUAL, section, Per::Node, 0);
         self.press_nodes(section, FORCE, None, &self.world.buffers["residual"], &[]);
+        self.residual_elastic(section);
     }
 
     /// Forces of the cells and of their laws at the new state.
@@ -52,8 +55,10 @@ impl Passes<'_, '_> {
         self.laws(pass::TANGENT_LAWS, section, Per::Cell, 0, &[]);
         self.run(pass::GATHER_MATRIX, section, Per::Block, 0);
         self.laws(pass::GATHER_LAWS, section, Per::Block, 0, &[]);
+        self.assemble_elastic(section);
         self.press_nodes(section, STIFFNESS, None, &self.world.buffers["column"], &[]);
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
+        self.forget_springs(section);
     }
 
     /// Derivative of the cells' force by the old state, times a vector (`back` is ALONG), or its transpose.

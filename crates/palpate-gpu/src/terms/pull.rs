@@ -35,6 +35,7 @@ impl Passes<'_, '_> {
         let material = sought.modulus || sought.poisson || sought.rest;
         if material || sought.damping[1] {
             self.run_with(pass::PULL_CELLS, ALL, Per::Cell, asked(sought), &named);
+            self.pull_elastic(&named);
         }
         if material || self.seeks_effect(sought, |s| matches!(s, Site::Cells(_))) {
             self.laws(pass::PULL_LAWS, ALL, Per::Cell, asked(sought), &named);
@@ -44,6 +45,9 @@ impl Passes<'_, '_> {
             let numbers = if grips { self.world.geometry.effects.hold_numbers() } else { [0; 2] };
             let extra = asked(sought) | numbers[0] << POSES_AT | numbers[1] << MATRICES_AT;
             self.run_with(pass::PULL_HOLDS, ALL, Per::Hold, extra, &named);
+        }
+        if sought.start {
+            self.pull_held(&named);
         }
         if sought.rest {
             self.run_with(pass::PULL_REST, ALL, Per::Node, asked(sought), &named);

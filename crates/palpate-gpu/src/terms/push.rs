@@ -45,6 +45,9 @@ impl Passes<'_, '_> {
         }
         let flags = rates.flags | if cells { WITH_CELLS } else { 0 };
         self.run_with(pass::PUSH_NODES, ALL, Per::Node, flags, &named);
+        if cells {
+            self.push_elastic(rates.flags, moved.start, &named);
+        }
         if points {
             self.press_nodes(ALL, COLUMN, None, &self.world.buffers["column"], &named);
         }

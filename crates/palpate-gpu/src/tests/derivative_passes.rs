@@ -16,7 +16,7 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 
 /// What was computed by one pass or by several together: name, numbers.
-type Part = (String, Vec<f64>);
+pub(super) type Part = (String, Vec<f64>);
 
 /// Part of the largest number that may differ. Derivatives by the old state and by parameters cancel more than forces do (two states,
 /// their difference over a step): ten times as much as forces.
@@ -40,7 +40,7 @@ fn name_of(key: ParamKey) -> String {
 }
 
 /// The device's numbers; derivatives of the whole in these `sizes`.
-fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
+pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
     let (world, n) = (&stepwise(backend, plan), plan.body.nodes.len());
     let tally = backend.new_tally(world, &Request { gradient: Wanted::All, ..Request::default() });
     let (now, next) = (backend.new_state(world), backend.new_state(world));
@@ -91,6 +91,7 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
         s.couple_patches(BACK, &[]);
         s.couple_cells(asks::TRANSPOSED, &[]);
         s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
+        s.couple_elastic(asks::TRANSPOSED, &adj_now.0.buffer, &[]);
         s.press_nodes(ALL, BACK, None, &adj_now.0.buffer, &[]);
     });
     let back = read(&adj_now.0.buffer, 2 * n);
@@ -107,6 +108,7 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
         s.couple_patches(BY_OLD, &[("probe", from)]);
         s.couple_cells(asks::ALONG, &[("probe", from)]);
         s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
+        s.couple_elastic(asks::ALONG, &world.buffers["rhs"], &[("probe", from)]);
         s.press_nodes(ALL, BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
     });
     parts.push(("couple_old and sum_old".into(), three(&read(&world.buffers["rhs"], n))));
@@ -123,7 +125,7 @@ fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Part> {
 }
 
 /// The CPU's, and the sizes of the terms of each derivative of the whole.
-fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
+pub(super) fn exact(plan: &Plan) -> (Vec<Part>, Vec<f64>) {
     let a = Exact::new(plan, given);
     let dt = plan.clock.step;
     let [u, v] = along(plan);
@@ -198,7 +200,7 @@ fn three_iterations(a: &Exact, load: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// Parts that differ by more than they may.
-fn apart(found: &[Part], right: &[Part]) -> Vec<String> {
+pub(super) fn apart(found: &[Part], right: &[Part]) -> Vec<String> {
     let names = |p: &[Part]| p.iter().map(|p| (p.0.clone(), p.1.len())).collect::<Vec<_>>();
     assert_eq!(names(found), names(right));
     let mut out = Vec::new();

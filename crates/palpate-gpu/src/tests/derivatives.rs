@@ -106,7 +106,7 @@ const EXACT: f64 = 1e-11;
 
 /// dJ/dp of a member by central differences of the CPU, and what counts as its size: the change of the cost over a change of the
 /// parameter by its own size.
-type Slope = [f64; 2];
+pub(super) type Slope = [f64; 2];
 
 /// Of every parameter.
 fn exact(plan: &Plan, row: &[f64]) -> Vec<Slope> {
@@ -137,7 +137,7 @@ fn wrong(gradient: &[f64], exact: &[Slope]) -> Vec<usize> {
 
 /// Both gradients of every member, against differences; each must be found out when it is off by one percent, by any parameter that
 /// the cost depends on; returns the differences.
-fn check(backend: &GpuBackend, plan: &Plan, members: usize) -> Vec<Vec<Slope>> {
+pub(super) fn check(backend: &GpuBackend, plan: &Plan, members: usize) -> Vec<Vec<Slope>> {
     let theta = spread(plan, members);
     let (adjoint, tangent) = gradients(backend, plan, &theta);
     let mut all = Vec::new();

@@ -128,7 +128,8 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
 #[test]
 fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through() {
     let Some(gpu) = device(None) else { return };
-    let shape = Shape { members: 3, nodes: 1000, cells: 333, blocks: 9001, patches: 777, holds: 55, ..Shape::default() };
+    let shape =
+        Shape { members: 3, nodes: 1000, cells: 333, blocks: 9001, patches: 777, holds: 55, elastic: 4321, ..Shape::default() };
     let [_, sizes] = listed(&gpu, shape);
     // A pass of each kind, how many of its lanes share an item, and the items.
     let kinds = [
@@ -140,6 +141,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         (Per::Hold, pass::HOLD_CELLS, 8, shape.holds),
         (Per::Wide, pass::TURN_CG, 1, shape.nodes),
         (Per::Row, pass::MULTIPLY_ROWS, 8, shape.nodes),
+        (Per::Elastic, pass::PRESS_ELASTIC, 1, shape.elastic),
     ];
     assert_eq!(kinds.len(), KINDS);
     for (per, pass, lanes, items) in kinds {

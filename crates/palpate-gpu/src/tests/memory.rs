@@ -22,7 +22,7 @@ fn ratios(plan: &Plan, members: usize) -> ParamBatch {
     ParamBatch::from_rows(&rows)
 }
 
-fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
+pub(super) fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Request) {
     let before = (gpu.made(), gpu.allocated());
     let mut rollout = Rollout::new(GpuBackend::on(gpu.clone()), plan, members).unwrap_or_else(|e| panic!("{e}"));
     let all = rollout.evaluate(&ratios(plan, members), request);

@@ -8,6 +8,7 @@ mod derivative_passes;
 mod derivatives;
 mod effects;
 mod efforts;
+mod elastic;
 mod extremes;
 pub(crate) mod faults;
 mod forward;

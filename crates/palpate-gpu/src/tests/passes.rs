@@ -3,7 +3,6 @@
 use super::products::crowded;
 use super::scenes::{device, plan};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::points::FORCE;
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{State, World};
 use crate::{GpuBackend, Product};
@@ -68,9 +67,9 @@ pub(super) fn vectors(v: &[[f32; 4]]) -> Vec<DVec3> {
     v.iter().map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into())).collect()
 }
 
-/// True without effects, for the linear material.
+/// True for a body of cells without effects, of the linear material.
 fn without_effects(plan: &Plan) -> bool {
-    plan.model.is_linear && plan.layout.effects().next().is_none()
+    plan.body.points.is_empty() && plan.model.is_linear && plan.layout.effects().next().is_none()
 }
 
 /// A world at the plan's own values that takes one iteration of Newton's method at a time.
@@ -109,19 +108,15 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
         world.gpu.queue.write_buffer(&world.buffers["increment"], 0, bytemuck::cast_slice(&w));
         step(world, &now, &next, &tally, |s| {
             s.run(pass::PLACE_NEXT, ALL, Per::Node, 0);
-            s.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
-            s.press_patches(ALL, FORCE, None, &[]);
-            s.run(pass::HOLD_CELLS, ALL, Per::Hold, 0);
-            s.press_cells(ALL);
-            s.run(pass::GATHER_RESIDUAL, ALL, Per::Node, 0);
-            s.press_nodes(ALL, FORCE, None, &s.world.buffers["residual"], &[]);
+            s.residual(ALL);
         });
         get("residual", n)
     };
     let potential = |r: &[[f32; 4]]| r.iter().map(|v| f64::from(v[3])).sum::<f64>();
     let half = potential(&trial(0.5));
     let residual = trial(1.0);
-    let forces = three(&get("cell_force", 8 * plan.body.cells().len()));
+    let cells = 8 * plan.body.cells().len();
+    let forces = if cells == 0 { Vec::new() } else { three(&get("cell_force", cells)) };
     step(world, &now, &next, &tally, |s| s.assemble(ALL));
     let placed: Vec<[f32; 4]> = world.gpu.download(&next.0.buffer, 2 * n).unwrap_or_else(|e| panic!("{e}"));
     let u1: Vec<DVec3> = vectors(&placed[..n]).iter().zip(vectors(&placed[n..])).map(|(a, b)| *a + b).collect();

@@ -16,7 +16,7 @@ use palpate_model::scene::Scene;
 use std::ops::ControlFlow;
 
 /// Displacements and velocities after every step.
-fn moments<B: Backend>(backend: B, plan: &Plan, theta: &[f64]) -> Vec<[Vec<DVec3>; 2]> {
+pub(super) fn moments<B: Backend>(backend: B, plan: &Plan, theta: &[f64]) -> Vec<[Vec<DVec3>; 2]> {
     let mut found = Vec::new();
     let mut rollout = Rollout::new(backend, plan, 1).unwrap_or_else(|e| panic!("{e}"));
     let visited = rollout.visit(theta, |_, s, _| {
@@ -28,14 +28,14 @@ fn moments<B: Backend>(backend: B, plan: &Plan, theta: &[f64]) -> Vec<[Vec<DVec3
 }
 
 /// Largest difference of displacements [m], and of velocities times the step [m].
-fn apart(plan: &Plan, a: &[[Vec<DVec3>; 2]], b: &[[Vec<DVec3>; 2]]) -> [f64; 2] {
+pub(super) fn apart(plan: &Plan, a: &[[Vec<DVec3>; 2]], b: &[[Vec<DVec3>; 2]]) -> [f64; 2] {
     assert_eq!(a.len(), b.len());
     let largest = |part: usize| a.iter().zip(b).map(|(a, b)| off(&a[part], &b[part])).fold(0.0, f64::max);
     [largest(0), plan.clock.step * largest(1)]
 }
 
 /// Schemes beside the θ-scheme.
-fn schemes() -> impl Iterator<Item = &'static Scheme> {
+pub(super) fn schemes() -> impl Iterator<Item = &'static Scheme> {
     ALL.iter().skip(1)
 }
 

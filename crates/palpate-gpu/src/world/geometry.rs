@@ -1,10 +1,12 @@
 //! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
 
 use super::effects::Effects;
+use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
 use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
 use crate::device::{GpuError, Maker};
-use crate::layout::{Cell, Mass, Patch, Shape};
+use crate::layout::{Cell, Shape};
+use crate::stencils::StencilTable;
 use palpate_model::cutcells::elements::Classes;
 use palpate_model::params::grips::within_reach;
 use palpate_model::plan::{Plan, WORLD_SIZE};
@@ -27,16 +29,6 @@ pub(crate) struct Geometry {
     /// (clamp, cell of the body) of every clamp cell in the device's order: all that a member may hold.
     pub(crate) holds: Vec<(usize, u32)>,
     pub(crate) effects: Effects,
-}
-
-/// Weights of a stencil of eight nodes, as all on cut cells are.
-fn eight(weights: &[f64]) -> [f32; 8] {
-    std::array::from_fn(|i| weights[i] as f32)
-}
-
-/// Its nodes.
-fn eight_nodes(nodes: &[u32]) -> [u32; 8] {
-    std::array::from_fn(|i| nodes[i])
 }
 
 fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
@@ -90,15 +82,16 @@ impl Geometry {
                 }
             })
             .collect();
-        let patches: Vec<Patch> = body
-            .patches
-            .iter()
-            .zip(body.surface.iter())
-            .map(|(p, s)| Patch { point: vec4(p.point, p.area), weights: eight(s.value), cell: p.cell, pad: [0; 3] })
-            .collect();
+        let patches: Vec<[f32; 4]> = body.patches.iter().map(|p| vec4(p.point, p.area)).collect();
         let rest: Vec<[f32; 4]> = body.nodes.iter().zip(&body.node_volume).map(|(x, v)| vec4(*x, *v)).collect();
-        let masses: Vec<Mass> =
-            plan.masses.iter().map(|m| Mass { nodes: eight_nodes(m.nodes), weights: eight(m.value) }).collect();
+        let mut stencils = StencilTable::default();
+        stencils.extend(body.points.stencils.iter());
+        let first_patch = stencils.len() as u32;
+        stencils.extend(body.surface.iter());
+        let first_mass = stencils.len() as u32;
+        stencils.extend(plan.masses.iter());
+        let acting = if touched { first_mass } else { first_patch };
+        let elastic = ElasticTables::new(plan, &pattern, &stencils, acting as usize);
 
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
         let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();
@@ -130,7 +123,11 @@ impl Geometry {
                 .into(),
             planes: plan.planes.len() as u64,
             pressed: if effects.on_contact() { plan.planes.len() as u64 } else { 0 },
-            masses: masses.len() as u64,
+            masses: plan.masses.len() as u64,
+            stencil: stencils.longest() as u64,
+            valence: elastic.of_node.longest(),
+            pairs: elastic.of_block.longest(),
+            holders: elastic.holders.longest(),
             grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
             aging: effects.aging_rows.into(),
             chunk: 1,
@@ -148,7 +145,7 @@ impl Geometry {
             holds: holds.len() as u32,
             clamps: plan.clamps.len() as u32,
             planes: plan.planes.len() as u32,
-            masses: masses.len() as u32,
+            masses: plan.masses.len() as u32,
             parameters: plan.layout.len() as u32,
             classes: classes.parts.len() as u32,
             steps: stages.len() as u32,
@@ -169,6 +166,10 @@ impl Geometry {
             point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
             rate_numbers,
             rate_effects,
+            first_patch,
+            first_mass,
+            elastic: body.points.len() as u32,
+            held: u32::from(elastic.holds()),
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
@@ -176,7 +177,8 @@ impl Geometry {
         buffers.insert("mean_gradients", gpu.upload("mean_gradients", &gradients)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);
         buffers.insert("rest", gpu.upload("rest", &rest)?);
-        buffers.insert("mass_sites", gpu.upload("mass_sites", &masses)?);
+        stencils.upload(gpu, buffers)?;
+        elastic.upload(gpu, buffers)?;
         buffers.insert("node_rows", gpu.upload("node_rows", &node_rows)?);
         buffers.insert("node_list", gpu.upload("node_list", &node_list)?);
         buffers.insert("block_rows", gpu.upload("block_rows", &to_u32(&pattern.blocks.rows))?);

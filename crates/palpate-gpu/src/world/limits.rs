@@ -28,6 +28,13 @@ pub(crate) struct Most {
     /// Planes at which effects on contact are asked.
     pub(crate) pressed: u64,
     pub(crate) masses: u64,
+    /// Entries of a stencil.
+    pub(crate) stencil: u64,
+    /// Elastic points and patches that have a node, and that make a block.
+    pub(crate) valence: u64,
+    pub(crate) pairs: u64,
+    /// Clamps that hold a node.
+    pub(crate) holders: u64,
     /// Numbers of effects on clamps, those that change matrices twice.
     pub(crate) grips: u64,
     /// Numbers of effects that change the stiffness in time.
@@ -46,27 +53,33 @@ impl Most {
 
     /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums.
     pub(super) fn of_iteration(&self) -> u64 {
-        1 + self.share() * (self.row + 4 + 17 * self.masses) + 20
+        1 + self.share() * (self.row + 4 + (1 + 2 * self.stencil) * self.masses) + 20
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 14] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 19] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
             ("begin_solve", 4 * self.share() + 300),
             ("step_back", 2 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
-            ("press_patches", 410 * self.pressed.max(1) + 100),
-            ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 20),
+            ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),
+            ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 2 * self.stencil + 4),
             // Once for each input, all planes together, and once for each of a plane's own numbers.
-            ("pull_patch_laws", 1000 * self.pressed.max(1) + 700),
-            ("pull_patches", (9 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 40),
+            ("pull_patch_laws", 1000 * self.pressed.max(1) + 2 * self.stencil + 684),
+            ("pull_patches", (9 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 2 * self.stencil + 24),
             ("pull_holds", 2 * (27 * self.grips + 60) + self.aging + 100),
             // Rotations by Jacobi's method at up to three states, and sums over the corners of a cell.
             ("pull_cells", 2600 + self.aging),
             ("gather_matrix", 8 * (4 + 2 * self.supports) + 12),
-            ("push_nodes", 60 + self.row + 20 * self.masses),
+            ("spread_elastic", self.valence),
+            ("gather_elastic", 10 * self.pairs + 12),
+            // Nine derivatives by hyper-dual numbers, or a rotation by Jacobi's method.
+            ("tangent_elastic", 9 * 800 + 20 * self.stencil),
+            ("place_held", self.holders * (1 + self.holders)),
+            ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
+            ("push_nodes", 60 + self.row + (4 + 2 * self.stencil) * self.masses),
             ("push_cells", 2600 + 2 * self.supports + self.aging),
             ("push_holds", 2 * (2 * self.grips + 10 * self.grips + 60) + self.aging + 60),
         ]

@@ -2,6 +2,7 @@
 
 mod effects;
 mod effort;
+mod elastic;
 mod geometry;
 mod limits;
 mod members;
@@ -107,9 +108,9 @@ impl World {
         Ok(world)
     }
 
-    /// True where effects add to blocks, which only the matrix holds.
+    /// True where elastic points or effects add to blocks, which only the matrix holds.
     pub(crate) fn needs_matrix(&self) -> bool {
-        self.geometry.effects.on_nodes() || self.geometry.effects.on_cells()
+        self.geometry.shape.elastic != 0 || self.geometry.effects.on_nodes() || self.geometry.effects.on_cells()
     }
 
     /// What changes along directions of the current batch; computed once for all tangents of an evaluation.

@@ -59,7 +59,7 @@ pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64
     vec![
         size_of::<Rate>() as u64 * members,
         4 * u64::from(shape.rate_numbers) * members,
-        of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * shape.cells),
+        of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * (shape.cells + shape.elastic)),
         of(varies(|s| matches!(s, Site::Density(_)), sought.density), 4 * shape.nodes),
         of(sought.rest, 16 * shape.nodes),
     ]

@@ -1,7 +1,7 @@
 //! Work space of the solves: which buffers there are, and how large they are.
 
 use super::limits::columns;
-use crate::device::pipelines::shared::{roster, structs};
+use crate::device::pipelines::shared::{elastic_asks, roster, structs};
 use crate::layout::{Health, Newton, Shape};
 
 /// Bytes of a node's vector.
@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 21] = [
+const WORK: [Work; 24] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -33,6 +33,9 @@ const WORK: [Work; 21] = [
     ("old_q", |s| if s.fields & structs::FIELD_MIXES == 0 { 0 } else { 8 * s.cells }, VECTOR),
     ("touches", |s| 3 * s.patches, VECTOR),
     ("hold_forces", |s| 8 * s.holds, VECTOR),
+    ("elastic_stress", |s| 3 * s.elastic, VECTOR),
+    ("past_strains", |s| 2 * s.elastic, VECTOR),
+    ("elastic_tangents", |s| elastic_asks::TANGENT_NUMBERS * s.elastic, 4),
 ];
 
 /// The same per column of a member that is solved for at the same time as others.

@@ -53,6 +53,9 @@ impl Sums {
         let floats = [
             ("cell_pulls", cells),
             ("cell_sums", cell_rows * each(shape.cells, 8)),
+            ("elastic_pulls", shape.elastic.into()),
+            ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * each(shape.elastic, 64)),
+            ("held_sums", each(shape.nodes, 64)),
             ("hold_pulls", holds),
             ("hold_sums", hold_rows * each(shape.holds, 8)),
             ("node_pulls", nodes),
@@ -87,7 +90,9 @@ impl Sums {
             for (slot, out) in g.physics.effects[number].iter_mut().enumerate() {
                 let row = effects.slope_row(number, slot as u32);
                 *out += match (&law.site, row, effects.cell_law(number)) {
-                    (Site::Aging(_), Some(row), _) => at.cells(CELL_ROWS + row) + at.holds(HOLD_ROWS + row),
+                    (Site::Aging(_), Some(row), _) => {
+                        at.cells(CELL_ROWS + row) + at.elastic(CELL_ROWS + row) + at.holds(HOLD_ROWS + row)
+                    }
                     (Site::Clamps(_) | Site::Edges(_), Some(row), _) => {
                         let matrix = effects.matrix_row(row).map_or(0.0, |k| at.holds(grips + poses + k));
                         at.holds(grips + row) + matrix
@@ -137,6 +142,10 @@ impl Member<'_> {
         self.sum("cell_sums", row, self.shape.cells.div_ceil(8), 1)[0]
     }
 
+    fn elastic(&self, row: u32) -> f64 {
+        self.sum("elastic_sums", row, self.shape.elastic.div_ceil(64), 1)[0]
+    }
+
     fn holds(&self, row: u32) -> f64 {
         self.sum("hold_sums", row, self.shape.holds.div_ceil(8), 1)[0]
     }
@@ -152,6 +161,7 @@ impl Member<'_> {
     fn add_material(&self, own: &Coefficients, geometry: &Geometry, g: &mut Coefficients) {
         let shape = self.shape;
         let mut modulus = self.items("cell_pulls", shape.cells, 1);
+        modulus.extend(self.items("elastic_pulls", shape.elastic, 1));
         let holds = self.items("hold_pulls", shape.holds, 1);
         geometry.holds.iter().zip(&holds).for_each(|((_, cell), h)| modulus[*cell as usize] += h);
         let density = self.items("node_pulls", shape.nodes, 1);
@@ -179,10 +189,10 @@ impl Member<'_> {
         let nodes = |name, row| self.sum(name, row, shape.nodes.div_ceil(64), 4);
         let by = nodes("node_sums", 0);
         p.youngs_modulus += by[0];
-        p.poisson_ratio += self.cells(0) + self.holds(0) + by[1];
-        p.stiffness_damping += self.cells(1) + by[2];
+        p.poisson_ratio += self.cells(0) + self.elastic(0) + self.holds(0) + by[1];
+        p.stiffness_damping += self.cells(1) + self.elastic(1) + by[2];
         p.mass_damping += by[3];
-        p.start += self.holds(1);
+        p.start += self.holds(1) + self.sum("held_sums", 0, shape.nodes.div_ceil(64), 1)[0];
         p.gravity += DVec3::from_slice(&nodes("node_sums", 1));
         p.velocity += DVec3::from_slice(&nodes("velocity_sums", 0));
         p.angular_velocity += DVec3::from_slice(&nodes("velocity_sums", 1));

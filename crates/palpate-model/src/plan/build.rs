@@ -4,6 +4,7 @@ mod sites;
 mod tets;
 
 pub use sites::marker_sites;
+pub use tets::HELD;
 
 use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
 use crate::cutcells::clamp_cell::held_cells;

@@ -171,7 +171,7 @@ impl Effects {
         self.first_rows[effect].map(|first| first + slot)
     }
 
-    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells`.
+    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells` (or elastic points).
     pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize, clamps: usize) -> Vec<(&'static str, usize)> {
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
         let mut all = vec![
@@ -198,7 +198,7 @@ impl Effects {
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<(), GpuError> {
         let body = &plan.body;
-        let sizes = self.sizes(batch.len(), body.nodes.len(), body.cells().len(), plan.clamps.len());
+        let sizes = self.sizes(batch.len(), body.nodes.len(), body.elements(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {

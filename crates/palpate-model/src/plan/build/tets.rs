@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Stiffness of a held node's spring over that of its share of the body: it gives way by a millionth of what the body is strained, and
 /// block-Jacobi takes the difference in size away again.
-const HELD: f64 = 1e6;
+pub const HELD: f64 = 1e6;
 
 /// Refuses what only cut cells have.
 pub(super) fn refuse_what_needs_cells(scene: &Scene) -> Result<(), PlanError> {

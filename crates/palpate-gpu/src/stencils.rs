@@ -1,0 +1,56 @@
+//! Stencils as the device has them (`shaders/shared/stencil.wgsl`): compressed rows of entries, with gradients where there are any.
+
+use crate::device::{GpuError, Maker};
+use crate::layout::Entry;
+use palpate_model::space::stencil::Stencil;
+use std::collections::HashMap;
+
+/// Stencils in compressed rows.
+#[derive(Clone, Debug)]
+pub(crate) struct StencilTable {
+    /// Start of each stencil's entries, and one past the last.
+    pub(crate) rows: Vec<u32>,
+    /// Nodes with their weights.
+    pub(crate) entries: Vec<Entry>,
+    /// Weights of the gradient [1/m], entry by entry; entries without one come last.
+    pub(crate) gradients: Vec<[f32; 4]>,
+}
+
+impl Default for StencilTable {
+    fn default() -> StencilTable {
+        StencilTable { rows: vec![0], entries: Vec::new(), gradients: Vec::new() }
+    }
+}
+
+impl StencilTable {
+    /// Adds stencils; those with gradients before all others.
+    pub(crate) fn extend<'a>(&mut self, stencils: impl Iterator<Item = Stencil<'a>>) {
+        for s in stencils {
+            debug_assert!(s.gradient.is_empty() || self.gradients.len() == self.entries.len());
+            self.entries.extend(s.nodes.iter().zip(s.value).map(|(node, w)| Entry { node: *node, weight: *w as f32 }));
+            self.gradients.extend(s.gradient.iter().map(|g| g.as_vec3().extend(0.0).to_array()));
+            self.rows.push(self.entries.len() as u32);
+        }
+    }
+
+    /// Number of stencils.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len() - 1
+    }
+
+    /// Most entries of a stencil.
+    pub(crate) fn longest(&self) -> usize {
+        self.rows.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
+    }
+
+    /// Uploads them under the names that passes know stencils by.
+    ///
+    /// # Errors
+    /// More than the device has.
+    pub(crate) fn upload<M: Maker>(&self, gpu: &M, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
+        to.insert("stencil_rows", gpu.upload("stencil_rows", &self.rows)?);
+        to.insert("stencil_entries", gpu.upload("stencil_entries", &self.entries)?);
+        to.insert("stencil_gradients", gpu.upload("stencil_gradients", &self.gradients)?);
+        Ok(())
+    }
+}

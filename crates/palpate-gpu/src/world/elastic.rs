@@ -1,0 +1,95 @@
+//! Tables of bodies without cells: which elastic points and patches have a node or make a block, in a fixed order, and which nodes clamps hold.
+
+use crate::device::{GpuError, Maker};
+use crate::layout::{Holder, Pair};
+use crate::stencils::StencilTable;
+use palpate_model::plan::Plan;
+use palpate_model::space::pattern::Pattern;
+use std::collections::HashMap;
+
+/// Lists in compressed rows.
+#[derive(Debug)]
+pub(super) struct Lists<T> {
+    rows: Vec<u32>,
+    all: Vec<T>,
+}
+
+impl<T: Copy> Lists<T> {
+    fn new(lists: &[Vec<T>]) -> Lists<T> {
+        let mut rows = vec![0];
+        for list in lists {
+            rows.push(rows[rows.len() - 1] + list.len() as u32);
+        }
+        Lists { rows, all: lists.concat() }
+    }
+
+    /// Length of the longest.
+    pub(super) fn longest(&self) -> u64 {
+        self.rows.windows(2).map(|w| u64::from(w[1] - w[0])).max().unwrap_or(0)
+    }
+}
+
+/// The tables; empty for a body of cells.
+#[derive(Debug)]
+pub(super) struct ElasticTables {
+    /// Stencil and entry, by node.
+    pub(super) of_node: Lists<[u32; 2]>,
+    /// By block of the matrix.
+    pub(super) of_block: Lists<Pair>,
+    /// Clamps that hold a node.
+    pub(super) holders: Lists<Holder>,
+    volumes: Vec<f32>,
+}
+
+impl ElasticTables {
+    /// Of a plan whose first `count` stencils, elastic points and patches, act on nodes.
+    pub(super) fn new(plan: &Plan, pattern: &Pattern, stencils: &StencilTable, count: usize) -> ElasticTables {
+        let has_points = !plan.body.points.is_empty();
+        let [nodes, blocks] = [pattern.nodes(), pattern.blocks.columns.len()].map(|n| if has_points { n } else { 0 });
+        let mut of_node = vec![Vec::new(); nodes];
+        let mut of_block = vec![Vec::new(); blocks];
+        let mut holders = vec![Vec::new(); nodes];
+        for s in if has_points { 0..count } else { 0..0 } {
+            let entries = stencils.rows[s]..stencils.rows[s + 1];
+            let node = |k: u32| stencils.entries[k as usize].node;
+            for row in entries.clone() {
+                of_node[node(row) as usize].push([s as u32, row]);
+                for column in entries.clone() {
+                    let pair = Pair { stencil: s as u32, row, column };
+                    of_block[pattern.blocks.find(node(row), node(column))].push(pair);
+                }
+            }
+        }
+        for (by, clamp) in (0u32..).zip(&plan.clamps) {
+            for (node, stiffness) in &clamp.nodes {
+                holders[*node as usize].push(Holder { by, stiffness: *stiffness as f32 });
+            }
+        }
+        ElasticTables {
+            of_node: Lists::new(&of_node),
+            of_block: Lists::new(&of_block),
+            holders: Lists::new(&holders),
+            volumes: plan.body.points.volume.iter().map(|v| *v as f32).collect(),
+        }
+    }
+
+    /// True where clamps hold nodes.
+    pub(super) fn holds(&self) -> bool {
+        !self.holders.all.is_empty()
+    }
+
+    /// Uploads them.
+    ///
+    /// # Errors
+    /// More than the device has.
+    pub(super) fn upload<M: Maker>(&self, gpu: &M, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
+        to.insert("elastic_volumes", gpu.upload("elastic_volumes", &self.volumes)?);
+        to.insert("elastic_rows", gpu.upload("elastic_rows", &self.of_node.rows)?);
+        to.insert("elastic_list", gpu.upload("elastic_list", &self.of_node.all)?);
+        to.insert("pair_rows", gpu.upload("pair_rows", &self.of_block.rows)?);
+        to.insert("pairs", gpu.upload("pairs", &self.of_block.all)?);
+        to.insert("held_rows", gpu.upload("held_rows", &self.holders.rows)?);
+        to.insert("holders", gpu.upload("holders", &self.holders.all)?);
+        Ok(())
+    }
+}

@@ -1,0 +1,39 @@
+//! Stress of every elastic point times its volume, by columns, with its energy; of the new state, damping included, or of the old one
+//! (shared/elastic_asks).
+// use shared/elastic
+// use shared/viscous
+// use shared/elastic_asks
+
+var<storage, read_write> elastic_stress: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                 @builtin(local_invocation_index) local: u32) {
+    let p = find_place(group, groups, local, shape.elastic, 64u);
+    if !p.live {
+        return;
+    }
+    let m = members[p.member];
+    let mix = mix_of(m);
+    var stress = mat3x3<f32>();
+    var energy = 0.0;
+    if call.extra == STRESS_OLD {
+        if mix.old != 0.0 {
+            stress = stress_at(gradient_now(p.member, p.item), m.lame.xy).stress * mix.old;
+        }
+    } else {
+        let h = gradient_next(p.member, p.item);
+        let r = stress_at(h, m.lame.xy);
+        stress = r.stress * mix.fresh + viscous(p.member, p.item, h, m.lame.xy) * mix.rate;
+        energy = mix.fresh * r.energy;
+        if mix.rate != 0.0 {
+            let g = strained(p.member, p.item, h);
+            energy += 0.5 * mix.rate * contract(g, linear_stress(g, m.lame.xy));
+        }
+    }
+    let scale = young_at(m, p.member, p.item) * elastic_volumes[p.item];
+    let at = stress_place(p.member, p.item);
+    elastic_stress[at] = vec4(scale * stress[0], scale * energy);
+    elastic_stress[at + 1u] = vec4(scale * stress[1], 0.0);
+    elastic_stress[at + 2u] = vec4(scale * stress[2], 0.0);
+}
