@@ -135,7 +135,8 @@ impl Geometry {
         };
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
-        let size = body.grid.h * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
+        let element_size = body.grid.h;
+        let size = element_size * body.grid.size.iter().max().copied().unwrap_or(1) as f64;
         let [rate_effects, rate_numbers] = effects.rate_places(plan);
         let shape = Shape {
             members: 0,
@@ -159,7 +160,7 @@ impl Geometry {
             iterations: 0,
             chunk: chunk as u32,
             most: MOST_ITERATIONS as u32,
-            quantum: (0.25 * body.grid.h).log2().floor().exp2() as f32,
+            quantum: (0.25 * element_size).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts.is_empty() && plan.solver.ghost != 0.0),
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
             time: plan.clock.step as f32,
@@ -171,7 +172,9 @@ impl Geometry {
             first_mass,
             elastic: body.points.len() as u32,
             held: u32::from(elastic.holds()),
-            contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.grid.h as f32,
+            element_size: element_size as f32,
+            pad: [0; 3],
+            contact_width: palpate_model::mechanics::contact::WIDTH as f32 * element_size as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
         buffers.insert("patches", gpu.upload("patches", &patches)?);
