@@ -64,8 +64,8 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if n.iteration == 0u {
         n.scale = f.x + f.y + f.z + f.w;
     }
-    // Rounding: differences of displacements across a cell carry a few 6e-8 of h; their errors add like a random walk.
-    n.floor = 2.4e-7 * shape.h * sqrt(s.z / 3.0);
+    // Rounding: differences of displacements across an element carry a few 6e-8 of its size; their errors add like a random walk.
+    n.floor = 2.4e-7 * shape.element_size * sqrt(s.z / 3.0);
     if broken == 0u && n.iteration >= shape.iterations {
         broken = STALLED;
     }

@@ -59,7 +59,7 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                     change[PLANE_AT + i] = turned[i];
                 }
                 change[PLANE_AT + 3u] = rate.x;
-                change[PLANE_AT + 4u] = plane.scales * rates[p.member].young * DEFAULT_STIFFNESS / shape.h;
+                change[PLANE_AT + 4u] = plane.scales * rates[p.member].young * DEFAULT_STIFFNESS / shape.element_size;
             }
         }
         let r = respond(effect.law, what, mean);

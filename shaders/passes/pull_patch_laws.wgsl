@@ -28,7 +28,7 @@ fn pull_patch_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
                 z[PLANE_AT + i] = number(plane.normal[i]);
             }
             z[PLANE_AT + 4u] = number(plane.stiffness);
-            add_inputs(effect, plane.scales * DEFAULT_STIFFNESS / shape.h);
+            add_inputs(effect, plane.scales * DEFAULT_STIFFNESS / shape.element_size);
             if is_sought(SEEK_PLANES) {
                 by = vec3(by_one(effect.law, PLANE_AT + 3u, 1.0), by_normal(effect.law, plane.by_theta.xyz),
                           by_normal(effect.law, plane.by_phi.xyz));

@@ -207,7 +207,7 @@ fn prepare(effect: EffectSite, member: u32, m: Member, mix: Mix) {
     for (var i = 0u; i < 3u; i++) {
         z[GRAVITY_AT + i] = number(m.gravity[i]);
     }
-    z[STIFFNESS_AT] = number(DEFAULT_STIFFNESS * m.young / shape.h);
+    z[STIFFNESS_AT] = number(DEFAULT_STIFFNESS * m.young / shape.element_size);
     z[TIME_AT] = number(m.start + f32(call.mode) * shape.time);
 }
 
@@ -237,7 +237,7 @@ fn change_along(effect: EffectSite, member: u32) {
     for (var i = 0u; i < 3u; i++) {
         change[GRAVITY_AT + i] = r.gravity[i];
     }
-    change[STIFFNESS_AT] = r.young * DEFAULT_STIFFNESS / shape.h;
+    change[STIFFNESS_AT] = r.young * DEFAULT_STIFFNESS / shape.element_size;
     change[TIME_AT] = r.start;
 }
 

@@ -59,7 +59,7 @@ fn add_inputs(effect: EffectSite, stiffness: f32) {
     }
     if is_sought(SEEK_STIFFNESS) {
         z[PLANE_AT + 4u].z = stiffness;
-        by_input[MOST + 3u] += by_one(effect.law, STIFFNESS_AT, DEFAULT_STIFFNESS / shape.h);
+        by_input[MOST + 3u] += by_one(effect.law, STIFFNESS_AT, DEFAULT_STIFFNESS / shape.element_size);
         z[PLANE_AT + 4u].z = 0.0;
     }
     if is_sought(SEEK_TIME) {

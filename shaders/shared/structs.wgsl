@@ -43,6 +43,7 @@ struct Shape { // mirrored
     first_mass: u32,
     elastic: u32,
     held: u32,
+    element_size: f32,
 }
 
 struct Member { // mirrored

@@ -47,7 +47,7 @@ pub struct Shape {
     pub classes: u32,
     /// Stages: solves of all steps.
     pub steps: u32,
-    /// Edge of a cell [m].
+    /// Edge of a cell [m]; of passes of cells alone.
     pub h: f32,
     /// Length of the stage [s].
     pub dt: f32,
@@ -91,6 +91,10 @@ pub struct Shape {
     pub elastic: u32,
     /// 1 where clamps hold nodes, as they do on bodies without cells.
     pub held: u32,
+    /// Length of an element [m]: the edge of a cell, or of a cube of six mean tetrahedra. What is not about cells goes by it.
+    pub element_size: f32,
+    /// Fills up.
+    pub pad: [u32; 3],
 }
 
 /// Parameters of one member.

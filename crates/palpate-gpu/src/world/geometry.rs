@@ -170,6 +170,8 @@ impl Geometry {
             first_mass,
             elastic: body.points.len() as u32,
             held: u32::from(elastic.holds()),
+            element_size: body.length as f32,
+            pad: [0; 3],
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
