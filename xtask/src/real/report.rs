@@ -96,7 +96,8 @@ impl Pair {
 
     /// The same with the unit and how far the simulation is off.
     pub fn compared(self, scale: f64, digits: usize, unit: &str) -> String {
-        format!("{}{unit} ({:+.1} %)", self.text(scale, digits), 100.0 * (self.simulated / self.measured - 1.0))
+        let off = format!("{:+.1}", 100.0 * (self.simulated / self.measured - 1.0)).replace('-', "−");
+        format!("{}{unit} ({off} %)", self.text(scale, digits))
     }
 }
 
