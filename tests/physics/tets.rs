@@ -3,31 +3,16 @@
 use glam::{DAffine3, DVec3};
 use palpate_model::materials;
 use palpate_model::scene::*;
-use palpate_model::space::points::TetMesh;
 use support::{run, scenes};
-
-/// A box as cubes of six tetrahedra each.
-fn bar(edge: f64, count: [usize; 3]) -> BodySource {
-    let [a, b, c] = count.map(|n| n + 1);
-    let mut mesh = TetMesh::default();
-    for n in 0..a * b * c {
-        mesh.nodes.push(edge * DVec3::new((n % a) as f64, (n / a % b) as f64, (n / (a * b)) as f64));
-    }
-    for n in 0..count.iter().product() {
-        let (i, j, k) = (n % count[0], n / count[0] % count[1], n / (count[0] * count[1]));
-        let corner = |bits: usize| (i + (bits & 1) + a * (j + (bits >> 1 & 1) + b * (k + (bits >> 2)))) as u32;
-        for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
-            mesh.tets.push([corner(0), corner(way[0]), corner(way[1]), corner(7)]);
-        }
-    }
-    let mesh = mesh.checked().unwrap();
-    BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
-}
 
 /// A column of 10 × 2 × 2 cm that stands on, or hangs from, its lowest nodes.
 fn column(model: &'static materials::Model) -> Scene {
     let mut s = scenes::body(Analytic::Ball { radius: 0.01, center: DVec3::ZERO }, 0.01);
-    s.object = Object { source: bar(0.01, [10, 2, 2]), pose: DAffine3::IDENTITY, resolution: Resolution::Own };
+    s.object = Object {
+        source: scenes::tetrahedra(DVec3::ZERO, 0.01, [10, 2, 2]),
+        pose: DAffine3::IDENTITY,
+        resolution: Resolution::Own,
+    };
     s.material.model = model;
     s.material.youngs_modulus = 1e5;
     s.material.poisson_ratio = 0.0;

@@ -5,6 +5,7 @@ use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
+use palpate_model::space::points::TetMesh;
 
 /// A body in free space at rest, E = 5 kPa, ν = 0.4, 1000 kg/m³, no damping, no gravity, 10 steps of 5 ms at θ = ½.
 pub fn body(shape: Analytic, cell_size: f64) -> Scene {
@@ -36,6 +37,24 @@ pub fn body(shape: Analytic, cell_size: f64) -> Scene {
         observation: None,
         fit: None,
     }
+}
+
+/// A box from `min` on as `count` cubes of six tetrahedra each.
+pub fn tetrahedra(min: DVec3, edge: f64, count: [usize; 3]) -> BodySource {
+    let [a, b, c] = count.map(|n| n + 1);
+    let mut mesh = TetMesh::default();
+    for n in 0..a * b * c {
+        mesh.nodes.push(min + edge * DVec3::new((n % a) as f64, (n / a % b) as f64, (n / (a * b)) as f64));
+    }
+    for n in 0..count.iter().product() {
+        let (i, j, k) = (n % count[0], n / count[0] % count[1], n / (count[0] * count[1]));
+        let corner = |bits: usize| (i + (bits & 1) + a * (j + (bits >> 1 & 1) + b * (k + (bits >> 2)))) as u32;
+        for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
+            mesh.tets.push([corner(0), corner(way[0]), corner(way[1]), corner(7)]);
+        }
+    }
+    let mesh = mesh.checked().expect("a box of cubes is sound");
+    BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
 }
 
 /// A clamp that holds still.
