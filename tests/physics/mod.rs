@@ -9,4 +9,5 @@ mod effects_contact;
 mod effects_loads;
 mod effects_materials;
 mod free;
+mod order;
 mod tets;
