@@ -71,7 +71,7 @@ fn every_scheme_has_its_order() {
             for (theta, least, most) in [(0.5, least, 2.15), (1.0, 0.85, 1.15)].into_iter().take(if open { 2 } else { 1 }) {
                 let errors = [64, 128, 256].map(|n| apart(&last(time(scheme, theta, n)), &exact));
                 let order = |k: usize, part: usize| (errors[k][part] / errors[k + 1][part]).log2();
-                // Velocities of the first halving are still on their way: backward Euler takes a fifth of an amplitude in a period there.
+                // Velocities of the first halving are still on their way: backward Euler takes a quarter of an amplitude in a period there.
                 let found = [order(0, 0), order(1, 0), order(1, 1)];
                 println!("{} at θ = {theta}, damping {damping} s: errors {errors:?}, orders {found:.2?}", scheme.name);
                 let meant = found.iter().all(|o| (least..most).contains(o));
