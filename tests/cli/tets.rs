@@ -65,7 +65,7 @@ fn array(of: &[Attribute], wanted: &str) -> Vec<f64> {
 fn tetrahedra_fly_without_stress_and_carry_their_fields() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, out) = (folder.path().join("bar.toml"), folder.path().join("frames"));
-    let mesh = tets::mesh(0.01, [6, 2, 2]);
+    let mesh = tets::mesh(DVec3::ZERO, 0.01, [6, 2, 2]);
     fs::write(folder.path().join("bar.msh"), tets::msh(&mesh)).unwrap();
     fs::write(&scene, BAR).unwrap();
     succeed(&["simulate", arg(&scene), "--backend", "cpu", "--out", arg(&out), "--format", "vtu"]);

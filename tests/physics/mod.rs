@@ -10,4 +10,5 @@ mod effects_loads;
 mod effects_materials;
 mod free;
 mod materials;
+mod order;
 mod tets;

@@ -3,13 +3,12 @@
 use glam::{DAffine3, DVec3};
 use palpate_model::materials;
 use palpate_model::scene::*;
-use support::tets::bar;
-use support::{run, scenes};
+use support::{run, scenes, tets};
 
 /// A column of 10 × 2 × 2 cm that stands on, or hangs from, its lowest nodes.
 fn column(model: &'static materials::Model) -> Scene {
     let mut s = scenes::body(Analytic::Ball { radius: 0.01, center: DVec3::ZERO }, 0.01);
-    s.object = Object { source: bar(0.01, [10, 2, 2]), pose: DAffine3::IDENTITY, resolution: Resolution::Own };
+    s.object = Object { source: tets::bar(DVec3::ZERO, 0.01, [10, 2, 2]), pose: DAffine3::IDENTITY, resolution: Resolution::Own };
     s.material.model = model;
     s.material.youngs_modulus = 1e5;
     s.material.poisson_ratio = 0.0;

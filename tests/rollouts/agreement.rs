@@ -32,8 +32,11 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
 /// The same of a brick of 2646 tetrahedra that flies and spins.
 fn plan_of_tets() -> Plan {
     let mut s = scenes::body(Analytic::Ball { radius: 0.01, center: DVec3::ZERO }, 0.01);
-    s.object =
-        Object { source: support::tets::bar(0.01, [9, 7, 7]), pose: DAffine3::from_rotation_x(0.3), resolution: Resolution::Own };
+    s.object = Object {
+        source: support::tets::bar(DVec3::ZERO, 0.01, [9, 7, 7]),
+        pose: DAffine3::from_rotation_x(0.3),
+        resolution: Resolution::Own,
+    };
     s.initial.angular_velocity = DVec3::new(0.0, 3.0, 0.0);
     s.material.stiffness_damping = 0.002;
     s.time = Time { step: 0.01, steps: 2, start: 0.0, theta: 0.6, ..Time::default() };

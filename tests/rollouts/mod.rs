@@ -1,6 +1,8 @@
 //! Whole simulations: derivatives agree, and so do solvers, threads and batches.
 
 mod agreement;
+mod backends;
+mod combinations;
 mod effects;
 mod fields;
 mod gradients;

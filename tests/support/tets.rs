@@ -4,12 +4,12 @@ use glam::DVec3;
 use palpate_model::scene::BodySource;
 use palpate_model::space::points::TetMesh;
 
-/// A box as `count` cubes of six tetrahedra each along the axes, their edges `edge` [m], from the origin on.
-pub fn mesh(edge: f64, count: [usize; 3]) -> TetMesh {
+/// A box as `count` cubes of six tetrahedra each along the axes, their edges `edge` [m], from `min` on.
+pub fn mesh(min: DVec3, edge: f64, count: [usize; 3]) -> TetMesh {
     let [a, b, c] = count.map(|n| n + 1);
     let mut mesh = TetMesh::default();
     for n in 0..a * b * c {
-        mesh.nodes.push(edge * DVec3::new((n % a) as f64, (n / a % b) as f64, (n / (a * b)) as f64));
+        mesh.nodes.push(min + edge * DVec3::new((n % a) as f64, (n / a % b) as f64, (n / (a * b)) as f64));
     }
     for n in 0..count.iter().product() {
         let (i, j, k) = (n % count[0], n / count[0] % count[1], n / (count[0] * count[1]));
@@ -22,8 +22,8 @@ pub fn mesh(edge: f64, count: [usize; 3]) -> TetMesh {
 }
 
 /// The same as a body of a scene.
-pub fn bar(edge: f64, count: [usize; 3]) -> BodySource {
-    let mesh = mesh(edge, count);
+pub fn bar(min: DVec3, edge: f64, count: [usize; 3]) -> BodySource {
+    let mesh = mesh(min, edge, count);
     BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
 }
 

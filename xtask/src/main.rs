@@ -96,7 +96,11 @@ enum Verb {
         why: Option<String>,
     },
     /// Fit every measured recording and print what docs/real-data.md says of them
-    Real,
+    Real {
+        /// Only these tables; the others stay in bench/real.json as they are
+        #[arg(long, value_name = "TABLE", num_args = 1..)]
+        only: Vec<real::report::Slice>,
+    },
     /// Run the tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
         /// Also the slow ones: whole recoveries and blind cases
@@ -155,7 +159,7 @@ fn run(verb: Verb) -> Result<(), String> {
             blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent })?;
         }
         Verb::Same { only, backend, why, .. } => same::run(&same::Options { only, backend, why })?,
-        Verb::Real => println!("\nwritten to {}", real::run()?.display()),
+        Verb::Real { only } => println!("\nwritten to {}", real::run(&only)?.display()),
         Verb::Test { full, packages, checked, names } => {
             test::run(&table::root(), &test::Options { full, packages, names, checked })?;
         }

@@ -1,12 +1,13 @@
 //! The tables: each recording's own fit, both beams with one modulus, what one beam says of the other, and how the load of 52 g may hang.
 
+use super::report::{Made, Pair, Report, Row, Slice};
 use super::tracks::{Sighting, rms, track};
-use super::{fit, found, height_at_rest, open, scene_path, swings};
+use super::{fit, found, height_at_rest, models, open, scene_path, swings};
 use crate::table;
+use clap::ValueEnum;
 use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, Fitted};
 use palpate_model::params::ParamKey;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 const MODULUS: &str = "material.youngs_modulus";
@@ -14,15 +15,15 @@ const DAMPING: &str = "material.stiffness_damping";
 
 /// A scene that fits a recording, and the marker whose swing is compared with a guess of its frequency [Hz]; none where nothing swings.
 #[derive(Clone, Copy)]
-struct Recorded {
-    name: &'static str,
-    scene: &'static str,
+pub(super) struct Recorded {
+    pub name: &'static str,
+    pub scene: &'static str,
     marker: Option<(&'static str, f64)>,
     /// Texts of the scene that end it before the recording does, and what they are where it does not.
     whole: &'static [(&'static str, &'static str)],
 }
 
-const BEAMS: [Recorded; 2] = [
+pub(super) const BEAMS: [Recorded; 2] = [
     Recorded {
         name: "Dragon Skin beam, own weight",
         scene: "beam-gravity",
@@ -54,53 +55,11 @@ const CANTILEVERS: [Recorded; 5] = [
     still("the same with the camera's biases", "cantilever-two-materials-hanging-raw"),
 ];
 
-/// Something measured, and the same simulated.
-#[derive(Clone, Copy, Debug, Serialize)]
-struct Pair {
-    simulated: f64,
-    measured: f64,
-}
-
-/// One row of a table.
-#[derive(Debug, Serialize)]
-struct Row {
-    name: String,
-    /// E and its standard error [Pa].
-    youngs_modulus: f64,
-    standard_error: Option<f64>,
-    damping_ratio: Option<Pair>,
-    /// \[Hz\]
-    frequency: Option<Pair>,
-    /// How far below its place at rest the marker swings [m].
-    sag: Option<Pair>,
-    /// Residual, and what noise alone would leave, root mean square [m].
-    rms: f64,
-    noise: f64,
-    /// The marker's distance from its measured places, root mean square, in the frames that were fitted and in all from the first of them to the
-    /// end of the recording [m].
-    marker_rms: Option<[f64; 2]>,
-    /// Stiffness-proportional damping and its standard error [s].
-    stiffness_damping: Option<[f64; 2]>,
-    /// Mean sag from [`LATE`] on, when the swing has died away [m].
-    late_sag: Option<Pair>,
-}
-
 /// Time on a recording's clock [s] from which a beam counts as at rest.
 const LATE: f64 = 3.0;
 
-/// Every table, as it is printed.
-#[derive(Debug, Serialize)]
-struct Report {
-    date: String,
-    recordings: Vec<Row>,
-    predictions: Vec<Row>,
-    loads: Vec<Row>,
-    /// Cells, the band of the cost and gravity across the swing.
-    variants: Vec<Row>,
-}
-
 /// How a fit did on one of its scenes.
-fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted, scene: usize) -> Result<Row, Error> {
+pub(super) fn row(name: &str, recorded: &Recorded, experiment: &Experiment, fitted: &Fitted, scene: usize) -> Result<Row, Error> {
     let theta = &fitted.result.theta[scene];
     let modulus = fitted.result.parameters.iter().find(|p| p.path == MODULUS);
     let damping = fitted.result.parameters.iter().find(|p| p.path == DAMPING);
@@ -292,58 +251,40 @@ fn told(row: Row) -> Row {
     row
 }
 
-fn print(title: &str, rows: &[Row]) {
-    let percent = |p: Pair| format!("{:+.1} %", 100.0 * (p.simulated / p.measured - 1.0));
-    let both = |p: Option<Pair>, scale: f64, digits: usize, off: bool| {
-        p.map_or("–".into(), |p| {
-            let text = format!("{:.digits$} / {:.digits$}", scale * p.simulated, scale * p.measured);
-            if off { format!("{text} ({})", percent(p)) } else { text }
-        })
-    };
-    let line = |r: &Row| {
-        let error = r.standard_error.map_or("given".into(), |e| format!("± {:.1}", 1e-3 * e));
-        vec![
-            r.name.clone(),
-            format!("{:.1} {error}", 1e-3 * r.youngs_modulus),
-            both(r.damping_ratio, 1.0, 3, false),
-            both(r.frequency, 1.0, 2, true),
-            both(r.sag, 1e3, 2, true),
-            format!("{:.2} ({:.2})", 1e3 * r.rms, 1e3 * r.noise),
-            r.marker_rms.map_or("–".into(), |[fitted, whole]| format!("{:.2} / {:.2}", 1e3 * fitted, 1e3 * whole)),
-            r.stiffness_damping.map_or("–".into(), |[value, error]| format!("{:.1} ± {:.1}", 1e3 * value, 1e3 * error)),
-            both(r.late_sag, 1e3, 2, true),
-        ]
-    };
-    let head = [
-        "",
-        "E [kPa]",
-        "damping ratio",
-        "frequency [Hz]",
-        "sag [mm]",
-        "rms (noise) [mm]",
-        "tip, fitted / to the end [mm]",
-        "stiffness damping [ms]",
-        "sag after 3 s [mm]",
-    ];
-    let rows: Vec<Vec<String>> = std::iter::once(head.map(String::from).to_vec()).chain(rows.iter().map(line)).collect();
-    table::print(title, &rows);
-}
-
-/// Fits every recording, prints the tables and writes `bench/real.json`.
+/// Computes tables, all or those named, prints them and writes them into `bench/real.json`.
 ///
 /// # Errors
-/// There are no recordings, or a fit fails.
-pub fn run() -> Result<PathBuf, String> {
+/// There are no recordings, or a fit fails that is not expected to.
+pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
     let data = crate::bench::data().ok_or("no recordings: set PALPATE_DATA to their folder")?;
-    let all = || -> Result<Report, Error> {
-        let (recordings, own) = recordings(&data)?;
-        let predictions = predictions(&data, &own)?;
-        Ok(Report { date: table::today(), recordings, predictions, loads: loads(&data)?, variants: variants(&data)? })
+    let wanted: Vec<Slice> = Slice::value_variants().iter().copied().filter(|s| only.is_empty() || only.contains(s)).collect();
+    let mut report = Report::load(&table::root())?;
+    let made = Made::now()?;
+    let mut measure = || -> Result<(), Error> {
+        let mut own = None;
+        for slice in &wanted {
+            match slice {
+                Slice::Recordings => {
+                    let (rows, fits) = recordings(&data)?;
+                    (report.recordings, own) = (rows, Some(fits));
+                }
+                Slice::Predictions => {
+                    let alone = || -> Result<[Fitted; 2], Error> {
+                        let of = |r: &Recorded| fit(&open(&data, r.scene, &[])?);
+                        Ok([of(&BEAMS[0])?, of(&BEAMS[1])?])
+                    };
+                    let fits = own.take().map_or_else(alone, Ok)?;
+                    report.predictions = predictions(&data, &fits)?;
+                }
+                Slice::Loads => report.loads = loads(&data)?,
+                Slice::Variants => report.variants = variants(&data)?,
+                Slice::Models => report.models = models::measure(&data)?,
+            }
+            report.made.insert(*slice, made.clone());
+        }
+        Ok(())
     };
-    let report = all().map_err(|e| e.to_string())?;
-    print("Fits of measured recordings (simulated / measured)", &report.recordings);
-    print("What one beam says of the other", &report.predictions);
-    print("How the load of 52 g acts", &report.loads);
-    print("Cantilevers with one thing changed", &report.variants);
+    measure().map_err(|e| e.to_string())?;
+    wanted.iter().for_each(|s| report.print(*s));
     table::save("real", &report)
 }

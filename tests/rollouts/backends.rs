@@ -1,0 +1,59 @@
+//! The GPU against the CPU through whole rollouts: every scheme with the last material of the table, and every material with the last scheme.
+
+use super::combinations::{Kind, beam, seen};
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Backend, Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
+use palpate_gpu::{Choice, Gpu, GpuBackend};
+use palpate_model::materials;
+use palpate_model::plan::Plan;
+use palpate_model::plan::scheme;
+
+/// Single precision through a few steps leaves derivatives that are right to a thousandth of what they could be at most.
+const AGREEMENT: f64 = 1e-3;
+
+/// Cost, gradient and Gauss–Newton matrix by every parameter.
+fn evaluate<B: Backend>(backend: B, plan: &Plan) -> Evaluation {
+    let mut rollout = Rollout::new(backend, plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let request = Request { gradient: Wanted::All, sensitivities: (0..plan.theta.len()).collect() };
+    let e = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
+    if let Some(f) = &e.failure {
+        panic!("{f}");
+    }
+    e
+}
+
+/// Gradients by the adjoint and by sensitivities over what they could be at most: |dJ/dp| ≤ √(2 J H_pp).
+fn gradients(e: &Evaluation, right: &Evaluation) -> Vec<[f64; 2]> {
+    let p = right.gradient.len();
+    let (own, exact) = (e.curvature.as_ref().expect("asked for"), right.curvature.as_ref().expect("asked for"));
+    let most = |i: usize| (2.0 * right.cost * exact.matrix[i * p + i]).sqrt();
+    (0..p).filter(|i| most(*i) > 0.0).map(|i| [e.gradient[i] / most(i), own.gradient[i] / most(i)]).collect()
+}
+
+#[test]
+fn every_scheme_and_every_material_agree() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let (scheme, model) = (scheme::ALL.last().expect("there is one"), materials::ALL.last().expect("there is one"));
+    let schemes = scheme::ALL.iter().map(|s| (s, model));
+    let models = materials::ALL.iter().filter(|m| *m != model).map(|m| (scheme, m));
+    for (scheme, model) in schemes.chain(models) {
+        let mut scene = beam(Kind::CutCells, scheme, model);
+        // As accurate as single precision can use.
+        scene.solver.tolerance = 1e-10;
+        let plan = seen(&scene);
+        let right = evaluate(CpuBackend, &plan);
+        let found = evaluate(GpuBackend::on(gpu.clone()), &plan);
+        let name = format!("{}, {}", scheme.name, model.name);
+        let cost = (found.cost / right.cost - 1.0).abs();
+        let pairs: Vec<([f64; 2], [f64; 2])> = gradients(&found, &right).into_iter().zip(gradients(&right, &right)).collect();
+        let off = pairs.iter().flat_map(|(a, b)| [(a[0] - b[0]).abs(), (a[1] - b[1]).abs()]).fold(0.0, f64::max);
+        let large = pairs.iter().filter(|(_, b)| b[0].abs() > 0.15).count();
+        println!("{name}: cost off by {cost:.1e}, gradients by {off:.1e}; {large} of {} are large", pairs.len());
+        assert!(cost < AGREEMENT && off < AGREEMENT, "{name}: cost {cost:.1e}, gradients {off:.1e}");
+        // So that one per cent of them would show.
+        assert!(large >= 3, "{name}: {large} gradients are large");
+    }
+}
