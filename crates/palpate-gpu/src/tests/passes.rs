@@ -217,7 +217,7 @@ impl Exact {
         let free = Context { plan: &bare, planes: &[], effects: &[], ..fresh };
         let residual = |c: Context| Equation::new(c).residual(u1);
         let supports: Vec<f64> = residual(fresh).iter().zip(residual(free)).flat_map(|(a, b)| (*a - b).to_array()).collect();
-        let (body, h) = (&plan.body, plan.body.cut().grid.h);
+        let (body, h) = (&plan.body, plan.body.length);
         let mut cells = Vec::new();
         for e in 0..body.cells().len() {
             let mut poses = [u1, c.past.u].map(|u| CellPose::new(&corners(body, e, u), h));
