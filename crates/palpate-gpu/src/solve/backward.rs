@@ -1,8 +1,6 @@
 //! Adjoint and tangent of start and step, with the exact tangent at the converged state.
 
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::points::{BACK, BY_OLD};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::columns;
 use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
@@ -28,7 +26,6 @@ pub(crate) fn step_adjoint(
         s.linearise();
         s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
         s.solve();
-        s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
         if s.past.is_empty() {
             s.back(&now.0.buffer, &adj.0.buffer, &adj_past[0].0.buffer);
         }
@@ -43,15 +40,6 @@ pub(crate) fn step_adjoint(
 }
 
 impl Passes<'_, '_> {
-    /// dJ/d(old state) from the solution of the adjoint's system, added to `to`; the cells' old deformation is that of `state`.
-    fn back(&mut self, state: &wgpu::Buffer, adj: &wgpu::Buffer, to: &wgpu::Buffer) {
-        self.couple_patches(BACK, &[]);
-        self.couple_cells(asks::TRANSPOSED, &[("now", state)]);
-        self.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", adj), ("adj_now", to)]);
-        self.couple_elastic(asks::TRANSPOSED, to, &[("now", state)]);
-        self.press_nodes(ALL, BACK, None, to, &[]);
-    }
-
     /// The weighted sum of the past states' tangents, in `sum` where they are several.
     fn mixed_tangent<'b>(&mut self, parts: &[(f32, &'b wgpu::Buffer)], sum: &'b wgpu::Buffer) -> &'b wgpu::Buffer {
         if let [(_, single)] = parts {
@@ -59,18 +47,6 @@ impl Passes<'_, '_> {
         }
         self.add_scaled(parts, sum);
         sum
-    }
-
-    /// Adds −T du to a tangent's right-hand side, and for the first of several past states the column; the cells' old deformation is that
-    /// of `state`, `probe` holds du.
-    fn along_old(&mut self, state: &wgpu::Buffer, probe: &wgpu::Buffer, first: bool) {
-        let named = [("probe", probe)];
-        self.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &named);
-        self.couple_patches(BY_OLD, &named);
-        self.couple_cells(asks::ALONG, &[("probe", probe), ("now", state)]);
-        self.run_with(pass::SUM_OLD, ALL, Per::Node, u32::from(!first), &named);
-        self.couple_elastic(asks::ALONG, &self.world.buffers["rhs"], &[("probe", probe), ("now", state)]);
-        self.press_nodes(ALL, BY_OLD, None, &self.world.buffers["rhs"], &named);
     }
 }
 
@@ -159,11 +135,11 @@ pub(crate) fn step_tangent(
                 s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
                 s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
                 if s.past.is_empty() {
-                    s.along_old(&now.0.buffer, from, true);
+                    s.along_past(&now.0.buffer, from, true);
                 }
                 for (k, (part, (_, state))) in parts.iter().zip(s.past.clone()).enumerate() {
                     s.add_scaled(&[*part], &share.buffer);
-                    s.along_old(state, &share.buffer, k == 0);
+                    s.along_past(state, &share.buffer, k == 0);
                 }
                 s.begin_column(q);
             }

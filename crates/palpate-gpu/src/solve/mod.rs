@@ -123,7 +123,7 @@ impl<'a> Passes<'a, '_> {
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.mix_states();
         self.prepare();
-        self.run(pass::TOUCH_PATCHES, ALL, Per::Patch, 0);
+        self.touch(ALL);
         self.assemble(ALL);
     }
 

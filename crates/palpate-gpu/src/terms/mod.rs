@@ -1,77 +1,222 @@
-//! The terms of a balance, one file each, and what they make together: residual, tangent, and derivatives by the old state.
+//! The terms of the balance of forces, one file each: passes for residual, tangent, and derivatives by the past and by the coefficients.
+//!
+//! Terms at cells, clamps and patches leave what they have to say where they stand; the node term gathers it ([`nodes`]), and what comes after
+//! adds to nodes and blocks by itself. So their order in [`TERMS`] matters.
 
-mod cell_laws;
-mod elastic;
+mod clamps;
+mod contact;
+mod elastic_cells;
+mod elastic_points;
+mod held_nodes;
+mod nodes;
 mod point_laws;
-mod pull;
-mod push;
+mod start;
 
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::points::{FORCE, STIFFNESS};
-use crate::device::pipelines::shared::{asks, structs};
+use crate::device::pipelines::shared::points::{BACK, BY_OLD};
+use crate::device::pipelines::shared::pulls::{SEEK_DAMPING, SEEK_MODULUS, SEEK_POISSON, SEEK_REST, SEEK_START};
 use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
+use crate::world::{Rates, Sums, Tally, World};
+use palpate_model::effects::Site;
+use palpate_model::params::coefficients::Sought;
+
+const TERMS: [&dyn Term; 8] = [
+    &contact::Contact,
+    &point_laws::SurfaceLaws,
+    &clamps::Clamps,
+    &elastic_cells::ElasticCells,
+    &nodes::Nodes,
+    &point_laws::NodeLaws,
+    &elastic_points::ElasticPoints,
+    &held_nodes::HeldNodes,
+];
+
+/// A term of the balance on its way to the device. What a term has no part in it leaves out.
+trait Term: Sync {
+    /// What the past leaves for the whole solve.
+    fn prepare(&self, _s: &mut Passes) {}
+    /// Its forces at a trial of the members of a section.
+    fn residual(&self, _s: &mut Passes, _section: u32) {}
+    /// Its part of the tangent at the new state, for the members of a section.
+    fn tangent(&self, _s: &mut Passes, _section: u32) {}
+    /// Subtracts the derivative of its force by a past state times a vector, or the transposed product.
+    fn by_past(&self, _s: &mut Passes, _past: &Past) {}
+    /// Its change along a direction of the coefficients → `column`.
+    fn by_coefficients(&self, _s: &mut Passes, _along: &Along) {}
+    /// Subtracts z · ∂(its force)/∂c for all coefficients that are sought, z in `direction`. How many parameters these make does not matter here:
+    /// the host pulls the sums back once, at the end.
+    fn by_coefficients_transposed(&self, _s: &mut Passes, _pull: &Pull) {}
+}
+
+/// A product with the derivative by a past state.
+struct Past<'a> {
+    way: Way<'a>,
+    /// The past state.
+    state: &'a wgpu::Buffer,
+    /// The vector.
+    probe: &'a wgpu::Buffer,
+    /// What the product is subtracted from.
+    to: &'a wgpu::Buffer,
+}
+
+/// Which of the two products.
+enum Way<'a> {
+    /// For a tangent's right-hand side, which the first of several past states begins.
+    Along { first: bool },
+    /// The transposed one, for dJ/d(past) of a step that dJ/d(next) came back through.
+    Back { adjoint: &'a wgpu::Buffer },
+}
+
+impl Past<'_> {
+    /// How effects on points are asked.
+    fn question(&self) -> u32 {
+        match self.way {
+            Way::Along { .. } => BY_OLD,
+            Way::Back { .. } => BACK,
+        }
+    }
+
+    fn named(&self) -> [(&'static str, &wgpu::Buffer); 1] {
+        [("probe", self.probe)]
+    }
+}
+
+/// A direction of the coefficients, and which terms change along it.
+struct Along<'a> {
+    moved: &'a Sought,
+    flags: u32,
+    named: Vec<(&'static str, &'a wgpu::Buffer)>,
+    /// The material or the stress-free shape changes.
+    body: bool,
+    /// Numbers of effects on clamps.
+    grips: bool,
+    /// What clamps do, for one of these reasons or because time does.
+    clamps: bool,
+    /// Laws of cells.
+    laws: bool,
+    /// Laws of points.
+    points: bool,
+    /// Something at patches.
+    patches: bool,
+    /// Something of what the node term gathers.
+    gathered: bool,
+}
+
+impl<'a> Along<'a> {
+    fn new(world: &World, rates: &'a Rates) -> Along<'a> {
+        let moved = &rates.moved;
+        let effects = &world.geometry.effects;
+        let on = |site: fn(&Site) -> bool| seeks_effect(world, moved, site);
+        let body = moved.modulus || moved.poisson || moved.rest;
+        let grips = on(|s| matches!(s, Site::Clamps(_) | Site::Edges(_)));
+        let clamps = body || grips || moved.start;
+        let laws = on(|s| matches!(s, Site::Cells(_)));
+        let points = point_laws::change(world, moved);
+        let patches = moved.planes || moved.modulus || (points && effects.on_patches());
+        let gathered = body || moved.damping[1] || clamps || patches || laws;
+        Along { moved, flags: rates.flags, named: rates.named(), body, grips, clamps, laws, points, patches, gathered }
+    }
+}
+
+/// Coefficients that derivatives are sought by, and where their sums go.
+struct Pull<'a> {
+    sums: &'a Sums,
+    named: Vec<(&'static str, &'a wgpu::Buffer)>,
+    /// Something of the material, or the stress-free shape.
+    material: bool,
+}
+
+impl<'a> Pull<'a> {
+    fn new(sums: &'a Sums, named: Vec<(&'static str, &'a wgpu::Buffer)>) -> Pull<'a> {
+        let s = &sums.sought;
+        Pull { sums, named, material: s.modulus || s.poisson || s.rest }
+    }
+
+    fn sought(&self) -> &Sought {
+        &self.sums.sought
+    }
+
+    /// What kernels are told of it.
+    fn asked(&self) -> u32 {
+        asked(self.sought())
+    }
+}
+
+/// The bit where something is sought.
+fn bit(sought: bool, bit: u32) -> u32 {
+    if sought { bit } else { 0 }
+}
+
+/// What terms of the whole body are told of what is sought.
+fn asked(s: &Sought) -> u32 {
+    bit(s.modulus, SEEK_MODULUS)
+        | bit(s.poisson, SEEK_POISSON)
+        | bit(s.damping[1], SEEK_DAMPING)
+        | bit(s.rest, SEEK_REST)
+        | bit(s.start, SEEK_START)
+}
+
+/// Whether numbers of some effect on such a site are sought.
+fn seeks_effect(world: &World, sought: &Sought, on: fn(&Site) -> bool) -> bool {
+    world.plan.layout.effects().zip(&sought.effects).any(|((law, _), own)| *own && on(&law.site))
+}
 
 impl Passes<'_, '_> {
-    /// What the old state leaves for the whole solve.
+    /// What the past leaves for the whole solve.
     pub(crate) fn prepare(&mut self) {
-        if self.step.is_none() {
-            return;
+        if self.step.is_some() {
+            TERMS.iter().for_each(|t| t.prepare(self));
         }
-        // The clamps' old force; its weight is zero where it does not act.
-        self.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_OLD);
-        self.mix_deformations();
-        self.run(pass::PRESS_OLD, ALL, Per::Cell, 0);
-        self.laws(pass::PRESS_LAWS, ALL, Per::Cell, 1, &[]);
-        self.run(pass::GATHER_OLD, ALL, Per::Node, 0);
-        self.prepare_elastic();
     }
 
-    /// The residual at a trial of the members of a section: forces of contact, clamps, cells and laws, summed per node with inertia.
+    /// The residual at a trial of the members of a section.
     pub(crate) fn residual(&mut self, section: u32) {
-        self.run(pass::TOUCH_PATCHES, section, Per::Patch, 0);
-        self.press_patches(section, FORCE, None, &[]);
-        self.run(pass::HOLD_CELLS, section, Per::Hold, 0);
-        self.press_cells(section);
-        self.run(pass::GATHER_RESIDUAL, section, Per::Node, 0);
-        self.press_nodes(section, FORCE, None, &self.world.buffers["residual"], &[]);
-        self.residual_elastic(section);
-    }
-
-    /// Forces of the cells and of their laws at the new state.
-    pub(crate) fn press_cells(&mut self, section: u32) {
-        self.run(pass::PRESS_CELLS, section, Per::Cell, 0);
-        self.laws(pass::PRESS_LAWS, section, Per::Cell, 0, &[]);
+        TERMS.iter().for_each(|t| t.residual(self, section));
     }
 
     /// Tangent, matrix and preconditioner of the members of a section, at the new state.
     pub(crate) fn assemble(&mut self, section: u32) {
-        if self.world.geometry.effects.on_patches() {
-            // Anew, because the convex part may be wanted after the exact one was taken.
-            self.run(pass::TOUCH_PATCHES, section, Per::Patch, 0);
-            self.press_patches(section, STIFFNESS, None, &[]);
-        }
-        self.run(pass::TANGENT_CELLS, section, Per::Cell, 0);
-        self.laws(pass::TANGENT_LAWS, section, Per::Cell, 0, &[]);
-        self.run(pass::GATHER_MATRIX, section, Per::Block, 0);
-        self.laws(pass::GATHER_LAWS, section, Per::Block, 0, &[]);
-        self.assemble_elastic(section);
-        self.press_nodes(section, STIFFNESS, None, &self.world.buffers["column"], &[]);
+        TERMS.iter().for_each(|t| t.tangent(self, section));
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
         self.forget_springs(section);
     }
 
-    /// Derivative of the cells' force by the old state, times a vector (`back` is ALONG), or its transpose.
-    pub(crate) fn couple_cells(&mut self, back: u32, more: &Named) {
-        self.run_with(pass::COUPLE_OLD, ALL, Per::Cell, back, more);
-        self.laws(pass::COUPLE_LAWS, ALL, Per::Cell, back, more);
+    /// Adds −T du to a tangent's right-hand side `rhs`, with T the derivative by past state `state` and du in `probe`; for the first of several
+    /// past states the column as well.
+    pub(crate) fn along_past(&mut self, state: &wgpu::Buffer, probe: &wgpu::Buffer, first: bool) {
+        let past = Past { way: Way::Along { first }, state, probe, to: &self.world.buffers["rhs"] };
+        TERMS.iter().for_each(|t| t.by_past(self, &past));
     }
 
-    /// What planes and effects on patches have to say of the old state, for `couple_old`.
-    pub(crate) fn couple_patches(&mut self, question: u32, more: &Named) {
-        if self.world.geometry.shape.fields & structs::FIELD_COUPLED != 0 {
-            self.run_with(pass::TOUCH_PATCHES, ALL, Per::Patch, asks::TOUCH_OLD, more);
-            self.press_patches(ALL, question, None, more);
+    /// Adds dJ/d(past state) to `to`, from the solution of the adjoint's system and dJ/d(next).
+    pub(crate) fn back(&mut self, state: &wgpu::Buffer, adjoint: &wgpu::Buffer, to: &wgpu::Buffer) {
+        let past = Past { way: Way::Back { adjoint }, state, probe: &self.world.buffers["direction"], to };
+        TERMS.iter().for_each(|t| t.by_past(self, &past));
+    }
+
+    /// (∂r/∂c) c' → `column`, whether the direction is one parameter's or any.
+    pub(crate) fn push(&mut self, rates: &Rates) {
+        let along = Along::new(self.world, rates);
+        TERMS.iter().for_each(|t| t.by_coefficients(self, &along));
+    }
+
+    /// Adds what this balance says of all that is sought, z in `direction`.
+    pub(crate) fn pull(&mut self, tally: &Tally) {
+        let Some(sums) = &tally.sums else { return };
+        let pull = Pull::new(sums, tally.named());
+        TERMS.iter().for_each(|t| t.by_coefficients_transposed(self, &pull));
+    }
+
+    /// A pass of the laws of cells, the material that is not linear among them; a plan without any has none of these passes.
+    fn laws(&mut self, pass: usize, section: u32, per: Per, extra: u32, more: &Named) {
+        if self.world.geometry.effects.on_cells() {
+            self.run_with(pass, section, per, extra, more);
         }
+    }
+
+    /// The same for all members.
+    fn all_laws(&mut self, pass: usize, extra: u32, more: &Named) {
+        self.laws(pass, ALL, Per::Cell, extra, more);
     }
 }

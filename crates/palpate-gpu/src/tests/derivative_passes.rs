@@ -5,8 +5,6 @@ use super::faults::{BALANCE, Fault};
 use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, three, vectors, with_context};
 use super::scenes::{device, plan};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::points::{BACK, BY_OLD};
 use crate::passes::{ALL, Passes, Per};
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
@@ -86,14 +84,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Par
     run(&|s| s.pull(&tally));
     let gradient = backend.read(world, &tally).remove(0).gradient;
     parts.push((PULL.into(), gradient.iter().zip(sizes).map(|(g, size)| g / size).collect()));
-    run(&|s| {
-        s.run(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE);
-        s.couple_patches(BACK, &[]);
-        s.couple_cells(asks::TRANSPOSED, &[]);
-        s.run_with(pass::STEP_BACK, ALL, Per::Node, 0, &[("adj", &adj.0.buffer), ("adj_now", &adj_now.0.buffer)]);
-        s.couple_elastic(asks::TRANSPOSED, &adj_now.0.buffer, &[]);
-        s.press_nodes(ALL, BACK, None, &adj_now.0.buffer, &[]);
-    });
+    run(&|s| s.back(&now.0.buffer, &adj.0.buffer, &adj_now.0.buffer));
     let back = read(&adj_now.0.buffer, 2 * n);
     parts.push(("couple_old and step_back, displacement".into(), three(&back[..n])));
     parts.push(("couple_old and step_back, velocity".into(), three(&back[n..])));
@@ -104,12 +95,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Par
         let (from, flight) = (&from.buffer, &world.buffers["trial"]);
         s.run_with(pass::FLY_TANGENT, ALL, Per::Node, 0, &[("tangent", from), ("flight", flight)]);
         s.run_with(pass::SUM_FLIGHT, ALL, Per::Node, 0, &[("probe", flight)]);
-        s.run_with(pass::HOLD_CELLS, ALL, Per::Hold, asks::HOLD_PROBE, &[("probe", from)]);
-        s.couple_patches(BY_OLD, &[("probe", from)]);
-        s.couple_cells(asks::ALONG, &[("probe", from)]);
-        s.run_with(pass::SUM_OLD, ALL, Per::Node, 0, &[("probe", from)]);
-        s.couple_elastic(asks::ALONG, &world.buffers["rhs"], &[("probe", from)]);
-        s.press_nodes(ALL, BY_OLD, None, &world.buffers["rhs"], &[("probe", from)]);
+        s.along_past(&now.0.buffer, from, true);
     });
     parts.push(("couple_old and sum_old".into(), three(&read(&world.buffers["rhs"], n))));
     write(&world.buffers["rhs"], &load(plan));

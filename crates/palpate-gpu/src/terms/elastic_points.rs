@@ -1,0 +1,82 @@
+//! Elastic and viscous force of points that stand for a volume each. A body of cells has none of these passes.
+
+use super::{Along, Past, Pull, Term, Way};
+use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::elastic_asks::{SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD};
+use crate::passes::{ALL, Passes, Per};
+
+pub(super) struct ElasticPoints;
+
+impl Passes<'_, '_> {
+    fn has_points(&self) -> bool {
+        self.world.geometry.shape.elastic != 0
+    }
+
+    /// Adds what points, and patches where they take part, do to nodes to `forces`.
+    fn spread_elastic(&mut self, section: u32, bits: u32, patches: bool, forces: &wgpu::Buffer) {
+        let patches = if patches && self.world.geometry.shape.patches != 0 { SPREAD_PATCHES } else { 0 };
+        self.run_with(pass::SPREAD_ELASTIC, section, Per::Node, bits | patches, &[("forces", forces)]);
+    }
+}
+
+impl Term for ElasticPoints {
+    fn prepare(&self, s: &mut Passes) {
+        if !s.has_points() {
+            return;
+        }
+        s.recorder.clear(&s.world.buffers["past_strains"]);
+        for (weight, state) in s.past.clone() {
+            s.run_with(pass::STRAIN_ELASTIC, ALL, Per::Elastic, weight.to_bits(), &[("now", state)]);
+        }
+        // Of several past states none has a force of its own.
+        if s.past.is_empty() {
+            s.run(pass::STRAIN_ELASTIC, ALL, Per::Elastic, 1.0f32.to_bits());
+            s.run(pass::PRESS_ELASTIC, ALL, Per::Elastic, STRESS_OLD);
+            s.spread_elastic(ALL, 0, false, &s.world.buffers["old_force"]);
+        }
+    }
+
+    /// The last of a residual: what all other terms left at nodes that are held counts no more.
+    fn residual(&self, s: &mut Passes, section: u32) {
+        if s.has_points() {
+            s.run(pass::PRESS_ELASTIC, section, Per::Elastic, STRESS_NEW);
+            s.spread_elastic(section, SPREAD_RESIDUAL, true, &s.world.buffers["residual"]);
+        }
+    }
+
+    /// Points, patches, springs and mass damping.
+    fn tangent(&self, s: &mut Passes, section: u32) {
+        if s.has_points() {
+            s.run(pass::TANGENT_ELASTIC, section, Per::Elastic, 0);
+            s.run(pass::GATHER_ELASTIC, section, Per::Block, 0);
+            s.run(pass::BRACE_NODES, section, Per::Node, 0);
+        }
+    }
+
+    /// With what patches left for it.
+    fn by_past(&self, s: &mut Passes, past: &Past) {
+        if s.has_points() {
+            let way = match past.way {
+                Way::Along { .. } => asks::ALONG,
+                Way::Back { .. } => asks::TRANSPOSED,
+            };
+            s.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, way, &[("probe", past.probe), ("now", past.state)]);
+            s.spread_elastic(ALL, SPREAD_MINUS, s.patches_see_past(), past.to);
+        }
+    }
+
+    /// With what patches left for it.
+    fn by_coefficients(&self, s: &mut Passes, along: &Along) {
+        if s.has_points() && along.gathered {
+            s.run_with(pass::PUSH_ELASTIC, ALL, Per::Elastic, along.flags, &along.named);
+            s.spread_elastic(ALL, 0, true, &s.world.buffers["column"]);
+        }
+    }
+
+    fn by_coefficients_transposed(&self, s: &mut Passes, pull: &Pull) {
+        if s.has_points() && (pull.material || pull.sought().damping[1]) {
+            s.run_with(pass::PULL_ELASTIC, ALL, Per::Elastic, 0, &pull.named);
+        }
+    }
+}
