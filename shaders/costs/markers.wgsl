@@ -43,6 +43,15 @@ fn stalk_of(member: u32, site: u32) -> vec3<f32> {
     return sites[site].stalk + offsets[member * sight.sites + site].xyz;
 }
 
+// The marker with what a residual pulls at it.
+fn pulled(carrier: Carried, r: vec3<f32>, member: u32, site: u32) -> Carried {
+    var c = carrier;
+    let pull = sites[site].weight * r;
+    c.pull = vec4(pull, 0.0);
+    c.spin = vec4(c.pair * cross(stalk_of(member, site), transpose(c.turn) * pull), 0.0);
+    return c;
+}
+
 // d ⊗ g, by columns.
 fn outer(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {
     return mat3x3(d * g.x, d * g.y, d * g.z);

@@ -29,10 +29,7 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let far = (seen[origin].xyz - mark.goal) + (seen[rest_part() + origin].xyz - mark.goal_rest);
     // The measured place is counted from the stated one: the offset itself comes on top of its turning.
     let r = far + (moved + excess * stalk + (stalk - site.stalk));
-    let pull = site.weight * r;
-    c.pull = vec4(pull, 0.0);
-    c.spin = vec4(c.pair * cross(stalk, transpose(c.turn) * pull), 0.0);
-    carried[s.slot * sight.markers + s.item] = c;
+    carried[s.slot * sight.markers + s.item] = pulled(c, r, s.look.member, mark.site);
     let row = s.slot * sight.rows + shot.point_count + 3u * s.item;
     rows[row] = vec2(r.x, site.weight);
     rows[row + 1u] = vec2(r.y, site.weight);

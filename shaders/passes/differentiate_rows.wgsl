@@ -5,8 +5,6 @@
 // use shared/directions
 
 var<storage, read> changes: array<vec4<f32>>;
-// As shared/directions says.
-var<storage, read> own_directions: array<u32>;
 // [points][readings]: derivatives of the true points.
 var<storage, read> reading_slopes: array<vec4<f32>>;
 // [slots][Q][most rows]
@@ -23,9 +21,10 @@ fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -
     }
     let spin = c.pair * axial(transpose(c.turn) * df);
     moved += c.turn * cross(spin, stalk_of(member, mark.site));
-    let own = own_directions[q];
-    if own != 0u && own < READING && (own - 1u) / 3u == mark.site {
-        moved += c.turn[(own - 1u) % 3u];
+    if sight.offsets > 0u {
+        for (var axis = 0u; axis < 3u; axis++) {
+            moved += offset_along(q, mark.site, axis) * c.turn[axis];
+        }
     }
     return moved;
 }
@@ -51,9 +50,8 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
             for (var i = 0u; i < 8u; i++) {
                 change += shape_at(f.xi, i) * changes[base + band_cells[f.cell].nodes[i]].xyz;
             }
-            let own = own_directions[q];
-            if own >= READING {
-                change -= reading_slopes[(shot.point_start + item) * sight.readings + own - READING].xyz;
+            for (var k = 0u; k < sight.readings; k++) {
+                change -= reading_along(q, k) * reading_slopes[(shot.point_start + item) * sight.readings + k].xyz;
             }
             d = -dot(f.gradient, change);
         }

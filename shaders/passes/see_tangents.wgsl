@@ -8,8 +8,6 @@ var<storage, read> next: array<vec4<f32>>;
 // [2][B][N]: du, dv of this direction.
 var<storage, read> tangent_now: array<vec4<f32>>;
 var<storage, read> tangent_next: array<vec4<f32>>;
-// 1 for a direction that starts the simulation later.
-var<storage, read> shifts: array<u32>;
 // [slots][Q][N + M]
 var<storage, read_write> changes: array<vec4<f32>>;
 
@@ -28,10 +26,11 @@ fn see_tangents(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let f = s.look.value;
     var d = f.x * tangent_now[a].xyz + f.y * tangent_now[plane + a].xyz
         + (f.z * tangent_next[a].xyz + f.w * tangent_next[plane + a].xyz);
-    if shifts[q] == 1u {
+    let later = later_start(q);
+    if later != 0.0 {
         let rate = s.look.rate;
         let moved = (next[a].xyz - now[a].xyz) + (next[plane + a].xyz - now[plane + a].xyz);
-        d -= rate.z * moved + (rate.y * now[2u * plane + a].xyz + rate.w * next[2u * plane + a].xyz);
+        d -= later * (rate.z * moved + (rate.y * now[2u * plane + a].xyz + rate.w * next[2u * plane + a].xyz));
     }
     changes[(s.slot * count + q) * sight.extended + node] = vec4(d, 0.0);
 }

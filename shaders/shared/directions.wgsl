@@ -1,6 +1,29 @@
 //! Directions of tangents, as the passes of observations are told of them.
+// use shared/look
 
 // In a call's `mode`: number of directions, plus DIRECTION times which of them.
 const DIRECTION = 65536u;
-// Codes of directions that change the measurement: 1 + 3 · marker + axis of an offset, READING + number of what moves readings, else 0.
-const READING = 0x80000000u;
+
+// [Q][entries]: components of the directions by what the measurement depends on beside the states: the start on the recording's clock;
+// where offsets of markers are parameters, 3 · marker + axis of them; numbers that move readings.
+var<storage, read> own_directions: array<f32>;
+
+fn of_offsets() -> u32 {
+    return select(0u, 3u * sight.sites, sight.offsets > 0u);
+}
+
+fn own_entry(q: u32, entry: u32) -> f32 {
+    return own_directions[q * (1u + of_offsets() + sight.readings) + entry];
+}
+
+fn later_start(q: u32) -> f32 {
+    return own_entry(q, 0u);
+}
+
+fn offset_along(q: u32, site: u32, axis: u32) -> f32 {
+    return own_entry(q, 1u + 3u * site + axis);
+}
+
+fn reading_along(q: u32, number: u32) -> f32 {
+    return own_entry(q, 1u + of_offsets() + number);
+}

@@ -319,10 +319,6 @@ impl Backend for CpuBackend {
             });
     }
 
-    fn has_products(&self) -> bool {
-        true
-    }
-
     fn observe_product(
         &self,
         world: &World,

@@ -3,7 +3,7 @@
 use crate::linear::{Purpose, is_direct};
 use crate::terms::elastic_cells::POSED;
 use glam::{DMat3, DVec3};
-use palpate_engine::Request;
+use palpate_engine::{Request, Wanted};
 use palpate_model::cutcells::corotation::V24;
 use palpate_model::cutcells::domain::BandCell;
 use palpate_model::cutcells::elements::Classes;
@@ -91,5 +91,11 @@ impl<'a> Sizes<'a> {
             states: bytes(members * 2 * kept * vector),
             tangents: bytes(members * 4 * request.sensitivities.len() * vector),
         }
+    }
+
+    /// The same of a product with the Gauss–Newton matrix: one simulation with all its states, and the tangents of all of them.
+    pub fn product(&self, threads: usize) -> Memory {
+        let back = self.memory(1, 1, threads, &Request { gradient: Wanted::All, ..Request::default() });
+        Memory { tangents: back.states, ..back }
     }
 }

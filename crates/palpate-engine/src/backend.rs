@@ -122,10 +122,6 @@ pub trait Backend: Send {
         tally: &mut Self::Tally,
     );
 
-    /// True where [`Backend::observe_product`] and tangents along any direction are computed.
-    fn has_products(&self) -> bool {
-        false
-    }
     /// Product with the Gauss–Newton matrix of [`Backend::observe`]: adds Jᵀ W J v to dJ/d(next) in `adj`, to dJ/d(now) in `adj_now` and
     /// to dJ/dθ, where the tangents at both ends have the single direction v. Residuals depend on θ also beside the states: by effects on
     /// the measurement, and by where on the curve between the states a frame is.

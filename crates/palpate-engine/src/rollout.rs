@@ -344,17 +344,10 @@ impl<B: Backend> Evaluate for Rollout<B> {
     }
 
     fn has_products(&self) -> bool {
-        self.backend.has_products()
+        true
     }
 
     fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        if !self.backend.has_products() {
-            let detail = format!("backend {} has no products with the Gauss-Newton matrix", self.backend.name());
-            return Err(Failure {
-                hint: "fit with optimizer = \"lbfgs\", or compute with --backend cpu".into(),
-                ..Failure::new(FailureKind::Unsupported, 0.0, detail)
-            });
-        }
         self.hold(theta)?;
         let (b, ways) = (&self.backend, (&self.stages[..], &*self.stop));
         let states = &self.held.as_ref().expect("a way forward was just kept").states;

@@ -199,16 +199,20 @@ impl Backend for GpuBackend {
     fn observe_product(
         &self,
         world: &World,
-        _k: usize,
-        _now: &State,
-        _next: &State,
-        _tangent: &Tangent,
-        _tangent_next: &Tangent,
-        _adj: &mut Adjoint,
-        _adj_now: &mut Adjoint,
-        _tally: &mut Tally,
+        k: usize,
+        now: &State,
+        next: &State,
+        tangent: &Tangent,
+        tangent_next: &Tangent,
+        adj: &mut Adjoint,
+        adj_now: &mut Adjoint,
+        tally: &mut Tally,
     ) {
-        world.gpu.keep(GpuError::Plan { what: "products with the Gauss-Newton matrix".into() });
+        tally.point(world, tangent);
+        let ends = [now, next].map(|s| &s.0.buffer);
+        let along = [tangent, tangent_next].map(|t| &t.parts[0].buffer);
+        let adjoints = [&adj_now.0.buffer, &adj.0.buffer];
+        world.record(|r| world.observer.observe_product(r, k, ends, along, adjoints, &tally.buffers));
     }
 
     fn rows(

@@ -22,6 +22,6 @@ mod world;
 
 pub use backend::GpuBackend;
 pub use device::{AdapterReport, Choice, Gpu, GpuError, Lanes, adapters};
-pub use memory::{Load, Memory, memory};
+pub use memory::{Load, Memory, memory, memory_of_product};
 pub use solve::{CgSpeed, Traffic};
 pub use world::{Adjoint, Product, State, Tally, Tangent, Tuning, World};

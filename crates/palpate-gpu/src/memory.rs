@@ -6,7 +6,7 @@ use crate::device::{GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::world::rates;
 use crate::world::{COLUMN_VECTORS, Geometry, MANY, Sums, VECTOR, columns, tally_sizes, work};
-use palpate_engine::Request;
+use palpate_engine::{Request, Wanted};
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
 
@@ -62,6 +62,19 @@ impl Memory {
     pub fn total(&self) -> u64 {
         self.constants + self.work + self.states + self.tangents
     }
+}
+
+/// Device memory that a product with the Gauss–Newton matrix takes: one simulation with all its states and, for the only direction, the
+/// tangents of all of them.
+///
+/// # Errors
+/// The body is beyond what the kernels can do.
+pub fn memory_of_product(plan: &Plan, gradient: &Wanted, room: u64) -> Result<Memory, GpuError> {
+    let request = Request { gradient: gradient.clone(), sensitivities: vec![0] };
+    let one = memory(plan, &Load { members: 1, ratios: 1, request: &request, room })?;
+    let tangent = 2 * VECTOR * plan.body.nodes.len() as u64;
+    let (kept, counted) = (plan.clock.stages().len() as u64 + 1, 2);
+    Ok(Memory { tangents: one.tangents + tangent * kept.saturating_sub(counted), ..one })
 }
 
 /// Device memory that one evaluation of a batch takes.

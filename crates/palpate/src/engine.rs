@@ -192,14 +192,6 @@ impl Backend {
         }
     }
 
-    /// True where products with the Gauss–Newton matrix are computed.
-    pub(crate) fn has_products(self) -> bool {
-        match self {
-            Backend::Gpu => gpu().is_ok_and(|g| g.has_products()),
-            _ => CpuBackend.has_products(),
-        }
-    }
-
     /// How many simulations of a fit run at once, with so many threads (0 = one per core).
     ///
     /// # Errors

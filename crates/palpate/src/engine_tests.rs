@@ -208,7 +208,7 @@ fn inspect_foresees_the_device_memory_of_a_fit() {
     let file = folder.path().join("fine.toml");
     let scene = BLOCK.replace("cell_size = 0.02", "cell_size = 0.01").replace("steps = 8", "steps = 4");
     let free = "[[fit.parameter]]\npath = \"material.poisson_ratio\"\nstart = [0.3, 0.45]\n";
-    for (optimizer, starts) in [("rprop", 3), ("gauss-newton", 2), ("lbfgs", 1)] {
+    for (optimizer, starts) in [("rprop", 3), ("gauss-newton", 2), ("lbfgs", 1), ("gauss-newton-cg", 1)] {
         let fit = FIT.replace("rprop", optimizer).replace("starts = 2", &format!("starts = {starts}"));
         // The recording is kept small; cells are fine enough for the body to take more than fixed tables do.
         std::fs::write(&file, scene.clone() + &fit + free).expect("writable");

@@ -170,10 +170,9 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     };
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
     let asked = options.optimizer.or(spec.optimizer);
-    let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free, true)), settings.starts);
+    let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free)), settings.starts);
     let backend = options.backend.resolve_for(first.plan(), &trial).0;
-    let (optimizer, chosen) =
-        optimizer(asked, &free, backend).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
+    let (optimizer, chosen) = optimizer(asked, &free).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
     let settings = Settings { optimizer, ..settings };
     let threads = options.threads.unwrap_or(spec.threads);
     let mut scenes = Vec::new();
@@ -293,12 +292,8 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
 }
 
 /// The optimiser where nobody names one: with more values than sensitivities are computed of, one that does without them.
-pub(crate) fn usual(free: &[FreeParameter], products: bool) -> Optimizer {
-    match (values(free) > MOST_SENSITIVITIES, products) {
-        (false, _) => Optimizer::GaussNewton,
-        (true, true) => Optimizer::GaussNewtonCg,
-        (true, false) => Optimizer::Lbfgs,
-    }
+pub(crate) fn usual(free: &[FreeParameter]) -> Optimizer {
+    if values(free) > MOST_SENSITIVITIES { Optimizer::GaussNewtonCg } else { Optimizer::GaussNewton }
 }
 
 fn values(free: &[FreeParameter]) -> usize {
@@ -306,19 +301,15 @@ fn values(free: &[FreeParameter]) -> usize {
 }
 
 /// The optimiser of a fit and, where it was not asked for and is not Gauss–Newton, why.
-fn optimizer(asked: Option<Optimizer>, free: &[FreeParameter], backend: Backend) -> Result<(Optimizer, Option<String>), String> {
-    let (count, products) = (values(free), backend.has_products());
-    let name = backend.name();
+fn optimizer(asked: Option<Optimizer>, free: &[FreeParameter]) -> Result<(Optimizer, Option<String>), String> {
+    let count = values(free);
     match asked {
         Some(Optimizer::GaussNewton) if count > MOST_SENSITIVITIES => Err(format!(
             "\"gauss-newton\" computes sensitivities by {MOST_SENSITIVITIES} values at most, {count} are free; choose \"gauss-newton-cg\" or \"lbfgs\""
         )),
-        Some(Optimizer::GaussNewtonCg) if !products => Err(format!(
-            "\"gauss-newton-cg\" needs products with the Gauss-Newton matrix, which backend {name} has not; choose \"lbfgs\" or --backend cpu"
-        )),
         Some(asked) => Ok((asked, None)),
         None => {
-            let usual = usual(free, products);
+            let usual = usual(free);
             let why = || {
                 format!(
                     "optimizer {}: {count} values are free, sensitivities are computed of {MOST_SENSITIVITIES} at most",

@@ -60,6 +60,11 @@ impl Demand {
         Request { gradient: Wanted::Nothing, sensitivities: self.places.clone() }
     }
 
+    /// True where products with the Gauss–Newton matrix are asked for.
+    fn multiplies(&self) -> bool {
+        self.optimizer == Optimizer::GaussNewtonCg
+    }
+
     fn ratios(&self, plan: &Plan, members: usize) -> usize {
         if self.places.contains(&plan.layout.index(ParamKey::PoissonRatio)) { members } else { 1 }
     }
@@ -74,9 +79,10 @@ impl Demand {
         let threads = if threads == 0 { rayon::current_num_threads() } else { threads };
         let sizes = palpate_cpu::Sizes::new(plan);
         let last = sizes.memory(1, 1, threads, &self.last());
+        let product = self.multiplies().then(|| sizes.product(threads));
         let of = |members| {
             let during = sizes.memory(members, self.ratios(plan, members), threads, &self.request());
-            if last.total() > during.total() { last } else { during }
+            [Some(last), product].into_iter().flatten().fold(during, |most, m| if m.total() > most.total() { m } else { most })
         };
         largest(self.most(), of, |m| self.asked.is_some() || m.total() <= BATCH_MEMORY)
     }
@@ -99,7 +105,10 @@ impl Demand {
         let request = Request { gradient, ..self.last() };
         let last = palpate_gpu::memory(plan, &Load { members: 1, ratios: 1, request: &request, room })?;
         let then = palpate_gpu::Memory { states: last.states, tangents: last.tangents, ..during };
-        Ok((members, if then.total() > during.total() { then } else { during }))
+        let gradient = self.request().gradient;
+        let product = if self.multiplies() { Some(palpate_gpu::memory_of_product(plan, &gradient, room)?) } else { None };
+        let all = [Some(then), product].into_iter().flatten();
+        Ok((members, all.fold(during, |most, m| if m.total() > most.total() { m } else { most })))
     }
 }
 

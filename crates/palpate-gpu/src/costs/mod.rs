@@ -17,6 +17,8 @@ mod looks;
 mod markers;
 #[cfg(test)]
 mod match_tests;
+#[cfg(test)]
+mod product_tests;
 mod readings;
 mod results;
 #[cfg(test)]
@@ -37,7 +39,7 @@ use crate::layout::{Carried, Found, Look, Sight};
 pub(crate) use bounds::MOST_DIRECTIONS;
 pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
-use palpate_engine::{ReadingResidual, ResidualRow};
+use palpate_engine::{Direction, ReadingResidual, ResidualRow};
 use palpate_model::cutcells::pullback::{NOISE_REACH, TURNED_AWAY};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::ReadingKind;
@@ -65,7 +67,7 @@ const CARRIED: u64 = size_of::<Carried>() as u64;
 const COSTS: [&dyn Cost; 3] = [&depth::Depth, &markers::Markers, &displacements::Displacements];
 
 /// What one kind of readings takes beside the passes that serve all (`see_nodes`, `sum_rows`, `fold_pulls`, `see_tangents`,
-/// `differentiate_rows`, `weigh_rows`).
+/// `differentiate_rows`, `weigh_rows`, `weigh_changes`).
 trait Cost: Sync {
     /// Most readings of a look in a round.
     fn items(&self, round: &Round) -> usize;
@@ -160,24 +162,22 @@ impl Observer {
         tangent_slots(&self.sight, self.room, self.largest, directions)
     }
 
-    /// Adds to a tally's buffers what observations write. What the device refuses is kept as its error.
-    pub(crate) fn extend_tally(&self, gpu: &Gpu, directions: &[usize], tally: &mut Buffers) {
+    /// Adds to a tally's buffers what observations write along directions. What the device refuses is kept as its error.
+    pub(crate) fn extend_tally(&self, gpu: &Gpu, directions: &[Direction], tally: &mut Buffers) {
+        sum_sizes(&self.sight).into_iter().for_each(|size| insert(gpu, size, tally));
+        self.point(gpu, directions, tally);
+    }
+
+    /// Makes a tally ready for tangents along these directions; what it has summed up stays.
+    pub(crate) fn point(&self, gpu: &Gpu, directions: &[Direction], tally: &mut Buffers) {
         if let Err(e) = bounds::check_directions(directions.len()) {
             gpu.keep(e);
         }
-        let together = tangent_slots(&self.sight, self.room, self.largest, directions.len());
-        for (name, bytes) in tally_sizes(&self.sight, directions.len() as u64, together as u64) {
-            let made = gpu.buffer(name, bytes).unwrap_or_else(|e| {
-                gpu.keep(e);
-                gpu.small()
-            });
-            tally.insert(name, made);
-        }
-        let moving = readings::shifts(&self.plan);
-        let shifts: Vec<u32> = directions.iter().map(|d| u32::from(moving.contains(d))).collect();
-        gpu.queue.write_buffer(&tally["shifts"], 0, bytemuck::cast_slice(&shifts));
-        let codes = readings::codes(&self.plan, directions);
-        gpu.queue.write_buffer(&tally["own_directions"], 0, bytemuck::cast_slice(&codes));
+        let together = self.tangent_slots(directions.len()) as u64;
+        let sizes = tangent_sizes(&self.sight, directions.len() as u64, together);
+        sizes.into_iter().for_each(|size| insert(gpu, size, tally));
+        let components = readings::components(&self.plan, directions);
+        gpu.queue.write_buffer(&tally["own_directions"], 0, bytemuck::cast_slice(&components));
     }
 
     fn rounds(&self, k: usize) -> impl Iterator<Item = Round> {
@@ -215,11 +215,36 @@ impl Observer {
             let adjoint = [("adj_now", adjoints[0]), ("adj_next", adjoints[1]), ("sums", &tally["start_sums"])];
             let own = self.named(&[&states[..], &adjoint[..]].concat(), tally);
             look(r, &own, &self.sight, round);
-            COSTS.iter().for_each(|cost| cost.pull(r, &own, &self.sight, round));
-            let parts = groups_of(self.sight.nodes as usize).min(PARTS);
-            run(r, pass::FOLD_PULLS, &own, round, parts, usize::from(round.points > 0));
-            run(r, pass::ADD_PARTS, &own, round, 1, parts);
+            self.pull(r, &own, round);
         }
+    }
+
+    /// Adds the product of the Gauss–Newton matrix of the frames of step k with the direction of the tangent, as
+    /// [`Observer::observe_adjoint`] adds the gradient.
+    pub(crate) fn observe_product(
+        &self,
+        r: &mut Recorder,
+        k: usize,
+        ends: [&wgpu::Buffer; 2],
+        tangent: [&wgpu::Buffer; 2],
+        adjoints: [&wgpu::Buffer; 2],
+        tally: &Buffers,
+    ) {
+        for round in self.rounds(k).flat_map(|round| round.parts(self.tangent_slots(1))) {
+            let mut own = self.differentiate(r, round, ends, &[tangent], tally);
+            let items: usize = COSTS.iter().map(|cost| cost.items(&round)).sum();
+            run(r, pass::WEIGH_CHANGES, &own, round, groups_of(items), 0);
+            own.extend([("adj_now", adjoints[0]), ("adj_next", adjoints[1]), ("sums", &tally["start_sums"])]);
+            self.pull(r, &own, round);
+        }
+    }
+
+    /// Adds what the residuals of a round pull at both ends of the step and at the start.
+    fn pull(&self, r: &mut Recorder, own: &Named, round: Round) {
+        COSTS.iter().for_each(|cost| cost.pull(r, own, &self.sight, round));
+        let parts = groups_of(self.sight.nodes as usize).min(PARTS);
+        run(r, pass::FOLD_PULLS, own, round, parts, usize::from(round.points > 0));
+        run(r, pass::ADD_PARTS, own, round, 1, parts);
     }
 
     /// Adds to the Gauss–Newton gradient and matrix of the frames of step k; one tangent buffer a direction.
@@ -273,18 +298,29 @@ fn tangent_slots(s: &Sight, room: Room, largest: u64, directions: usize) -> usiz
     (largest.min(room.scratch) / each.max(1)).clamp(1, u64::from(s.slots)) as usize
 }
 
-/// What observations add to a tally along q directions, in bytes.
-fn tally_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 7] {
+fn insert(gpu: &Gpu, (name, bytes): (&'static str, u64), tally: &mut Buffers) {
+    let made = gpu.buffer(name, bytes).unwrap_or_else(|e| {
+        gpu.keep(e);
+        gpu.small()
+    });
+    tally.insert(name, made);
+}
+
+/// Sums over frames that observations add to a tally, in bytes.
+fn sum_sizes(s: &Sight) -> [(&'static str, u64); 2] {
     let looks = u64::from(s.members) * u64::from(s.frames);
-    let together = if q == 0 || looks == 0 { 0 } else { together };
+    [("frame_sums", VECTOR * looks), ("start_sums", VECTOR * looks)]
+}
+
+/// What observations add to a tally along q directions, in bytes.
+fn tangent_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 4] {
+    let together = if q == 0 || s.members * s.frames == 0 { 0 } else { together };
+    let offsets = if s.offsets > 0 { 3 * u64::from(s.sites) } else { 0 };
     [
-        ("frame_sums", VECTOR * looks),
-        ("start_sums", VECTOR * looks),
         ("curvature", 4 * u64::from(s.members) * (q + q * q)),
         ("changes", VECTOR * together * q * u64::from(s.extended)),
         ("slopes", 4 * together * q * u64::from(s.rows)),
-        ("shifts", 4 * q),
-        ("own_directions", 4 * q),
+        ("own_directions", 4 * q * (1 + offsets + u64::from(s.readings))),
     ]
 }
 
@@ -299,8 +335,8 @@ pub(crate) fn memory<M: Maker<Buffer = u64>>(
     let (_, mut sight, buffers) = tables(maker, plan, members, room)?;
     sight.members = members as u32;
     let together = tangent_slots(&sight, room, maker.largest(), directions) as u64;
-    let tally = tally_sizes(&sight, directions as u64, together);
-    Ok(buffers.into_values().chain(tally.iter().map(|t| t.1)).collect())
+    let tally = sum_sizes(&sight).into_iter().chain(tangent_sizes(&sight, directions as u64, together));
+    Ok(buffers.into_values().chain(tally.map(|t| t.1)).collect())
 }
 
 /// What [`tables`] makes.

@@ -5,7 +5,7 @@
 use super::shots::{Shots, split};
 use crate::device::GpuError;
 use crate::device::Maker;
-use crate::device::pipelines::shared::directions::READING;
+use palpate_engine::Direction;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::effects::{Site, Unstated};
 use palpate_model::params::ParamKey;
@@ -26,14 +26,17 @@ pub(super) fn offset_places(plan: &Plan) -> Vec<[u32; 2]> {
     (0..plan.observation.markers.len() as u32).flat_map(of).collect()
 }
 
-/// What directions change of the measurement, as `shared/directions.wgsl` says.
-pub(super) fn codes(plan: &Plan, directions: &[usize]) -> Vec<u32> {
-    let (offsets, readings) = (offset_places(plan), places(plan));
-    let code = |d: &usize| {
-        let offset = offsets.iter().find(|p| p[1] as usize == *d).map(|p| p[0] + 1);
-        offset.or_else(|| readings.iter().position(|p| *p as usize == *d).map(|k| READING + k as u32)).unwrap_or(0)
+/// Components of directions by what the measurement depends on beside the states, as `shared/directions.wgsl` says.
+pub(super) fn components(plan: &Plan, directions: &[Direction]) -> Vec<f32> {
+    let (shifts, offsets, readings) = (shifts(plan), offset_places(plan), places(plan));
+    let of_offsets = if offsets.is_empty() { 0 } else { 3 * plan.observation.markers.len() };
+    let one = |d: &Direction| {
+        let mut all = vec![0.0; of_offsets];
+        offsets.iter().for_each(|[number, place]| all[*number as usize] = d.component(*place as usize) as f32);
+        let later = shifts.iter().map(|p| d.component(*p)).sum::<f64>() as f32;
+        [vec![later], all, readings.iter().map(|p| d.component(*p as usize) as f32).collect()].concat()
     };
-    directions.iter().map(code).collect()
+    directions.iter().flat_map(one).collect()
 }
 
 /// Offsets of all markers, `[B][sites]` [m].

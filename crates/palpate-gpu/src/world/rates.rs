@@ -16,6 +16,8 @@ use palpate_model::plan::{Physics, Plan};
 /// One direction, for all members.
 #[derive(Debug)]
 pub(crate) struct Rates {
+    /// The direction.
+    pub(crate) direction: Direction,
     /// By the names that kernels know them by.
     pub(crate) buffers: Buffers,
     /// What kernels are told: bits of `shared/rates.wgsl`.
@@ -120,7 +122,7 @@ impl Gathered {
         put("rate_moduli", world.gpu.upload("rate_moduli", &self.moduli));
         put("rate_densities", world.gpu.upload("rate_densities", &self.densities));
         put("rate_rests", world.gpu.upload("rate_rests", &self.rests));
-        Rates { buffers, flags, moved, flying }
+        Rates { direction: direction.clone(), buffers, flags, moved, flying }
     }
 }
 

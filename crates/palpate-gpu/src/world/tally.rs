@@ -1,11 +1,11 @@
 //! What is read of every member at the end.
 
-use super::World;
 use super::sums::Sums;
+use super::{Tangent, World};
 use crate::device::Maker as _;
 use crate::device::recorder::Buffers;
 use crate::layout::Health;
-use palpate_engine::Request;
+use palpate_engine::{Direction, Request};
 
 /// Everything to be read of every member.
 #[derive(Debug)]
@@ -15,6 +15,8 @@ pub struct Tally {
     pub(crate) buffers: Buffers,
     /// What an adjoint sums up; `None` where no gradient is wanted.
     pub(crate) sums: Option<Sums>,
+    /// The buffers are those along the direction of a product.
+    pointed: bool,
 }
 
 /// What a tally of B members and P parameters holds beside observations and the sums of an adjoint, in bytes.
@@ -37,8 +39,17 @@ impl Tally {
             buffers.insert(name, buffer);
         }
         let directions = &request.sensitivities;
-        world.observer.extend_tally(&world.gpu, directions, &mut buffers);
-        Tally { directions: directions.clone(), buffers, sums }
+        world.observer.extend_tally(&world.gpu, &Direction::parameters(directions), &mut buffers);
+        Tally { directions: directions.clone(), buffers, sums, pointed: false }
+    }
+
+    /// Makes it ready for a product along the only direction of a tangent.
+    pub(crate) fn point(&mut self, world: &World, tangent: &Tangent) {
+        if !self.pointed {
+            let directions: Vec<Direction> = tangent.rates.iter().map(|r| r.direction.clone()).collect();
+            world.observer.point(&world.gpu, &directions, &mut self.buffers);
+            self.pointed = true;
+        }
     }
 
     pub(crate) fn get(&self, name: &'static str) -> &wgpu::Buffer {

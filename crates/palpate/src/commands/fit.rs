@@ -237,7 +237,7 @@ pub fn choose(a: &Choices, experiments: &[Experiment]) -> Result<(Backend, Optio
     let starts = a.starts.map_or(spec.map_or(1, |f| f.starts), |n| n as usize);
     let (_, free, _) = free_parameters(experiments)?;
     let asked = a.optimizer.map(Optimizer::from).or(spec.and_then(|f| f.optimizer));
-    let optimizer = asked.unwrap_or_else(|| usual(&free, true));
+    let optimizer = asked.unwrap_or_else(|| usual(&free));
     a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts))
 }
 

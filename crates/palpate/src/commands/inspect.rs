@@ -95,7 +95,7 @@ fn demand(e: &Experiment) -> (Demand, String) {
     let one = || (Demand::forward(1), "one simulation".to_string());
     let Some(fit) = e.scene().fit.as_ref().filter(|f| !f.parameters.is_empty()) else { return one() };
     let Ok((_, free, _)) = free_parameters(std::slice::from_ref(e)) else { return one() };
-    let optimizer = fit.optimizer.unwrap_or_else(|| fitting::usual(&free, true));
+    let optimizer = fit.optimizer.unwrap_or_else(|| fitting::usual(&free));
     let demand = fitting::demand(&free, 0, optimizer, fit.starts);
     let numbers = demand.places.len();
     let name = optimizer.name();
