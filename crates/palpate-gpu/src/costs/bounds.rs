@@ -39,6 +39,8 @@ pub(crate) struct Seen {
     /// Nodes of a marker's site, and sites at a node.
     pub(crate) site: u64,
     pub(crate) sites: u64,
+    /// Numbers that move depth readings.
+    pub(crate) readings: u64,
 }
 
 impl Seen {
@@ -58,6 +60,7 @@ impl Seen {
             markers: s.markers.into(),
             site: sites.stencils.longest() as u64,
             sites: sites.of_node.longest() as u64,
+            readings: s.readings.into(),
         }
     }
 
@@ -67,7 +70,7 @@ impl Seen {
     }
 
     /// Bounds by kernel, for those that have long loops; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 7] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 8] {
         let (rows, stripes) = (self.rows_of_cubes, self.stripes);
         // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and those of Newton's method.
         let matching = self.layers + rows + (rows + self.points.div_ceil(8 * stripes)) * (1 + ITERATIONS as u64);
@@ -81,6 +84,8 @@ impl Seen {
             ("fold_pulls", self.share() * (1 + self.fold + self.sites + self.markers) + 8),
             // 700: rotations of Jacobi's method.
             ("carry_markers", self.site + 700),
+            // Corners of a cell, and axes of an offset.
+            ("differentiate_rows", self.readings + self.site + 8 + 3),
             // The entry of the matrix that a workgroup adds is found row by row. 8: the sum over the workgroup.
             ("weigh_rows", self.rows.div_ceil(64) + MOST_DIRECTIONS + 8),
         ]

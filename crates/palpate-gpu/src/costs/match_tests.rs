@@ -218,6 +218,7 @@ fn lanes_with_as_many_points_as_a_build_accepts_lose_none() {
         markers: 0,
         site: 0,
         sites: 0,
+        readings: 0,
     };
     let most = (1..100_000).rev().find(|n| seen(*n).check().is_ok()).unwrap_or(0);
     let room = Room { points: 100_000, scratch: SCRATCH };

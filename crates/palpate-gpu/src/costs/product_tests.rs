@@ -14,7 +14,8 @@ use palpate_model::scene::Scene;
 
 /// A held ball that is seen in every way, with numbers of the measurement that residuals depend on beside the states.
 fn plan(scene: &Scene) -> Plan {
-    let depth = seen(scene);
+    // Their effects need markers, which come after.
+    let depth = seen(&Scene { effects: Vec::new(), ..scene.clone() });
     let mut observation = (*depth.observation).clone();
     let mut noise = Noise(5);
     let place = depth.body.patches[3].point;

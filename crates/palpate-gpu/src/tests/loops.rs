@@ -80,6 +80,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("rows_of(shots[s.look.shot])") => seen.rows.div_ceil(64),
         () if has("while left > a") => MOST_DIRECTIONS,
         () if has("< place_iterations") => pullback::ITERATIONS as u64,
+        () if has("< sight.readings") => seen.readings,
         () if has("front_most + front_root") => (1 + front::MOST + front::ROOT) as u64,
         () => return None,
     };
@@ -202,6 +203,7 @@ const RECORDING: Seen = Seen {
     markers: 100,
     site: 30,
     sites: 30,
+    readings: 12,
 };
 
 #[test]
@@ -238,6 +240,7 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
         largest(Seen { nodes: 1000, ..RECORDING }, |s, n| s.markers = n, observed),
         largest(RECORDING, |s, n| s.site = n, observed),
         largest(RECORDING, |s, n| s.sites = n, observed),
+        largest(RECORDING, |s, n| s.readings = n, observed),
     ];
     assert!(recordings[0].points > 3_900_000, "{:?}", recordings[0]);
     for most in bodies {
