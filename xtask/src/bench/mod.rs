@@ -11,6 +11,7 @@ use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch, Request, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::{self, Effect, Family};
+use palpate_model::materials::{ALL, Model, find};
 use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::{Layout, ParamKey};
 use palpate_model::plan::{Clock, Plan, PlaneSite};
@@ -68,12 +69,16 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
             // Longest side 0.3 m: the file's unit is a fifth of it, with 6 cells to a unit.
             let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
             if wanted("dragon") {
-                let line = one("dragon", &sdf, 0.3 / 5.0 / 6.0, &[])?;
+                let line = one("dragon", &sdf, 0.3 / 5.0 / 6.0, &[], linear())?;
                 add(Line { paper: Some(PAPER_DRAGON), ..line });
             }
             // Beside the first: a tenth more for a step, but the adjoint takes derivatives by every number of every effect, absent or not.
             if wanted("dragon, effects absent") {
-                add(one("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, &effects())?);
+                add(one("dragon, effects absent", &sdf, 0.3 / 5.0 / 6.0, &effects(), linear())?);
+            }
+            if wanted("dragon, neo-Hookean") {
+                let model = find("neo-hookean").ok_or("there is no such material")?;
+                add(one("dragon, neo-Hookean", &sdf, 0.3 / 5.0 / 6.0, &[], model)?);
             }
         }
         None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
@@ -87,7 +92,7 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         for (kind, shape, across) in [("ball", ball, balls[k]), ("block", block, blocks[k])] {
             let name = format!("{kind} {}", SIZES[k]);
             if wanted(&name) {
-                add(one(&name, &placed(shape), 0.2 / across, &[])?);
+                add(one(&name, &placed(shape), 0.2 / across, &[], linear())?);
             }
         }
     }
@@ -97,6 +102,11 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         report.fields = Some(fields);
     }
     Ok(report)
+}
+
+/// The material of cells by themselves.
+pub(super) fn linear() -> &'static Model {
+    &ALL[0]
 }
 
 /// Names of the sizes.
@@ -150,7 +160,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     };
     Plan {
         fields: Vec::new(),
-        model: &palpate_model::materials::ALL[0],
+        model: linear(),
         theta,
         layout,
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
@@ -175,14 +185,14 @@ pub(super) fn blocks(body: &Body) -> usize {
     pairs.len()
 }
 
-pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, laws: &[usize]) -> Result<Line, String> {
+pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, laws: &[usize], model: &'static Model) -> Result<Line, String> {
     reserve();
     PeakAlloc.reset_peak_usage();
     let before = PeakAlloc.current_usage();
     let clock = Instant::now();
     let body = Body::build(shape, h, BAND * h, SUBDIVISIONS).map_err(|e| format!("{name}: {e}"))?;
     let build = clock.elapsed().as_secs_f64();
-    let plan = plan(body, laws);
+    let plan = Plan { model, ..plan(body, laws) };
     let body = &plan.body;
     let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
     let mut taken = Seconds::default();

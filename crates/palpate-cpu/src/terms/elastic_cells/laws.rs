@@ -79,7 +79,6 @@ impl Default for LawState {
 /// Derivatives of ψ: first, and second (symmetric).
 #[derive(Clone, Copy, Default)]
 struct Slopes {
-    value: f64,
     first: [f64; ENERGY],
     second: [[f64; ENERGY]; ENERGY],
 }
@@ -245,20 +244,37 @@ impl<'a> CellLaws<'a> {
         self.rate > 0.0 && self.laws.iter().any(|l| l.law.needs(self.loss_part()) > 0)
     }
 
-    fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: &[DVec3; 8]) -> Side {
-        let kq = multiply(k, &q);
-        let mut s = [0.0; ENERGY];
-        s[0] = 0.5 * dot(&q, &kq) / volume;
-        for (c, s) in s.iter_mut().skip(1).enumerate().take(n - 1) {
-            *s = dot(&strain_row(c, gradient), &q);
+    /// K q, which is zero where nothing asks for it, and the first `n` scalars of a deformation.
+    fn scalars(&self, k: &M24, volume: f64, q: &V24, n: usize, gradient: &[DVec3; 8]) -> (V24, [f64; ENERGY]) {
+        let (mut kq, mut s) = ([0.0; 24], [0.0; ENERGY]);
+        // A material sees strains alone.
+        if !self.laws.is_empty() {
+            kq = multiply(k, q);
+            s[0] = 0.5 * dot(q, &kq) / volume;
         }
+        for (c, s) in s.iter_mut().skip(1).enumerate().take(n - 1) {
+            *s = dot(&strain_row(c, gradient), q);
+        }
+        (kq, s)
+    }
+
+    /// ψ of the laws that act, and of the material beyond the linear one.
+    fn energy(&self, s: &[f64; ENERGY]) -> f64 {
+        let of_laws = self.acting().map(|l| {
+            let (z, len) = input(s, &l.p);
+            l.law.value(Part::Energy, &z[..len])
+        });
+        self.material.map_or(0.0, |law| self.material_energy(law, s)) + of_laws.sum::<f64>()
+    }
+
+    fn side(&self, k: &M24, volume: f64, pose: CellPose, q: V24, n: usize, gradient: &[DVec3; 8]) -> Side {
+        let (kq, s) = self.scalars(k, volume, &q, n, gradient);
         let mut slopes = Slopes::default();
         if let Some(law) = self.material {
             self.add_material(law, &s, &mut slopes);
         }
         for l in self.acting() {
             let (z, len) = input(&s, &l.p);
-            slopes.value += l.law.value(Part::Energy, &z[..len]);
             let own = l.law.needs(Part::Energy);
             for i in 0..own {
                 for j in 0..=i {
@@ -289,11 +305,8 @@ impl<'a> CellLaws<'a> {
         self.cells.c.elements.gradient(e)
     }
 
-    /// The past's pose and q̃, where anything sees it.
+    /// The past's pose and q̃.
     fn past(&self, e: usize) -> Option<(CellPose, V24)> {
-        if self.cells.c.weights.old == 0.0 && !self.lossy() {
-            return None;
-        }
         let mut q = [0.0; 24];
         let mut newest = None;
         for (weight, u) in self.cells.c.past.each {
@@ -304,13 +317,22 @@ impl<'a> CellLaws<'a> {
         Some((newest?, q))
     }
 
-    /// The same with at least `n` scalars.
+    /// The same with at least `n` scalars, and with the past where it has a force of its own or what is lost depends on it.
     fn local_with(&self, n: usize, e: usize, u1: &[DVec3]) -> Local<'a> {
+        let seen = self.cells.c.weights.old != 0.0 || self.lossy();
+        self.local_at(n, e, self.cells.pose(e, u1), if seen { self.past(e) } else { None })
+    }
+
+    /// The same for the force that goes with the new pose alone.
+    fn local_new(&self, e: usize, pose: CellPose) -> Local<'a> {
+        self.local_at(self.needs(), e, pose, if self.lossy() { self.past(e) } else { None })
+    }
+
+    fn local_at(&self, n: usize, e: usize, pose: CellPose, past: Option<(CellPose, V24)>) -> Local<'a> {
         let cells = &self.cells;
         let (k, volume, gradient) = (cells.stiffness(e), self.volume(e), self.gradient(e));
-        let pose = cells.pose(e, u1);
         let new = self.side(k, volume, pose, pose.q, n, gradient);
-        let old = self.past(e).map(|(pose, q)| self.side(k, volume, pose, q, n, gradient));
+        let old = past.map(|(pose, q)| self.side(k, volume, pose, q, n, gradient));
         let (mut kd, mut d, mut loss) = ([0.0; 24], 0.0, Loss::default());
         if let (Some(old), true) = (&old, self.lossy()) {
             kd = std::array::from_fn(|i| new.kq[i] - old.kq[i]);
@@ -327,10 +349,10 @@ impl<'a> CellLaws<'a> {
         Local { k, volume, young: cells.young_of(e), n, gradient, new, old, kd, d, loss }
     }
 
-    /// The laws at `u1`, and their forces on the corners that go with the new pose.
-    pub(super) fn state(&self, e: usize, u1: &[DVec3]) -> (LawState, Corners) {
+    /// The laws at a pose of a cell, and their forces on the corners that go with it.
+    pub(super) fn state(&self, e: usize, pose: &CellPose) -> (LawState, Corners) {
         // The old state's own force is computed once a solve.
-        let l = self.local(e, u1);
+        let l = self.local_new(e, *pose);
         let weight = self.cells.c.weights.new;
         let stress = l.force_new(weight);
         let state = LawState {
@@ -357,19 +379,16 @@ impl<'a> CellLaws<'a> {
         );
     }
 
-    /// Potential whose gradient by u₁ is the laws' force, up to a constant [J].
+    /// Potential whose gradient by u₁ is the laws' force that goes with the new pose, up to a constant [J].
     pub(super) fn potential(&self, u1: &[DVec3]) -> f64 {
-        let weights = &self.cells.c.weights;
+        let weight = self.cells.c.weights.new;
         let cell = |e: usize| {
-            let l = self.local(e, u1);
-            let mut w = l.young * l.volume * (weights.new * l.new.slopes.value + l.loss.value);
-            if let (Some(old), true) = (&l.old, weights.old != 0.0) {
-                let f0 = old.pose.force(&l.stress(old, &old.slopes.first));
-                w += weights.old * pick(self.cells.body(), e, u1).iter().zip(&f0).map(|(u, f)| u.dot(*f)).sum::<f64>();
-            }
-            w
+            let (pose, volume) = (self.cells.pose(e, u1), self.volume(e));
+            let loss = if self.lossy() { self.local_new(e, pose).loss.value } else { 0.0 };
+            let s = self.scalars(self.cells.stiffness(e), volume, &pose.q, self.needs(), self.gradient(e)).1;
+            self.cells.young_of(e) * volume * (weight * self.energy(&s) + loss)
         };
-        (0..self.cells.body().cells().len()).map(cell).sum()
+        self.cells.each_cell(cell).iter().sum()
     }
 
     /// Adds the part of the tangent of cell e that no matrix K has: Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ, world frame, blocks

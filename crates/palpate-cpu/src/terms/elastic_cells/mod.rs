@@ -254,7 +254,8 @@ impl Term for ElasticCells<'_> {
         self.posed = posed;
         self.add_forces(out);
         if let Some(laws) = &self.laws {
-            let (lawful, forces): (Vec<LawState>, Vec<Corners>) = self.cells.each_cell(|e| laws.state(e, u1)).into_iter().unzip();
+            let (lawful, forces): (Vec<LawState>, Vec<Corners>) =
+                self.cells.each_cell(|e| laws.state(e, &self.posed[e].pose)).into_iter().unzip();
             self.cells.sum_corners(|e, i| forces[e][i], out);
             out.iter_mut().zip(&self.old_laws).for_each(|(v, f)| *v += *f);
             self.lawful = lawful;
@@ -274,7 +275,9 @@ impl Term for ElasticCells<'_> {
             },
         );
         let own = crate::linear::vector::dot(&u1[..self.before.force.len()], &self.before.force);
-        parts.iter().sum::<f64>() + own + self.laws.as_ref().map_or(0.0, |l| l.potential(u1))
+        let of_laws = self.laws.as_ref().map_or(0.0, |l| l.potential(u1));
+        let old = crate::linear::vector::dot(&u1[..self.old_laws.len()], &self.old_laws);
+        parts.iter().sum::<f64>() + own + of_laws + old
     }
 
     fn tangent(&self, _u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {

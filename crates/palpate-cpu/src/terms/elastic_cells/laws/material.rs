@@ -41,13 +41,18 @@ impl CellLaws<'_> {
         out
     }
 
-    /// Adds the material's energy density over E beyond the linear one's, with its derivatives, by the mean strain in `s`.
+    /// The material's energy density over E beyond the linear one's, at the mean strain in `s`.
+    pub(super) fn material_energy(&self, law: &dyn Solid, s: &[f64; ENERGY]) -> f64 {
+        let ((lambda, mu), h) = (self.lame[0], strain(s));
+        law.value(&h, lambda, mu) - materials::linear(&h, lambda, mu)
+    }
+
+    /// Adds its derivatives.
     pub(super) fn add_material(&self, law: &dyn Solid, s: &[f64; ENERGY], slopes: &mut Slopes) {
         let (lambda, mu) = self.lame[0];
         let h = strain(s);
         let (stress, tangent) = law.stress(&h, lambda, mu);
         let trace = h[0][0] + h[1][1] + h[2][2];
-        slopes.value += law.value(&h, lambda, mu) - materials::linear(&h, lambda, mu);
         for (c, pair) in PAIRS.iter().enumerate() {
             let (own, linear) = (entries(*pair), linear_stress(*pair, s[1 + c], trace, (lambda, mu)));
             slopes.first[1 + c] += own.clone().map(|k| stress[k]).sum::<f64>() - linear;
