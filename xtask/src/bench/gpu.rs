@@ -144,7 +144,7 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
     compile(&gpu)?;
     let mut longest: Option<Longest> = None;
     for s in subjects(quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
-        let mut cpu = one(s.name, &*s.shape, s.h, &[], super::linear())?;
+        let mut cpu = one(s.name, &*s.shape, s.h, &super::Case::default())?;
         cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
         let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
