@@ -206,13 +206,14 @@ fn world(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     lines.push(("time", text));
 }
 
-/// What the θ-scheme damps by itself: ζ = (θ − ½) ω Δt to first order, which a fit takes for the material's.
+/// What the scheme damps by itself, which a fit takes for the material's.
 fn numerical_damping(time: &palpate_model::scene::Time) -> String {
-    let of_one_hertz = std::f64::consts::TAU * (time.theta - 0.5) * time.step;
-    if of_one_hertz < 1e-6 {
+    let [slow, fast] = [1.0, 10.0].map(|hertz| 100.0 * time.scheme.numerical_damping(time.step, time.theta, hertz));
+    if fast < 1e-3 {
         return String::new();
     }
-    format!("; theta = {} damps 1 Hz by {:.2} % of critical, 10 Hz by ten times as much", time.theta, 100.0 * of_one_hertz)
+    let stated = if time.scheme.name == "theta" { format!("theta = {}", time.theta) } else { time.scheme.name.into() };
+    format!("; {stated} damps 1 Hz by {slow:.2} % of critical, 10 Hz by {fast:.2} %")
 }
 
 /// What the simulation is compared with.
