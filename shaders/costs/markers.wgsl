@@ -51,8 +51,3 @@ fn pulled(carrier: Carried, r: vec3<f32>, member: u32, site: u32) -> Carried {
     c.spin = vec4(c.pair * cross(stalk_of(member, site), transpose(c.turn) * pull), 0.0);
     return c;
 }
-
-// d ⊗ g, by columns.
-fn outer(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {
-    return mat3x3(d * g.x, d * g.y, d * g.z);
-}

@@ -12,11 +12,6 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 
-// d ⊗ g, by columns.
-fn outer3(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {
-    return mat3x3(d * g.x, d * g.y, d * g.z);
-}
-
 fn contract(a: mat3x3<f32>, b: mat3x3<f32>) -> f32 {
     return dot(a[0], b[0]) + dot(a[1], b[1]) + dot(a[2], b[2]);
 }
@@ -27,7 +22,7 @@ fn gradient_next(member: u32, point: u32) -> mat3x3<f32> {
     var h = mat3x3<f32>();
     for (var k = stencil_rows[point]; k < stencil_rows[point + 1u]; k++) {
         let a = at_node(member, stencil_entries[k].node);
-        h += outer3((next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz), stencil_gradients[k].xyz);
+        h += outer((next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz), stencil_gradients[k].xyz);
     }
     return h;
 }
@@ -37,7 +32,7 @@ fn gradient_now(member: u32, point: u32) -> mat3x3<f32> {
     var h = mat3x3<f32>();
     for (var k = stencil_rows[point]; k < stencil_rows[point + 1u]; k++) {
         let a = at_node(member, stencil_entries[k].node);
-        h += outer3((now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz), stencil_gradients[k].xyz);
+        h += outer((now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz), stencil_gradients[k].xyz);
     }
     return h;
 }
@@ -46,7 +41,7 @@ fn gradient_probe(member: u32, point: u32) -> mat3x3<f32> {
     let o = at_node(member, stencil_entries[stencil_rows[point]].node);
     var h = mat3x3<f32>();
     for (var k = stencil_rows[point]; k < stencil_rows[point + 1u]; k++) {
-        h += outer3(probe[at_node(member, stencil_entries[k].node)].xyz - probe[o].xyz, stencil_gradients[k].xyz);
+        h += outer(probe[at_node(member, stencil_entries[k].node)].xyz - probe[o].xyz, stencil_gradients[k].xyz);
     }
     return h;
 }

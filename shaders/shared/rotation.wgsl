@@ -4,6 +4,11 @@
 override newton_determinant: f32;
 override smallest_pair: f32;
 
+// d ⊗ g, by columns.
+fn outer(d: vec3<f32>, g: vec3<f32>) -> mat3x3<f32> {
+    return mat3x3(d * g.x, d * g.y, d * g.z);
+}
+
 fn identity3() -> mat3x3<f32> {
     return mat3x3(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0));
 }

@@ -1,8 +1,7 @@
 //! Elastic and viscous force of the cells, and what their laws and a material that is not linear add to it.
 
-use super::{Along, Past, Pull, Term, Way, seeks_effect};
+use super::{Along, Past, Pull, Term, seeks_effect};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks;
 use crate::passes::{ALL, Passes, Per};
 use palpate_model::effects::Site;
 
@@ -26,13 +25,9 @@ impl Term for ElasticCells {
     }
 
     fn by_past(&self, s: &mut Passes, past: &Past) {
-        let way = match past.way {
-            Way::Along { .. } => asks::ALONG,
-            Way::Back { .. } => asks::TRANSPOSED,
-        };
         let named = [("probe", past.probe), ("now", past.state)];
-        s.run_with(pass::COUPLE_OLD, ALL, Per::Cell, way, &named);
-        s.all_laws(pass::COUPLE_LAWS, way, &named);
+        s.run_with(pass::COUPLE_OLD, ALL, Per::Cell, past.ask(), &named);
+        s.all_laws(pass::COUPLE_LAWS, past.ask(), &named);
     }
 
     fn by_coefficients(&self, s: &mut Passes, along: &Along) {

@@ -1,8 +1,7 @@
 //! Elastic and viscous force of points that stand for a volume each. A body of cells has none of these passes.
 
-use super::{Along, Past, Pull, Term, Way};
+use super::{Along, Past, Pull, Term};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::elastic_asks::{SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD};
 use crate::passes::{ALL, Passes, Per};
 
@@ -57,11 +56,7 @@ impl Term for ElasticPoints {
     /// With what patches left for it.
     fn by_past(&self, s: &mut Passes, past: &Past) {
         if s.has_points() {
-            let way = match past.way {
-                Way::Along { .. } => asks::ALONG,
-                Way::Back { .. } => asks::TRANSPOSED,
-            };
-            s.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, way, &[("probe", past.probe), ("now", past.state)]);
+            s.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, past.ask(), &[("probe", past.probe), ("now", past.state)]);
             s.spread_elastic(ALL, SPREAD_MINUS, s.patches_see_past(), past.to);
         }
     }

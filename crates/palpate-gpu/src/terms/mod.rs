@@ -13,6 +13,7 @@ mod point_laws;
 mod start;
 
 use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::points::{BACK, BY_OLD};
 use crate::device::pipelines::shared::pulls::{SEEK_DAMPING, SEEK_MODULUS, SEEK_POISSON, SEEK_REST, SEEK_START};
 use crate::device::recorder::Named;
@@ -74,6 +75,14 @@ impl Past<'_> {
         match self.way {
             Way::Along { .. } => BY_OLD,
             Way::Back { .. } => BACK,
+        }
+    }
+
+    /// How elements are asked.
+    fn ask(&self) -> u32 {
+        match self.way {
+            Way::Along { .. } => asks::ALONG,
+            Way::Back { .. } => asks::TRANSPOSED,
         }
     }
 
