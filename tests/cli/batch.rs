@@ -29,7 +29,8 @@ fn statuses(out: &std::path::Path) -> Vec<String> {
 fn one_bad_scene_harms_no_other_and_finished_ones_are_taken_over() {
     let folder = folder();
     let (scenes, out) = (folder.path().join("scenes"), folder.path().join("out"));
-    let run = |more: &[&str]| -> Answer { palpate(&[&["batch", arg(&scenes), "--out", arg(&out)], more].concat()) };
+    let run =
+        |more: &[&str]| -> Answer { palpate(&[&["batch", "--no-grid-check", arg(&scenes), "--out", arg(&out)], more].concat()) };
     let first = run(&[]);
     assert_eq!(first.code, 1, "{}", first.err);
     assert_eq!(statuses(&out), ["complete", "bad-input", "complete"]);
@@ -92,7 +93,7 @@ fn a_scene_that_is_taken_over_keeps_its_warning() {
     let text = fs::read_to_string(folder.path().join("fit.toml")).unwrap().replace("starts = 3", "starts = 1");
     fs::write(&scene, high(&text)).unwrap();
     let message = |more: &[&str]| {
-        let a = palpate(&[&["batch", arg(&scene), "--out", arg(&out)], more].concat());
+        let a = palpate(&[&["batch", "--no-grid-check", arg(&scene), "--out", arg(&out)], more].concat());
         assert_eq!(a.code, 0, "{}", a.err);
         json(out.join("summary.json"))["scenes"][0]["message"].as_str().unwrap().to_string()
     };
@@ -109,7 +110,7 @@ fn a_scene_that_is_taken_over_keeps_its_warning() {
 fn a_resumed_run_that_stops_early_forgets_no_scene_ahead() {
     let folder = folder();
     let (scenes, out) = (folder.path().join("scenes"), folder.path().join("out"));
-    let arguments = ["batch", arg(&scenes), "--out", arg(&out)];
+    let arguments = ["batch", "--no-grid-check", arg(&scenes), "--out", arg(&out)];
     assert_eq!(palpate(&arguments).code, 1);
     // The first scene changed, and the run stops in its fit.
     let a = fs::read_to_string(scenes.join("a.toml")).unwrap();
@@ -127,11 +128,11 @@ fn an_interrupted_batch_goes_on_where_it_was() {
     let list = folder.path().join("list.txt");
     fs::write(&list, "# two scenes\nscenes/a.toml\n\nscenes/c.toml\n").unwrap();
     let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
-    assert_eq!(palpate(&["batch", arg(&list), "--out", arg(&whole)]).code, 0);
-    let cut = stopped(&["batch", arg(&list), "--out", arg(&broken)], Interrupt::after(2));
+    assert_eq!(palpate(&["batch", "--no-grid-check", arg(&list), "--out", arg(&whole)]).code, 0);
+    let cut = stopped(&["batch", "--no-grid-check", arg(&list), "--out", arg(&broken)], Interrupt::after(2));
     assert_eq!(cut.code, INTERRUPTED, "{}", cut.err);
     assert_eq!(statuses(&broken), ["interrupted"]);
-    assert_eq!(palpate(&["batch", arg(&list), "--out", arg(&broken), "--resume"]).code, 0);
+    assert_eq!(palpate(&["batch", "--no-grid-check", arg(&list), "--out", arg(&broken), "--resume"]).code, 0);
     for name in ["a", "c"] {
         let value = |f: &std::path::Path| json(f.join(name).join("result.json"))["parameters"].clone();
         assert_eq!(value(&whole), value(&broken), "to the last bit");
@@ -148,7 +149,7 @@ fn a_batch_on_the_gpu_backend_finds_what_the_cpu_finds() {
     let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/batch/soft.toml");
     let found = |backend: &str| {
         let out = folder.path().join(backend);
-        let a = palpate(&["batch", arg(&scene), "--out", arg(&out), "--backend", backend]);
+        let a = palpate(&["batch", "--no-grid-check", arg(&scene), "--out", arg(&out), "--backend", backend]);
         assert_eq!(a.code, 0, "{}", a.err);
         let row = json(out.join("summary.json"))["scenes"][0].clone();
         assert_eq!((&row["status"], &row["backend"]), (&"complete".into(), &backend.into()));
@@ -164,10 +165,10 @@ fn a_batch_on_the_gpu_backend_finds_what_the_cpu_finds() {
 #[test]
 fn nothing_to_fit_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
-    let a = palpate(&["batch", arg(folder.path())]);
+    let a = palpate(&["batch", "--no-grid-check", arg(folder.path())]);
     assert!(a.code == 2 && a.err.contains("holds no scene"), "{}", a.err);
     let list = folder.path().join("list.txt");
     fs::write(&list, "# nothing\n").unwrap();
-    let a = palpate(&["batch", arg(&list)]);
+    let a = palpate(&["batch", "--no-grid-check", arg(&list)]);
     assert!(a.code == 2 && a.err.contains("names no scene"), "{}", a.err);
 }

@@ -71,7 +71,7 @@ fn recorded(cell: f64, field: &str) -> tempfile::TempDir {
 
 fn found(folder: &Path, options: &[&str]) -> (serde_json::Value, String) {
     let (scene, out) = (folder.join("fit.toml"), folder.join("found"));
-    let answer = succeed(&[&["fit", arg(&scene), "--out", arg(&out)], options].concat());
+    let answer = succeed(&[&["fit", "--no-grid-check", arg(&scene), "--out", arg(&out)], options].concat());
     (json(out.join("result.json")), answer.out)
 }
 

@@ -1,9 +1,9 @@
 //! Diagnosis from end to end: recordings made on another grid with another step, and a model that lacks one thing, or nothing.
 
-mod blind;
 mod measured;
 mod resuming;
 mod stopping;
+mod suite;
 
 use crate::cli::BLOCK;
 use serde_json::Value;
@@ -51,7 +51,7 @@ fn named(d: &Value) -> Vec<String> {
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
     let (folder, d) = diagnosed("");
-    assert_eq!((&d["format"], &d["verdict"]), (&"diagnosis/1".into(), &"adequate".into()));
+    assert_eq!((&d["format"], &d["verdict"]), (&"diagnosis/2".into(), &"adequate".into()));
     assert!(d["effects"].as_array().is_none_or(|e| e.iter().all(|e| e["accepted"] != true)));
     assert!(folder.path().join("why/report.html").exists());
 }

@@ -44,7 +44,7 @@ fn beam(time: Time) -> Scene {
 
 /// The whole time in so many steps.
 fn time(scheme: &'static scheme::Scheme, theta: f64, steps: usize) -> Time {
-    Time { step: END / steps as f64, steps, start: 0.0, theta, scheme }
+    Time { step: END / steps as f64, steps, start: 0.0, theta, scheme, open: None }
 }
 
 /// Distance of two states, in displacement [m] and in velocity [m/s], root mean square over nodes.

@@ -1,13 +1,18 @@
-//! Studies of the whole chain: recovery of known parameters ([`paper`]), what a diagnosis finds of what was hidden ([`blind`]), fits of
-//! measured recordings ([`real`]), time and memory ([`bench`]), bits that stay ([`same`]), order in the house ([`tidy`]).
+//! Studies of the whole chain: recovery of known parameters ([`paper`]), what a diagnosis finds of what was hidden ([`suite`]), fits of
+//! measured recordings ([`real`]), the equations against theory ([`verify`]), time and memory
+//! ([`bench`]), bits that stay ([`same`]), order in the house ([`tidy`]).
 //!
 //! Invariant: nothing here is used by the product; tests and developer verbs use it.
 
 pub mod bench;
-pub mod blind;
+pub mod coverage;
 pub mod paper;
 pub mod real;
+pub mod rows;
 pub mod same;
+pub mod suite;
 pub mod table;
 pub mod test;
+pub mod tetrahedra;
 pub mod tidy;
+pub mod verify;

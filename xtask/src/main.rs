@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, blind, paper, real, same, table, test, tidy};
+use studies::{bench, coverage, paper, real, same, suite, table, test, tidy, verify};
 
 /// Counts what the benchmarks allocate.
 #[global_allocator]
@@ -49,36 +49,62 @@ enum Verb {
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
     },
-    /// Hide every effect in recordings and see what the diagnosis says
-    Blind {
-        /// Only cases that hide this effect, or a group: null, pair, magnet; or one case by its name
-        #[arg(long, value_name = "EFFECT")]
+    /// Fit recordings of another simulator with drawn truths and count those inside the intervals that fits state (docs/coverage.md)
+    Coverage {
+        /// Only bodies of this kind (beam, plate, block, bouncing ball, resting ball), or sets of free numbers that hold this word
+        #[arg(long, value_name = "WORD")]
         only: Option<String>,
-        /// Only this scene: beam, torus, ball, blob or plate
-        #[arg(long, value_name = "NAME")]
-        scene: Option<String>,
-        /// Recordings with nothing hidden
-        #[arg(long, value_name = "N", default_value_t = 20)]
-        nulls: usize,
-        /// A fixed small subset
-        #[arg(long)]
-        quick: bool,
-        /// Time for the search of one case [s]
-        #[arg(long, value_name = "SECONDS", default_value_t = 180.0)]
-        budget: f64,
-        /// Do cases again that are known already
+        /// Stop after so many seconds; the next run goes on
+        #[arg(long, value_name = "SECONDS")]
+        slice: Option<f64>,
+        /// Stop after so many fits
+        #[arg(long, value_name = "N")]
+        fits: Option<usize>,
+        /// Fit again what this commit has fitted already
         #[arg(long)]
         fresh: bool,
-        /// Only print how strong each case is
+        /// Instead: print the table of all that was measured, and store it
         #[arg(long)]
-        strengths: bool,
+        report: bool,
+    },
+    /// Hide every effect, and what nobody knows, in recordings and see what palpate and methods beside it say (benchmark/README.md)
+    Suite {
+        /// Only these: groups (strong, weak, pair, outside, null), names of cases, scenes, kinds of drawn scenes, or what is hidden
+        #[arg(long, value_name = "A,B")]
+        only: Option<String>,
+        /// Who answers
+        #[arg(long, value_name = "A,B", default_value = "palpate")]
+        method: String,
+        /// At most so many cases of every group, spread over all of them
+        #[arg(long, value_name = "N")]
+        first: Option<usize>,
+        /// Stop after so many minutes; the next run goes on
+        #[arg(long, value_name = "MINUTES")]
+        slice: Option<f64>,
+        /// Time for the search of one case [s]
+        #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
+        budget: f64,
+        /// Measure again what this commit has measured already
+        #[arg(long)]
+        fresh: bool,
+        /// Let rows of other commits count as measured
+        #[arg(long)]
+        keep: bool,
         /// Say what is being computed
         #[arg(long)]
         verbose: bool,
-        /// Instead: recordings by a simulator that shares nothing with palpate (quadratic tetrahedra, neo-Hookean); --only takes a case, its
-        /// first word, its scene or what is hidden
-        #[arg(long, conflicts_with_all = ["scene", "quick", "strengths"])]
-        independent: bool,
+        /// Instead: find amplitudes of cases in benchmark/cases.toml that have none
+        #[arg(long, conflicts_with_all = ["record", "score", "report"])]
+        calibrate: bool,
+        /// Instead: write recordings and scenes of the cases for other methods
+        #[arg(long, value_name = "FOLDER", conflicts_with_all = ["score", "report"])]
+        record: Option<PathBuf>,
+        /// Instead: score answers of another method
+        #[arg(long, value_name = "FILE", conflicts_with = "report")]
+        score: Option<PathBuf>,
+        /// Instead: print the table of all that was measured, and store it
+        #[arg(long)]
+        report: bool,
     },
     /// Compare states, costs, derivatives and a fit of small scenes, bit by bit, with bench/same.json
     Same {
@@ -101,9 +127,18 @@ enum Verb {
         #[arg(long, value_name = "TABLE", num_args = 1..)]
         only: Vec<real::report::Slice>,
     },
+    /// Check the equations against theory: orders in space and time, the gradient, and benchmarks with known answers
+    ///
+    /// Each study is stored in bench/verify.json as it ends, and docs/verification.md is written from that file. Fails where a figure
+    /// is not what it has to be.
+    Verify {
+        /// Only these studies, the others stay as stored: space, time, taylor, cantilever, cook, vibration, hertz, bounce, friction, spin
+        #[arg(long, value_name = "STUDY", num_args = 1..)]
+        only: Vec<String>,
+    },
     /// Run the tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
-        /// Also the slow ones: whole recoveries and blind cases
+        /// Also the slow ones: whole recoveries and cases of the suite
         #[arg(long)]
         full: bool,
         /// Only those of this package
@@ -155,11 +190,22 @@ fn run(verb: Verb) -> Result<(), String> {
             report.print();
             println!("\nwritten to {}", table::save(&format!("bench-{}", report.date), &report)?.display());
         }
-        Verb::Blind { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent } => {
-            blind::run(&blind::Options { only, scene, nulls, quick, budget, fresh, strengths, verbose, independent })?;
+        Verb::Coverage { only, slice, fits, fresh, report } => {
+            coverage::run(&coverage::Options { only, slice, fits, fresh, report })?;
+        }
+        Verb::Suite { only, method, first, slice, budget, fresh, keep, verbose, calibrate, record, score, report } => {
+            let instead = match (calibrate, record, score, report) {
+                (true, ..) => suite::Instead::Calibrate,
+                (_, Some(folder), ..) => suite::Instead::Record(folder),
+                (_, _, Some(file), _) => suite::Instead::Score(file),
+                (.., true) => suite::Instead::Report,
+                _ => suite::Instead::Nothing,
+            };
+            suite::run(&suite::Options { only, method, first, slice, budget, fresh, keep, verbose, instead })?;
         }
         Verb::Same { only, backend, why, .. } => same::run(&same::Options { only, backend, why })?,
         Verb::Real { only } => println!("\nwritten to {}", real::run(&only)?.display()),
+        Verb::Verify { only } => verify::run(&only)?,
         Verb::Test { full, packages, checked, names } => {
             test::run(&table::root(), &test::Options { full, packages, names, checked })?;
         }

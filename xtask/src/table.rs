@@ -1,6 +1,7 @@
 //! Tables for people and JSON for later comparison.
 
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Prints rows with columns as wide as their widest cell; the first row is the heading.
@@ -47,6 +48,37 @@ pub fn save(name: &str, value: &impl Serialize) -> Result<PathBuf, String> {
     std::fs::create_dir_all(root().join("bench")).map_err(fail)?;
     std::fs::write(&path, text + "\n").map_err(fail)?;
     Ok(path)
+}
+
+/// What `bench/NAME.json` holds; nothing where there is no file.
+///
+/// # Errors
+/// The file is there and holds something else.
+pub fn stored<T: DeserializeOwned + Default>(root: &Path, name: &str) -> Result<T, String> {
+    let path = root.join("bench").join(format!("{name}.json"));
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(T::default()) };
+    serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// The line that stands before and after a generated table.
+pub fn mark(name: &str) -> String {
+    format!("<!-- {name} table -->\n")
+}
+
+/// Puts a generated table between the two marks of a page.
+///
+/// # Errors
+/// The page cannot be read or written, or has no two marks.
+pub fn replace(page: &str, name: &str, text: &str) -> Result<(), String> {
+    let path = root().join(page);
+    let fail = |e: std::io::Error| format!("{}: {e}", path.display());
+    let old = std::fs::read_to_string(&path).map_err(fail)?;
+    let mark = mark(name);
+    let parts: Vec<&str> = old.split(&mark).collect();
+    let [before, _, after] = parts[..] else {
+        return Err(format!("{}: there must be two lines {}", path.display(), mark.trim()));
+    };
+    std::fs::write(&path, format!("{before}{mark}{text}{mark}{after}")).map_err(fail)
 }
 
 /// Root of the workspace.

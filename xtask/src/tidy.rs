@@ -1,7 +1,11 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
+use crate::coverage;
 use crate::real::models;
 use crate::real::report::Report;
+use crate::suite::report as suite;
+use crate::table::mark;
+use crate::verify::report::Report as Verification;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +32,8 @@ pub fn check(root: &Path) -> Vec<String> {
     rooms(root, &mut found);
     tables(root, &mut found);
     measured(root, &mut found);
+    generated(root, &mut found);
+    verified(root, &mut found);
     effects(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
@@ -96,6 +102,34 @@ fn measured(root: &Path, found: &mut Vec<String>) {
     match Report::load(root) {
         Ok(report) if text.split(MARK).nth(1) == Some(&models::markdown(&report.models)) => {}
         Ok(_) => found.push("docs/real-data.md: the table of materials and schemes is not that of bench/real.json".into()),
+        Err(e) => found.push(e),
+    }
+}
+
+/// Tables of pages that are generated from what `bench/` holds.
+fn generated(root: &Path, found: &mut Vec<String>) {
+    let suite = suite::stored(root).map(|lines| suite::markdown(&lines));
+    let coverage = coverage::report::stored(root).map(|lines| coverage::report::markdown(&lines));
+    for (name, table) in [("suite", suite), ("coverage", coverage)] {
+        let text = fs::read_to_string(root.join(format!("docs/{name}.md"))).unwrap_or_default();
+        match table {
+            Ok(table) if text.split(&mark(name)).nth(1) == Some(&table) => {}
+            Ok(_) => {
+                found.push(format!("docs/{name}.md: the table is not that of bench/{name}.json; cargo xtask {name} --report"))
+            }
+            Err(e) => found.push(e),
+        }
+    }
+}
+
+/// The page of verification is what `bench/verify.json` holds, and says of nothing that it fails.
+fn verified(root: &Path, found: &mut Vec<String>) {
+    let text = fs::read_to_string(root.join("docs/verification.md")).unwrap_or_default();
+    match Verification::load(root) {
+        Ok(report) if text == report.page() => {
+            found.extend(report.failures().iter().map(|r| format!("docs/verification.md: \"{}\" fails", r.what)));
+        }
+        Ok(_) => found.push("docs/verification.md: is not what bench/verify.json says".into()),
         Err(e) => found.push(e),
     }
 }

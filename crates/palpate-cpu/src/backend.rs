@@ -22,10 +22,18 @@ impl CpuBackend {
     /// Stiffness of one member at a state without inertia (clamps, contact and ghost penalty included): blocks (row node, column
     /// node, 3 × 3) [N/m], for studies of conditioning and vibration.
     pub fn stiffness(&self, world: &mut World, state: &State, member: usize) -> Vec<(usize, usize, DMat3)> {
-        let matrix = simulate::stiffness(&world.shared, &mut world.members[member], &state.members[member]);
+        let u = state.members[member].u.clone();
+        self.statics(world, &u, member).1
+    }
+
+    /// Forces of one member at a displacement `[N]` without inertia [N], in the direction that resists it, and their derivative as
+    /// [`CpuBackend::stiffness`] gives it: for studies that bring loads of their own.
+    pub fn statics(&self, world: &mut World, u: &[DVec3], member: usize) -> (Vec<DVec3>, Vec<(usize, usize, DMat3)>) {
+        let (forces, matrix) = simulate::statics(&world.shared, &mut world.members[member], u);
         let rows = &world.shared.pattern.blocks;
         let of_row = |a: usize| (rows.rows[a]..rows.rows[a + 1]).map(move |k| (a, k));
-        (0..rows.len()).flat_map(of_row).map(|(a, k)| (a, rows.columns[k] as usize, matrix.values[k])).collect()
+        let blocks = (0..rows.len()).flat_map(of_row).map(|(a, k)| (a, rows.columns[k] as usize, matrix.values[k]));
+        (forces, blocks.collect())
     }
 }
 

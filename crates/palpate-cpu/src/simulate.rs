@@ -85,13 +85,13 @@ pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option
     })
 }
 
-/// The static stiffness at a state.
-pub fn stiffness(shared: &Shared, member: &mut Member, s: &MemberState) -> Matrix {
-    let (start, mut matrix) = (Start::still(s.u.len()), Matrix::default());
+/// The residual of the static problem at a displacement, and its derivative.
+pub fn statics(shared: &Shared, member: &mut Member, u: &[DVec3]) -> (Nodes, Matrix) {
+    let (start, mut matrix) = (Start::still(u.len()), Matrix::default());
     let mut e = equation(shared, member, None, &start);
-    e.residual(&s.u);
-    e.tangent(&s.u, Curvature::Exact, &mut matrix);
-    matrix
+    let residual = e.residual(u);
+    e.tangent(u, Curvature::Exact, &mut matrix);
+    (residual, matrix)
 }
 
 /// Takes the scratch matrix out of a member, so that an equation can borrow the rest.

@@ -31,11 +31,6 @@ impl Predicted {
     pub fn loss(&self) -> f64 {
         self.y.iter().map(|y| y * y).sum()
     }
-
-    /// What of it the right model would not leave, not negative.
-    pub fn excess(&self) -> f64 {
-        (self.loss() - self.floor).max(0.0)
-    }
 }
 
 /// Ways to leave data out: by time, or by region of the body in a recording of one instant; and by camera where several saw the body.
@@ -104,19 +99,4 @@ pub fn rms(values: impl Iterator<Item = (Source, Option<f64>)>) -> f64 {
         }
     }
     (sum / f64::max(n, 1.0)).sqrt()
-}
-
-/// How much worse `other` predicts than `best`, in standard deviations of the difference (Vuong, *Econometrica* 57, 1989, with frames as
-/// independent units, or regions of the body where there are few frames).
-pub fn worse_by(cells: &Cells, best: &Predicted, other: &Predicted) -> (f64, f64) {
-    let mut units = std::collections::BTreeMap::new();
-    let by_region = cells.few_instants();
-    for (i, k) in cells.keys.iter().enumerate() {
-        let unit = (k.scene, k.frame, if by_region { k.region } else { 0 });
-        *units.entry(unit).or_insert(0.0) += other.y[i].powi(2) - best.y[i].powi(2);
-    }
-    let n = units.len() as f64;
-    let sum: f64 = units.values().sum();
-    let variance = units.values().map(|d| (d - sum / n).powi(2)).sum::<f64>() * n / (n - 1.0).max(1.0);
-    (sum, if sum == 0.0 { 0.0 } else { sum / variance.sqrt().max(1e-12) })
 }

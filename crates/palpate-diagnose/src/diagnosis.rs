@@ -76,8 +76,8 @@ pub struct Found {
     pub sentence: String,
     /// Its numbers.
     pub parameters: Vec<FoundNumber>,
-    /// Probability of such an improvement by chance, times the number of starts of candidates, or of pairs of them.
-    pub p_value: f64,
+    /// How much better the model predicted what was left out with it than before, when it was added [nats], and the standard error of that.
+    pub nats: (f64, f64),
     /// Share of the gap that it closed when it was added, on data left out.
     pub held_out_gain: f64,
     /// True when it is part of the corrected model.
@@ -99,8 +99,6 @@ pub struct Tried {
     pub promised: f64,
     /// Share of the gap that it closed on data left out; `None` when it was not fitted.
     pub held_out_gain: Option<f64>,
-    /// Probability of the promise by chance.
-    pub p_value: f64,
 }
 
 /// One stretch of time of the slack force field.
@@ -167,12 +165,11 @@ pub struct MapEntry {
 pub struct Diagnosis {
     /// What it says.
     pub verdict: Verdict,
-    /// Probability of the baseline's residual structure when nothing is missing.
-    pub p_value: f64,
-    /// The same for the corrected model.
-    pub p_value_after: f64,
-    /// How large that structure is before and after: root mean square of blocks' means, as far as the null does not reach [m].
-    pub structure: (f64, f64),
+    /// How much better the baseline predicts what was left out beside a discrepancy than alone [nats], and the standard error of that: positive
+    /// where something is missing.
+    pub missing: (f64, f64),
+    /// The same of the corrected model.
+    pub missing_after: (f64, f64),
     /// The fitted model of the scene as it is.
     pub baseline: Model,
     /// Its distance from the measurement.
@@ -223,17 +220,9 @@ impl Diagnosis {
     fn answer(&self) -> String {
         let apart =
             format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
-        let p = |p: f64| if p <= 0.002 { "p ≤ 0.002".to_string() } else { format!("p = {p:.3}") };
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
         match self.verdict {
-            Verdict::Adequate => {
-                // A right model's residuals, or structure that is real but too small to look for its cause.
-                let small = match self.p_value <= 0.01 && self.structure.0 > 0.0 {
-                    true => format!("; structure of {} is too small to count", mm(self.structure.0)),
-                    false => String::new(),
-                };
-                format!("Nothing is missing that these data could show: {apart} ({}{small}).", p(self.p_value))
-            }
+            Verdict::Adequate => format!("Nothing is missing that these data could show: {apart}."),
             Verdict::Undecided if self.unsure => {
                 format!(
                     "Nothing is decided: the diagnosis was interrupted before the baseline and its noise were known; so far {apart}."
@@ -257,7 +246,7 @@ impl Diagnosis {
                 let slack = self.slack.as_ref().map_or(String::new(), |s| {
                     format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
                 });
-                format!("Something is missing ({}){why}: {apart}{place}; {close}{slack}.", p(self.p_value))
+                format!("Something is missing{why}: {apart}{place}; {close}{slack}.")
             }
             Verdict::MissingEffect => {
                 let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();
@@ -293,11 +282,8 @@ impl Diagnosis {
 
     /// What keeps the answer from being the whole one.
     fn caution(&self) -> String {
-        format!(
-            " What is left still has structure ({}, p = {:.3}): something else is missing as well, or this is only the nearest that is known.",
-            mm(self.structure.1),
-            self.p_value_after
-        )
+        " What is left still has structure: something else is missing as well, or this is only the nearest that is known."
+            .to_string()
     }
 
     /// What was not tried to its end although an answer was found; empty when nothing is open.

@@ -1,6 +1,7 @@
 //! The laboratory: what a diagnosis asks of whoever simulates and fits.
 
 use crate::change::Change;
+use crate::judgement::prior::Strange;
 use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::ResidualRow;
@@ -80,6 +81,8 @@ pub struct Number {
     pub scale: f64,
     /// How a fit sees it.
     pub transform: Transform,
+    /// Value and standard deviation that are known beforehand: a prior that costs and fits of a [`Laboratory`] contain, and readings do not.
+    pub known: Option<(f64, f64)>,
 }
 
 impl Number {
@@ -143,8 +146,8 @@ pub struct Fit {
     pub model: Model,
     /// Its cost per scalar residual.
     pub cost: f64,
-    /// By how much it lowered the cost it started from.
-    pub gained: f64,
+    /// By how much the curvature there promises to lower its cost further.
+    pub promised: f64,
     /// Longest step that it would try next.
     pub reach: f64,
     /// False when more iterations would go on.
@@ -183,13 +186,28 @@ pub struct Field {
     pub name: &'static str,
     /// Change of every residual [m]; `None` where it cannot be said.
     pub change: Vec<Option<f64>>,
+    /// How many times the field is in the residuals, before any is read: its mean and standard deviation.
+    pub times: (f64, f64),
     /// Share of the field that is not known, independently in every block.
     pub rough: f64,
 }
 
 impl Field {
-    /// Share of the discretisation's error that its estimate from one refinement misses.
-    pub const REFINED: f64 = 0.3;
+    /// What a finer computation of the same model adds to the residuals. What one refinement says is trusted to its own size as a whole, and
+    /// to half of it in every block: contact and edges follow no order of convergence.
+    pub fn refined(name: &'static str, change: Vec<Option<f64>>) -> Field {
+        Field { name, change, times: (1.0, 1.0), rough: 0.5 }
+    }
+
+    /// One of the recording's systematic errors, by its standard deviation.
+    pub fn systematic(name: &'static str, change: Vec<Option<f64>>) -> Field {
+        Field { name, change, times: (0.0, 1.0), rough: 0.0 }
+    }
+
+    /// The same field for another model of the same recording: its size is known, its sign is not.
+    pub fn borrowed(&self) -> Field {
+        Field { times: (0.0, self.times.0.abs().max(self.times.1)), ..self.clone() }
+    }
 
     /// Mean square of the changes that can be said [m²].
     pub fn mean_square(&self) -> f64 {
@@ -220,25 +238,23 @@ pub trait Laboratory {
     fn systematic(&mut self, _changes: &[Change], _values: &[f64]) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
-    /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none.
+    /// Residuals of data that no fit has seen, with the numbers that are not shared with them fitted; `None` when there are none. Columns are
+    /// the model's numbers, zero where they say nothing there, then those that were fitted there.
     fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError>;
-    /// What finer computations would change in those residuals, `coarse` as [`Laboratory::held_out`] gave them for the same model. `moves` says
-    /// by how much its numbers would move, were they fitted again with what the field of that name in [`Laboratory::finer`] adds: what one
-    /// recording taught them on a coarse grid makes up for errors of the grid in the other as well.
+    /// What finer computations of the same model would change in those residuals, `coarse` as [`Laboratory::held_out`] gave them.
     ///
     /// # Errors
     /// The finer scene cannot be computed.
-    fn held_out_finer(
-        &mut self,
-        _model: &Model,
-        _moves: &[(&'static str, Vec<f64>)],
-        _coarse: &Readings,
-    ) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(&mut self, _model: &Model, _coarse: &Readings) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
     /// What other measurements would read of each of several rivals, compared with what they would read of the model that is named; those
     /// that there is time to simulate.
     fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation>;
+    /// Numbers of a model that lie outside the world as it is known, or at a bound.
+    fn strange(&self, _model: &Model) -> Vec<Strange> {
+        Vec::new()
+    }
     /// True when the time that was allowed is over.
     fn out_of_time(&self) -> bool;
     /// Iterations of fits that there is time for, about; with no limit of the time all that can be counted.
@@ -264,6 +280,7 @@ mod tests {
             bounds: (-0.999, 1e3),
             scale: 0.5,
             transform,
+            known: None,
         };
         for start in [-0.9, 0.0, 4.0] {
             let n = number(start, Transform::Relative);

@@ -7,6 +7,7 @@ mod cells;
 mod change;
 mod crossval;
 mod diagnosis;
+mod judgement;
 mod laboratory;
 mod linear;
 mod locate;
@@ -21,12 +22,13 @@ mod workflow;
 pub use cells::Regions;
 pub use change::{Candidate, Change, can_be_freed, candidates};
 pub use diagnosis::{Diagnosis, Found, FoundNumber, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
+pub use judgement::prior::Strange;
 pub use laboratory::{Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
 pub use linear::least_squares;
 pub use locate::{Place, direction};
 pub use quantity::{millimetres, stated};
 pub use separation::{Separated, Separation};
-pub use workflow::{Options, diagnose};
+pub use workflow::{Options, Policy, diagnose};
 
 #[cfg(test)]
 mod tests;

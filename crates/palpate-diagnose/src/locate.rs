@@ -2,7 +2,7 @@
 
 use crate::cells::Cells;
 use crate::laboratory::Setting;
-use crate::null::Adequacy;
+use crate::null::Block;
 use glam::DVec3;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -25,9 +25,8 @@ pub struct Place {
 }
 
 /// Places of a model's excess, the largest share first.
-pub fn locate(cells: &Cells, adequacy: &Adequacy, setting: &Setting) -> Vec<Place> {
+pub fn locate(cells: &Cells, blocks: &[Block], setting: &Setting) -> Vec<Place> {
     let normal = Normal::standard();
-    let blocks = &adequacy.blocks;
     let p: Vec<f64> = blocks.iter().map(|b| 2.0 * normal.sf(b.z.abs())).collect();
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));

@@ -1,4 +1,4 @@
-//! Is something missing? Structure of residuals over body and time, against what noise and discretisation leave after a refit.
+//! The map of residuals over body and time, in standard deviations of what noise and discretisation leave after a refit.
 //!
 //! In units of the noise a right model leaves r = Π (ε + Σ s_k d_k), ε noise, d_k the fields by which finer computations differ and the
 //! recording's systematic errors, Π what refitting leaves, drawn with the shapes that noise was seen to have. s_k is one number per field
@@ -19,9 +19,6 @@ use std::collections::BTreeMap;
 /// Recordings drawn from the null.
 pub const DRAWS: usize = 499;
 
-/// Standard deviations of the null beyond which a block shows structure: two hundred blocks reach three of them once by chance.
-const CLEAR: f64 = 3.0;
-
 /// Largest number of times that a field of errors, which is carried on to the limit, explains residuals; what remains beyond twice is
 /// something else that looks alike. Right models of bodies simulated by another method (quadratic tetrahedra, second order in time) need up to 1.6.
 pub const LARGEST: f64 = 2.0;
@@ -41,6 +38,8 @@ pub struct Frame {
     pub fields: Vec<Vec<f64>>,
     /// Share of each that is not known.
     rough: Vec<f64>,
+    /// Root mean square times that each is there, over its standard deviation.
+    whole: Vec<f64>,
 }
 
 /// A vector over cells with zeros for the pseudo-readings.
@@ -61,12 +60,21 @@ pub fn absorbed_by<'a>(columns: impl Iterator<Item = &'a Vec<f64>>, fields: &[Ve
 }
 
 impl Frame {
-    /// A model's table with fields of errors and the shares of them that are not known.
-    pub fn new(table: &Table, fields: Vec<Vec<f64>>, rough: Vec<f64>) -> Frame {
+    /// A model's table with fields of errors, how many times they are expected (mean and standard deviation), and the shares of them that
+    /// are not known.
+    pub fn new(table: &Table, fields: &[Vec<f64>], times: &[(f64, f64)], rough: &[f64]) -> Frame {
         let n = fields.len();
         let free = Basis::new(table.columns.iter());
+        let mut y = extended(&table.y, n);
+        for (f, (mean, _)) in fields.iter().zip(times) {
+            y.iter_mut().zip(f).for_each(|(y, f)| *y += mean * f);
+        }
+        let scaled = |(f, (_, sd)): (&Vec<f64>, &(f64, f64))| f.iter().map(|f| sd * f).collect();
+        let fields: Vec<Vec<f64>> = fields.iter().zip(times).map(scaled).collect();
+        let rough = rough.iter().zip(times).map(|(r, (_, sd))| r / sd).collect();
         let absorbed = absorbed_by(table.columns.iter(), &fields);
-        Frame { y: extended(&table.y, n), absorbed, free, fields, rough }
+        let whole = times.iter().map(|(mean, sd)| mean.hypot(*sd) / sd).collect();
+        Frame { y, absorbed, free, fields, rough, whole }
     }
 
     /// Residuals after the refit `[m + fields]`.
@@ -82,12 +90,18 @@ impl Frame {
 
     /// What of the fields free numbers do not absorb `[fields][m]`: only that shows in residuals.
     pub fn visible(&self) -> Vec<Vec<f64>> {
+        let whole = |(f, w): (Vec<f64>, &f64)| f.iter().map(|f| w * f).collect();
+        self.bent().into_iter().zip(&self.whole).map(whole).collect()
+    }
+
+    /// The same for one standard deviation of each.
+    fn bent(&self) -> Vec<Vec<f64>> {
         self.fields.iter().map(|f| self.free.without(f)).collect()
     }
 
     /// Residuals after the refit in cells `[m]`, with no field taken more than a few times.
     pub fn left_within_reason(&self) -> Vec<f64> {
-        let bent = self.visible();
+        let bent = self.bent();
         let mut left = self.free.without(&self.y[..self.y.len() - self.fields.len()]);
         let mut times = vec![0.0; bent.len()];
         for _ in 0..ROUNDS {
@@ -119,17 +133,6 @@ pub struct Block {
     pub z: f64,
 }
 
-/// Answer of the test.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Adequacy {
-    /// Probability of such structure, or more, when nothing is missing.
-    pub p_value: f64,
-    /// How large the structure is: root mean square over cells of their blocks' mean residuals, as far as the null does not reach [m].
-    pub structure: f64,
-    /// The blocks.
-    pub blocks: Vec<Block>,
-}
-
 /// Blocks of cells: `bins` stretches of time.
 pub fn blocks(cells: &Cells, bins: usize) -> Vec<Block> {
     let bin = cells.time_blocks(bins);
@@ -144,18 +147,6 @@ pub fn blocks(cells: &Cells, bins: usize) -> Vec<Block> {
 /// Mean over a block of its residuals in units of their noise, times √n.
 fn sum(block: &Block, y: &[f64]) -> f64 {
     block.cells.iter().map(|i| y[*i]).sum::<f64>() / (block.cells.len() as f64).sqrt()
-}
-
-/// Mean over a block of its residuals [m].
-fn mean(block: &Block, cells: &Cells, y: &[f64]) -> f64 {
-    block.cells.iter().map(|i| y[*i] * cells.sd[*i]).sum::<f64>() / block.cells.len() as f64
-}
-
-/// Mean square over cells of what their blocks' mean residuals show beyond the null [m²].
-fn excess(blocks: &[Block], cells: &Cells, y: &[f64]) -> f64 {
-    let beyond = |b: &Block| (1.0 - (CLEAR / b.z).powi(2)).max(0.0);
-    let squares = blocks.iter().map(|b| b.cells.len() as f64 * mean(b, cells, y).powi(2) * beyond(b));
-    squares.sum::<f64>() / (cells.len() as f64).max(1.0)
 }
 
 /// One draw of residuals that a right model would leave.
@@ -175,8 +166,8 @@ fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, blocks: &[Block], rng: &mu
     left
 }
 
-/// Tests a model's residuals; the same seed gives the same answer.
-pub fn test(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64) -> Adequacy {
+/// The map of a model's residuals: blocks of region and time in standard deviations of what a right model leaves; the same seed gives the same.
+pub fn map(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64) -> Vec<Block> {
     let mut blocks = blocks(cells, bins);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let draws: Vec<Vec<f64>> = (0..DRAWS)
@@ -186,19 +177,9 @@ pub fn test(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64
         })
         .collect();
     let left = frame.left_within_reason();
-    let sd: Vec<f64> =
-        (0..blocks.len()).map(|b| (draws.iter().map(|d| d[b] * d[b]).sum::<f64>() / DRAWS as f64).sqrt().max(1e-6)).collect();
-    for (b, sd) in blocks.iter_mut().zip(&sd) {
-        b.z = sum(b, &left) / sd;
+    for k in 0..blocks.len() {
+        let sd = (draws.iter().map(|d| d[k] * d[k]).sum::<f64>() / DRAWS as f64).sqrt().max(1e-6);
+        blocks[k].z = sum(&blocks[k], &left) / sd;
     }
-    let structure = excess(&blocks, cells, &left).sqrt();
-    // Two questions at once: structure spread over many blocks, and structure in one.
-    let both = |z: &mut dyn Iterator<Item = f64>| z.fold([0.0f64, 0.0], |[s, m], z| [s + z * z, m.max(z.abs())]);
-    let observed = both(&mut blocks.iter().map(|b| b.z));
-    let drawn: Vec<[f64; 2]> = draws.iter().map(|d| both(&mut d.iter().zip(&sd).map(|(z, s)| z / s))).collect();
-    let share = |k: usize, value: f64| (1 + drawn.iter().filter(|d| d[k] >= value).count()) as f64 / (DRAWS + 1) as f64;
-    let least = |v: &[f64; 2]| share(0, v[0]).min(share(1, v[1]));
-    let mine = least(&observed);
-    let as_small = drawn.iter().filter(|d| least(d) <= mine).count();
-    Adequacy { p_value: (1 + as_small) as f64 / (DRAWS + 1) as f64, structure, blocks }
+    blocks
 }

@@ -1,11 +1,10 @@
-//! What a candidate could explain, from sensitivities where it is absent: a generalised score (partial F) test.
+//! What a candidate could explain, from sensitivities where it is absent: a generalised score.
 //!
 //! With the fitted numbers and the discretisation projected out of residuals y and of the candidate's columns C, the sum of squares falls by
 //! |P_C y|² when the candidate's amplitudes are set free (Rao, *Proc. Camb. Phil. Soc.* 44, 1948, for small changes).
 
 use crate::linear::{Basis, dot, least_squares, least_squares_in};
 use crate::null::Frame;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Ridge on columns of unit length: directions that the fitted numbers absorb up to a thousandth are not told apart from them.
 const RIDGE: f64 = 1e-6;
@@ -24,8 +23,6 @@ pub struct Score {
     pub share: f64,
     /// Free amplitudes that it takes.
     pub freedom: usize,
-    /// Probability of so large a decrease by chance.
-    pub p_value: f64,
     /// Best change of each number `[columns]`.
     pub step: Vec<f64>,
 }
@@ -41,7 +38,7 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)], groups:
     let mut active: Vec<usize> = (0..columns.len()).filter(|k| own(*k)).collect();
     let lengths: Vec<f64> = bent.iter().map(|b| dot(b, b).sqrt()).collect();
     let size = |k: usize| lengths.iter().zip(groups).filter(|(_, g)| **g == groups[k]).map(|(l, _)| *l).fold(0.0, f64::max);
-    let mut out = Score { step: vec![0.0; columns.len()], p_value: 1.0, ..Score::default() };
+    let mut out = Score { step: vec![0.0; columns.len()], ..Score::default() };
     // Residuals with the changes that reached a bound.
     let mut y = y;
     let mut held = Vec::new();
@@ -75,16 +72,5 @@ pub fn score(frame: &Frame, columns: &[Vec<f64>], bounds: &[(f64, f64)], groups:
         break;
     }
     out.share = if total > 0.0 { out.gain / total } else { 0.0 };
-    let rest = y.len() as f64 - (frame.absorbed.rank() + out.freedom) as f64;
-    out.p_value = f_tail(out.gain, out.freedom, total - out.gain, rest);
     out
-}
-
-/// Probability that chance alone takes `gain` from a sum of squares with `freedom` numbers when `left` remains with `rest` degrees.
-pub fn f_tail(gain: f64, freedom: usize, left: f64, rest: f64) -> f64 {
-    if freedom == 0 || rest < 1.0 {
-        return 1.0;
-    }
-    let f = (gain / freedom as f64) / (left / rest).max(1e-300);
-    FisherSnedecor::new(freedom as f64, rest).map_or(1.0, |d| d.sf(f.max(0.0)))
 }

@@ -4,46 +4,40 @@ mod bound;
 mod candidate;
 mod choose;
 mod conclude;
+mod linear;
 mod needed;
 mod own_errors;
 mod pairs;
+mod policy;
 mod prune;
 mod race;
 mod replace;
 mod rounds;
+mod state;
 mod variants;
 
 use crate::cells::{Cells, Table};
-use crate::change::Change;
+use crate::change::{Change, candidates};
 use crate::crossval::{Predicted, foldings, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
+use crate::judgement::density::Blocks;
+use crate::judgement::prior::{Prior, Strange};
+use crate::judgement::rule::Judged;
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
 use crate::locate::{Place, locate};
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
-use crate::null::{Adequacy, Block, Frame, extended, test};
+use crate::null::{Block, Frame, extended, map};
 use crate::score::Score;
 use crate::still::still_ratio;
 use candidate::CandidateId;
+pub use policy::Policy;
 use variants::{Variant, most_promising};
 
 /// How to diagnose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// False-alarm rate of the question whether something is missing.
-    pub significance: f64,
-    /// Smallest structure of residuals that counts, over the noise of single readings. Thousands of readings make a tenth of their noise
-    /// significant, but no model of a body is that good.
-    pub least_structure: f64,
-    /// Smallest share of the gap that an effect must close on data left out.
-    pub least_gain: f64,
-    /// Share of the gap that all accepted effects together must close, unless nothing remains.
-    pub enough: f64,
-    /// The same when there are several effects, whatever remains: what takes a patchwork to be followed roughly is not known.
-    pub enough_of_several: f64,
-    /// Most effects added.
-    pub rounds: usize,
-    /// Candidates fitted in a round.
-    pub fits: usize,
+    /// How the search spends its time.
+    pub search: Policy,
     /// Stretches of time that residuals are looked at in.
     pub bins: usize,
     /// Windows of time of the slack force.
@@ -54,18 +48,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options {
-            significance: 0.01,
-            least_structure: 0.25,
-            least_gain: 0.3,
-            enough: 0.7,
-            enough_of_several: 0.9,
-            rounds: 3,
-            fits: 12,
-            bins: 8,
-            windows: 5,
-            seed: 1,
-        }
+        Options { search: Policy::default(), bins: 8, windows: 5, seed: 1 }
     }
 }
 
@@ -84,6 +67,14 @@ struct State {
     held_out_finer: Vec<Field>,
     /// Why there are none although there is such data.
     elsewhere: Option<String>,
+    /// True where the fields are of this very model.
+    own: bool,
+    /// Numbers that the recording asks for, of every change.
+    needed: Vec<usize>,
+    /// What is strange about its numbers.
+    strange: Vec<Strange>,
+    /// How it predicts what was left out.
+    judged: Judged,
 }
 
 impl State {
@@ -97,7 +88,8 @@ impl State {
 struct Fitted {
     candidate: CandidateId,
     state: State,
-    p_value: f64,
+    /// How much better it predicts than the model before, and the standard error of that [nats].
+    nats: (f64, f64),
     gain: f64,
     freedom: usize,
     /// Of these, numbers that the recording asks for.
@@ -130,6 +122,12 @@ struct Session<'a> {
     options: &'a Options,
     cells: Cells,
     folds: Vec<Vec<usize>>,
+    /// Blocks of cells that are left out.
+    blocks: Blocks,
+    /// The same of a second recording.
+    second: Option<(Cells, Blocks)>,
+    /// Number of candidates.
+    candidates: usize,
     noise_ratio: f64,
     design_effect: f64,
     noise: Shapes,
@@ -143,6 +141,8 @@ struct Session<'a> {
     no_time: bool,
 }
 
+/// Standard deviations outside the known world from which on a number is evidence that something is missing.
+const STRANGE: f64 = 3.0;
 /// Share of the baseline's readings that a model must meet for its residuals to tell of the noise.
 const KEPT: f64 = 0.95;
 /// Diagnoses a scene from its fitted baseline.
@@ -160,12 +160,15 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
         *sd *= if k.stream.sensor.is_camera() { noise_ratio } else { 1.0 };
     }
-    let folds = foldings(&cells);
+    let (folds, blocks, count) = (foldings(&cells), Blocks::new(&cells), candidates(lab.setting()).len());
     let mut s = Session {
         lab,
         options,
         cells,
         folds,
+        blocks,
+        second: None,
+        candidates: count,
         noise_ratio,
         design_effect: 1.0,
         noise: Shapes::default(),
@@ -177,22 +180,23 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
     };
     let fields = s.finer(&baseline);
     let unsure = s.lab.interrupted();
-    let mut state = s.state(baseline.clone(), readings, fields, None)?;
+    let mut state = s.state(baseline.clone(), readings, fields, true, None)?;
     state.held_out_finer = s.held_out_finer(&state);
     s.correlate(&mut state);
+    s.look_elsewhere(&mut state);
     let mut first = (state.readings.clone(), s.grid(&state));
     let mut out = Progress { unsure, ..Progress::default() };
-    let mut adequacy;
+    let mut blocks;
     let mut base = state.clone();
+    let mut rounds: Vec<(State, Vec<Found>)> = Vec::new();
     loop {
-        adequacy = s.adequacy(&state);
+        blocks = s.map(&state);
         if out.places.is_none() {
-            out.places = Some(locate(&s.cells, &adequacy, s.lab.setting()));
-            (out.p_value, out.structure) = (adequacy.p_value, adequacy.structure);
-            out.blocks.clone_from(&adequacy.blocks);
+            out.places = Some(locate(&s.cells, &blocks, s.lab.setting()));
+            out.blocks.clone_from(&blocks);
         }
         out.interrupted = s.lab.interrupted();
-        if !s.is_missing(&adequacy, &state) || out.accepted.len() >= options.rounds || out.interrupted {
+        if !s.is_worth_a_look(&state) || out.accepted.len() >= options.search.rounds || out.interrupted {
             break;
         }
         if s.lab.out_of_time() {
@@ -210,14 +214,20 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
                     }
                     continue;
                 }
+                let before = (state.clone(), out.accepted.clone());
                 out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
-                s.settle(&mut state, met(&base.readings));
                 if let Some(mut other) = s.replace(&state, &mut out.accepted) {
                     s.refine(&mut other);
                     state = s.prune(other, &mut out.accepted);
-                    s.settle(&mut state, met(&base.readings));
                 }
+                // A round that ends no better than it began would follow itself for ever.
+                if !state.judged.over(&before.0.judged).is_clear() {
+                    (state, out.accepted) = before;
+                    break;
+                }
+                s.settle(&mut state, met(&base.readings));
+                rounds.push(before);
             }
             Ok((None, close)) => {
                 out.close = close;
@@ -230,9 +240,20 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             Err(e) => return Err(e),
         }
     }
+    // With enough effects anything is followed roughly: the last one must explain what is left better than "something unknown" does.
+    while let Some((mut before, accepted)) = rounds.pop() {
+        s.remeasure(&mut before);
+        if !state.judged.is_missing() || state.judged.alone_over(&before.judged).nats > 0.0 {
+            break;
+        }
+        out.close = std::mem::replace(&mut out.accepted, accepted).into_iter().last().into_iter().collect();
+        out.close.iter_mut().for_each(|f| f.accepted = false);
+        state = before;
+        blocks = s.map(&state);
+    }
     // Both levels in the noise as it is known at the end.
     let before = s.level_of(&first.0, first.1, &[]);
-    Ok(s.conclude((base, before), state, &adequacy, out))
+    Ok(s.conclude((base, before), state, &blocks, out))
 }
 
 /// What the rounds have brought so far.
@@ -243,8 +264,6 @@ struct Progress {
     places: Option<Vec<Place>>,
     /// The baseline's residuals in blocks.
     blocks: Vec<Block>,
-    p_value: f64,
-    structure: f64,
     interrupted: bool,
     unsure: bool,
 }
@@ -270,63 +289,6 @@ fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
 }
 
 impl Session<'_> {
-    /// What a finer grid and half the step would change, and what the recording's systematic errors may have changed. A scene that is too
-    /// large to be refined, or fails there, has no estimate, and neither has one whose diagnosis was asked to stop.
-    fn finer(&mut self, model: &Model) -> Vec<Field> {
-        let same = |of: &Model| (&of.changes, &of.values) == (&model.changes, &model.values);
-        if let Some((_, known)) = self.finer.iter().find(|(of, _)| same(of)) {
-            return known.clone();
-        }
-        self.lab.say("discretisation error: finer grid, half step");
-        let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
-        all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
-        if !self.lab.interrupted() {
-            self.finer.push((model.clone(), all.clone()));
-        }
-        all
-    }
-
-    /// Brings errors of the discretisation up to date: with another effect in place they are others.
-    fn refine(&mut self, state: &mut State) {
-        state.fields = self.finer(&state.model);
-        state.held_out_finer = self.held_out_finer(state);
-        self.remeasure(state);
-    }
-
-    /// Everything known about a model; means of cells that it lost are taken over from another one's.
-    fn state(
-        &mut self,
-        model: Model,
-        readings: Readings,
-        fields: Vec<Field>,
-        fallback: Option<&Table>,
-    ) -> Result<State, LabError> {
-        let table = self.cells.table(&readings, fallback);
-        let frame = self.frame(&table, &fields);
-        let predicted = self.predict(&readings, &table, &frame);
-        let (held_out, elsewhere) = match self.lab.held_out(&model) {
-            Ok(readings) => (readings, None),
-            Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-            // A model that cannot follow the other recording is judged by this one.
-            Err(e) => (None, Some(e.to_string())),
-        };
-        Ok(State { model, readings, table, fields, frame, predicted, held_out, held_out_finer: Vec::new(), elsewhere })
-    }
-
-    /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.
-    fn beside(&mut self, state: &State, model: Model, readings: Readings) -> Result<State, LabError> {
-        let mut new = self.state(model, readings, state.fields.clone(), Some(&state.table))?;
-        new.held_out_finer.clone_from(&state.held_out_finer);
-        Ok(new)
-    }
-
-    /// What finer computations would change in a state's residuals of data that no fit has seen.
-    fn held_out_finer(&mut self, state: &State) -> Vec<Field> {
-        let Some(coarse) = &state.held_out else { return Vec::new() };
-        let moves: Vec<_> = state.fields.iter().zip(&state.frame.fields).map(|(f, y)| (f.name, race::moves(state, y))).collect();
-        self.lab.held_out_finer(&state.model, &moves, coarse).unwrap_or_default()
-    }
-
     /// Root mean square noise of single residuals [m].
     fn reading_noise(&self, readings: &Readings) -> f64 {
         let known = readings.rows.iter().filter(|r| r.row.value.is_some());
@@ -340,23 +302,24 @@ impl Session<'_> {
         (ratio * r.row.noise * r.row.along_sight).powi(2)
     }
 
-    /// Structure of a state's residuals against what noise and discretisation leave.
-    fn adequacy(&self, state: &State) -> Adequacy {
-        test(&self.cells, &state.frame, &self.noise, self.options.bins, self.options.seed)
+    /// A state's residuals against what noise and discretisation leave.
+    fn map(&self, state: &State) -> Vec<Block> {
+        map(&self.cells, &state.frame, &self.noise, self.options.bins, self.options.seed)
     }
 
-    /// True when residuals have structure that is no chance and counts: because it is large, or because more than twice what noise and
-    /// discretisation explain is left. What swings within a block does not show in its mean, and what errors of the discretisation could
-    /// just make up for, taken twice each, not in the test at all: more than four times as much is missing something in any case.
-    fn is_missing(&self, found: &Adequacy, state: &State) -> bool {
-        let least = self.options.least_structure * self.reading_noise(&state.readings);
-        let level = self.level(state);
-        level.is_far() || found.p_value <= self.options.significance && (found.structure >= least || !level.is_close())
+    /// True when something is missing in a model, or may be: a discrepancy beside it predicts better, its numbers are not of this world, or a
+    /// candidate promises more than it costs.
+    fn is_worth_a_look(&self, state: &State) -> bool {
+        let price = Prior { candidates: self.candidates, readings: self.cells.len() };
+        let promises = |v: &Variant| 0.5 * v.score.gain + price.log(&[v.score.freedom], &[]) > 0.0;
+        let scored = self.scored.iter().flatten().any(promises);
+        state.judged.is_missing() || state.strange.iter().any(|s| s.deviations > STRANGE) || scored
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {
-        let means = fields.iter().map(|f| self.cells.means(&f.change)).collect();
-        Frame::new(table, means, fields.iter().map(|f| f.rough).collect())
+        let means: Vec<Vec<f64>> = fields.iter().map(|f| self.cells.means(&f.change)).collect();
+        let times: Vec<(f64, f64)> = fields.iter().map(|f| f.times).collect();
+        Frame::new(table, &means, &times, &fields.iter().map(|f| f.rough).collect::<Vec<_>>())
     }
 
     fn predict(&self, readings: &Readings, table: &Table, frame: &Frame) -> Vec<Predicted> {
@@ -368,6 +331,7 @@ impl Session<'_> {
         state.table = self.cells.table(&state.readings, None);
         state.frame = self.frame(&state.table, &state.fields);
         state.predicted = self.predict(&state.readings, &state.table, &state.frame);
+        self.judge(state);
     }
 
     /// Finds how much more cells scatter than independent readings would, and rescales everything by it.

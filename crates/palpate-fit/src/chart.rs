@@ -38,6 +38,16 @@ pub enum AtBound {
     Upper,
 }
 
+impl AtBound {
+    /// As sentences name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            AtBound::Lower => "lower",
+            AtBound::Upper => "upper",
+        }
+    }
+}
+
 impl Chart {
     /// A chart for values in `[lower, upper]`; the error says what is wrong and what is allowed.
     pub fn new(transform: Transform, typical: f64, lower: f64, upper: f64) -> Result<Chart, String> {

@@ -1,13 +1,15 @@
 //! The fit itself: starts, the best of them, and what is known about it.
 
 use crate::chart::AtBound;
+use crate::dense::{box_step, dot};
 use crate::journal::{Journal, JournalError, JournalFile};
 use crate::multistart;
 use crate::optimise::{Sample, Status};
 use crate::problem::{Problem, Want};
-use crate::settings::{ErrorModel, Settings};
+use crate::settings::{ErrorModel, Settings, Walk};
 use crate::uncertainty::{self, Uncertainty};
 use palpate_engine::MOST_SENSITIVITIES;
+use palpate_model::params::Transform;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -55,6 +57,9 @@ pub struct Progress {
 /// From θ of every scene to how many residuals count as one independent reading.
 pub type Worth<'a> = dyn FnMut(&[Vec<f64>]) -> f64 + 'a;
 
+/// From the values `[q]` of starts that see nothing to those where each sees something; `None` where none were found.
+pub type Lead<'a> = dyn FnMut(&[Vec<f64>]) -> Vec<Option<Vec<f64>>> + 'a;
+
 /// What the caller hears and controls while a fit runs.
 #[derive(Default)]
 pub struct Hooks<'a> {
@@ -67,6 +72,8 @@ pub struct Hooks<'a> {
     pub journal: Option<JournalFile>,
     /// Told θ of every scene at the best point, says how many residuals count as one independent reading there; 1 without it.
     pub design_effect: Option<&'a mut Worth<'a>>,
+    /// Leads starts from which nothing can be seen ([`Status::Blind`]) to where something can; without it they are searched from like others.
+    pub lead: Option<&'a mut Lead<'a>>,
 }
 
 /// One start's search.
@@ -86,8 +93,10 @@ pub struct Run {
     pub evaluations: usize,
     /// Products with the Gauss–Newton matrix used.
     pub products: usize,
-    /// Longest step that Gauss–Newton would try next ([`Settings::first_step`]).
-    pub reach: f64,
+    /// How Gauss–Newton stood ([`Settings::walk`]).
+    pub walk: Walk,
+    /// By how much the curvature at its end promises to lower the cost further; 0 where none is known.
+    pub promised: f64,
     /// How it ended.
     pub status: Status,
 }
@@ -103,8 +112,14 @@ pub struct FittedParameter {
     pub value: f64,
     /// Standard error in the same unit; `None` if it could not be computed.
     pub standard_error: Option<f64>,
+    /// The part of it that averages out over residuals, without errors that those of a group share.
+    pub noise: Option<f64>,
     /// SI unit, `1` for none.
     pub unit: String,
+    /// Value and standard deviation that were known beforehand.
+    pub known: Option<(f64, f64)>,
+    /// How the fit saw it.
+    pub transform: Transform,
     /// The bound that holds the value, if one does.
     pub at_bound: Option<AtBound>,
 }
@@ -139,6 +154,8 @@ pub struct FitResult {
     pub independent: f64,
     /// Number of the best start.
     pub best: usize,
+    /// Distance of the best point from the optimum in standard errors, as far as the curvature there says; NaN where it was not computed.
+    pub distance: f64,
     /// Cost of the first start; infinite if it could not be evaluated.
     pub initial_cost: f64,
     /// Cost of the best point.
@@ -184,7 +201,8 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
             iterations: s.outcome.iterations,
             evaluations: s.outcome.evaluations,
             products: s.outcome.products,
-            reach: s.outcome.reach,
+            walk: s.outcome.walk,
+            promised: s.outcome.promised,
             status: s.outcome.status.clone(),
         })
         .collect();
@@ -208,7 +226,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     // Data whose errors go together say less; never more.
     let design_effect = hooks.design_effect.as_mut().map_or(1.0, |ask| ask(&theta)).max(1.0);
     let settings = &Settings { errors: ErrorModel { design_effect, ..settings.errors.clone() }, ..settings.clone() };
-    let (u, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, cut, &mut broken);
+    let (u, distance, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, cut, &mut broken);
     let mut warnings = u.warnings.clone();
     warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
     let failed: Vec<usize> = (0..runs.len()).filter(|&s| runs[s].cost.is_infinite()).collect();
@@ -237,6 +255,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
         independent: u.independent,
         best,
         theta,
+        distance,
         initial_cost: runs[0].start_cost,
         cost: runs[best].cost,
         evaluations: runs.iter().map(|r| r.evaluations).sum::<usize>() + extra,
@@ -258,7 +277,10 @@ fn found(problem: &Problem, values: &[f64], u: &Uncertainty) -> (Vec<FittedParam
                 index: first,
                 value: values[first],
                 standard_error: u.standard_errors[first],
+                noise: u.noise_errors[first],
                 unit,
+                known: f.known,
+                transform: f.transform,
                 at_bound: problem.charts()[first].at_bound(values[first]),
             });
         } else {
@@ -269,7 +291,24 @@ fn found(problem: &Problem, values: &[f64], u: &Uncertainty) -> (Vec<FittedParam
     (parameters, fields)
 }
 
-/// Uncertainty at the best point, and how many evaluations that took. Nothing is computed for a fit that was `cut` short; a device
+/// How far the optimum is, in standard errors, by a free step in the box.
+fn distance(problem: &Problem, z: &[f64], sample: &Sample, settings: &Settings) -> f64 {
+    let q = z.len();
+    let diagonal = (0..q).fold(0.0, |m: f64, i| m.max(sample.curvature[i * q + i]));
+    let mut h = sample.curvature.clone();
+    (0..q).for_each(|i| h[i * q + i] += 1e-9 * diagonal);
+    let range = |side: fn((f64, f64)) -> f64| -> Vec<f64> {
+        let room = problem.charts().iter().zip(z).map(|(c, z)| side(c.range()) - z);
+        room.map(|r| r.clamp(-settings.max_step, settings.max_step)).collect()
+    };
+    let (lower, upper) = (range(|r| r.0), range(|r| r.1));
+    let Some(p) = box_step(&h, &sample.gradient, &lower, &upper) else { return f64::NAN };
+    let hp = |i: usize| dot(&sample.curvature[i * q..(i + 1) * q], &p);
+    let promised = -dot(&sample.gradient, &p) - 0.5 * (0..q).map(|i| p[i] * hp(i)).sum::<f64>();
+    sample.decrement(q, promised)
+}
+
+/// Uncertainty and distance from the optimum at the best point, and how many evaluations that took. Nothing is computed for a fit that was `cut` short; a device
 /// that fails here says so in `broken`.
 fn curvature(
     problem: &mut Problem,
@@ -278,7 +317,7 @@ fn curvature(
     settings: &Settings,
     cut: Option<&str>,
     broken: &mut Option<String>,
-) -> (Uncertainty, usize) {
+) -> (Uncertainty, f64, usize) {
     // A sample without curvature still tells of bounds.
     let without = |problem: &Problem, why: &str| {
         let mut u = uncertainty::assess(problem, z, &Sample::default(), &settings.errors);
@@ -289,24 +328,24 @@ fn curvature(
     if let Some(sample) = known.filter(|s| s.curvature.len() == z.len() * z.len()) {
         let mut u = uncertainty::assess(problem, z, sample, &settings.errors);
         u.warnings.extend(cut.map(|why| format!("{why}: standard errors are those of the place that it had reached")));
-        return (u, 0);
+        return (u, distance(problem, z, sample, settings), 0);
     }
     if let Some(why) = cut {
-        return (without(problem, why), 0);
+        return (without(problem, why), f64::NAN, 0);
     }
     if z.len() > MOST_SENSITIVITIES {
         let mut u =
             without(problem, &format!("{} values are free, and they are computed of {MOST_SENSITIVITIES} at most", z.len()));
         // Said first: nothing else is said of errors.
         u.warnings.rotate_right(1);
-        return (u, 0);
+        return (u, f64::NAN, 0);
     }
     let sample = problem.evaluate(&[z.to_vec()], Want::Curvature).swap_remove(0);
     match &sample.failure {
         Some(why) => {
             *broken = sample.broken.then(|| why.clone());
-            (without(problem, why), 1)
+            (without(problem, why), f64::NAN, 1)
         }
-        None => (uncertainty::assess(problem, z, &sample, &settings.errors), 1),
+        None => (uncertainty::assess(problem, z, &sample, &settings.errors), distance(problem, z, &sample, settings), 1),
     }
 }

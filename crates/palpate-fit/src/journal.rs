@@ -28,7 +28,7 @@ struct Head {
     format: String,
     optimizer: String,
     seed: u64,
-    /// Longest step, longest first step, steps of Rprop, tolerances.
+    /// Longest step, where Gauss–Newton goes on from, steps of Rprop, tolerances.
     options: (f64, String, String, String),
     parameters: Vec<HeadParameter>,
     scenes: Vec<HeadScene>,
@@ -42,6 +42,9 @@ struct HeadParameter {
     typical: f64,
     bounds: [String; 2],
     start: [f64; 2],
+    /// Value and standard deviation known beforehand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    known: Option<[f64; 2]>,
     /// Number of values, of a field.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     count: usize,
@@ -114,6 +117,8 @@ struct Entry {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     curvature: String,
     residuals: usize,
+    #[serde(default)]
+    unmatched: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failure: Option<String>,
 }
@@ -186,6 +191,7 @@ impl Journal {
                 gradient: to_hex(&sample.gradient),
                 curvature: to_hex(&sample.curvature),
                 residuals: sample.residuals,
+                unmatched: sample.unmatched,
                 failure: sample.failure.clone(),
             })
             .collect();
@@ -207,6 +213,7 @@ impl Head {
             typical: f.typical,
             bounds: [f.bounds.0.to_string(), f.bounds.1.to_string()],
             start: [f.start.0, f.start.1],
+            known: f.known.map(|(value, sd)| [value, sd]),
             count: f.count,
             slots: f.slots.iter().map(|s| (s.scene, s.place, to_hex(&[s.factor]))).collect(),
         };
@@ -217,7 +224,7 @@ impl Head {
             seed: settings.seed,
             options: (
                 settings.max_step,
-                settings.first_step.to_string(),
+                format!("{:?}", settings.walk),
                 format!("{:?}", settings.rprop),
                 format!("{:?}", settings.tolerance),
             ),
@@ -249,8 +256,9 @@ impl Entry {
         let (z, cost) = (from_hex(&self.z)?, from_hex(&self.cost)?);
         let (gradient, curvature) = (from_hex(&self.gradient)?, from_hex(&self.curvature)?);
         let sizes = z.len() == q && cost.len() == 1 && [0, q].contains(&gradient.len()) && [0, q * q].contains(&curvature.len());
-        let (residuals, failure) = (self.residuals, self.failure);
-        sizes.then(|| (z, Sample { cost: cost[0], gradient, curvature, residuals, failure, broken: false, stopped: false }))
+        let (residuals, unmatched, failure) = (self.residuals, self.unmatched, self.failure);
+        let sample = Sample { cost: cost[0], gradient, curvature, residuals, unmatched, failure, broken: false, stopped: false };
+        sizes.then_some((z, sample))
     }
 }
 

@@ -7,6 +7,7 @@ mod chart;
 mod dense;
 mod fit;
 mod journal;
+mod known;
 mod multistart;
 mod optimise;
 mod problem;
@@ -14,11 +15,12 @@ mod settings;
 mod uncertainty;
 
 pub use chart::{AtBound, Chart};
-pub use fit::{FitError, FitResult, FittedField, FittedParameter, Hooks, Progress, Run, Worth, fit};
+pub use fit::{FitError, FitResult, FittedField, FittedParameter, Hooks, Lead, Progress, Run, Worth, fit};
 pub use journal::{JournalError, JournalFile};
+pub use known::KnownRow;
 pub use optimise::{Outcome, Sample, Search, Status, Stop, want};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};
-pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance};
+pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance, Walk};
 
 #[cfg(test)]
 mod tests;

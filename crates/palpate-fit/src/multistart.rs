@@ -8,7 +8,7 @@ use crate::fit::{FitError, Hooks, Progress};
 use crate::journal::Journal;
 use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
 use crate::problem::{FreeParameter, Problem};
-use crate::settings::Settings;
+use crate::settings::{Settings, Walk};
 use palpate_engine::FailureKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -74,19 +74,24 @@ fn first_start(free: &[FreeParameter], own: &[f64], drawn: Vec<f64>) -> Vec<f64>
 /// What one start needs to know.
 struct Runner<'a> {
     number: usize,
+    /// Its place among those that run together.
+    line: usize,
     free: &'a [FreeParameter],
     charts: &'a [Chart],
     own: &'a [f64],
     lower: &'a [f64],
     upper: &'a [f64],
     settings: &'a Settings,
+    /// Where it starts, if not where the draw says; and then it goes on whether it sees anything or not.
+    given: Option<&'a Vec<f64>>,
+    sight: bool,
 }
 
 impl Runner<'_> {
     fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Answer, Stop>>) -> StartRun {
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
         rng.set_stream(self.number as u64);
-        let fixed = self.free.iter().all(|f| f.start.0 == f.start.1);
+        let fixed = self.given.is_some() || self.free.iter().all(|f| f.start.0 == f.start.1);
         let mut spent = 0;
         let mut attempt = 0;
         loop {
@@ -94,9 +99,12 @@ impl Runner<'_> {
             if self.number == 0 && attempt == 0 {
                 values = first_start(self.free, self.own, values);
             }
+            if let Some(given) = self.given {
+                values.clone_from(given);
+            }
             let start: Vec<f64> = self.charts.iter().zip(&values).map(|(c, &v)| c.coordinate(v)).collect();
             let ask = |what: Ask| {
-                let sent = tell.send((self.number, Message::Ask(what)));
+                let sent = tell.send((self.line, Message::Ask(what)));
                 // A broker that is gone cannot answer any more: the same as an interruption.
                 sent.map_err(|_| Stop::Interrupted)?;
                 answers.recv().unwrap_or(Err(Stop::Interrupted))
@@ -111,10 +119,10 @@ impl Runner<'_> {
             };
             let mut progress = |n: usize, cost: f64, z: &[f64]| {
                 // Without a broker nobody listens, and the next evaluation ends the search.
-                let _ = tell.send((self.number, Message::Iteration(n, cost, z.to_vec())));
+                let _ = tell.send((self.line, Message::Iteration(n, cost, z.to_vec())));
             };
             let search = Search::new(&mut evaluate, &mut progress, self.lower, self.upper, self.settings);
-            let search = search.with_products(&mut product);
+            let search = search.with_products(&mut product).with_sight(self.sight && self.given.is_none());
             let mut outcome = search.run(self.settings.optimizer, &start);
             spent += outcome.evaluations;
             attempt += 1;
@@ -128,31 +136,96 @@ impl Runner<'_> {
     }
 }
 
-/// Runs all starts; the result is ordered by start.
+/// Runs all starts; the result is ordered by start. Starts that see nothing are led to where they do, where the hooks have who leads.
 pub fn run(
     problem: &mut Problem,
     settings: &Settings,
     hooks: &mut Hooks,
-    journal: Option<Journal>,
+    mut journal: Option<Journal>,
+) -> Result<Vec<StartRun>, FitError> {
+    // Fixed starts are all the same.
+    let fixed = problem.free().iter().all(|f| f.start.0 == f.start.1);
+    let all: Vec<Begin> = (0..if fixed { 1 } else { settings.starts.max(1) }).map(Begin::drawn).collect();
+    let mut runs = run_some(problem, settings, hooks, journal.as_mut(), &all)?;
+    let blind: Vec<usize> = (0..runs.len()).filter(|s| runs[*s].outcome.status == Status::Blind).collect();
+    let Some(lead) = hooks.lead.as_mut().filter(|_| !blind.is_empty()) else { return Ok(runs) };
+    let values: Vec<Vec<f64>> = blind.iter().map(|s| problem.values(&runs[*s].start)).collect();
+    let led = lead(&values);
+    let again: Vec<Begin> = blind
+        .iter()
+        .zip(values.into_iter().zip(led))
+        .map(|(&s, (own, led))| Begin { number: s, served: runs[s].outcome.evaluations, given: Some(led.unwrap_or(own)) })
+        .collect();
+    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal.as_mut(), &again)?) {
+        let first = &mut runs[begin.number];
+        if run.outcome.sample.is_none() {
+            // Stopped before it could look again: its first look is what there is.
+            first.outcome.status = run.outcome.status;
+            continue;
+        }
+        // A search that never saw anything has not converged, whatever ended it.
+        if run.outcome.sample.as_ref().is_some_and(|s| s.residuals > 0 && s.unmatched == s.residuals) {
+            run.outcome.status = Status::Blind;
+        }
+        (run.start, run.outcome.start_cost) = (first.start.clone(), first.outcome.start_cost);
+        run.outcome.evaluations += first.outcome.evaluations;
+        *first = run;
+    }
+    Ok(runs)
+}
+
+/// How a start begins.
+struct Begin {
+    number: usize,
+    /// Evaluations that it has had.
+    served: usize,
+    /// Values `[q]`, where they are not drawn.
+    given: Option<Vec<f64>>,
+}
+
+impl Begin {
+    fn drawn(number: usize) -> Begin {
+        Begin { number, served: 0, given: None }
+    }
+}
+
+/// Runs some of the starts.
+fn run_some(
+    problem: &mut Problem,
+    settings: &Settings,
+    hooks: &mut Hooks,
+    journal: Option<&mut Journal>,
+    begins: &[Begin],
 ) -> Result<Vec<StartRun>, FitError> {
     let free = problem.free().to_vec();
     let charts = problem.charts().to_vec();
     let own = problem.own_values();
     let (lower, upper): (Vec<f64>, Vec<f64>) = charts.iter().map(Chart::range).unzip();
-    // Fixed starts are all the same.
-    let starts = if free.iter().all(|f| f.start.0 == f.start.1) { 1 } else { settings.starts.max(1) };
+    let sight = hooks.lead.is_some();
 
     std::thread::scope(|scope| {
         let (tell, inbox) = channel();
         let mut lines = Vec::new();
-        for number in 0..starts {
+        for (line, Begin { number, given, .. }) in begins.iter().enumerate() {
+            let number = *number;
             let (answer, answers) = channel();
             let tell = tell.clone();
-            let runner = Runner { number, free: &free, charts: &charts, own: &own, lower: &lower, upper: &upper, settings };
+            let runner = Runner {
+                number,
+                free: &free,
+                charts: &charts,
+                own: &own,
+                lower: &lower,
+                upper: &upper,
+                settings,
+                line,
+                given: given.as_ref(),
+                sight,
+            };
             let work = move || {
                 let run = std::panic::AssertUnwindSafe(|| runner.run(&tell, &answers));
                 match std::panic::catch_unwind(run) {
-                    Ok(done) => drop(tell.send((number, Message::Done(Box::new(done))))),
+                    Ok(done) => drop(tell.send((line, Message::Done(Box::new(done))))),
                     Err(panic) => {
                         // The broker must not wait for this start; the panic itself surfaces at the end of the scope.
                         let outcome = Outcome {
@@ -162,12 +235,13 @@ pub fn run(
                             iterations: 0,
                             evaluations: 0,
                             products: 0,
-                            reach: f64::INFINITY,
+                            walk: Walk::default(),
+                            promised: 0.0,
                             status: Status::Failed("the optimiser broke off".into()),
                             sample: None,
                         };
                         let run = StartRun { start: Vec::new(), outcome };
-                        drop(tell.send((number, Message::Done(Box::new(run)))));
+                        drop(tell.send((line, Message::Done(Box::new(run)))));
                         std::panic::resume_unwind(panic);
                     }
                 }
@@ -179,7 +253,7 @@ pub fn run(
             lines.push(answer);
         }
         drop(tell);
-        broker(problem, settings, hooks, journal, &inbox, &lines)
+        broker(problem, settings, hooks, journal, begins, &inbox, &lines)
     })
 }
 
@@ -188,14 +262,15 @@ fn broker(
     problem: &mut Problem,
     settings: &Settings,
     hooks: &mut Hooks,
-    mut journal: Option<Journal>,
+    mut journal: Option<&mut Journal>,
+    begins: &[Begin],
     inbox: &Receiver<(usize, Message)>,
     answers: &[Sender<Result<Answer, Stop>>],
 ) -> Result<Vec<StartRun>, FitError> {
     let starts = answers.len();
     let mut done: Vec<Option<StartRun>> = vec![None; starts];
     let mut asked: Vec<Option<Ask>> = (0..starts).map(|_| None).collect();
-    let mut served = vec![0; starts];
+    let mut served: Vec<usize> = begins.iter().map(|b| b.served).collect();
     let mut residuals = 0;
     let mut broken = None;
     loop {
@@ -214,7 +289,7 @@ fn broker(
         heard.sort_by_key(|h| h.0);
         for (start, iteration, cost, z) in heard {
             if let Some(f) = &mut hooks.on_iteration {
-                f(&Progress { start, iteration, cost, values: problem.values(&z) });
+                f(&Progress { start: begins[start].number, iteration, cost, values: problem.values(&z) });
             }
         }
         if asked.iter().all(Option::is_none) {
@@ -253,7 +328,7 @@ fn broker(
         let mut answered = Vec::new();
         if let Some(journal) = &mut journal {
             for &s in &live {
-                if let Some(sample) = z_of(s).map_or(Ok(None), |z| journal.find(s, served[s], z))? {
+                if let Some(sample) = z_of(s).map_or(Ok(None), |z| journal.find(begins[s].number, served[s], z))? {
                     answered.push((s, sample));
                 }
             }
@@ -271,8 +346,8 @@ fn broker(
             // A round that broke or was stopped is computed again by a resumed fit, as a whole.
             let stopped = samples.iter().any(|s| s.stopped);
             if let (Some(journal), None, false) = (&mut journal, &broken, stopped) {
-                let round: Vec<_> =
-                    fresh.iter().zip(&z).zip(&samples).map(|((&s, z), sample)| (s, served[s], z.as_slice(), sample)).collect();
+                let entry = |((&s, z), sample): ((&usize, _), _)| (begins[s].number, served[s], Vec::as_slice(z), sample);
+                let round: Vec<_> = fresh.iter().zip(&z).zip(&samples).map(entry).collect();
                 journal.add(&round)?;
             }
             answered.extend(fresh.iter().copied().zip(samples));

@@ -1,9 +1,11 @@
 //! What is fitted to what: free parameters, and the scenes that share them.
 
 use crate::chart::Chart;
-use crate::optimise::Sample;
+use crate::known;
+use crate::optimise::{Sample, is_blind, want};
 use palpate_engine::{Evaluate, Failure, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
+use palpate_model::scene::Optimizer;
 
 /// Where a free parameter acts: `theta[scene][place] = value · factor`; value k of a field at `place + k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +33,8 @@ pub struct FreeParameter {
     pub bounds: (f64, f64),
     /// Where starts are drawn from; equal ends fix the start.
     pub start: (f64, f64),
+    /// Value and standard deviation that are known beforehand, in its own unit: a Gaussian prior, of every value of a field.
+    pub known: Option<(f64, f64)>,
     /// Places that follow it; at least one.
     pub slots: Vec<Slot>,
     /// How many values follow each other from every slot's place on: 1 for a number.
@@ -63,7 +67,7 @@ pub enum Want {
 }
 
 /// A joint fit of one or more scenes. Its cost is `Σ n_s J_s / Σ n_s` with n_s the residual count of scene s, so that every
-/// residual counts once. The free values of all parameters, one after the other, are the vector `[q]` that optimisers see.
+/// residual counts once; what is known of values beforehand adds to it ([`crate::KnownRow`]). The free values of all parameters, one after the other, are the vector `[q]` that optimisers see.
 pub struct Problem<'a> {
     scenes: Vec<FitScene<'a>>,
     free: Vec<FreeParameter>,
@@ -96,6 +100,7 @@ impl<'a> Problem<'a> {
             charts.extend(std::iter::repeat_n(chart, f.count));
             firsts.push(charts.len());
             check_start(f).map_err(wrong)?;
+            f.known.map_or(Ok(()), |k| known::check(k, f.bounds)).map_err(wrong)?;
             for s in &f.slots {
                 let scene = scenes.get(s.scene).ok_or_else(|| wrong(format!("scene number {} does not exist", s.scene)))?;
                 let Some(taken) = taken[s.scene].get_mut(s.place..s.place + f.count) else {
@@ -175,6 +180,12 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// True where a search from values `[q]` is moved by what it sees; see [`crate::Status::Blind`].
+    pub fn sees(&mut self, values: &[f64], optimizer: Optimizer) -> bool {
+        let sample = self.evaluate_values(&[values.to_vec()], want(optimizer)).remove(0);
+        sample.failure.is_none() && !is_blind(&sample)
+    }
+
     /// True where every scene's physics has [`Problem::product`].
     pub fn has_products(&self) -> bool {
         self.scenes.iter().all(|s| s.evaluate.has_products())
@@ -203,6 +214,8 @@ impl<'a> Problem<'a> {
                 out[*i] += self.residuals[s] / all * slot.factor * slopes[*i] * product[slot.place];
             }
         }
+        let known = self.known_curvature(z, all);
+        out.iter_mut().zip(known).zip(direction).for_each(|((o, k), d)| *o += k * d);
         Ok(out)
     }
 
@@ -247,6 +260,7 @@ impl<'a> Problem<'a> {
                 weights[b] += n;
                 self.residuals[s] = n;
                 sum.residuals += e.residuals;
+                sum.unmatched += e.residuals.saturating_sub(e.matched);
                 sum.cost += n * e.cost;
                 if want == Want::Gradient {
                     for (i, slot) in &slots {
@@ -272,8 +286,9 @@ impl<'a> Problem<'a> {
                 sums[b] = Sample::failed(format!("{}: the backend returned no result", self.scenes[s].name));
             }
         }
-        for (sum, n) in sums.iter_mut().zip(weights) {
+        for ((sum, n), values) in sums.iter_mut().zip(weights).zip(values) {
             if sum.failure.is_none() {
+                self.add_known(sum, values);
                 sum.scale(1.0 / n);
             }
         }

@@ -17,8 +17,8 @@ pub struct Settings {
     pub tolerance: Tolerance,
     /// Longest step of any optimiser along one axis of z; 1.5 is a factor 4.5 in a parameter fitted as its logarithm.
     pub max_step: f64,
-    /// The same for the first step of Gauss–Newton, where a search goes on that has found shorter ones to be long enough.
-    pub first_step: f64,
+    /// Where Gauss–Newton goes on from: how it stood when an earlier search ended.
+    pub walk: Walk,
     /// Steps of Rprop.
     pub rprop: RpropSteps,
     /// What is known about the measurement's errors.
@@ -35,16 +35,38 @@ impl Settings {
             seed: 1,
             tolerance: Tolerance::default(),
             max_step: 1.5,
-            first_step: f64::INFINITY,
+            walk: Walk::default(),
             rprop: RpropSteps::default(),
             errors: ErrorModel::default(),
         }
     }
 }
 
+/// How Gauss–Newton's damping stands between two iterations. A search that goes on with it where another ended is one with that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walk {
+    /// Longest step that it would try next; infinite before the first.
+    pub reach: f64,
+    /// Damping; `None` before the first step.
+    pub damping: Option<f64>,
+    /// Factor of the damping at the next rejected step.
+    pub growth: f64,
+    /// Rejected steps in a row that changed nothing.
+    pub level: u32,
+}
+
+impl Default for Walk {
+    fn default() -> Walk {
+        Walk { reach: f64::INFINITY, damping: None, growth: 2.0, level: 0 }
+    }
+}
+
 /// Stopping criteria; a run that meets one of them has converged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
+    /// Distance to the optimum in standard errors, as the curvature promises it: √(2 n ΔJ/s²) for the decrease ΔJ that is left to gain,
+    /// n residuals and s² = max(1, 2 n J/(n − q)). Of optimisers that know a curvature; 0 for digits that no data have.
+    pub decrement: f64,
     /// Decrease of the cost, relative to the cost.
     pub cost: f64,
     /// Largest entry of the projected gradient by z, relative to the cost.
@@ -55,7 +77,7 @@ pub struct Tolerance {
 
 impl Default for Tolerance {
     fn default() -> Tolerance {
-        Tolerance { cost: 1e-9, gradient: 1e-8, step: 1e-7 }
+        Tolerance { decrement: 0.01, cost: 1e-9, gradient: 1e-8, step: 1e-7 }
     }
 }
 

@@ -10,7 +10,11 @@
 //! - an error of `systematic · σ` that all residuals of a group share does not average out within the group. As a bound, each
 //!   group counts like one residual with the average sensitivity: `systematic² H⁻¹/groups`.
 //!
-//! Altogether `cov = τ H⁻¹`, `τ = s² D/n + systematic²/groups`. All of this is done in z (relative errors for logarithms);
+//! Altogether `cov = τ H⁻¹`, `τ = s² D/n + systematic²/groups`.
+//!
+//! What is known beforehand is one more residual, `H = H_data + H_known`, which neither s² nor D widens, as it does not come from the
+//! recording: `cov = H⁻¹ (τ H_data + H_known/n) H⁻¹`, the covariance of the estimate under the errors that both have (White,
+//! Econometrica 50, 1982). With τ = 1/n that is H⁻¹/n, the covariance of the Gaussian posterior. In s² it counts among n. All of this is done in z (relative errors for logarithms);
 //! standard errors in units of the parameter follow by the slope of its chart.
 
 use crate::chart::AtBound;
@@ -45,6 +49,8 @@ const CLOSE: f64 = 0.1;
 pub struct Uncertainty {
     /// Standard error of every parameter in its unit `[q]`; `None` at a bound or without curvature.
     pub standard_errors: Vec<Option<f64>>,
+    /// The same of what averages out, without errors that residuals of a group share `[q]`.
+    pub noise_errors: Vec<Option<f64>>,
     /// Correlation matrix `[q][q]` in z; rows of parameters without standard error are those of the identity. Empty for very many.
     pub correlation: Vec<Vec<f64>>,
     /// Mean square residual over the squared noise, `2 n J/(n − q)`; NaN when there are too few residuals.
@@ -57,6 +63,8 @@ pub struct Uncertainty {
     pub(crate) errors_z: Vec<Option<f64>>,
     /// τ above; 0 if it is not known.
     pub(crate) tau: f64,
+    /// Its part that averages out, s² D/n.
+    tau_noise: f64,
 }
 
 /// Unit vectors `[m]` along which vectors of which only the direction counts grow: that changes no residual and is no unknown.
@@ -77,7 +85,7 @@ fn lengths(problem: &Problem, inner: &[usize], z: &[f64]) -> Vec<Vec<f64>> {
 /// Uncertainty at z `[q]`, from a sample by z there; without curvature there are no standard errors.
 pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel) -> Uncertainty {
     let mut u = Uncertainty::unknown(z.len());
-    u.count(sample, errors);
+    u.count(sample, errors, problem.known_count());
     let inner = inside(problem, z, &mut u.warnings);
     if inner.is_empty() || sample.curvature.is_empty() {
         return u;
@@ -85,6 +93,10 @@ pub fn assess(problem: &Problem, z: &[f64], sample: &Sample, errors: &ErrorModel
     if sample.residuals == 0 {
         u.warnings.push("no standard errors: the cost counts no residuals".into());
         return u;
+    }
+    let averaged = Spread::new(problem, z, sample, u.tau_noise, inner.clone());
+    for (a, &i) in inner.iter().enumerate() {
+        u.noise_errors[i] = averaged.as_ref().ok().map(|s| s.sd[a] * problem.charts()[i].slope(z[i]));
     }
     match Spread::new(problem, z, sample, u.tau, inner) {
         Err(why) => u.warnings.push(format!("no standard errors: {why}")),
@@ -158,8 +170,28 @@ impl Spread {
         }
         let variance = |k: usize| if is_length(k) { 0.0 } else { tau / values[k].max(RANK * largest) };
         let mut spread = Spread { variances: (0..m).map(variance).collect(), inner, vectors, sd: Vec::new() };
+        spread.with_known(&problem.known_curvature(z, sample.residuals as f64), tau, sample.residuals as f64);
         spread.sd = (0..m).map(|a| spread.covariance(a, a).sqrt()).collect();
         Ok(spread)
+    }
+
+    /// Turns τ H⁻¹ into the covariance with what is known beforehand, whose share of H's diagonal is `known` `[q]`.
+    fn with_known(&mut self, known: &[f64], tau: f64, n: f64) {
+        let m = self.inner.len();
+        let known: Vec<f64> = self.inner.iter().map(|&i| known[i]).collect();
+        if known.iter().all(|k| *k == 0.0) || tau <= 0.0 {
+            return;
+        }
+        // H⁻¹ (τ H + (1/n − τ) H_known) H⁻¹, from C = τ H⁻¹.
+        let c: Vec<f64> = (0..m * m).map(|k| self.covariance(k / m, k % m)).collect();
+        let by = (1.0 / n - tau) / (tau * tau);
+        let row = |a: usize| &c[a * m..(a + 1) * m];
+        let of_known = |a: usize, b: usize| known.iter().enumerate().map(|(j, k)| row(a)[j] * k * row(b)[j]).sum::<f64>();
+        let all: Vec<f64> = (0..m * m).map(|k| c[k] + by * of_known(k / m, k % m)).collect();
+        if let Some((values, vectors)) = eigen(&all, m) {
+            self.variances = values.iter().rev().map(|v| v.max(0.0)).collect();
+            self.vectors = vectors.into_iter().rev().collect();
+        }
     }
 
     /// Covariance of two of the m parameters in z.
@@ -183,6 +215,7 @@ impl Uncertainty {
     fn unknown(q: usize) -> Uncertainty {
         Uncertainty {
             standard_errors: vec![None; q],
+            noise_errors: vec![None; q],
             errors_z: vec![None; q],
             correlation: if q <= MOST_CORRELATED { identity(q) } else { Vec::new() },
             reduced_chi_square: f64::NAN,
@@ -192,17 +225,18 @@ impl Uncertainty {
     }
 
     /// Reduced χ², what the residuals are worth, and τ.
-    fn count(&mut self, sample: &Sample, errors: &ErrorModel) {
+    fn count(&mut self, sample: &Sample, errors: &ErrorModel, known: usize) {
         let (n, q) = (sample.residuals as f64, self.standard_errors.len());
-        if n > q as f64 {
-            self.reduced_chi_square = 2.0 * n * sample.cost / (n - q as f64);
+        let free = n + known as f64 - q as f64;
+        if n > 0.0 && free > 0.0 {
+            self.reduced_chi_square = 2.0 * n * sample.cost / free;
         } else if n > 0.0 {
             self.warnings.push(format!("there are only {n} residuals for {q} free parameters"));
         }
         if n > 0.0 {
             self.independent = n / errors.design_effect.max(1.0);
-            self.tau =
-                self.reduced_chi_square.max(1.0) / self.independent + errors.systematic.powi(2) / errors.groups.max(1) as f64;
+            self.tau_noise = self.reduced_chi_square.max(1.0) / self.independent;
+            self.tau = self.tau_noise + errors.systematic.powi(2) / errors.groups.max(1) as f64;
         }
     }
 

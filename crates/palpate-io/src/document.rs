@@ -5,7 +5,7 @@ use crate::keys::Schema;
 use glam::DVec3;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml_edit::{Document, Item, TableLike, Value};
+use toml_edit::{Array, Document, Item, TableLike, Value};
 
 /// A parsed TOML file.
 pub(crate) struct Source {
@@ -341,6 +341,25 @@ impl<'a> Table<'a> {
             Ok(n) if allowed.contains(&n) => Ok(Some(n)),
             _ => Err(self.error(key, format!("{i} is out of range; expected {wanted}"))),
         }
+    }
+
+    /// A pair of numbers for each component, or one for all.
+    pub fn optional_pairs(&self, key: &str, components: usize) -> Result<Option<Vec<(f64, f64)>>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let vector = if components > 1 { ", or an array of three of these" } else { "" };
+        let wrong = || self.wrong(key, &format!("a pair [value, standard deviation]{vector}"), item);
+        let pair = |a: &Array| -> Result<(f64, f64), InputError> {
+            let numbers: Vec<f64> = a.iter().map(|x| self.value_f64(key, x)).collect::<Result<_, _>>()?;
+            if let [value, sd] = numbers[..] { Ok((value, sd)) } else { Err(wrong()) }
+        };
+        let all = item.as_array().ok_or_else(wrong)?;
+        if components > 1 && all.len() == components && all.iter().all(Value::is_array) {
+            return all.iter().filter_map(Value::as_array).map(pair).collect::<Result<_, _>>().map(Some);
+        }
+        if all.iter().any(Value::is_array) {
+            return Err(wrong());
+        }
+        Ok(Some(vec![pair(all)?; components]))
     }
 
     /// A number, or an array of numbers and pairs of numbers, as fit ranges use them: `[x]` per entry either one number or two.

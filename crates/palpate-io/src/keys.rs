@@ -88,7 +88,7 @@ pub(crate) const SCENE: Schema = Schema {
             "fit",
             Schema {
                 keys: &["optimizer", "iterations", "starts", "seed", "threads"],
-                tables: &[("parameter", table(&["path", "start", "bounds", "per_scene"]))],
+                tables: &[("parameter", table(&["path", "start", "bounds", "known", "per_scene"]))],
             },
         ),
     ],

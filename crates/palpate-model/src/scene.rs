@@ -147,6 +147,8 @@ pub enum Resolution {
     CellSize(f64),
     /// Number of cells along the longest side of the body's bounding box.
     Cells(u32),
+    /// Left open: somebody chooses before the body is cut.
+    Open,
 }
 
 /// An isotropic material with Rayleigh damping.
@@ -245,12 +247,14 @@ pub struct Time {
     pub theta: f64,
     /// How a step is taken.
     pub scheme: &'static Scheme,
+    /// What is to be simulated [s], where step and number of steps are left open: somebody chooses them before the plan is built.
+    pub open: Option<f64>,
 }
 
 impl Default for Time {
     /// No step at all, of a length that serves a static problem.
     fn default() -> Time {
-        Time { step: 1.0, steps: 0, start: 0.0, theta: 0.6, scheme: &scheme::ALL[0] }
+        Time { step: 1.0, steps: 0, start: 0.0, theta: 0.6, scheme: &scheme::ALL[0], open: None }
     }
 }
 
@@ -398,6 +402,8 @@ pub struct FitParameter {
     pub start: (f64, f64),
     /// Allowed range.
     pub bounds: (f64, f64),
+    /// Value and standard deviation that are known beforehand: a Gaussian prior in the number's own unit.
+    pub known: Option<(f64, f64)>,
     /// With several scenes: not shared between them.
     pub per_scene: bool,
 }

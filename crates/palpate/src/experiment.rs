@@ -1,5 +1,6 @@
 //! A scene and its recording, ready to be simulated, compared and fitted.
 
+use crate::choose::{Choice, choose};
 use crate::embed::Embedding;
 use crate::engine::Backend;
 use crate::error::Error;
@@ -13,7 +14,7 @@ use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
-use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
+use palpate_model::scene::{InitialShape, ObservationSpec, Resolution, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
 use std::sync::Arc;
@@ -34,6 +35,7 @@ pub struct Experiment {
     recording: Option<Arc<Recording>>,
     shape: Arc<dyn Shape>,
     pub(crate) plan: Plan,
+    chosen: Vec<Choice>,
     warnings: Vec<String>,
 }
 
@@ -88,7 +90,7 @@ impl Experiment {
     ///
     /// # Errors
     /// As [`Experiment::open`].
-    pub fn new(scene: Scene, text: String, mut warnings: Vec<String>) -> Result<Experiment, Error> {
+    pub fn new(mut scene: Scene, text: String, mut warnings: Vec<String>) -> Result<Experiment, Error> {
         let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
         let shape = shape_of(&scene.object);
         let mut recording = None;
@@ -109,8 +111,9 @@ impl Experiment {
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(Arc::new(read));
         }
+        let chosen = choose(&mut scene, shape.as_ref(), &observation);
         let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
-        let mut experiment = Experiment { scene, text, recording, shape, plan, warnings };
+        let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
         experiment.check_times()?;
         experiment.check_planes();
         Ok(experiment)
@@ -192,6 +195,11 @@ impl Experiment {
         self.recording.as_deref()
     }
 
+    /// What the scene left open and was chosen for it: key, value in SI units, and why.
+    pub fn chosen(&self) -> &[Choice] {
+        &self.chosen
+    }
+
     /// The rest shape.
     pub fn shape(&self) -> &dyn Shape {
         self.shape.as_ref()
@@ -261,22 +269,30 @@ impl Experiment {
     /// # Errors
     /// [`Error::File`] when the finer grid cannot be built.
     pub fn refined(&self, factor: f64) -> Result<Experiment, Error> {
-        self.with_finer_grid(factor, None)
+        self.with_finer_grid(factor, factor, None)
     }
 
     /// The same experiment with cells and time step divided by `factor`, compared with its recording in the same band.
     ///
     /// # Errors
     /// [`Error::File`] when the finer grid cannot be built or the recording is gone.
-    pub fn finer(&self, factor: f64) -> Result<Experiment, Error> {
+    pub fn finer(&self, factor: f64, step: f64) -> Result<Experiment, Error> {
         let observation = self.scene.observation.clone().map(|o| ObservationSpec { band: o.band * factor, ..o });
-        self.with_finer_grid(factor, observation)
+        self.with_finer_grid(factor, step, observation)
     }
 
-    fn with_finer_grid(&self, factor: f64, observation: Option<ObservationSpec>) -> Result<Experiment, Error> {
+    /// The same experiment with cells and time step divided by factors, compared as this says.
+    pub(crate) fn with_finer_grid(
+        &self,
+        factor: f64,
+        step: f64,
+        observation: Option<ObservationSpec>,
+    ) -> Result<Experiment, Error> {
         let mut scene = Scene { observation, ..self.scene.clone() };
-        scene.object.resolution = palpate_model::scene::Resolution::CellSize(self.plan.body.length / factor);
-        let steps = (scene.time.steps as f64 * factor).round() as usize;
+        if scene.object.resolution != Resolution::Own {
+            scene.object.resolution = Resolution::CellSize(self.plan.body.length / factor);
+        }
+        let steps = (scene.time.steps as f64 * step).round() as usize;
         if steps > 0 {
             scene.time.step *= scene.time.steps as f64 / steps as f64;
             scene.time.steps = steps;

@@ -4,10 +4,11 @@ use crate::engine::{Backend, with_threads};
 use crate::error::Error;
 use crate::experiment::Experiment;
 pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
+use crate::grid::{GridCheck, grid_check};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::FitStatus;
+use crate::results::fit::{FitStatus, Verdict};
 use crate::scatter::Excess;
 use palpate_engine::{Evaluate, Evaluation, Failure, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
@@ -16,9 +17,20 @@ use palpate_model::observation::ReadingKind;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
 
+mod answer;
 mod free;
+mod lead;
+mod verdict;
 
+/// Standard errors from the optimum up to which what finer cells do is asked.
+const ARRIVED: f64 = 1.0;
+
+/// Standard deviations from what is known beforehand beyond which chance (one in 370) is no explanation.
+const SURPRISING: f64 = 3.0;
+
+pub use answer::{Headline, Parts};
 pub(crate) use free::free_parameters;
+use verdict::verdict;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -88,10 +100,10 @@ pub struct Fitted {
     pub after: Vec<ResidualSummary>,
     /// True when the fit was stopped before its end.
     pub interrupted: bool,
-    /// How far a finer grid and time step would move each parameter, where that was asked for ([`grid_shift`]).
-    ///
-    /// [`grid_shift`]: crate::grid_shift
-    pub grid_shift: Option<Vec<f64>>,
+    /// What cells and time step do to each number, where that was looked at ([`Fitted::check_grid`]).
+    pub grid: Option<GridCheck>,
+    /// What it is worth, in a word and its reasons.
+    pub verdict: Verdict,
     /// What deserves attention: from the files, from the fit, from the residuals.
     pub warnings: Vec<String>,
 }
@@ -110,6 +122,26 @@ impl Fitted {
         let named = |n: &FreeNumber| specs(experiment).is_some_and(|f| f.parameters.iter().any(|p| p.path == n.path));
         let all = self.free.iter().zip(&self.result.parameters);
         all.filter(|(n, _)| own(n) && named(n)).map(|(n, p)| (n.path.clone(), p.value)).collect()
+    }
+
+    /// Looks at what cells and time step do to the numbers found ([`GridCheck`]): one evaluation on finer ones, and one on coarser ones
+    /// where that moves a number by more than noise does. A check that cannot be made is a warning, one that is stopped an interruption.
+    pub fn check_grid(&mut self, experiments: &[Experiment], backend: Backend, interrupt: &Interrupt) {
+        if self.status() != FitStatus::Complete || self.free.is_empty() {
+            return;
+        }
+        if self.result.distance > ARRIVED {
+            // The way that is left to the optimum of these cells would count as theirs.
+            self.warnings.push("± does not hold what cells and step do: the search did not converge".into());
+            return;
+        }
+        match grid_check(experiments, self, backend, interrupt) {
+            Ok(check) => self.grid = Some(check),
+            Err(Error::Interrupted) => self.interrupted = true,
+            // The fit stands without it.
+            Err(e) => self.warnings.push(format!("± does not hold what cells and step do: no grid check ({e})")),
+        }
+        self.verdict = verdict(self, experiments);
     }
 
     /// How the fit ended.
@@ -187,12 +219,13 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
             evaluate: Box::new(Counted { inner, interrupt: options.interrupt.clone(), first: scenes.is_empty() }),
         });
     }
-    let mut problem = Problem::new(scenes, free).map_err(|e| InputError::file(&first.scene().path, e))?;
+    let mut guide =
+        lead::Guide { experiments, free: &free, backend, settings: &settings, interrupt: &options.interrupt, notes: Vec::new() };
+    let mut problem = Problem::new(scenes, free.clone()).map_err(|e| InputError::file(&first.scene().path, e))?;
     let interrupt = options.interrupt.clone();
     let mut history = Vec::new();
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
     let mut told = options.on_iteration.take();
-    let settings = &settings;
     type Done = (FitResult, Vec<Vec<f64>>, Vec<Option<ResidualSummary>>, Vec<ResidualSummary>, Vec<String>);
     let done: Result<Done, Error> = with_threads(threads, || {
         let mut hear = |p: &Progress| {
@@ -214,9 +247,16 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
             after.iter().for_each(|r| excess.add(r.excess));
             excess.design_effect()
         };
-        let hooks =
-            Hooks { on_iteration: Some(&mut hear), interrupt: Some(interrupt.flag()), journal, design_effect: Some(&mut worth) };
-        let result = palpate_fit::fit(&mut problem, settings, hooks)?;
+        let mut lead = |starts: &[Vec<f64>]| guide.lead(starts);
+        let hooks = Hooks {
+            on_iteration: Some(&mut hear),
+            interrupt: Some(interrupt.flag()),
+            journal,
+            design_effect: Some(&mut worth),
+            lead: Some(&mut lead),
+        };
+        let result = palpate_fit::fit(&mut problem, &settings, hooks)?;
+        notes.append(&mut guide.notes);
         if let Some(e) = fault {
             return Err(e);
         }
@@ -248,10 +288,13 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         before,
         after,
         interrupted,
-        grid_shift: None,
+        grid: None,
+        verdict: Verdict::default(),
         warnings,
     };
-    Ok(with_residual_warnings(fitted))
+    let mut fitted = with_residual_warnings(fitted);
+    fitted.verdict = verdict(&fitted, experiments);
+    Ok(fitted)
 }
 
 /// Residuals at θ; the CPU's where the device fails, so that a result is not lost with it.
@@ -271,21 +314,25 @@ pub(crate) fn residuals_at(
 }
 
 fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
-    let (rms, noise, points) = fitted.residual();
+    let points = fitted.residual().2;
     let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
-    if unmatched * 20 > points + unmatched {
+    // Of the larger part the verdict speaks.
+    if unmatched * 20 > points + unmatched && unmatched <= points {
         fitted.warnings.push(format!(
             "{unmatched} of {} observed points met no part of the simulated body; is something else in the images, or is the band too narrow?",
             points + unmatched
         ));
     }
-    if rms > 2.0 * noise {
+    for (n, p) in fitted.free.iter().zip(&fitted.result.parameters) {
+        let Some((value, sd)) = p.known.filter(|(value, sd)| (p.value - value).abs() > SURPRISING * sd) else { continue };
         fitted.warnings.push(format!(
-            "the remaining residual of {:.3} mm is {:.1} times what noise explains ({:.3} mm): something in the model is \
-             missing or wrong (`palpate diagnose` looks for it), or cells and time step are too coarse (`--grid-check`)",
-            rms * 1e3,
-            rms / noise,
-            noise * 1e3
+            "{}: {} is {:.1} standard deviations from the {} ± {} that it is known to be: something in the model is missing or wrong, or \
+             what is known",
+            n.label(),
+            palpate_engine::number(p.value),
+            (p.value - value).abs() / sd,
+            palpate_engine::number(value),
+            palpate_engine::number(sd)
         ));
     }
     fitted

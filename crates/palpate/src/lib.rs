@@ -33,6 +33,7 @@
 //! Invariant: this room reads options, chooses a backend and talks to people. It computes no physics.
 
 mod catalogue;
+mod choose;
 pub mod cli;
 mod commands;
 mod diagnosing;
@@ -60,8 +61,8 @@ pub use embed::Embedding;
 pub use engine::Backend;
 pub use error::Error;
 pub use experiment::{Experiment, Simulation};
-pub use fitting::{FitOptions, Fitted, FreeNumber, fit};
-pub use grid::grid_shift;
+pub use fitting::{FitOptions, Fitted, FreeNumber, Headline, Parts, fit};
+pub use grid::{GridCheck, GridEffect, grid_check};
 pub use interrupt::Interrupt;
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};

@@ -9,7 +9,7 @@ use palpate_model::scene::Optimizer;
 
 /// Memory that the simulations of one batch may take together [B], unless the user says how many run at once. What a graphics
 /// device has cannot be asked; any that computes faster than a CPU has more.
-const BATCH_MEMORY: u64 = 2_000_000_000;
+pub(crate) const BATCH_MEMORY: u64 = 2_000_000_000;
 
 /// What a fit asks of its backend.
 #[derive(Clone, Debug)]

@@ -120,7 +120,13 @@ fn auto_takes_what_it_measured_to_be_faster_and_says_so() {
         ("nelder-mead", "a step with the cost"),
     ] {
         let mut command = program();
-        command.arg("fit").arg(path("fit.toml")).args(["--optimizer", optimizer, "--pictures", "0", "--out"]);
+        command.args(["fit", "--no-grid-check"]).arg(path("fit.toml")).args([
+            "--optimizer",
+            optimizer,
+            "--pictures",
+            "0",
+            "--out",
+        ]);
         let (code, _, err) = run(command.arg(path(optimizer)).env("PALPATE_ADAPTER", &name));
         assert_eq!(code, 0, "{err}");
         check_choice(&err, step, &name);
@@ -191,7 +197,7 @@ fn inspect_foresees_the_memory_of_a_fit_on_the_cpu() {
         let said: Value = serde_json::from_str(&json).expect("it is JSON");
         assert_eq!(said["batch"], 4, "{said}");
         let mut fit = program();
-        fit.arg("fit").arg(&file).args(["--backend", "cpu", "--pictures", "0", "--out"]).arg(path(h));
+        fit.args(["fit", "--no-grid-check"]).arg(&file).args(["--backend", "cpu", "--pictures", "0", "--out"]).arg(path(h));
         (said["memory"].as_f64().expect("a number of bytes"), peak(&mut fit))
     });
     let (said, real) = (taken[1].0 - taken[0].0, taken[1].1 - taken[0].1);
@@ -280,7 +286,11 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
     let log = || fs::read_to_string(path("log")).unwrap_or_default();
     let stopped_when = |options: &[&str], ready: &dyn Fn(Duration) -> bool| {
         let mut fit = program();
-        fit.arg("fit").arg(path("fit.toml")).args(["--backend", "cpu", "--batch", "2", "--out"]).arg(path("out")).args(options);
+        fit.args(["fit", "--no-grid-check"])
+            .arg(path("fit.toml"))
+            .args(["--backend", "cpu", "--batch", "2", "--out"])
+            .arg(path("out"))
+            .args(options);
         let errors = fs::File::create(path("log")).expect("writable");
         let mut fit = Running(fit.stdout(Stdio::null()).stderr(errors).spawn().expect("the program starts"));
         let begun = Instant::now();

@@ -116,6 +116,7 @@ pub fn search_on(backend: Backend, plan: &Plan, unknowns: &[Unknown], how: &Sear
                 typical: spec.typical,
                 bounds: (spec.lower, spec.upper),
                 start: u.start,
+                known: None,
                 count: 1,
                 direction: u.key.direction(),
                 slots: vec![Slot { scene: 0, place: place(u), factor: 1.0 }],

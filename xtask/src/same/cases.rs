@@ -59,7 +59,7 @@ pub const CASES: [Case; 16] = [
         case("first fit", &[], Seen::Points, &[]),
         &[
             ("cells = 16", "cells = 9"),
-            ("= 0.006", "= 0.01"),
+            ("= 0.0075", "= 0.01"),
             ("starts     = 3", "starts     = 2"),
             ("= 20\n", "= 4\n"),
             ("[fit]", "pixel_stride = 2\n[fit]"),

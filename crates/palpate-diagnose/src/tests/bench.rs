@@ -192,6 +192,7 @@ impl Laboratory for Bench {
             bounds,
             scale: 1e-3,
             transform,
+            known: None,
         };
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let mut out = vec![number("stiffness".into(), 0.0, free), number("damping".into(), 0.0, free)];
@@ -234,7 +235,7 @@ impl Laboratory for Bench {
             Ok(Fit {
                 model: Model { changes: changes.clone(), numbers: self.numbers(changes)?, errors, values },
                 cost,
-                gained: 0.0,
+                promised: 0.0,
                 reach: f64::INFINITY,
                 settled: true,
             })
@@ -258,7 +259,7 @@ impl Laboratory for Bench {
     fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
         let at = |i: usize| pattern("grid", self.rest[i % POINTS], (i / POINTS) as f64 / FRAMES as f64);
         let change = (0..FRAMES * POINTS).map(|i| Some(self.grid * at(i))).collect();
-        Ok(vec![Field { name: "grid", change, rough: Field::REFINED }])
+        Ok(vec![Field::refined("grid", change)])
     }
 
     fn held_out(&mut self, _: &Model) -> Result<Option<Readings>, LabError> {
@@ -281,5 +282,7 @@ impl Laboratory for Bench {
         self.stopped
     }
 
-    fn say(&mut self, _: &str) {}
+    fn say(&mut self, what: &str) {
+        println!("{what}");
+    }
 }

@@ -3,9 +3,12 @@
 use super::bench::{Bench, NOISE};
 use crate::cells::Cells;
 use crate::diagnosis::Verdict;
+use crate::judgement::density::{Blocks, Linear};
+use crate::judgement::rule::Judged;
 use crate::laboratory::Laboratory;
+use crate::linear::dot;
 use crate::noise::design_effect;
-use crate::null::{Frame, test};
+use crate::null::Frame;
 use crate::{Options, diagnose};
 use palpate_model::effects::{ALL, find};
 
@@ -23,7 +26,7 @@ fn hidden_effects_are_named_and_the_gap_closes() {
         // Noise leaves 1/√5760 of 1 mm on the amplitude.
         assert!((first.parameters[0].1 / (1.5 * NOISE) - 1.0).abs() < 0.05, "{:?}", first.parameters);
         assert!(d.gap_closed > 0.9 && first.held_out_gain > 0.9, "{} {}", d.gap_closed, first.held_out_gain);
-        assert!(d.places.iter().map(|p| p.share).sum::<f64>() > 0.5 && d.p_value < 0.01);
+        assert!(d.places.iter().map(|p| p.share).sum::<f64>() > 0.5 && d.missing.0 > 0.0);
         assert!(d.effects.iter().filter(|e| e.accepted).count() == 1);
     }
 }
@@ -45,20 +48,14 @@ fn two_hidden_effects_are_both_named() {
 }
 
 #[test]
-fn a_plain_effect_and_a_freer_one_are_found_together_where_neither_passes_alone() {
+fn a_plain_effect_and_a_freer_one_are_both_found() {
     let drag = Bench::first_pattern("air-drag");
     let mut bench = Bench::new(8, &[(&drag, -1.5 * NOISE), ("camera-pose 1 []", 1.5 * NOISE)], false);
     let baseline = bench.baseline();
-    // The camera alone closes 85 % of the gap.
-    let d = diagnose(&mut bench, baseline, &Options { least_gain: 0.9, ..Options::default() }).unwrap();
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     let mut kinds: Vec<&str> = d.effects.iter().filter(|e| e.accepted).map(|e| e.kind.as_str()).collect();
     kinds.sort_unstable();
     assert_eq!(kinds, ["air-drag", "camera-pose"], "{}", d.sentence());
-    assert!(
-        d.tried.iter().any(|t| t.round == 1 && t.kind == "camera-pose + air-drag" && t.held_out_gain.is_some()),
-        "{:?}",
-        d.tried
-    );
 }
 
 #[test]
@@ -96,7 +93,7 @@ fn what_is_missing_does_not_hide_behind_the_discretisation() {
     let baseline = bench.baseline();
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     assert!(!matches!(d.verdict, Verdict::Adequate), "{}", d.sentence());
-    assert!(d.p_value < 0.01 && d.structure.0 > 1e-3, "{} {:?}", d.p_value, d.structure);
+    assert!(d.remains, "{:?}", d.missing);
 }
 
 #[test]
@@ -111,16 +108,13 @@ fn what_bends_to_the_grid_does_not_leave_the_right_effect_behind() {
 #[test]
 fn an_answer_says_what_there_was_no_time_for() {
     let (a, b) = (Bench::first_pattern("uniform-force"), Bench::first_pattern("depth-bias"));
-    let mut bench = Bench::new(9, &[(&a, -2.0 * NOISE), (&b, 0.5 * NOISE)], false);
+    let mut bench = Bench::new(9, &[(&a, -2.0 * NOISE), (&b, 0.25 * NOISE)], false);
     bench.slow = vec!["depth-bias"];
     let baseline = bench.baseline();
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", d.sentence());
-    assert!(
-        d.sentence().ends_with("The search ended before it had tried to the end: uniform-force + depth-bias."),
-        "{}",
-        d.sentence()
-    );
+    let end = "The search ended before it had tried to the end: uniform-force + depth-bias, depth-bias.";
+    assert!(d.sentence().ends_with(end), "{}", d.sentence());
 }
 
 #[test]
@@ -151,6 +145,7 @@ fn an_answer_that_leaves_much_is_none_where_time_cut_the_search_short() {
         "{}",
         whole.sentence()
     );
+    // What there was no time for may explain it better.
     let hurried = answer(vec!["depth-bias"]);
     assert_eq!(hurried.verdict, Verdict::Undecided, "{}", hurried.sentence());
     assert!(hurried.sentence().contains("the known effect that helps most, uniform-force,"), "{}", hurried.sentence());
@@ -184,22 +179,32 @@ fn who_stops_before_the_noise_is_known_is_told_no_more_than_that() {
 fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
     let (mut alarms, mut factors) = (0, Vec::new());
     const RECORDINGS: u64 = 120;
+    // A discrepancy is one of twenty things that a scene may need.
     const STATED: f64 = 0.05;
     for seed in 0..RECORDINGS {
         let mut bench = Bench::new(1000 + seed, &[], true);
         let model = bench.baseline();
         let readings = bench.linearise(&[(Vec::new(), model.values.clone())]).remove(0).unwrap();
-        let fields = bench.finer(&[], &model.values).unwrap();
+        let field = bench.finer(&[], &model.values).unwrap().remove(0);
         let mut cells = Cells::new(&readings);
-        let frame = |cells: &Cells| {
-            Frame::new(&cells.table(&readings, None), vec![cells.means(&fields[0].change)], vec![fields[0].rough])
-        };
-        let first = frame(&cells);
-        let (factor, noise) = design_effect(&cells, &first.left(), |i| first.absorbed.leverage(i));
+        let frame = Frame::new(&cells.table(&readings, None), &[cells.means(&field.change)], &[field.times], &[field.rough]);
+        let (factor, _) = design_effect(&cells, &frame.left(), |i| frame.absorbed.leverage(i));
         factors.push(factor);
         cells.sd.iter_mut().for_each(|s| *s *= factor.sqrt());
-        let p = test(&cells, &frame(&cells), &noise, 8, seed).p_value;
-        alarms += usize::from(p < STATED);
+        let (table, change, blocks) = (cells.table(&readings, None), cells.means(&field.change), Blocks::new(&cells));
+        let times = |c: &[f64], by: f64| c.iter().map(|c| by * c).collect::<Vec<f64>>();
+        // Nothing is known of the two numbers; of the field what it is.
+        let mut moves: Vec<Vec<f64>> = table.columns.iter().map(|c| times(c, 100.0 / dot(c, c).sqrt())).collect();
+        moves.push(times(&change, field.times.1));
+        let model = Linear {
+            y: table.y.iter().zip(&change).map(|(y, c)| y + field.times.0 * c).collect(),
+            moves,
+            known: vec![false, false, true],
+            rough: vec![times(&change, field.rough)],
+        };
+        let beside = model.left_out(&blocks, model.discrepancy(&blocks));
+        let judged = Judged { alone: model.left_out(&blocks, 0.0), beside, ..Judged::default() };
+        alarms += usize::from(judged.missing().nats > 0.0);
     }
     let rate = alarms as f64 / RECORDINGS as f64;
     let factor = factors.iter().sum::<f64>() / factors.len() as f64;

@@ -1,27 +1,20 @@
 //! The verdict: levels before and after, and the gap that is closed.
 
-use super::{Options, Progress, Session, State};
+use super::{Progress, STRANGE, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, Readings};
 use crate::linear::least_squares;
-use crate::null::{Adequacy, Block, LARGEST};
+use crate::null::{Block, LARGEST};
 use crate::quantity::millimetres;
 
+/// Standard deviations outside the known world from which on an answer says so.
+const WORTH_SAYING: f64 = 2.0;
 /// Distance over what noise and discretisation explain beyond which a recording that no fit has seen counts as not met: bodies simulated
 /// by another method, with nothing missing, stay below 1.2.
 const MET: f64 = 1.5;
-/// The same for an effect that is not quite the right one: what leaves more must close as much of the gap as a patchwork of several.
-const OFF: f64 = 2.5;
 /// Ridge that keeps errors of the discretisation apart that look the same.
 const SMALL: f64 = 1e-3;
-
-impl Options {
-    /// The share of the gap that a single effect must close to be an explanation, when it leaves so much of a second recording.
-    fn enough_of_one(&self, left: Option<Level>) -> f64 {
-        if left.is_some_and(|l| l.rms > OFF * l.noise) { self.enough.max(self.enough_of_several) } else { self.enough }
-    }
-}
 
 impl Session<'_> {
     /// Distance of a model from the measurement, and what noise and discretisation explain of it.
@@ -61,7 +54,7 @@ impl Session<'_> {
         &mut self,
         (mut base, before): (State, Level),
         state: State,
-        adequacy: &Adequacy,
+        blocks: &[Block],
         mut out: Progress,
     ) -> Diagnosis {
         let after = self.level(&state);
@@ -73,25 +66,26 @@ impl Session<'_> {
             (Level { rms: predicted.0, noise }, Level { rms: predicted.1, noise })
         });
         let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
-        let adequate = !self.is_missing(adequacy, &state);
-        let enough = self.options.enough_of_one(held_out.map(|(_, after)| after));
-        let verdict = match (adequate, out.accepted.len()) {
-            (true, 0) => Verdict::Adequate,
-            // It may be the nearest of those that there was time for.
-            (false, 1) if self.no_time && !after.is_close() => Verdict::Undecided,
-            // What follows one recording and not the other has only bent to it.
-            (true, 1) if held_out.is_none() || gap_closed >= enough => Verdict::MissingEffect,
-            (false, 1) if gap_closed >= enough => Verdict::MissingEffect,
-            (_, 2..) if gap_closed >= self.options.enough_of_several => Verdict::MissingEffect,
+        // The noise may have become known better since.
+        self.remeasure(&mut base);
+        let is_missing = |s: &State| s.judged.is_missing() || s.strange.iter().any(|x| x.deviations > STRANGE);
+        let remains = is_missing(&state);
+        let explained = state.judged.alone_over(&base.judged).nats;
+        // What there was no time for may explain more than what was found.
+        let is_open = self.no_time && state.judged.missing().nats > explained;
+        let verdict = match out.accepted.len() {
+            0 if !remains => Verdict::Adequate,
+            1.. if explained > 0.0 && !is_open => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if out.interrupted || self.no_time => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
-        // Of all that is missing, not of what a rejected explanation leaves; the noise may have become known better since.
-        self.remeasure(&mut base);
+        // Of all that is missing, not of what a rejected explanation leaves.
         let slack = if verdict == Verdict::Unexplained { self.slack_or_why(&base) } else { None };
-        let caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
-        let baseline = base.model;
+        let mut caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
+        let strange = if verdict == Verdict::Unexplained { &base.strange } else { &state.strange };
+        caveats.extend(strange.iter().filter(|s| s.deviations >= WORTH_SAYING).map(|s| format!("The fit ends with {}.", s.what)));
+        let baseline = base.model.clone();
         if verdict == Verdict::Unexplained {
             // Part of an explanation is not one: it is shown, but not believed.
             out.accepted.iter_mut().for_each(|f| f.accepted = false);
@@ -100,13 +94,12 @@ impl Session<'_> {
         effects.extend(out.close);
         Diagnosis {
             verdict,
-            p_value: out.p_value,
-            p_value_after: adequacy.p_value,
-            structure: (out.structure, adequacy.structure),
+            missing: base.judged.missing().parts(),
+            missing_after: state.judged.missing().parts(),
             baseline: baseline.clone(),
             before,
             places: if verdict == Verdict::Adequate { Vec::new() } else { out.places.unwrap_or_default() },
-            map: out.blocks.iter().zip(&adequacy.blocks).map(|(b, a)| self.entry(b, a)).collect(),
+            map: out.blocks.iter().zip(blocks).map(|(b, a)| self.entry(b, a)).collect(),
             effects,
             tried: std::mem::take(&mut self.tried),
             not_tried: std::mem::take(&mut self.not_tried),
@@ -119,7 +112,7 @@ impl Session<'_> {
             noise_ratio: self.noise_ratio,
             design_effect: self.design_effect,
             caveats,
-            remains: !adequate,
+            remains,
             interrupted: out.interrupted,
             unsure: out.unsure,
         }
@@ -148,47 +141,4 @@ fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&
     });
     let failed = failure.map(|e| format!("The second recording took no part: {e}."));
     missed.into_iter().chain(failed).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::prune::tests::left;
-    use super::*;
-    use crate::diagnosis::Found;
-    use crate::tests::bench::NOISE;
-
-    #[test]
-    fn an_effect_that_leaves_much_of_the_second_recording_must_close_more_of_the_gap() {
-        let options = Options::default();
-        let left = |rms: f64| Some(Level { rms, noise: 1e-3 });
-        assert_eq!(options.enough_of_one(None), options.enough);
-        assert_eq!(options.enough_of_one(left(2e-3)), options.enough);
-        assert_eq!(options.enough_of_one(left(3e-3)), options.enough_of_several);
-    }
-
-    /// Asks whether something is missing where the means of blocks show nothing.
-    fn asks<const MISSING: bool>(s: &mut Session, state: State, _: &mut Vec<Found>) -> State {
-        let swings = |p_value| Adequacy { p_value, structure: 0.0, blocks: Vec::new() };
-        assert_eq!(s.is_missing(&swings(0.005), &state), MISSING);
-        // Never by chance, and always where structure is large.
-        assert!(!s.is_missing(&swings(0.02), &state));
-        assert!(s.is_missing(&Adequacy { structure: NOISE, ..swings(0.005) }, &state));
-        state
-    }
-
-    #[test]
-    fn what_swings_within_blocks_is_missing_where_it_leaves_more_than_twice_what_is_explained() {
-        let both = ["depth-bias", "air-drag"];
-        left(asks::<false>, both, &[]);
-        left(asks::<true>, both, &[("magnet", 3.0 * NOISE)]);
-    }
-
-    #[test]
-    fn what_leaves_far_more_than_is_explained_is_missing_whatever_its_structure() {
-        let asks = |s: &mut Session, state: State, _: &mut Vec<Found>| {
-            assert!(s.is_missing(&Adequacy { p_value: 1.0, structure: 0.0, blocks: Vec::new() }, &state));
-            state
-        };
-        left(asks, ["depth-bias", "air-drag"], &[("magnet", 6.0 * NOISE)]);
-    }
 }

@@ -2,93 +2,108 @@
 //! numbers in all; where it is only turned it is as plain an explanation as any other with three. A load on a slender beam is a mass at a
 //! distance from the clamp: where in the cross-section it hangs is not seen.
 
-use super::choose::price;
-use super::{Session, State, Variant, met};
+use super::{Session, State};
 use crate::change::{Aim, Change};
+use crate::judgement::prior::Prior;
 use crate::laboratory::Number;
 use crate::linear::dot;
 use crate::null::absorbed_by;
 use std::collections::BTreeMap;
 
-/// Numbers of a candidate that are moved away from the optimum, by place among its own: by how much.
+/// Numbers of a change that are moved away from the optimum, by place among its own: by how much.
 type Moved = BTreeMap<usize, f64>;
 
+/// One change of a model with the place of its first number.
+struct Part<'a> {
+    change: &'a Change,
+    first: usize,
+    numbers: &'a [Number],
+    values: &'a [f64],
+    amplitudes: Vec<bool>,
+}
+
+impl State {
+    /// Its changes with their numbers, which come last, in their order.
+    fn parts(&self) -> Vec<Part<'_>> {
+        let m = &self.model;
+        let mut first = m.values.len() - m.changes.iter().map(|c| c.free_slots().len()).sum::<usize>();
+        let mut out = Vec::new();
+        for change in &m.changes {
+            let own = first..first + change.free_slots().len();
+            first = own.end;
+            let (start, numbers, values) = (own.start, &m.numbers[own.clone()], &m.values[own]);
+            out.push(Part { change, first: start, numbers, values, amplitudes: change.amplitudes() });
+        }
+        out
+    }
+}
+
 impl Session<'_> {
-    /// Numbers of a fitted candidate, but for those that leave no more than their price when they are not fitted, around the optimum: the
+    /// Of every change, its numbers but for those that leave no more than their price when they are not fitted, around the optimum: the
     /// vectors and amplitudes that go back to "absent" one after the other, coordinates of a place that may be anywhere on the body, and
-    /// components of a direction that may point anywhere; of every change one of each stays. To have picked some vectors out of more counts as one number: an effect that has no others is plainer.
-    pub(super) fn needed(&self, old: &State, new: &State, v: &Variant) -> usize {
-        let mut count = v.columns.len();
-        let first = new.model.values.len() - count;
-        let each = price(met(&new.readings), &new.predicted[0], &old.predicted[0]);
-        let mut moved = Moved::new();
-        let mut chosen = false;
-        loop {
-            let left = rise(new, first, &moved);
-            let vectors =
-                removable(v, &moved).into_iter().map(|g| (g.into_iter().map(|k| (k, absent(new, first, v, k))).collect(), true));
-            let coordinates =
-                vague(v, &new.model.values[first..], &moved).into_iter().map(|(k, by)| (Moved::from([(k, by)]), false));
-            let cost = |more: &Moved| {
-                let with = moved.iter().chain(more).map(|(k, by)| (*k, *by)).collect();
-                (rise(new, first, &with) - left) / more.len() as f64
-            };
-            let open = vectors.chain(coordinates).map(|(more, vector): (Moved, bool)| (cost(&more), more, vector));
-            let Some((_, more, vector)) = open.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(cost, ..)| *cost < each) else {
-                return count + usize::from(chosen);
-            };
-            count -= more.len();
-            chosen |= vector;
-            moved.extend(more);
-        }
+    /// components of a direction that may point anywhere; one of each stays. To have picked some vectors out of more counts as one number:
+    /// an effect that has no others is plainer.
+    pub(super) fn needed(&self, state: &State) -> Vec<usize> {
+        // A model that leaves more than noise has readings that weigh less.
+        let misfit = (state.squares() / self.cells.len() as f64).max(1.0);
+        let price = Prior { candidates: self.candidates, readings: self.cells.len() };
+        let each = 2.0 * price.number() * misfit;
+        state.parts().iter().map(|part| asked_for(state, part, each)).collect()
     }
 }
 
-/// How far a candidate's number is from where it was before.
-fn absent(state: &State, first: usize, v: &Variant, k: usize) -> f64 {
-    v.numbers[k].start - state.model.values[first + k]
+/// How many numbers of a change are worth their price.
+fn asked_for(state: &State, part: &Part, each: f64) -> usize {
+    let mut count = part.numbers.len();
+    let mut moved = Moved::new();
+    let mut chosen = false;
+    loop {
+        let left = rise(state, part.first, &moved);
+        let back = |k: usize| (k, part.numbers[k].start - part.values[k]);
+        let vectors = removable(part, &moved).into_iter().map(|g| (g.into_iter().map(back).collect(), true));
+        let coordinates = vague(part, &moved).into_iter().map(|(k, by)| (Moved::from([(k, by)]), false));
+        let cost = |more: &Moved| {
+            let with = moved.iter().chain(more).map(|(k, by)| (*k, *by)).collect();
+            (rise(state, part.first, &with) - left) / more.len() as f64
+        };
+        let open = vectors.chain(coordinates).map(|(more, vector): (Moved, bool)| (cost(&more), more, vector));
+        let Some((_, more, vector)) = open.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(cost, ..)| *cost < each) else {
+            return count + usize::from(chosen);
+        };
+        count -= more.len();
+        chosen |= vector;
+        moved.extend(more);
+    }
 }
 
-/// Vectors and amplitudes of changes that keep another one without them.
-fn removable(v: &Variant, moved: &Moved) -> Vec<Vec<usize>> {
-    let mut next = 0;
-    let mut out = Vec::new();
-    for groups in v.changes.iter().map(Change::groups) {
-        let own = next..next + groups.len();
-        next = own.end;
-        let mut open: Vec<(&String, Vec<usize>)> = Vec::new();
-        for (name, k) in groups.iter().zip(own).filter(|(_, k)| v.amplitudes[*k] && !moved.contains_key(k)) {
-            match open.iter_mut().find(|g| g.0 == name) {
-                Some((_, members)) => members.push(k),
-                None => open.push((name, vec![k])),
-            }
-        }
-        if open.len() > 1 {
-            out.extend(open.into_iter().map(|g| g.1));
+/// Vectors and amplitudes of a change that keeps another one without them.
+fn removable(part: &Part, moved: &Moved) -> Vec<Vec<usize>> {
+    let mut open: Vec<(String, Vec<usize>)> = Vec::new();
+    let groups = part.change.groups().into_iter().enumerate();
+    for (k, name) in groups.filter(|(k, _)| part.amplitudes[*k] && !moved.contains_key(k)) {
+        match open.iter_mut().find(|g| g.0 == name) {
+            Some((_, members)) => members.push(k),
+            None => open.push((name, vec![k])),
         }
     }
-    out
+    if open.len() > 1 { open.into_iter().map(|g| g.1).collect() } else { Vec::new() }
 }
 
 /// Coordinates of places on the body and components of directions, with how far one that may be anywhere, or point anywhere, is from its
-/// mean, root mean square. One of every place and direction stays: it has been chosen. `values` are those of the candidate's numbers.
-fn vague(v: &Variant, values: &[f64], moved: &Moved) -> Vec<(usize, f64)> {
-    let mut next = 0;
+/// mean, root mean square. One of every place and direction stays: it has been chosen.
+fn vague(part: &Part, moved: &Moved) -> Vec<(usize, f64)> {
+    let aims = part.change.aims();
     let mut out = Vec::new();
-    for aims in v.changes.iter().map(Change::aims) {
-        let own = next..next + aims.len();
-        next = own.end;
-        for aim in [Aim::Place, Aim::Direction] {
-            let all: Vec<usize> = own.clone().zip(&aims).filter(|(_, a)| **a == Some(aim)).map(|(k, _)| k).collect();
-            let length = all.iter().map(|k| values[*k].powi(2)).sum::<f64>().sqrt();
-            let spread = |n: &Number| match aim {
-                Aim::Place => (n.bounds.1 - n.bounds.0) / 12f64.sqrt(),
-                Aim::Direction => length / 3f64.sqrt(),
-            };
-            let open: Vec<usize> = all.into_iter().filter(|k| !moved.contains_key(k)).collect();
-            if open.len() > 1 {
-                out.extend(open.into_iter().map(|k| (k, spread(&v.numbers[k]))));
-            }
+    for aim in [Aim::Place, Aim::Direction] {
+        let all: Vec<usize> = (0..aims.len()).filter(|k| aims[*k] == Some(aim)).collect();
+        let length = all.iter().map(|k| part.values[*k].powi(2)).sum::<f64>().sqrt();
+        let spread = |n: &Number| match aim {
+            Aim::Place => (n.bounds.1 - n.bounds.0) / 12f64.sqrt(),
+            Aim::Direction => length / 3f64.sqrt(),
+        };
+        let open: Vec<usize> = all.into_iter().filter(|k| !moved.contains_key(k)).collect();
+        if open.len() > 1 {
+            out.extend(open.into_iter().map(|k| (k, spread(&part.numbers[k]))));
         }
     }
     out
@@ -115,10 +130,7 @@ mod tests {
 
     /// Counts the numbers that the newest of two changes needs.
     fn needs<const COUNT: usize>(s: &mut Session, state: State, _: &mut Vec<Found>) -> State {
-        let kind = state.model.changes[1].kind();
-        let old = s.refitted_without(&state, &[1]).unwrap();
-        let variant = s.variants_of(&old, |c| c.kind() == kind).unwrap().remove(0);
-        assert_eq!(s.needed(&old, &state, &variant), COUNT, "{kind}");
+        assert_eq!(s.needed(&state)[1], COUNT, "{}", state.model.changes[1].kind());
         state
     }
 

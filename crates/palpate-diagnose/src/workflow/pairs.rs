@@ -7,20 +7,8 @@ use crate::laboratory::{LabError, Model, Number};
 use crate::score::Score;
 use std::rc::Rc;
 
-/// Most numbers of an effect of a pair, and of the freer one of a pair that is tried because nothing plainer explains anything.
-const PLAIN: usize = 3;
-const FREE: usize = 9;
-/// Pairs of so many numbers in all are ranked on their own: those with more always promise more.
-const CLASSES: [std::ops::RangeInclusive<usize>; 3] = [2..=2, 3..=3, 4..=2 * PLAIN];
-/// The same of pairs with a freer effect.
-const FREE_CLASSES: [std::ops::RangeInclusive<usize>; 2] = [5..=9, 10..=FREE + PLAIN];
-/// Pairs of a class, and partners of a fitted effect, that are fitted; and pairs with a freer effect.
-const EACH: usize = 2;
-const FREE_EACH: usize = 8;
-/// Fitted effects that partners are looked for.
-const HALVES: usize = 3;
-/// Share of the sum of squares that a pair must promise to take away, and how much of it beyond what its better half does alone.
-const PROMISE: (f64, f64) = (0.8, 0.05);
+/// A range of numbers of numbers: pairs of each are ranked on their own, because those with more always promise more.
+type Class = std::ops::RangeInclusive<usize>;
 
 impl Session<'_> {
     /// Pairs of plain effects with fewer than so many numbers that are worth a fit, each with the state that it starts from.
@@ -35,9 +23,11 @@ impl Session<'_> {
         if fewer_than <= 2 {
             return Ok(Vec::new());
         }
-        let plain = with_at_most(PLAIN, variants);
+        let policy = &self.options.search;
+        let most = policy.plain.0;
+        let plain = with_at_most(most, variants);
         let mut out = self.partners(state, fitted, &plain, fewer_than)?;
-        out.extend(self.promising(state, &plain, (&CLASSES, EACH), |a, b| a + b < fewer_than));
+        out.extend(self.promising(state, &plain, (&[2..=2, 3..=3, 4..=2 * most], policy.pairs.0), |a, b| a + b < fewer_than));
         keep_first(&mut out, |(_, v)| v.candidate);
         Ok(out)
     }
@@ -45,7 +35,10 @@ impl Session<'_> {
     /// Pairs of a plain effect and a freer one that are worth a fit where nothing plainer passes: what two causes do together may look like
     /// neither of them, and like no single cause.
     pub(super) fn freer_pairs(&self, state: &State, variants: &[Variant]) -> Vec<(Rc<State>, Variant)> {
-        self.promising(state, &with_at_most(FREE, variants), (&FREE_CLASSES, FREE_EACH), |a, b| (a > PLAIN) != (b > PLAIN))
+        let policy = &self.options.search;
+        let (plain, free) = policy.plain;
+        let classes = [plain + 2..=free, free + 1..=free + plain];
+        self.promising(state, &with_at_most(free, variants), (&classes, policy.pairs.1), |a, b| (a > plain) != (b > plain))
     }
 
     /// Those that promise most together where both are absent, of those whose numbers of numbers fit, with the state where they are.
@@ -53,9 +46,10 @@ impl Session<'_> {
         &self,
         state: &State,
         effects: &[&Variant],
-        (classes, each): (&[std::ops::RangeInclusive<usize>], usize),
+        (classes, each): (&[Class], usize),
         fits: impl Fn(usize, usize) -> bool,
     ) -> Vec<(Rc<State>, Variant)> {
+        let promise = self.options.search.promise;
         let mut out: Vec<Variant> = Vec::new();
         for class in classes {
             let mut these: Vec<Variant> = Vec::new();
@@ -66,7 +60,7 @@ impl Session<'_> {
                         let mut both = joined(a, b);
                         both.score = self.score(state, &both);
                         let share = both.score.share;
-                        these.extend((share >= PROMISE.0 && share >= a.score.share + PROMISE.1).then_some(both));
+                        these.extend((share >= promise.0 && share >= a.score.share + promise.1).then_some(both));
                     }
                 }
             }
@@ -87,14 +81,16 @@ impl Session<'_> {
         plain: &[&Variant],
         fewer_than: usize,
     ) -> Result<Vec<(Rc<State>, Variant)>, LabError> {
+        let policy = self.options.search.clone();
         let mut out: Vec<(Rc<State>, Variant)> = Vec::new();
-        for f in fitted.iter().filter(|f| f.effects == 1 && plain.iter().any(|v| v.candidate == f.candidate)).take(HALVES) {
+        for f in fitted.iter().filter(|f| f.effects == 1 && plain.iter().any(|v| v.candidate == f.candidate)).take(policy.pairs.2)
+        {
             let fits = |v: &&&Variant| v.candidate != f.candidate && v.columns.len() + f.freedom < fewer_than;
             let wanted = plain.iter().filter(fits).map(|v| (v.candidate, v.changes[0].clone())).collect();
             let mut seconds = self.scored(&f.state, wanted)?;
             seconds.sort_by(most_promising);
-            seconds.truncate(EACH);
-            seconds.retain(|v| f.state.squares() - v.score.gain <= (1.0 - PROMISE.0) * state.squares());
+            seconds.truncate(policy.pairs.0);
+            seconds.retain(|v| f.state.squares() - v.score.gain <= (1.0 - policy.promise.0) * state.squares());
             let (from, half) = as_fitted(state, f);
             let from = Rc::new(from);
             out.extend(seconds.iter().map(|b| (from.clone(), joined(&half, b))));

@@ -1,7 +1,5 @@
 //! Backward elimination: what was accepted first may be a stand-in for what was found later.
 
-use super::choose::price;
-use super::rounds::FAR;
 use super::{Session, State};
 use crate::change::Change;
 use crate::diagnosis::Found;
@@ -37,8 +35,9 @@ impl Session<'_> {
     /// had ended in another valley, and what looks like an effect only showed the way out of it.
     pub(super) fn better_baseline(&mut self, before: &State, next: &State, added: usize) -> Option<State> {
         let size = |k: usize| before.model.values[k].abs().max(before.model.numbers[k].scale);
+        let far = self.options.search.strayed.0;
         let has_moved = |to: &State| {
-            (0..before.model.values.len()).any(|k| (to.model.values[k] - before.model.values[k]).abs() > FAR * size(k))
+            (0..before.model.values.len()).any(|k| (to.model.values[k] - before.model.values[k]).abs() > far * size(k))
         };
         if self.lab.interrupted() || !has_moved(next) {
             return None;
@@ -47,13 +46,12 @@ impl Session<'_> {
         let changes = next.model.changes.len();
         let newest: Vec<usize> = (changes - added..changes).collect();
         let mut less = self.refitted_without(next, &newest).ok()?;
-        let freedom = next.model.values.len() - before.model.values.len();
+        self.refine(&mut less);
         // Back where it was, or no better: the same round would follow for ever.
-        let is_better = has_moved(&less) && less.predicted[0].loss() < before.predicted[0].loss();
-        if !is_better || !self.is_as_good(&less, next, freedom as f64) {
+        let is_better = has_moved(&less) && less.judged.over(&before.judged).is_clear();
+        if !is_better || next.judged.over(&less.judged).is_clear() {
             return None;
         }
-        self.refine(&mut less);
         Some(less)
     }
 
@@ -66,8 +64,12 @@ impl Session<'_> {
         if places.last().is_some_and(|newest| newest.len() > freedom) && !kin {
             return Ok(None);
         }
-        let less = self.refitted_without(state, &[k])?;
-        Ok(self.is_as_good(&less, state, freedom as f64).then_some(less))
+        let mut less = self.refitted_without(state, &[k])?;
+        if state.judged.over(&less.judged).is_clear() {
+            return Ok(None);
+        }
+        self.refine(&mut less);
+        Ok((!state.judged.over(&less.judged).is_clear()).then_some(less))
     }
 
     /// The state without some of its changes, fitted again.
@@ -81,17 +83,6 @@ impl Session<'_> {
         let fit = super::one(self.lab.fit(&[start], EFFORT.0, EFFORT.1))?;
         let readings = super::one(self.lab.linearise(&[(fit.model.changes.clone(), fit.model.values.clone())]))?;
         self.beside(state, fit.model, readings)
-    }
-
-    /// True if a model predicts the recording as well as another one with so many more numbers, but for the price of these.
-    pub(super) fn is_as_good(&self, less: &State, state: &State, more: f64) -> bool {
-        let (with, without) = (&state.predicted[0], &less.predicted[0]);
-        let price = price(super::met(&state.readings), with, without);
-        let worse_elsewhere = self.held_out(less).zip(self.held_out(state)).is_some_and(|(a, b)| {
-            // Data that no fit has seen decide where there are any: a tenth of their noise is no loss.
-            a.rms * a.rms > b.rms * b.rms + 0.01 * b.noise * b.noise
-        });
-        without.loss() - with.loss() < price * more && !worse_elsewhere
     }
 
     /// Where the numbers of every change stand among all.
@@ -133,6 +124,9 @@ pub(super) mod tests {
         let options = crate::Options::default();
         let mut s = Session {
             folds: foldings(&cells),
+            blocks: crate::judgement::density::Blocks::new(&cells),
+            second: None,
+            candidates: 60,
             lab: &mut bench,
             options: &options,
             cells,
@@ -145,12 +139,12 @@ pub(super) mod tests {
             not_tried: Vec::new(),
             no_time: false,
         };
-        let state = s.state(model, readings, Vec::new(), None).unwrap();
+        let state = s.state(model, readings, Vec::new(), true, None).unwrap();
         let found = |kind: &str| Found {
             kind: kind.into(),
             sentence: String::new(),
             parameters: Vec::new(),
-            p_value: 0.0,
+            nats: (0.0, 0.0),
             held_out_gain: 1.0,
             accepted: true,
             indistinguishable_from: Vec::new(),

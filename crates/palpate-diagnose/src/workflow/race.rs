@@ -1,26 +1,14 @@
 //! Candidates race: all are fitted for an iteration, and only those within reach of the leader go on (successive halving; Jamieson &
 //! Talwalkar, *AISTATS* 2016).
 
+use super::policy::Policy;
 use super::{Session, State, Variant, keep_first};
 use crate::laboratory::{Fit, LabError, Number, Readings, Start};
 use crate::linear::least_squares;
 
-/// Iterations of a lap, the relative decrease of the cost at which a fit is settled, and by what share of the leader's gain others may lag
-/// behind after it and still go on. The last lap brings what is compared to its optimum.
-pub(super) const LAPS: [(usize, f64, f64); 4] = [(2, 2e-4, 0.4), (3, 2e-4, 0.05), (8, 2e-5, 0.02), (25, 2e-5, 1.0)];
 /// Iterations that a fit takes after a lap, in the mean, and fewest that go on however little time there is.
 const TO_THE_END: usize = 6;
 const FEWEST: usize = 2;
-/// A fit may gain as many times again what it gained in a lap.
-const STAMINA: f64 = 2.0;
-/// Shares of the linear estimate that a fit may start from: the first at which the cost is lower than without.
-pub(super) const STARTS: [f64; 3] = [1.0, 0.3, 0.1];
-/// The same of a fit that starts carefully: far out an effect is no longer linear, and what is found there may be another valley.
-pub(super) const CAREFUL: [f64; 2] = [0.3, 0.1];
-/// A lap that gained less than this share of the cost may have spent itself on finding the length of a step.
-const NO_GAIN: f64 = 0.02;
-/// Laps after which such a fit goes on if it promised nearly as much as the best, by this share.
-const PATIENCE: (usize, f64) = (2, 0.8);
 /// Largest change of a fitted number by a linear answer, relative to its size.
 const MOVES: f64 = 0.3;
 /// Ridge of the fitted numbers' linear answer.
@@ -28,22 +16,25 @@ const RIDGE: f64 = 1e-3;
 
 impl Session<'_> {
     /// Fits variants side by side, each from the state that it was scored at and along the first of the shares of its linear estimate that
-    /// helps; those that arrived, the lowest cost first, at most one for each candidate.
+    /// helps; those that arrived, the lowest cost first, at most one for each candidate. After every lap those go on whose curvature promises most:
+    /// a fit that is still far away has gained little, and may end lowest.
     pub(super) fn race<'v>(
         &mut self,
         state: &State,
         tries: &[(&State, &'v Variant)],
         shares: &[f64],
     ) -> Result<Vec<(&'v Variant, Fit)>, LabError> {
+        let policy = self.options.search.clone();
         let mut jobs = self.starts(tries, shares);
-        let most = tries.iter().map(|(_, v)| v.score.share).fold(0.0, f64::max);
-        let mut running: Vec<(&Variant, Option<Fit>)> = tries.iter().map(|(_, v)| (*v, None)).collect();
-        for (lap, (iterations, tolerance, lag)) in LAPS.into_iter().enumerate() {
-            let last = lap + 1 == LAPS.len();
+        let mut running: Vec<Runner> = tries.iter().map(|(_, v)| (*v, None)).collect();
+        let laps = policy.laps.len();
+        for (lap, iterations) in policy.laps.into_iter().enumerate() {
+            let last = lap + 1 == laps;
             let goes_on = |i: &usize| last || running[*i].1.as_ref().is_none_or(|f| !f.settled);
             let open: Vec<usize> = (0..running.len()).filter(goes_on).collect();
-            self.lab.say(&format!("fitting {} candidates, lap {} of {}", open.len(), lap + 1, LAPS.len()));
-            let answers = self.lab.fit(&open.iter().map(|i| jobs[*i].clone()).collect::<Vec<_>>(), iterations, tolerance);
+            self.lab.say(&format!("fitting {} candidates, lap {} of {laps}", open.len(), lap + 1));
+            let starts: Vec<Start> = open.iter().map(|i| jobs[*i].clone()).collect();
+            let answers = self.lab.fit(&starts, iterations, policy.tolerance[lap / 2]);
             for (&i, answer) in open.iter().zip(answers) {
                 match answer {
                     Ok(fit) => {
@@ -51,7 +42,7 @@ impl Session<'_> {
                         jobs[i].reach = fit.reach;
                         // A lap that gained nothing leaves what was reached before.
                         match &mut running[i].1 {
-                            Some(before) if before.cost < fit.cost => before.gained = 0.0,
+                            Some(before) if before.cost < fit.cost => before.promised = fit.promised,
                             reached => *reached = Some(fit),
                         }
                     }
@@ -59,19 +50,10 @@ impl Session<'_> {
                     Err(why) => self.missed(&running[i].0.kind(), &why),
                 }
             }
-            let reached = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost);
-            let best = running.iter().map(reached).fold(f64::INFINITY, f64::min);
-            let worst = best + lag * (state.readings.cost - best).max(0.0);
-            // Steps have a longest length: who starts far away and still gains with every step is not behind for good.
-            let promises = |r: &(&Variant, Option<Fit>)| r.1.as_ref().map_or(f64::INFINITY, |f| f.cost - STAMINA * f.gained);
-            let searches = |f: &Fit| !f.settled && f.gained < NO_GAIN * f.cost && f.cost < state.readings.cost;
-            let patient = |r: &(&Variant, Option<Fit>)| {
-                lap < PATIENCE.0 && r.0.score.share >= PATIENCE.1 * most && r.1.as_ref().is_some_and(searches)
-            };
-            let mut stays: Vec<bool> = running.iter().map(|r| promises(r) <= worst || patient(r)).collect();
-            self.spare(state, &running, lag, &mut stays);
+            let mut stays = if last { vec![true; running.len()] } else { going_on(&policy, state.readings.cost, &running) };
             if !last {
-                self.hurry(&running, promises, &mut stays);
+                self.spare(state, &running, policy.lag, &mut stays);
+                self.hurry(&running, &mut stays);
             }
             let mut keep = stays.iter();
             jobs.retain(|_| *keep.next().unwrap_or(&false));
@@ -86,7 +68,7 @@ impl Session<'_> {
 
     /// Lets those go on that have arrived and leave, but for errors of the discretisation, hardly more than the leader. Where these are
     /// larger than noise, a free effect that bends to them costs less than the right one, which cannot.
-    fn spare(&mut self, state: &State, running: &[(&Variant, Option<Fit>)], lag: f64, stays: &mut [bool]) {
+    fn spare(&mut self, state: &State, running: &[Runner], lag: f64, stays: &mut [bool]) {
         if self.grid(state) <= self.reading_noise(&state.readings).powi(2) {
             return;
         }
@@ -107,16 +89,11 @@ impl Session<'_> {
     }
 
     /// Where time is short only so many of those that are not at their optimum yet go on as may come to it, those that promise most.
-    fn hurry(
-        &mut self,
-        running: &[(&Variant, Option<Fit>)],
-        promises: impl Fn(&(&Variant, Option<Fit>)) -> f64,
-        stays: &mut [bool],
-    ) {
+    fn hurry(&mut self, running: &[Runner], stays: &mut [bool]) {
         let most = (self.lab.iterations_left() / TO_THE_END).max(FEWEST);
         let fits_on = |i: &usize| stays[*i] && running[*i].1.as_ref().is_none_or(|f| !f.settled);
         let mut left: Vec<usize> = (0..running.len()).filter(fits_on).collect();
-        left.sort_by(|a, b| promises(&running[*a]).total_cmp(&promises(&running[*b])));
+        left.sort_by(|a, b| promise(&running[*a]).total_cmp(&promise(&running[*b])));
         for i in left.into_iter().skip(most) {
             stays[i] = false;
             self.missed(&running[i].0.kind(), &LabError::NoTime);
@@ -151,6 +128,27 @@ impl Session<'_> {
             self.not_tried.push(line);
         }
     }
+}
+
+/// A variant on its way.
+type Runner<'v> = (&'v Variant, Option<Fit>);
+
+/// The cost that the curvature where it is promises; nothing of what could not be computed.
+fn promise(runner: &Runner) -> f64 {
+    runner.1.as_ref().map_or(f64::INFINITY, |f| f.cost - if f.settled { 0.0 } else { f.promised })
+}
+
+/// Who goes on: those whose promise reaches the leader, and of those on the way the better half.
+fn going_on(policy: &Policy, before: f64, running: &[Runner]) -> Vec<bool> {
+    let reached = running.iter().filter_map(|r| r.1.as_ref()).map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let worst = reached + policy.lag * (before - reached).max(0.0);
+    let on_the_way = |i: &usize| running[*i].1.as_ref().is_some_and(|f| !f.settled);
+    let mut order: Vec<usize> = (0..running.len()).filter(on_the_way).collect();
+    order.sort_by(|a, b| promise(&running[*a]).total_cmp(&promise(&running[*b])));
+    let (share, least) = policy.kept;
+    let most = ((share * order.len() as f64).ceil() as usize).max(least);
+    let behind = &order[most.min(order.len())..];
+    (0..running.len()).map(|i| promise(&running[i]) <= worst && !behind.contains(&i)).collect()
 }
 
 /// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer, within bounds.

@@ -2,16 +2,12 @@
 //! can be a body of two parts; so can a gradient that leaves something. Adding the right effect and dropping the others does not get there,
 //! because they stand in the wrong valley.
 
-use super::race::STARTS;
 use super::rounds::ranked;
 use super::variants::Variant;
 use super::{Fitted, Session, State, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::Found;
 use crate::laboratory::LabError;
-
-/// Candidates that are fitted in the place of others.
-const FITS: usize = 4;
 
 impl Session<'_> {
     /// The state with one effect in the place of the newest and an older one of its family or, while something is missing, of a single one;
@@ -21,7 +17,7 @@ impl Session<'_> {
         let is_kin = |a: usize, b: usize| state.model.changes[first + a].is_kin(&state.model.changes[first + b]);
         let newest = accepted.len().checked_sub(1)?;
         let mut places: Vec<Vec<usize>> = (0..newest).filter(|k| is_kin(*k, newest)).map(|k| vec![k, newest]).collect();
-        if self.is_missing(&self.adequacy(state), state) {
+        if state.judged.is_missing() {
             places.extend((0..=newest).rev().filter(|k| is_kin(*k, *k)).map(|k| vec![k]));
         }
         for old in places {
@@ -50,11 +46,11 @@ impl Session<'_> {
         variants.sort_by(most_promising);
         let mut best: Vec<&Variant> = variants.iter().collect();
         keep_first(&mut best, |v| v.candidate);
-        best.truncate(FITS);
+        let policy = self.options.search.clone();
+        best.truncate(policy.kin);
         let tries: Vec<(&State, &Variant)> = best.into_iter().map(|v| (&without, v)).collect();
-        let fitted = ranked(self.fitted(&without, &tries, &STARTS, variants.len(), Vec::new())?);
-        let freedom = state.model.values.len() - without.model.values.len();
-        Ok(fitted.into_iter().find(|f| self.is_as_good(&f.state, state, freedom as f64 - f.freedom as f64)))
+        let fitted = ranked(self.fitted(&without, &tries, &policy.starts, Vec::new())?);
+        Ok(fitted.into_iter().find(|f| f.state.judged.over(&state.judged).nats >= 0.0))
     }
 }
 

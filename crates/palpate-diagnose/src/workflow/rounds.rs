@@ -1,44 +1,28 @@
 //! One round: candidates are fitted, judged on data left out, and one of them is chosen, or none.
 
-use super::own_errors::MEASURED;
-use super::race::{CAREFUL, LAPS, STARTS};
+use super::policy::Policy;
 use super::{CandidateId, Fitted, Session, State, Variant, keep_first, most_promising};
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number};
-use crate::score::f_tail;
 use crate::separation::Separated;
 use std::rc::Rc;
-
-/// Change of a fitted number, relative to its size, from which on it may lie in another valley, and where it was before is another place to
-/// start from.
-pub(super) const FAR: f64 = 0.3;
-
-/// The same, from which on a number makes up for what is missing where it cannot be right: what shows there shows nothing of the
-/// body, and the place where it was before comes first.
-const LOST: f64 = 10.0;
-
-/// Share of the sum of squares that a wall must take away where it stands first, without any fit, to be fitted.
-const WALL: f64 = 0.3;
-/// So many of them are.
-const WALLS: usize = 3;
-/// Further starts of candidates at unknown places: in all, and of each.
-const ELSEWHERE: (usize, usize) = (10, 3);
 
 /// Iterations that a candidate of a race takes in the mean, and fewest candidates that race however little time there is.
 const RACE: usize = 9;
 const FEWEST: usize = 3;
 
 /// A wall, or another effect at a size, that helps as it stands: what others promise after a fit does not compare.
-fn is_wall(v: &Variant) -> bool {
-    v.blunt.is_some() && v.score.share > WALL
+fn is_wall(policy: &Policy, v: &Variant) -> bool {
+    v.blunt.is_some() && v.score.share > policy.walls.1
 }
 
 /// The most promising further starts of candidates at unknown places, of variants sorted by what they promise.
-fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Variant> {
+fn elsewhere<'v>(policy: &Policy, variants: &'v [Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&'v Variant> {
+    let (most, each) = policy.elsewhere;
     let mut out: Vec<&Variant> = Vec::new();
     for v in variants.iter().filter(|v| !v.is_certain() && !taken(v)) {
-        if out.len() < ELSEWHERE.0 && out.iter().filter(|o| o.candidate == v.candidate).count() < ELSEWHERE.1 {
+        if out.len() < most && out.iter().filter(|o| o.candidate == v.candidate).count() < each {
             out.push(v);
         }
     }
@@ -47,7 +31,7 @@ fn elsewhere(variants: &[Variant], taken: impl Fn(&Variant) -> bool) -> Vec<&Var
 
 /// The best prediction first, each candidate once.
 pub(super) fn ranked(mut all: Vec<Fitted>) -> Vec<Fitted> {
-    all.sort_by(|a, b| a.state.predicted[0].loss().total_cmp(&b.state.predicted[0].loss()));
+    all.sort_by(|a, b| b.state.judged.score().total_cmp(&a.state.judged.score()));
     keep_first(&mut all, |f| f.candidate);
     all
 }
@@ -60,12 +44,11 @@ impl Session<'_> {
             Some(v) => v,
             None => self.variants(state)?,
         };
-        let looks = variants.len();
-        let count = variants.iter().map(|v| v.candidate).collect::<std::collections::BTreeSet<_>>().len() as f64;
         variants.sort_by(most_promising);
         let mut seen: Vec<CandidateId> = Vec::new();
         let mut tries: Vec<(&State, &Variant)> = Vec::new();
-        let fits = if self.cells.few_instants() { 2 * self.options.fits } else { self.options.fits };
+        let policy = self.options.search.clone();
+        let fits = if self.cells.few_instants() { 2 * policy.fits } else { policy.fits };
         for v in &variants {
             let before = seen.iter().filter(|c| **c == v.candidate).count();
             seen.push(v.candidate);
@@ -74,41 +57,49 @@ impl Session<'_> {
             }
             // The best start of a candidate, a second one where it acts at an unknown place, and several of walls.
             let starts = match v {
-                wall if is_wall(wall) => WALLS,
+                wall if is_wall(&policy, wall) => policy.walls.0,
                 certain if certain.is_certain() => 1,
                 _ => 2,
             };
-            if before < starts && (tries.len() < fits + fits / 2 || is_wall(v)) {
+            if before < starts && (tries.len() < fits + fits / 2 || is_wall(&policy, v)) {
                 tries.push((state, v));
             }
         }
-        let lost = strayed(state, LOST);
+        let starts: Vec<f64> = state.model.numbers.iter().map(|n| n.start).collect();
+        let lost = strayed(state, &starts, policy.strayed.1);
         let home = if round == 1 && (lost || self.affordable() > tries.len()) { self.home(state)? } else { None };
         if let Some((home, variants)) = &home {
             let place = if lost { 0 } else { tries.len() };
             tries.splice(place..place, variants.iter().map(|v| (home, v)));
         }
         self.shorten(&mut tries);
-        let mut fitted = self.fitted(state, &tries, &STARTS, looks, Vec::new())?;
-        if !self.explained(state, &fitted) && !self.lab.out_of_time() {
+        let mut fitted = self.fitted(state, &tries, &policy.starts, Vec::new())?;
+        if !self.explained(&fitted) && !self.lab.out_of_time() {
             // A patchwork is worse than one effect that was not found because its fits started in the wrong places.
-            let others = elsewhere(&variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
+            let others = elsewhere(&policy, &variants, |v| tries.iter().any(|t| std::ptr::eq(t.1, v)));
             let further: Vec<(&State, &Variant)> = others.into_iter().map(|v| (state, v)).collect();
             if !further.is_empty() {
-                fitted = self.fitted(state, &further, &CAREFUL, looks, fitted)?;
+                fitted = self.fitted(state, &further, &policy.starts[1..], fitted)?;
             }
         }
-        let explained = self.explained(state, &fitted);
+        if round == 1
+            && !self.lab.out_of_time()
+            && let Some((there, variants)) = self.there(state, &fitted)?
+        {
+            let tries: Vec<(&State, &Variant)> = variants.iter().map(|v| (&there, v)).collect();
+            fitted = self.fitted(state, &tries, &policy.starts, fitted)?;
+        }
+        let explained = self.explained(&fitted);
         let mut fitted = ranked(fitted);
         // There must be room for both.
-        if round < self.options.rounds && !self.lab.out_of_time() {
-            let named = self.choose(state, &fitted, count).map_or(usize::MAX, |(w, _)| fitted[w].needed);
+        if round < policy.rounds && !self.lab.out_of_time() {
+            let named = self.choose(state, &fitted).map_or(usize::MAX, |(w, _)| fitted[w].needed);
             let fewer_than = if explained { named } else { usize::MAX };
             let pairs = self.pairs(state, &fitted, &variants, fewer_than)?;
-            fitted = self.with_pairs((state, round), &pairs, looks, fitted)?;
-            if self.choose(state, &fitted, count).is_none() && !self.lab.out_of_time() {
+            fitted = self.with_pairs((state, round), &pairs, fitted)?;
+            if self.choose(state, &fitted).is_none() && !self.lab.out_of_time() {
                 let pairs = self.freer_pairs(state, &variants);
-                fitted = self.with_pairs((state, round), &pairs, looks, fitted)?;
+                fitted = self.with_pairs((state, round), &pairs, fitted)?;
             }
         }
         for f in &fitted {
@@ -116,7 +107,7 @@ impl Session<'_> {
             let mine = self.tried.iter_mut().find(|t| t.round == round && t.kind == kind && t.held_out_gain.is_none());
             mine.into_iter().for_each(|t| t.held_out_gain = Some(f.gain));
         }
-        self.decide(state, fitted, count)
+        self.decide(state, fitted)
     }
 
     /// Notes pairs in a round, fits them and ranks them among what was fitted before.
@@ -124,7 +115,6 @@ impl Session<'_> {
         &mut self,
         (state, round): (&State, usize),
         pairs: &[(Rc<State>, Variant)],
-        looks: usize,
         before: Vec<Fitted>,
     ) -> Result<Vec<Fitted>, LabError> {
         pairs.iter().for_each(|(_, p)| self.note(round, p));
@@ -132,7 +122,8 @@ impl Session<'_> {
             return Ok(before);
         }
         let tries: Vec<(&State, &Variant)> = pairs.iter().map(|(from, v)| (from.as_ref(), v)).collect();
-        Ok(ranked(self.fitted(state, &tries, &STARTS, looks, before)?))
+        let starts = self.options.search.starts;
+        Ok(ranked(self.fitted(state, &tries, &starts, before)?))
     }
 
     /// Candidates that there is time to fit: a few that arrive say more than many that do not.
@@ -143,7 +134,7 @@ impl Session<'_> {
     /// Leaves out what there is no time for: of every candidate the best start comes before a second one of any. Half of the time is for the
     /// first lap, in which all of them run.
     fn shorten(&mut self, tries: &mut Vec<(&State, &Variant)>) {
-        let affordable = (self.lab.iterations_left() / (2 * LAPS[0].0)).max(FEWEST);
+        let affordable = (self.lab.iterations_left() / (2 * self.options.search.laps[0])).max(FEWEST);
         if affordable < tries.len() {
             let mut seen = Vec::new();
             tries.sort_by_cached_key(|(_, v)| {
@@ -158,17 +149,15 @@ impl Session<'_> {
 
     /// Notes that a candidate is looked at.
     fn note(&mut self, round: usize, v: &Variant) {
-        let (kind, promised, p_value) = (v.kind(), v.score.share, v.score.p_value);
-        self.tried.push(Tried { round, kind, promised, held_out_gain: None, p_value });
+        self.tried.push(Tried { round, kind: v.kind(), promised: v.score.share, held_out_gain: None });
     }
 
-    /// Fits variants, of so many that were looked at, judges what arrives, and adds it to what was fitted before.
+    /// Fits variants, judges what arrives, and adds it to what was fitted before.
     pub(super) fn fitted(
         &mut self,
         state: &State,
         tries: &[(&State, &Variant)],
         shares: &[f64],
-        looks: usize,
         before: Vec<Fitted>,
     ) -> Result<Vec<Fitted>, LabError> {
         let arrived = self.race(state, tries, shares)?;
@@ -176,63 +165,63 @@ impl Session<'_> {
             arrived.iter().map(|(_, f)| (f.model.changes.clone(), f.model.values.clone())).collect();
         self.lab.say(&format!("judging {} candidates", jobs.len()));
         let mut fitted = before;
-        let old = fitted.len();
-        let mut variants: Vec<&Variant> = Vec::new();
         for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
             match readings {
                 Ok(readings) => {
                     let new = self.beside(state, fit.model, readings)?;
-                    fitted.push(self.judge(state, v, new, looks));
-                    variants.push(v);
+                    fitted.push(self.compared(state, v, new));
                 }
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(why) => self.missed(&v.kind(), &why),
             }
         }
-        for k in self.rivals(state, &fitted, old) {
-            if self.lab.iterations_left() < MEASURED {
-                break;
-            }
-            let own = self.beside_its_own(&fitted[k].state);
-            fitted[k] = self.judge(state, variants[k - old], own, looks);
-        }
+        self.measure_rivals(state, &mut fitted);
         Ok(fitted)
     }
 
     /// The scene where the baseline's fit started, with the candidates that promise most there, where that is far away: the numbers that
     /// make up best for what is missing may lie where nothing else can be seen any more.
     fn home(&mut self, state: &State) -> Result<Option<(State, Vec<Variant>)>, LabError> {
-        let model = &state.model;
-        if !strayed(state, FAR) {
+        let values: Vec<f64> = state.model.numbers.iter().map(|n| n.start).collect();
+        if strayed(state, &values, self.options.search.strayed.0) { self.seen_from(state, values) } else { Ok(None) }
+    }
+
+    /// The same scene where the best candidate has its numbers, if that is far away: others may explain as much once these do not make up for
+    /// what is missing any more.
+    fn there(&mut self, state: &State, fitted: &[Fitted]) -> Result<Option<(State, Vec<Variant>)>, LabError> {
+        let best = fitted.iter().max_by(|a, b| a.state.judged.score().total_cmp(&b.state.judged.score()));
+        let Some(best) = best.filter(|f| f.state.judged.score() > state.judged.score()) else { return Ok(None) };
+        let values = best.state.model.values[..state.model.values.len()].to_vec();
+        if !strayed(state, &values, self.options.search.strayed.0) {
             return Ok(None);
         }
-        let values: Vec<f64> = model.numbers.iter().map(|n| n.start).collect();
+        let (best, found) = (best.candidate, self.seen_from(state, values)?);
+        Ok(found.map(|(there, variants)| (there, variants.into_iter().filter(|v| v.candidate != best).collect())))
+    }
+
+    /// A state with other values of its numbers, and the candidates that promise most there.
+    fn seen_from(&mut self, state: &State, values: Vec<f64>) -> Result<Option<(State, Vec<Variant>)>, LabError> {
+        let (model, policy) = (&state.model, self.options.search.clone());
         let Some(Ok(readings)) = self.lab.linearise(&[(model.changes.clone(), values.clone())]).pop() else { return Ok(None) };
         let table = self.cells.table(&readings, Some(&state.table));
         let frame = self.frame(&table, &state.fields);
-        let home = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
-        let mut variants = self.variants(&home)?;
+        let there = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
+        let mut variants = self.variants(&there)?;
         variants.sort_by(most_promising);
-        let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) = variants.into_iter().partition(is_wall);
-        walls.truncate(WALLS);
+        let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) = variants.into_iter().partition(|v| is_wall(&policy, v));
+        walls.truncate(policy.walls.0);
         keep_first(&mut others, |v| v.candidate);
-        others.truncate(self.options.fits * 3 / 4);
+        others.truncate(policy.fits * 3 / 4);
         others.extend(walls);
-        Ok(Some((home, others)))
+        Ok(Some((there, others)))
     }
 
-    /// What a fitted candidate is worth, one of so many that were looked at.
-    fn judge(&self, state: &State, v: &Variant, new: State, looks: usize) -> Fitted {
-        let (with, without) = (new.squares(), state.squares());
-        let freedom = v.columns.len();
-        // Bonferroni: every start was looked at, and a pair is one of all pairs of them.
-        let n = looks as f64;
-        let looks = if v.changes.len() > 1 { 0.5 * n * (n - 1.0).max(1.0) } else { n };
-        let rest = self.cells.len() as f64 - (state.frame.absorbed.rank() + freedom) as f64;
-        let p_value = (f_tail((without - with).max(0.0), freedom, with, rest) * looks).min(1.0);
-        let gain = self.gain(state, &new);
-        let needed = self.needed(state, &new, v);
-        Fitted { candidate: v.candidate, state: new, p_value, gain, freedom, needed, effects: v.changes.len() }
+    /// A fitted candidate beside the state that it competes with.
+    fn compared(&self, before: &State, v: &Variant, state: State) -> Fitted {
+        let effects = v.changes.len();
+        let needed = state.needed[state.needed.len() - effects..].iter().sum();
+        let (gain, nats) = (self.gain(before, &state), state.judged.over(&before.judged).parts());
+        Fitted { candidate: v.candidate, state, nats, gain, freedom: v.columns.len(), needed, effects }
     }
 
     /// Share of the gap that one model leaves which another closes, on data left out, in whichever way of leaving some out it is least.
@@ -253,13 +242,8 @@ impl Session<'_> {
 
     /// Chooses among fitted candidates, best prediction first.
     #[expect(clippy::type_complexity, reason = "as `round`")]
-    fn decide(
-        &mut self,
-        state: &State,
-        fitted: Vec<Fitted>,
-        count: f64,
-    ) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
-        let Some((winner, equal)) = self.choose(state, &fitted, count) else {
+    fn decide(&mut self, state: &State, fitted: Vec<Fitted>) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
+        let Some((winner, equal)) = self.choose(state, &fitted) else {
             return Ok((None, fitted.iter().take(3).flat_map(|f| self.found(f, false)).collect()));
         };
         let mut found = self.found(&fitted[winner], true);
@@ -279,7 +263,9 @@ impl Session<'_> {
         }
         let mut fitted = fitted;
         let mut next = fitted.swap_remove(winner).state;
-        self.refine(&mut next);
+        if !next.own {
+            self.refine(&mut next);
+        }
         Ok((Some((found, next)), Vec::new()))
     }
 
@@ -294,7 +280,7 @@ impl Session<'_> {
                 kind: change.kind().into(),
                 sentence: change.sentence().into(),
                 parameters: own.map(|k| model.found(k)).collect(),
-                p_value: f.p_value,
+                nats: f.nats,
                 held_out_gain: f.gain.clamp(0.0, 1.0),
                 accepted,
                 indistinguishable_from: Vec::new(),
@@ -305,11 +291,11 @@ impl Session<'_> {
     }
 }
 
-/// True if a fitted number has gone further from its start than this share of its size.
-fn strayed(state: &State, share: f64) -> bool {
-    let size = |n: &Number| if n.start == 0.0 { n.scale } else { n.start.abs() };
-    let far = |(v, n): (&f64, &Number)| (v - n.start).abs() > share * size(n);
-    state.model.values.iter().zip(&state.model.numbers).any(far)
+/// True if one of a state's numbers is further from another value of it than this share of that one's size.
+fn strayed(state: &State, from: &[f64], share: f64) -> bool {
+    let far =
+        |((v, from), n): ((&f64, &f64), &Number)| (v - from).abs() > share * if *from == 0.0 { n.scale } else { from.abs() };
+    state.model.values.iter().zip(from).zip(&state.model.numbers).any(far)
 }
 
 #[cfg(test)]
@@ -336,17 +322,18 @@ mod tests {
         all.extend((0..6).map(|k| variant(1, "point-mass", &place, 0.8 - 0.01 * f64::from(k))));
         all.extend((0..20).map(|k| variant(2 + k, "inclusion", &place, 0.5)));
         let first = std::ptr::from_ref(&all[1]);
-        let chosen = elsewhere(&all, |v| std::ptr::eq(v, first));
+        let policy = Policy::default();
+        let chosen = elsewhere(&policy, &all, |v| std::ptr::eq(v, first));
         // The best one was tried already; three of a kind are enough, and ten in all.
         let shares: Vec<f64> = chosen.iter().filter(|v| v.candidate == CandidateId::Single(1)).map(|v| v.score.share).collect();
         assert_eq!(shares, [0.79, 0.78, 0.77]);
-        assert!(chosen.len() == ELSEWHERE.0 && chosen.iter().all(|v| v.candidate > CandidateId::Single(0)));
+        assert!(chosen.len() == policy.elsewhere.0 && chosen.iter().all(|v| v.candidate > CandidateId::Single(0)));
     }
 
     #[test]
     fn a_wall_is_fitted_for_what_it_does_where_it_stands() {
-        assert!(is_wall(&variant(0, "second-plane", &[true, false, false, false], 0.4)));
-        assert!(!is_wall(&variant(0, "second-plane", &[true, false, false, false], 0.2)));
-        assert!(!is_wall(&variant(0, "point-mass", &[true, false, false, false], 0.9)));
+        assert!(is_wall(&Policy::default(), &variant(0, "second-plane", &[true, false, false, false], 0.4)));
+        assert!(!is_wall(&Policy::default(), &variant(0, "second-plane", &[true, false, false, false], 0.2)));
+        assert!(!is_wall(&Policy::default(), &variant(0, "point-mass", &[true, false, false, false], 0.9)));
     }
 }

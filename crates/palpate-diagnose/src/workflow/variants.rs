@@ -7,11 +7,6 @@ use crate::null::extended;
 use crate::score::{Score, score};
 use palpate_model::effects::Trial;
 
-/// Starts of an effect at an unknown place that are scored first; the others follow where one of these comes within reach of the best.
-const FIRST_STARTS: usize = 8;
-/// The share of the best candidate's gain that is within reach.
-const REACH: f64 = 0.25;
-
 /// A variant of a candidate with its columns where it is absent.
 #[derive(Clone)]
 pub(super) struct Variant {
@@ -57,7 +52,8 @@ impl Session<'_> {
     pub(super) fn variants_of(&mut self, state: &State, wanted: impl Fn(&Change) -> bool) -> Result<Vec<Variant>, LabError> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
-        let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(FIRST_STARTS).max(1) };
+        let (places, reach) = self.options.search.places;
+        let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(places).max(1) };
         let (mut first, mut later) = (Vec::new(), Vec::new());
         for (n, c) in all.iter().enumerate() {
             let by = stride(c);
@@ -67,7 +63,7 @@ impl Session<'_> {
         }
         let mut scored = self.scored(state, first)?;
         let best = scored.iter().map(|v| v.score.gain).fold(0.0, f64::max);
-        let within = |n: CandidateId| scored.iter().any(|v| v.candidate == n && v.score.gain >= REACH * best);
+        let within = |n: CandidateId| scored.iter().any(|v| v.candidate == n && v.score.gain >= reach * best);
         let more: Vec<_> = later.into_iter().filter(|(n, _)| within(*n)).collect();
         scored.extend(self.scored(state, more)?);
         let saturates = |v: &&Variant| v.changes.iter().all(|c| c.is_tried(Trial::Saturates));

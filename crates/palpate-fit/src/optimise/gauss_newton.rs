@@ -4,11 +4,15 @@
 //! eq. 2.21 and algorithm 3.16). A step may also not exceed a length in z: parameters far from their optimum otherwise jump
 //! into regions where a simulation fails.
 //!
+//! It ends where a free step promises less than a hundredth of a standard error ([`crate::Tolerance::decrement`]): what is left to gain
+//! says nothing that the noise does not hide.
+//!
 //! The model of the cost is a matrix from forward sensitivities, or products with it ([`super::conjugate`]): the way is the same.
 
 use super::conjugate::{self, Model};
 use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
+use crate::settings::Walk;
 
 /// Damping relative to the largest diagonal entry at the start.
 const FIRST_DAMPING: f64 = 1e-3;
@@ -45,10 +49,8 @@ pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Res
 fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
     let q = z.len();
     let tolerance = search.settings.tolerance.clone();
-    let mut damping = None;
-    let mut growth = 2.0;
-    let mut level = 0;
-    let mut longest = search.settings.max_step.min(search.settings.first_step);
+    let Walk { reach, mut damping, mut growth, mut level } = search.settings.walk;
+    let mut longest = search.settings.max_step.min(reach);
     loop {
         if matches!(curvature, Curvature::Matrix) && at.curvature.len() != q * q {
             return Ok(Status::Failed("no sensitivities were computed".into()));
@@ -79,6 +81,13 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
         if length <= tolerance.step || promised <= tolerance.cost * at.cost {
             return Ok(if settled(search, &z, &at, curvature, scale)? { Status::Converged } else { Status::Stalled });
         }
+        // A damped step promises less than a free one: that is asked where the first is near the end, as it may cost products.
+        if search.decrement(&at, promised) <= tolerance.decrement {
+            let free = free_step(search, &z, &at, curvature, scale)?;
+            if free.is_some_and(|(_, promised)| search.decrement(&at, promised) <= tolerance.decrement) {
+                return Ok(Status::Converged);
+            }
+        }
         let trial_z = search.project(&(0..q).map(|i| z[i] + p[i]).collect::<Vec<_>>());
         let trial = search.evaluate(&trial_z)?;
         if trial.cost < at.cost {
@@ -101,7 +110,7 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
             // A failure says nothing about the curvature, only that the step was too long.
             longest = length * if trial.failure.is_some() { 0.25 } else { 0.5 };
         }
-        search.reach = longest;
+        search.walk = Walk { reach: longest, damping, growth, level };
         search.iterated(at.cost, &z);
     }
 }
@@ -133,9 +142,31 @@ fn step(
     Ok(box_step(&h, &at.gradient, &lower, &upper).map(promise))
 }
 
+/// A step that is hardly damped.
+fn free_step(
+    search: &mut Search,
+    z: &[f64],
+    at: &Sample,
+    curvature: &Curvature,
+    scale: f64,
+) -> Result<Option<(Vec<f64>, f64)>, Stop> {
+    step(search, z, at, curvature, 1e-9 * scale, search.settings.max_step)
+}
+
+/// The decrease of the cost that a free step from a sample promises; 0 where it has no curvature that leads down.
+pub fn promised(search: &mut Search, z: &[f64], at: &Sample) -> f64 {
+    let q = z.len();
+    if at.curvature.len() != q * q {
+        return 0.0;
+    }
+    let scale = (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i]));
+    let free = free_step(search, z, at, &Curvature::Matrix, scale);
+    free.ok().flatten().map_or(0.0, |(_, promised)| promised.max(0.0))
+}
+
 /// True if even a free step would gain next to nothing.
 fn settled(search: &mut Search, z: &[f64], at: &Sample, curvature: &Curvature, scale: f64) -> Result<bool, Stop> {
-    let full = step(search, z, at, curvature, 1e-9 * scale, search.settings.max_step)?;
     let tolerance = search.settings.tolerance.step;
-    Ok(full.is_some_and(|(p, promised)| max_abs(&p) <= tolerance || promised <= COST_NOISE * at.cost))
+    Ok(free_step(search, z, at, curvature, scale)?
+        .is_some_and(|(p, promised)| max_abs(&p) <= tolerance || promised <= COST_NOISE * at.cost))
 }

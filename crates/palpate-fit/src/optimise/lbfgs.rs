@@ -16,7 +16,7 @@ const FEW: usize = 256;
 const FIRST: f64 = 0.3;
 
 pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<Status, Stop> {
-    let q = z.len();
+    let (q, tolerance) = (z.len(), search.settings.tolerance.decrement);
     let mut pairs: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
     loop {
         if search.is_flat(&z, &at) {
@@ -30,6 +30,10 @@ pub fn minimise(search: &mut Search, mut z: Vec<f64>, mut at: Sample) -> Result<
         if dot(&d, &g) >= 0.0 {
             pairs.clear();
             d = direction(&g, &pairs);
+        }
+        // What the quadratic model of a whole memory promises, ½ gᵀHg.
+        if pairs.len() >= q.min(MEMORY[usize::from(q > FEW)]) && search.decrement(&at, -0.5 * dot(&d, &g)) <= tolerance {
+            return Ok(Status::Converged);
         }
         let limit = if pairs.is_empty() { FIRST } else { search.settings.max_step };
         let shorten = (limit / max_abs(&d)).min(1.0);

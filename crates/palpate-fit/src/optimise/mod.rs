@@ -10,8 +10,14 @@ mod simplex;
 
 use crate::dense::max_abs;
 use crate::problem::Want;
-use crate::settings::Settings;
+use crate::settings::{Settings, Walk};
 use palpate_model::scene::Optimizer;
+
+/// Added to a unit diagonal, so that what changes nothing stays put.
+const LENGTHS: f64 = 1e-10;
+
+/// Share of readings that meet nothing up to which a start sees enough: outliers and the edges of images.
+const LOST: f64 = 0.05;
 
 /// Cost and derivatives at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,6 +30,8 @@ pub struct Sample {
     pub curvature: Vec<f64>,
     /// Scalar residuals in all scenes.
     pub residuals: usize,
+    /// Those of them that met nothing, and tell of the parameters nothing.
+    pub unmatched: usize,
     /// Why there is no cost.
     pub failure: Option<String>,
     /// True where there is none because what computes broke: the point is not to blame.
@@ -38,18 +46,36 @@ impl Sample {
         Sample { cost: f64::INFINITY, failure: Some(why), ..Sample::default() }
     }
 
-    /// The undamped Gauss–Newton step −H⁻¹g `[q]`: where the model of the cost at this point has its minimum. `None` without
-    /// curvature, or where it does not determine every parameter.
-    pub fn gauss_newton_step(&self) -> Option<Vec<f64>> {
-        let q = self.gradient.len();
-        if self.curvature.len() != q * q || q == 0 {
+    /// The undamped Gauss–Newton step −H⁻¹g `[q]` along some axes, with the others held: where the model of the cost at this point has its
+    /// minimum. `None` without curvature, or where it does not determine all of them.
+    pub fn gauss_newton_step(&self, free: &[usize]) -> Option<Vec<f64>> {
+        let (q, m) = (self.gradient.len(), free.len());
+        if self.curvature.len() != q * q || m == 0 {
             return None;
         }
         // Parameters may differ by many orders of magnitude: scaled to a unit diagonal.
-        let scale: Vec<f64> = (0..q).map(|i| self.curvature[i * q + i].sqrt()).collect();
-        let h: Vec<f64> = (0..q * q).map(|k| self.curvature[k] / (scale[k / q] * scale[k % q])).collect();
-        let g: Vec<f64> = (0..q).map(|i| -self.gradient[i] / scale[i]).collect();
-        Some(crate::dense::solve(&h, &g)?.iter().zip(&scale).map(|(d, s)| d / s).collect())
+        let scale: Vec<f64> = free.iter().map(|i| self.curvature[i * q + i].sqrt()).collect();
+        let h: Vec<f64> =
+            (0..m * m).map(|k| self.curvature[free[k / m] * q + free[k % m]] / (scale[k / m] * scale[k % m])).collect();
+        // The length of a vector of which only the direction counts is no unknown: nothing pulls at it.
+        let h: Vec<f64> = h.iter().enumerate().map(|(k, h)| if k / m == k % m { h * (1.0 + LENGTHS) } else { *h }).collect();
+        let g: Vec<f64> = free.iter().zip(&scale).map(|(i, s)| -self.gradient[*i] / s).collect();
+        let mut step = vec![0.0; q];
+        for ((i, d), s) in free.iter().zip(crate::dense::solve(&h, &g)?).zip(&scale) {
+            step[*i] = d / s;
+        }
+        Some(step)
+    }
+
+    /// Distance to the optimum in standard errors, for a decrease of the cost that is promised to q parameters; infinite where no residuals
+    /// are counted.
+    pub(crate) fn decrement(&self, q: usize, promised: f64) -> f64 {
+        let (n, q) = (self.residuals as f64, q as f64);
+        if n == 0.0 {
+            return f64::INFINITY;
+        }
+        let s_square = if n > q { (2.0 * n * self.cost / (n - q)).max(1.0) } else { 1.0 };
+        (2.0 * n * promised.max(0.0) / s_square).sqrt()
     }
 
     /// Multiplies cost and derivatives by one number.
@@ -88,6 +114,8 @@ pub enum Status {
     Stalled,
     /// The start could not be evaluated, or the run broke off.
     Failed(String),
+    /// From the start nothing could be seen: readings met nothing, and some parameter changes none of those that did.
+    Blind,
     /// The fit was interrupted.
     Interrupted,
     /// What computes broke, in its words.
@@ -111,6 +139,7 @@ impl Status {
             Status::IterationLimit => "iteration-limit",
             Status::Stalled => "stalled",
             Status::Failed(_) => "failed",
+            Status::Blind => "blind",
             Status::Interrupted => "interrupted",
             Status::Broken(_) => "broken-off",
         }
@@ -134,14 +163,16 @@ pub struct Search<'a> {
     evaluate: &'a mut dyn FnMut(&[f64]) -> Result<Sample, Stop>,
     progress: &'a mut dyn FnMut(usize, f64, &[f64]),
     product: Option<&'a mut Product<'a>>,
+    /// Whether a start from which nothing can be seen ends it.
+    sight: bool,
     /// Smallest z `[q]`; may be −∞.
     pub lower: &'a [f64],
     /// Largest z `[q]`; may be ∞.
     pub upper: &'a [f64],
     /// Limits and tolerances.
     pub settings: &'a Settings,
-    /// Longest step that would be tried next.
-    pub reach: f64,
+    /// How Gauss–Newton stands.
+    pub walk: Walk,
     best: Option<(Vec<f64>, Sample)>,
     start_cost: f64,
     evaluations: usize,
@@ -164,12 +195,20 @@ pub struct Outcome {
     pub evaluations: usize,
     /// Products with the Gauss–Newton matrix used.
     pub products: usize,
-    /// Longest step that Gauss–Newton would try next, for [`Settings::first_step`] of a search that goes on from here.
-    pub reach: f64,
+    /// How Gauss–Newton stood, for [`Settings::walk`] of a search that goes on from here.
+    pub walk: Walk,
+    /// By how much the curvature at z promises to lower the cost further, where sensitivities give one; 0 without.
+    pub promised: f64,
     /// How it ended.
     pub status: Status,
     /// Cost and derivatives at z, as far as the optimiser asked for them; `None` if no point could be evaluated.
     pub sample: Option<Sample>,
+}
+
+/// True where readings meet nothing, and a parameter changes none of those that do: a search would not move it.
+pub(crate) fn is_blind(sample: &Sample) -> bool {
+    let (n, lost) = (sample.residuals, sample.unmatched);
+    n > 0 && (lost == n || lost as f64 > LOST * n as f64 && sample.gradient.contains(&0.0))
 }
 
 impl<'a> Search<'a> {
@@ -185,10 +224,11 @@ impl<'a> Search<'a> {
             evaluate,
             progress,
             product: None,
+            sight: false,
             lower,
             upper,
             settings,
-            reach: settings.first_step,
+            walk: settings.walk,
             best: None,
             start_cost: f64::INFINITY,
             evaluations: 0,
@@ -203,6 +243,12 @@ impl<'a> Search<'a> {
         Search { product: Some(product), ..self }
     }
 
+    /// The same search, which ends as [`Status::Blind`] at a start from which nothing can be seen.
+    #[must_use]
+    pub fn with_sight(self, sight: bool) -> Search<'a> {
+        Search { sight, ..self }
+    }
+
     /// Runs an optimiser from `z`.
     pub fn run(mut self, optimizer: Optimizer, z: &[f64]) -> Outcome {
         let start = self.project(z);
@@ -213,6 +259,7 @@ impl<'a> Search<'a> {
                 self.start_cost = first.cost;
                 (self.progress)(0, first.cost, &start);
                 let walk = match optimizer {
+                    _ if self.sight && is_blind(&first) => Ok(Status::Blind),
                     Optimizer::GaussNewton => gauss_newton::minimise(&mut self, start.clone(), first),
                     Optimizer::GaussNewtonCg => gauss_newton::minimise_by_products(&mut self, start.clone(), first),
                     Optimizer::Rprop => rprop::minimise(&mut self, start.clone(), first),
@@ -223,10 +270,14 @@ impl<'a> Search<'a> {
                 walk.unwrap_or_else(Status::from)
             }
         };
-        let Search { start_cost, iterations, evaluations, products, reach, best, .. } = self;
+        let promised = match (optimizer, self.best.clone()) {
+            (Optimizer::GaussNewton, Some((z, at))) => gauss_newton::promised(&mut self, &z, &at),
+            _ => 0.0,
+        };
+        let Search { start_cost, iterations, evaluations, products, walk, best, .. } = self;
         let (z, sample) = best.map_or((start, None), |(z, s)| (z, Some(s)));
         let cost = sample.as_ref().map_or(f64::INFINITY, |s| s.cost);
-        Outcome { z, cost, start_cost, iterations, evaluations, products, reach, status, sample }
+        Outcome { z, cost, start_cost, iterations, evaluations, products, walk, promised, status, sample }
     }
 
     /// Evaluates a point. Whatever is not a number counts as a failed point with infinite cost.
@@ -269,6 +320,11 @@ impl<'a> Search<'a> {
     fn projected_gradient(&self, z: &[f64], g: &[f64]) -> Vec<f64> {
         let against = |i: usize| (g[i] > 0.0 && z[i] <= self.lower[i]) || (g[i] < 0.0 && z[i] >= self.upper[i]);
         (0..z.len()).map(|i| if against(i) { 0.0 } else { g[i] }).collect()
+    }
+
+    /// Distance to the optimum in standard errors, for a decrease of the cost that the curvature promises.
+    fn decrement(&self, at: &Sample, promised: f64) -> f64 {
+        at.decrement(self.lower.len(), promised)
     }
 
     /// True where moving z by one would change the cost by no more than `tolerance.gradient` of itself.

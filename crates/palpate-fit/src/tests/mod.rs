@@ -2,7 +2,9 @@
 
 mod blocks;
 mod broken;
+mod ending;
 mod errors;
 mod fits;
+mod known;
 mod models;
 mod resume;

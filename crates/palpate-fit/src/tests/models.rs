@@ -98,6 +98,7 @@ pub fn parameter(place: usize, transform: Transform, bounds: (f64, f64), start: 
         typical: 1.0,
         bounds,
         start,
+        known: None,
         slots: vec![Slot { scene: 0, place, factor: 1.0 }],
         count: 1,
         direction: None,

@@ -137,10 +137,14 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
     };
     let starts = ranges("start")?;
     let bounds = ranges("bounds")?;
+    let known_values = known_values(t, chosen.len(), of_field.is_some())?;
     let per_scene = t.optional_bool("per_scene")?.unwrap_or(false);
     let mut out = Vec::new();
     for (i, k) in chosen.iter().enumerate() {
-        let start = starts.as_ref().map_or(k.value, |s| s[i]);
+        let beforehand = known_values.as_ref().map(|v| v[i]);
+        // What the scene does not state starts where it is known to be.
+        let stated = if k.value.0.is_nan() { beforehand.map_or(k.value, |(v, _)| (v, v)) } else { k.value };
+        let start = starts.as_ref().map_or(stated, |s| s[i]);
         let bounds = bounds.as_ref().map_or((k.lower, k.upper), |b| b[i]);
         let path = &k.path;
         let (low, high) = (number(bounds.0), number(bounds.1));
@@ -168,9 +172,29 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
             let start = if first == last { first } else { format!("[{first}, {last}]") };
             return Err(t.error("bounds", format!("{path}: [{low}, {high}] excludes {from} {start}")));
         }
-        out.push(FitParameter { path: path.clone(), start, bounds, per_scene });
+        if let Some((value, _)) = beforehand
+            && !(value >= bounds.0 && value <= bounds.1)
+        {
+            return Err(t.error("known", format!("{path}: {} lies outside the bounds [{low}, {high}]", number(value))));
+        }
+        out.push(FitParameter { path: path.clone(), start, bounds, known: beforehand, per_scene });
     }
     Ok(out)
+}
+
+/// `known`: a pair of value and standard deviation for each of `count` numbers, or one for all.
+fn known_values(t: &Table, count: usize, of_field: bool) -> Result<Option<Vec<(f64, f64)>>, InputError> {
+    let Some(pairs) = t.optional_pairs("known", if of_field { 1 } else { count })? else { return Ok(None) };
+    for (value, sd) in &pairs {
+        if *sd <= 0.0 {
+            let (value, sd) = (number(*value), number(*sd));
+            return Err(t.error(
+                "known",
+                format!("[{value}, {sd}]: the standard deviation must be > 0; leave the key out where nothing is known"),
+            ));
+        }
+    }
+    Ok(Some(if of_field { vec![pairs[0]; count] } else { pairs }))
 }
 
 fn unknown_path(path: &str, scene: &Scene, known: &[Target]) -> String {

@@ -1,5 +1,7 @@
 //! Format `scene/1`: one TOML file ↔ [`Scene`].
 
+#[cfg(test)]
+mod answer_tests;
 mod effects;
 mod fields;
 mod fit;
@@ -214,13 +216,15 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     let step = t.f64_where("step", |x| x >= SHORTEST_STEP, "is not allowed: must be > 0, and at least 1e-9 (s)")?;
     let duration = t.f64_where("duration", |x| x >= 0.0, "is not allowed: must be ≥ 0 (s)")?;
     let steps = t.optional_count("steps", 0..=MOST_STEPS as u64)?;
+    let mut open = None;
     let (key, count) = match (duration, steps) {
         (Some(_), Some(_)) => return Err(t.error("steps", "duration and steps exclude each other; give one")),
         (None, None) => return Err(t.missing("duration", "duration (s) or steps")),
         (None, Some(n)) => ("steps", n as f64),
         (Some(0.0), None) => ("duration", 0.0),
         (Some(d), None) => {
-            let step = step.ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
+            open = step.is_none().then_some(d);
+            let step = step.unwrap_or(d);
             let n = (d / step).round();
             if n < 1.0 {
                 return Err(t.error("duration", format!("{} s is shorter than half a step ({} s)", number(d), number(step))));
@@ -237,7 +241,8 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
         return Err(t.error(key, "0 needs initial.state = \"static-equilibrium\" (a static problem)"));
     }
     // A static problem has no step; any positive length serves.
-    let step = step.or((count == 0.0).then_some(1.0)).ok_or_else(|| t.missing("step", "a number > 0 (s)"))?;
+    let given = step.or((count == 0.0).then_some(1.0)).or(open);
+    let step = given.ok_or_else(|| t.missing("step", "a number > 0 (s), or duration instead of steps"))?;
     let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
     let schemes: Vec<(&str, &'static Scheme)> = scheme::ALL.iter().map(|s| (s.name, s)).collect();
     let scheme = t.optional_choice("scheme", &schemes)?.unwrap_or(&scheme::ALL[0]);
@@ -251,6 +256,7 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
         start: t.optional_f64("start")?.unwrap_or(0.0),
         theta: theta.unwrap_or(default.theta),
         scheme,
+        open,
     })
 }
 

@@ -52,7 +52,7 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
     let resolution =
         match (t.f64_where("cell_size", |x| x > 0.0, "is not allowed: must be > 0 (m)")?, t.optional_count("cells", 1..=4096)?) {
             (Some(_), Some(_)) => return Err(t.error("cells", "cell_size and cells exclude each other; give one")),
-            (None, None) => return Err(t.missing("cell_size", "cell_size (m) or cells")),
+            (None, None) => Resolution::Open,
             (None, Some(n)) => Resolution::Cells(n as u32),
             (Some(h), None) if h > longest => {
                 return Err(t.error(

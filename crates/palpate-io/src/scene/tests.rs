@@ -6,7 +6,7 @@ use palpate_model::observation::ReadingKind;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::FitParameter;
 
-const BASE: &str = r#"format = "scene/1"
+pub(super) const BASE: &str = r#"format = "scene/1"
 [object]
 shape = { ball = { radius = 0.05 } }   # a ball
 cell_size = 0.01
@@ -25,7 +25,7 @@ step = 0.008333
 duration = 1.5
 "#;
 
-fn read(extra: &str) -> Result<Loaded<Scene>, InputError> {
+pub(super) fn read(extra: &str) -> Result<Loaded<Scene>, InputError> {
     parse_scene(&format!("{BASE}{extra}"), "some/scene.toml")
 }
 
@@ -122,7 +122,7 @@ fn numbers_out_of_range_say_what_is_allowed() {
         ("step = 0.008333", "step = 0", "must be > 0"),
         ("step = 0.008333", "step = 0.01\ntheta = 0.4", "must lie in [0.5, 1)"),
         ("step = 0.008333", "step = 0.01\ntheta = 1.0", "must lie in [0.5, 1)"),
-        ("step = 0.008333", "", "time.step: missing"),
+        ("step = 0.008333\nduration = 1.5", "steps = 3", "time.step: missing"),
         ("duration = 1.5", "duration = 0", "static-equilibrium"),
         ("duration = 1.5", "duration = 1.5\nsteps = 3", "exclude each other"),
         ("normal = [0, 0, 2]", "normal = [0, 0, 0]", "has no length"),
@@ -185,7 +185,7 @@ fn a_static_problem_needs_no_step() {
     assert_eq!(s.unwrap().value.time.steps, 0);
 }
 
-fn parameters(text: &str) -> Vec<FitParameter> {
+pub(super) fn parameters(text: &str) -> Vec<FitParameter> {
     read(&format!("[fit]\n{text}")).unwrap().value.fit.unwrap().parameters
 }
 
@@ -213,6 +213,17 @@ fn impossible_fits_are_refused_with_the_way_out() {
         ("path = \"material.youngs_modulus\"\nbounds = [1, 10]", "[1, 10] excludes the scene's value 100000"),
         ("path = \"material.youngs_modulus\"\nstart = [1, 100]\nbounds = [10, 1000]", "[10, 1000] excludes start [1, 100]"),
         ("path = \"material.mass_damping\"", "set start to a number > 0"),
+        (
+            "path = \"material.density\"\nknown = 1070",
+            "fit.parameter.0.known: expected a pair [value, standard deviation], found",
+        ),
+        ("path = \"material.density\"\nknown = [1070]", "expected a pair [value, standard deviation], found an array"),
+        (
+            "path = \"world.gravity\"\nknown = [[0, 1], [0, 1]]",
+            "standard deviation], or an array of three of these, found an array",
+        ),
+        ("path = \"material.density\"\nknown = [1070, 0]", "[1070, 0]: the standard deviation must be > 0"),
+        ("path = \"material.density\"\nknown = [1e9, 1]", "material.density: 1e9 lies outside the bounds [0.001, 100000]"),
         ("path = \"material.youngs_modulus\"\nbounds = [0, 1e7]", "must be > 0"),
         ("path = \"material.poisson_ratio\"\nbounds = [0, 0.5]", "must lie in (-1, 0.5)"),
         ("path = \"mass.0.mass\"\nbounds = [2, 1]", "low must not exceed high"),

@@ -83,7 +83,7 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 let array = table.get_mut(name).and_then(Item::as_array_mut).ok_or_else(unknown)?;
                 replace(array.get_mut(a).ok_or_else(unknown)?, Value::from(*value));
             }
-            [group @ ("material" | "time"), name] => {
+            [group @ ("material" | "time" | "object"), name] => {
                 let table = section(&mut doc, group).ok_or_else(unknown)?;
                 match name {
                     "density" => drop(table.remove("mass")),
@@ -103,10 +103,33 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
         set(table, "point", vector(point));
         set(table, "normal", vector(normal));
     }
+    start_there(&mut doc, values);
     let before: DocumentMut = template.parse().expect("it was parsed above");
     note_changes(doc.as_table_mut(), before.as_table());
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
     Ok(doc.to_string())
+}
+
+/// Lets the next fit start where this one ended: a `start` that is written becomes the value found. One that could not say it, of a field or
+/// of a plane's angles (whose axis may be another now), goes, and the scene's own values are the start.
+fn start_there(doc: &mut DocumentMut, values: &[(String, f64)]) {
+    let Some(parameters) = doc.get_mut("fit").and_then(Item::as_table_like_mut) else { return };
+    let found = |path: &str| values.iter().find(|(p, _)| p == path).map(|(_, v)| *v);
+    let mut i = 0;
+    while let Some(t) = entry(parameters, "parameter", i) {
+        i += 1;
+        let Some(path) = t.get("path").and_then(Item::as_str).map(str::to_string).filter(|_| t.contains_key("start")) else {
+            continue;
+        };
+        let components: Option<Vec<f64>> = ["x", "y", "z"].iter().map(|a| found(&format!("{path}.{a}"))).collect();
+        let says_it = !(path.starts_with("field.") || path.ends_with(".theta") || path.ends_with(".phi"));
+        match (found(&path), components) {
+            (Some(value), _) if says_it => set(t, "start", Value::from(value)),
+            (None, Some(all)) => set(t, "start", Value::from(all.into_iter().collect::<Array>())),
+            (None, None) if says_it => {}
+            _ => drop(t.remove("start")),
+        }
+    }
 }
 
 /// The field and region that a path's numbers name, where there are such.

@@ -55,7 +55,9 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
     let (key, h) = match scene.object.resolution {
         Resolution::CellSize(h) => ("object.cell_size", h),
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
-        Resolution::Own => return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into())),
+        Resolution::Own | Resolution::Open => {
+            return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into()));
+        }
     };
     let mut parts = cutting::build_parts(shape.as_ref(), h, band_cells(scene) * h, SUBDIVISIONS).map_err(|e| {
         let key = if matches!(e, BodyError::Empty { .. }) { "object" } else { key };

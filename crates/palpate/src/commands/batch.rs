@@ -8,7 +8,7 @@ use crate::fitting::{FNV_START, fingerprint, fnv1a};
 use crate::options::stem;
 use crate::results;
 use crate::results::batch::{BatchDocument, BatchRow, RowStatus};
-use crate::results::fit::FitDocument;
+use crate::results::fit::{FitDocument, VerdictWord};
 use clap::Args;
 use palpate_io::InputError;
 use palpate_io::output::{make_folder, write_file};
@@ -190,6 +190,7 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
         (row.status, row.message) = match (fitted.result.broken, fitted.interrupted) {
             (Some(why), _) => (RowStatus::Failed, why),
             (None, true) => (RowStatus::Interrupted, BEST_KEPT.into()),
+            (None, false) if result.verdict.word != VerdictWord::Converged => (RowStatus::Complete, result.verdict.to_string()),
             (None, false) => (RowStatus::Complete, fitted.warnings.into_iter().next().unwrap_or_default()),
         };
         row.take(result);

@@ -21,7 +21,7 @@ Examples:
   palpate diagnose ball.toml --budget 10 --out why    stop the search after ten minutes and say what was not tried
   palpate diagnose ball.toml --out why --resume       go on with an interrupted diagnosis
 
-The scene's [fit] says what is free in the baseline. The folder gets diagnosis.json (format diagnosis/1), model.toml (the scene with
+The scene's [fit] says what is free in the baseline. The folder gets diagnosis.json (format diagnosis/2), model.toml (the scene with
 the effects that were found, readable by simulate, fit and diagnose), report.html, and checkpoints. Ctrl-C stops after the current
 stage, writes what is known, and exits with 130.";
 

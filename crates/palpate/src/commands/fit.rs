@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fields::{self, files_of, write_fields};
 use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters, usual};
-use crate::grid::grid_shift;
 use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
 use crate::report::{FramePicture, ReportInput, fit_document, fit_html, history_csv, pictures, summary};
@@ -26,12 +25,18 @@ Examples:
   palpate fit beam.toml --out found --resume   go on with an interrupted fit
 
 What is free, and where starts are drawn from, is said by [[fit.parameter]] in the scene. The folder gets result.json
-(format fit/1), model.toml (the scene with the values found; of several scenes model-1.toml, model-2.toml, … in their
-order), history.csv, report.html and journal.jsonl. Results that are already there are moved to previous-1, previous-2, …
-in the same folder. Ctrl-C stops at the next time step, writes the best so far (\"status\": \"interrupted\") and exits with
-130. A graphics device that fails (out of memory, lost) ends the fit as well: the best so far is written (\"status\":
-\"broken-off\"), the exit code is 1, and --resume goes on where it failed, also with another --batch: how many simulations
-run at once changes no number. `palpate inspect` says how much memory they will take.";
+(format fit/2), model.toml (the scene with the values found; of several scenes model-1.toml, model-2.toml, … in their
+order), history.csv, report.html and journal.jsonl. Results that are already there are moved to previous-1,
+previous-2, … in the same folder.
+
+What is printed, result.json and the report begin with a verdict: converged, interrupted, at-a-bound or
+not-to-be-trusted, and why. ± holds noise, what the recording calls systematic, and what an evaluation on finer cells
+and half the step shows that these leave open (--no-grid-check leaves that out).
+
+Ctrl-C stops at the next time step, writes the best so far (\"status\": \"interrupted\") and exits with 130. A
+graphics device that fails (out of memory, lost) ends the fit as well: the best so far is written (\"status\":
+\"broken-off\"), the exit code is 1, and --resume goes on where it failed, also with another --batch: how many
+simulations run at once changes no number. `palpate inspect` says how much memory they will take.";
 
 /// Find the parameters that explain a recording
 #[derive(Clone, Debug, Args)]
@@ -74,9 +79,10 @@ pub struct Choices {
     /// Threads; 0 = one per core [default: the scene's]
     #[arg(long, value_name = "N", value_parser = count(0..=4096), allow_negative_numbers = true)]
     threads: Option<u64>,
-    /// Also say how far cells and time step half as large would move the result (costs about as much as ten evaluations)
+    /// Leave out the look at cells and time step half as large, which says what they add to ± (it costs about as much as ten
+    /// evaluations, and says how long it took)
     #[arg(long)]
-    grid_check: bool,
+    no_grid_check: bool,
     /// Pictures per scene in the report
     #[arg(long, value_name = "N", default_value_t = 4, hide_short_help = true)]
     pictures: usize,
@@ -147,6 +153,7 @@ fn command(scenes: &[PathBuf], a: &Choices, fitted: &Fitted) -> String {
     let name = |o: OptimizerName| o.to_possible_value().map(|v| v.get_name().to_string());
     option("optimizer", a.optimizer.and_then(name));
     option("seed", a.seed.map(|n| n.to_string()));
+    words.extend(a.no_grid_check.then(|| "--no-grid-check".to_string()));
     words.join(" ")
 }
 
@@ -174,7 +181,9 @@ fn write_all(
     results::write(folder.join("result.json"), &result)?;
     text("history.csv", &history_csv(fitted))?;
     for (s, e) in experiments.iter().enumerate() {
-        let values = fitted.values_of(s, e);
+        let mut values = fitted.values_of(s, e);
+        // What was chosen for this fit is what its values belong to.
+        values.extend(e.chosen().iter().map(|(key, value, _)| (key.to_string(), *value)));
         let model = palpate_io::write_scene(e.text(), e.scene(), &values, folder)?;
         let model = palpate_io::name_field_files(&model, e.scene(), &files_of(&result.fields, s, e))?;
         let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
@@ -307,12 +316,9 @@ pub fn run_in(
     if resume {
         make_room(console)?;
     }
-    if a.grid_check && fitted.status() == FitStatus::Complete {
-        match grid_shift(experiments, &fitted, 2.0, backend) {
-            Ok(shift) => fitted.grid_shift = Some(shift),
-            // The fit stands without it.
-            Err(e) => fitted.warnings.push(format!("no grid check: {e}")),
-        }
+    if !a.no_grid_check {
+        track.on(0, "looking at cells and step half as large");
+        fitted.check_grid(experiments, backend, &console.interrupt);
     }
     let result = write_all(scenes, a, folder, experiments, &fitted, backend)?;
     Ok((fitted, result))

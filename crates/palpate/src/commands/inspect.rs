@@ -182,13 +182,18 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band().cells.len());
     match body.cut {
         Some(_) => lines.extend([
-            ("cell size", format!("{:.5} m", body.length)),
+            ("cell size", format!("{:.5} m{}", body.length, why(e, "object.cell_size"))),
             ("cells", format!("{all} ({full} full, {cut} cut)")),
             ("band cells", format!("{} of {:.4} m", body.band().cells.len(), plan.band)),
         ]),
         None => lines.push(("tetrahedra", format!("{all} of about {:.5} m", body.length))),
     }
     lines.extend([("nodes", nodes.to_string()), ("degrees of freedom", (3 * nodes).to_string())]);
+}
+
+/// Why a number of the scene is what it is, where it was chosen.
+fn why(e: &Experiment, key: &str) -> String {
+    e.chosen().iter().find(|c| c.0 == key).map_or(String::new(), |(_, _, why)| format!(" (chosen: {why})"))
 }
 
 /// What acts on the body, and when.
@@ -201,7 +206,13 @@ fn world(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     content.time = Time { step: time.step, steps, start: time.start, end };
     let text = match steps {
         0 => "static".to_string(),
-        _ => format!("{steps} steps of {} s, from {} s to {end:.4} s{}", time.step, time.start, numerical_damping(time)),
+        _ => format!(
+            "{steps} steps of {} s{}, from {} s to {end:.4} s{}",
+            time.step,
+            why(e, "time.step"),
+            time.start,
+            numerical_damping(time)
+        ),
     };
     lines.push(("time", text));
 }

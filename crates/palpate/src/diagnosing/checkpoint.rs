@@ -1,5 +1,6 @@
 //! Fits of hypotheses that are already done, so that an interrupted diagnosis goes on where it stopped.
 
+use super::laps::Lap;
 use crate::error::Error;
 use crate::results;
 use crate::results::checkpoint::{CheckpointFit, CheckpointHead};
@@ -43,17 +44,18 @@ impl Checkpoint {
     }
 
     /// Keeps a fit. A disk that is full costs the checkpoint, not the diagnosis.
-    pub fn keep(&mut self, key: String, fit: &Fit) {
+    pub fn keep(&mut self, key: String, fit: &Fit, lap: &Lap) {
         let (values, errors) = (fit.model.values.clone(), fit.model.errors.clone());
         let done = CheckpointFit {
             key: key.clone(),
             values,
             errors,
             cost: fit.cost,
-            gained: fit.gained,
+            promised: fit.promised,
             // JSON has no infinity.
             reach: fit.reach.min(f64::MAX),
             settled: fit.settled,
+            lap: lap.to_document(),
         };
         if let Some(path) = &self.path {
             let _ = append(path, &done);

@@ -145,7 +145,7 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
         }
     }
     let middle = 0.0f64.clamp(bounds.0, bounds.1);
-    let parameter = FitParameter { path, start: (middle, middle), bounds, per_scene };
+    let parameter = FitParameter { path, start: (middle, middle), bounds, known: None, per_scene };
     let empty = || FitSpec { optimizer: None, iterations: 50, starts: 1, seed: 1, threads: 0, parameters: Vec::new() };
     e.scene.fit.get_or_insert_with(empty).parameters.push(parameter);
 }
@@ -167,7 +167,15 @@ impl Prepared {
             };
             let start = if k < self.given { guess } else { own[k] };
             let scale = if f.transform == Transform::Log && start > 0.0 { start } else { f.typical };
-            Number { path: n.label(), unit: f.unit.clone(), start, bounds: f.bounds, scale, transform: f.transform }
+            Number {
+                path: n.label(),
+                unit: f.unit.clone(),
+                start,
+                bounds: f.bounds,
+                scale,
+                transform: f.transform,
+                known: f.known,
+            }
         };
         self.names.iter().zip(&self.free).enumerate().map(number).collect()
     }

@@ -3,33 +3,33 @@
 use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
 use super::hypothesis::{Prepared, held, lab_error, prepare};
+use super::laps::{Lap, Laps, fit};
 use super::limits::Limits;
 use super::others::{contact_times, held_out, still_frames};
 use super::refined::{GRID, STEP, difference, finer, halved};
 use super::separate::separations;
 use super::systematic::systematic;
 use super::walls::walls;
+use super::world::strange;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::{errors, fingerprint};
+use crate::fitting::fingerprint;
 use crate::interrupt::Interrupt;
 use palpate_cpu::CpuBackend;
 use palpate_diagnose::{
-    Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start,
+    Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start, Strange,
 };
 use palpate_engine::Rollout;
-use palpate_fit::{FitScene, Hooks, Problem, Progress, Sample, Settings, Status, Tolerance, Want};
-use palpate_model::scene::Optimizer;
+use palpate_fit::{FitScene, Problem, Sample, Want};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Most bytes of tangents of one simulation that computes the sensitivities of several hypotheses.
 const MEMORY: usize = 1 << 29;
 /// Newton's tolerance over the relative decrease of the cost that a fit is after: forces that are off by 1e-6 move costs by less than 1e-4.
-const NEWTON: f64 = 5e-3;
+pub(super) const NEWTON: f64 = 5e-3;
 /// Simulations with sensitivities that an iteration of a fit costs: that at its end, and costs along the way.
 const ITERATION: f64 = 3.0;
 /// Bytes of one tangent per node: displacement and velocity, before and after a step.
@@ -48,6 +48,7 @@ pub(super) struct Lab<'a> {
     /// Why the device failed, if it did: the end of the search, as if it had been interrupted.
     broken: OnceLock<String>,
     checkpoint: Checkpoint,
+    laps: Laps,
     finer: Option<Vec<Experiment>>,
     /// Refinements whose time is set aside of the search's.
     set_aside: Vec<&'static str>,
@@ -98,6 +99,7 @@ impl<'a> Lab<'a> {
             interrupt: options.interrupt.clone(),
             broken: OnceLock::new(),
             checkpoint,
+            laps: Laps::default(),
             finer: None,
             set_aside: Vec::new(),
             seconds: 0.0,
@@ -131,12 +133,13 @@ impl<'a> Lab<'a> {
 }
 
 /// The problem of fitting one hypothesis from a start, with its numbers; Newton's method in it is no tighter than `newton`.
-fn problem(
+pub(super) fn problem(
     base: &[Experiment],
     backend: Backend,
     limits: Limits,
     (changes, start): (&[Change], &[f64]),
     newton: f64,
+    before: Option<&Lap>,
 ) -> Result<(Problem<'static>, Vec<Number>), LabError> {
     let mut ready = prepare(base, changes).map_err(lab_error)?;
     let numbers = ready.numbers();
@@ -147,6 +150,9 @@ fn problem(
         f.start = (v, v);
         // The longest step of an iteration counts in typical sizes: a number that starts far above its own may change by as much as it is.
         f.typical = f.typical.max(v.abs());
+    }
+    for (f, typical) in ready.free.iter_mut().zip(before.iter().flat_map(|lap| &lap.typical)) {
+        f.typical = *typical;
     }
     let mut scenes = Vec::new();
     for e in &mut ready.experiments {
@@ -164,7 +170,7 @@ fn problem(
 /// Cost of one hypothesis at these values.
 fn cost(base: &[Experiment], backend: Backend, limits: Limits, (changes, values): &Try) -> Result<f64, LabError> {
     limits.check()?;
-    let (mut problem, _) = problem(base, backend, limits, (changes, values), NEWTON * 1e-3)?;
+    let (mut problem, _) = problem(base, backend, limits, (changes, values), NEWTON * 1e-3, None)?;
     let values = problem.free().iter().map(|f| f.start.0).collect();
     let Some(sample) = problem.evaluate_values(&[values], Want::Cost).into_iter().next() else { return Ok(f64::INFINITY) };
     match sample {
@@ -172,53 +178,6 @@ fn cost(base: &[Experiment], backend: Backend, limits: Limits, (changes, values)
         Sample { stopped: true, .. } => Err(LabError::Interrupted),
         s => Ok(s.cost),
     }
-}
-
-/// Fits one hypothesis; when the time is over, what was reached until then.
-fn fit(
-    base: &[Experiment],
-    backend: Backend,
-    limits: Limits,
-    Start { changes, values, reach }: &Start,
-    (iterations, tolerance): (usize, f64),
-) -> Result<Fit, LabError> {
-    limits.check()?;
-    let (mut problem, numbers) = problem(base, backend, limits, (changes, values), NEWTON * tolerance)?;
-    let settings = Settings {
-        iterations,
-        first_step: *reach,
-        // Of ten thousand readings a share of 2e-4 of the cost is that of two. Steps count as its square root.
-        tolerance: Tolerance { cost: tolerance, gradient: tolerance, step: 0.1 * tolerance.sqrt() },
-        errors: errors(base),
-        ..Settings::new(Optimizer::GaussNewton)
-    };
-    let stop = AtomicBool::new(false);
-    let mut first = None;
-    let mut watch = |p: &Progress| {
-        first.get_or_insert(p.cost);
-        stop.store(limits.check().is_err(), Ordering::SeqCst);
-    };
-    let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
-    let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
-        palpate_fit::FitError::Interrupted => LabError::Interrupted,
-        e => LabError::failed(e),
-    })?;
-    if let Some(why) = result.broken {
-        return Err(limits.break_off(why));
-    }
-    if limits.is_over() {
-        return Err(LabError::Interrupted);
-    }
-    let model = Model {
-        changes: changes.clone(),
-        numbers,
-        values: result.parameters.iter().map(|p| p.value).collect(),
-        errors: result.parameters.iter().map(|p| p.standard_error).collect(),
-    };
-    let run = &result.runs[result.best];
-    let unsettled = matches!(run.status, Status::IterationLimit | Status::Interrupted);
-    let gained = first.map_or(0.0, |f| (f - result.cost).max(0.0));
-    Ok(Fit { model, cost: result.cost, gained, reach: run.reach, settled: !unsettled })
 }
 
 /// Residuals of every scene, with derivatives by the numbers from `from` on. Always the reference backend: statistics want its precision.
@@ -232,30 +191,42 @@ fn linearise_some(ready: &Prepared, values: &[f64], from: usize, wanted: impl Fn
     let mut out = Readings { columns, ..Readings::default() };
     let (mut rows, mut residuals) = (Vec::new(), 0.0);
     for (scene, e) in ready.experiments.iter().enumerate() {
-        let mut directions = Vec::new();
-        let mut columns_of = Vec::new();
-        for (k, f) in ready.free[from..].iter().enumerate().filter(|(k, _)| wanted(*k)) {
-            for s in f.slots.iter().filter(|s| s.scene == scene) {
-                directions.push(s.place);
-                columns_of.push((k, s.factor));
-            }
-        }
-        let mut rollout = Rollout::new(CpuBackend, &e.plan, 1).map_err(|e| lab_error(e.into()))?;
-        let l = rollout.linearise(&ready.theta(scene, values), &directions).map_err(|e| lab_error(e.into()))?;
-        let (q, n) = (directions.len(), l.evaluation.residuals.max(1) as f64);
-        out.cost += n * l.evaluation.cost;
+        let free = ready.free[from..].iter().enumerate().filter(|(k, _)| wanted(*k));
+        let slots = free.flat_map(|(k, f)| f.slots.iter().filter(|s| s.scene == scene).map(move |s| (k, s.place, s.factor)));
+        let one = along(e, scene, &ready.theta(scene, values), &slots.collect::<Vec<_>>(), columns)?;
+        let n = one.rows.len().max(1) as f64;
+        out.cost += n * one.cost;
         residuals += n;
-        for (i, row) in l.rows.residuals.iter().enumerate() {
-            let time = e.plan.observation.frames[row.frame].time;
-            rows.push(Reading { scene, time, row: *row });
-            let at = out.sensitivity.len();
-            out.sensitivity.resize(at + columns, 0.0);
-            for ((k, factor), d) in columns_of.iter().zip(&l.rows.sensitivity[i * q..(i + 1) * q]) {
-                out.sensitivity[at + k] += factor * d;
-            }
-        }
+        rows.extend_from_slice(&one.rows);
+        out.sensitivity.extend(one.sensitivity);
     }
     out.cost /= f64::max(residuals, 1.0);
+    out.rows = Arc::new(rows);
+    Ok(out)
+}
+
+/// Residuals of one experiment, with derivatives by `columns` numbers: each direction is a number's column, a place in θ, and the factor by
+/// which the number acts there.
+pub(super) fn along(
+    e: &Experiment,
+    scene: usize,
+    theta: &[f64],
+    directions: &[(usize, usize, f64)],
+    columns: usize,
+) -> Result<Readings, LabError> {
+    let places: Vec<usize> = directions.iter().map(|d| d.1).collect();
+    let mut rollout = Rollout::new(CpuBackend, &e.plan, 1).map_err(|e| lab_error(e.into()))?;
+    let l = rollout.linearise(theta, &places).map_err(|e| lab_error(e.into()))?;
+    let mut out = Readings { columns, cost: l.evaluation.cost, ..Readings::default() };
+    let mut rows = Vec::new();
+    for (i, row) in l.rows.residuals.iter().enumerate() {
+        rows.push(Reading { scene, time: e.plan.observation.frames[row.frame].time, row: *row });
+        let at = out.sensitivity.len();
+        out.sensitivity.resize(at + columns, 0.0);
+        for ((k, _, factor), d) in directions.iter().zip(&l.rows.sensitivity[i * places.len()..]) {
+            out.sensitivity[at + k] += factor * d;
+        }
+    }
     out.rows = Arc::new(rows);
     Ok(out)
 }
@@ -320,32 +291,35 @@ impl Laboratory for Lab<'_> {
 
     fn fit(&mut self, tries: &[Start], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>> {
         let effort = (iterations, tolerance);
-        let known: Vec<Option<Result<Fit, LabError>>> = tries
+        let known: Vec<Option<Result<(Fit, Lap), LabError>>> = tries
             .iter()
             .map(|start| {
                 let done = self.checkpoint.find(&self.key(start, effort))?;
                 let (values, errors) = (done.values.clone(), done.errors.clone());
-                let (cost, gained, reach, settled) = (done.cost, done.gained, done.reach, done.settled);
+                let (cost, promised, reach, settled) = (done.cost, done.promised, done.reach, done.settled);
                 let model = |numbers| Model { changes: start.changes.clone(), numbers, values, errors };
-                Some(self.numbers(&start.changes).map(|n| Fit { model: model(n), cost, gained, reach, settled }))
+                let lap = Lap::from_document(&done.lap, reach);
+                Some(self.numbers(&start.changes).map(|n| (Fit { model: model(n), cost, promised, reach, settled }, lap)))
             })
             .collect();
-        let (base, backend) = (&self.base, self.backend);
+        let (base, backend, laps) = (&self.base, self.backend, &self.laps);
         let limits = self.limits();
-        let answers: Vec<Result<Fit, LabError>> = tries
+        let answers: Vec<Result<(Fit, Lap), LabError>> = tries
             .par_iter()
             .zip(known)
-            .map(|(t, known)| known.unwrap_or_else(|| fit(base, backend, limits, t, effort)))
+            .map(|(t, known)| known.unwrap_or_else(|| fit(base, backend, limits, t, effort, laps.before(t))))
             .collect();
         // What the deadline cut short is not kept: with more time the fit would go on.
         let in_time = !self.out_of_time();
         for (t, a) in tries.iter().zip(&answers) {
-            if let (Ok(f), true) = (a, in_time) {
+            let Ok((f, lap)) = a else { continue };
+            self.laps.keep(f, lap);
+            if in_time {
                 let key = self.key(t, effort);
-                self.checkpoint.keep(key, f);
+                self.checkpoint.keep(key, f, lap);
             }
         }
-        answers
+        answers.into_iter().map(|a| a.map(|(f, _)| f)).collect()
     }
 
     fn linearise(&mut self, tries: &[Try]) -> Vec<Result<Readings, LabError>> {
@@ -399,22 +373,12 @@ impl Laboratory for Lab<'_> {
         self.held_out.map(|e| held_out(e, &self.base, self.backend, self.limits(), model)).transpose()
     }
 
-    fn held_out_finer(
-        &mut self,
-        model: &Model,
-        moves: &[(&'static str, Vec<f64>)],
-        coarse: &Readings,
-    ) -> Result<Vec<Field>, LabError> {
+    fn held_out_finer(&mut self, model: &Model, coarse: &Readings) -> Result<Vec<Field>, LabError> {
         let Some(e) = self.held_out else { return Ok(Vec::new()) };
         let (base, backend, began) = (&self.base, self.backend, Instant::now());
         let mut fields = Vec::new();
         for (name, e, factor) in [("grid", finer(e).map_err(lab_error)?, GRID), ("step", halved(e.clone()), STEP)] {
-            let mut model = model.clone();
-            // They are those in the limit.
-            for (_, moves) in moves.iter().filter(|m| m.0 == name) {
-                model.values.iter_mut().zip(moves).for_each(|(v, d)| *v += d / factor);
-            }
-            fields.push(difference(name, &held_out(&e, base, backend, self.limits(), &model)?, coarse, factor));
+            fields.push(difference(name, &held_out(&e, base, backend, self.limits(), model)?, coarse, factor));
         }
         self.set_aside("held out", began);
         Ok(fields)
@@ -426,6 +390,10 @@ impl Laboratory for Lab<'_> {
         let limits = Limits { deadline: self.deadline.map(quarter), ..self.limits() };
         let models: Vec<&Model> = std::iter::once(&named).chain(rivals).copied().collect();
         separations(&self.base, self.backend, &models, &|| limits.check().is_ok())
+    }
+
+    fn strange(&self, model: &Model) -> Vec<Strange> {
+        prepare(&self.base, &model.changes).map_or_else(|_| Vec::new(), |ready| strange(&ready, &model.values, &model.errors))
     }
 
     fn iterations_left(&self) -> usize {

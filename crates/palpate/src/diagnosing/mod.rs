@@ -3,12 +3,14 @@
 mod checkpoint;
 mod hypothesis;
 mod lab;
+mod laps;
 mod limits;
 mod others;
 mod refined;
 mod separate;
 mod systematic;
 mod walls;
+mod world;
 
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;

@@ -1,7 +1,7 @@
 //! Other data and other looks: a second recording of the same body, times of contact, frames at rest.
 
 use super::hypothesis::{Prepared, is_own, lab_error, prepare};
-use super::lab::linearise;
+use super::lab::along;
 use super::limits::Limits;
 use crate::engine::Backend;
 use crate::error::Error;
@@ -91,13 +91,17 @@ pub(super) fn held_out(
         })
         .collect();
     let mut ready: Prepared = prepare(std::slice::from_ref(e), &changes).map_err(lab_error)?;
-    let start: Vec<f64> = ready.numbers().iter().map(|n| n.start).collect();
-    let mut values = start.clone();
+    let mut values: Vec<f64> = ready.numbers().iter().map(|n| n.start).collect();
     let mut open = Vec::new();
+    // Of every number of the model where it acts here.
+    let mut directions: Vec<(usize, usize, f64)> = Vec::new();
     for (k, n) in ready.names.iter().enumerate() {
         let shared = trained.names.iter().position(|t| t.path == n.path).filter(|_| !is_own(&n.path));
         match shared {
-            Some(t) => values[k] = model.values[t],
+            Some(t) => {
+                values[k] = model.values[t];
+                directions.extend(ready.free[k].slots.iter().map(|s| (t, s.place, s.factor)));
+            }
             None => open.push(k),
         }
     }
@@ -109,7 +113,9 @@ pub(super) fn held_out(
             && !ready.names.iter().any(|m| m.path == n.path)
             && let Some(p) = experiment.plan.layout.keys.iter().position(place)
         {
-            experiment.plan.theta[p] = model.values[t] * trained.free[t].slots[0].factor;
+            let factor = trained.free[t].slots[0].factor;
+            experiment.plan.theta[p] = model.values[t] * factor;
+            directions.push((t, p, factor));
         }
     }
     if !open.is_empty() {
@@ -134,6 +140,9 @@ pub(super) fn held_out(
         }
         open.iter().zip(&found.parameters).for_each(|(k, p)| values[*k] = p.value);
     }
-    let none = ready.free.len();
-    linearise(&ready, &values, none)
+    let shared = model.values.len();
+    for (i, k) in open.iter().enumerate() {
+        directions.extend(ready.free[*k].slots.iter().map(|s| (shared + i, s.place, s.factor)));
+    }
+    along(&ready.experiments[0], 0, &ready.theta(0, &values), &directions, shared + open.len())
 }

@@ -13,7 +13,7 @@ pub(super) const STEP: f64 = 2.0;
 
 /// An experiment on finer cells, with the same step: that is halved by itself.
 pub(super) fn finer(e: &Experiment) -> Result<Experiment, Error> {
-    let mut f = e.finer(FINER)?;
+    let mut f = e.finer(FINER, FINER)?;
     f.plan.clock = e.plan.clock;
     f.plan.theta.clone_from(&e.plan.theta);
     f.scene.fit.clone_from(&e.scene.fit);
@@ -31,5 +31,5 @@ pub(super) fn halved(mut e: Experiment) -> Experiment {
 pub(super) fn difference(name: &'static str, fine: &Readings, coarse: &Readings, factor: f64) -> Field {
     let both = fine.rows.iter().zip(coarse.rows.iter());
     let change = both.map(|(f, c)| Some(factor * (f.row.value? - c.row.value?))).collect();
-    Field { name, change, rough: Field::REFINED }
+    Field::refined(name, change)
 }

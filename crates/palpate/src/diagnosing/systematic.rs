@@ -4,7 +4,7 @@
 use super::hypothesis::{lab_error, prepare};
 use super::lab::linearise;
 use crate::experiment::Experiment;
-use palpate_diagnose::{Change, Field, LabError};
+use palpate_diagnose::{Change, Field, LabError, Reading};
 use palpate_engine::Source;
 use palpate_model::effects::{Effect, find};
 use palpate_model::observation::{ReadingKind, Sensor};
@@ -42,12 +42,10 @@ pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]
     at.resize(ready.free.len(), 0.0);
     let readings = linearise(&ready, &at, from)?;
     // What an error changes of every reading that is its sensor's.
-    let field = |name: &'static str, mine: &dyn Fn(usize, &Source) -> bool, change: &dyn Fn(usize) -> f64| Field {
-        name,
-        change: (readings.rows.iter().enumerate())
-            .map(|(i, r)| r.row.value.map(|_| if mine(r.scene, &r.row.source) { change(i) } else { 0.0 }))
-            .collect(),
-        rough: 0.0,
+    let field = |name: &'static str, mine: &dyn Fn(usize, &Source) -> bool, change: &dyn Fn(usize) -> f64| {
+        let rows = readings.rows.iter().enumerate();
+        let of = |(i, r): (usize, &Reading)| r.row.value.map(|_| if mine(r.scene, &r.row.source) { change(i) } else { 0.0 });
+        Field::systematic(name, rows.map(of).collect())
     };
     let rows = &readings;
     let along = |column: usize, size: f64| move |i: usize| size * rows.sensitivity[i * rows.columns + column];

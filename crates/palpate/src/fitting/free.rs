@@ -51,6 +51,17 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                     );
                     return Err(Error::scene(file(scene), &p.path, message));
                 }
+                if f.known != p.known {
+                    let text =
+                        |k: Option<(f64, f64)>| k.map_or("no known value".into(), |(v, sd)| format!("known = [{v}, {sd}]"));
+                    let message = format!(
+                        "has {} here and {} in {}; a shared parameter has the same in both, or say per_scene = true",
+                        text(p.known),
+                        text(f.known),
+                        file(f.slots[0].scene).display()
+                    );
+                    return Err(Error::scene(file(scene), &p.path, message));
+                }
                 if f.count != count {
                     let message = format!(
                         "has {count} values here and {} in {}; share a field between bodies of the same cells, or say per_scene = true",
@@ -74,6 +85,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                 typical: spec.typical / slot.factor,
                 bounds: p.bounds,
                 start: p.start,
+                known: p.known,
                 count,
                 slots: vec![slot],
             });

@@ -1,7 +1,7 @@
 //! What a diagnosis found, for its result file and in a few lines for the terminal.
 
 use crate::diagnosing::Diagnosed;
-use crate::results::diagnosis::{self as results, BeforeAfter, DiagnosisDocument, HeldOut, Noise, SeparatedBy, Values};
+use crate::results::diagnosis::{self as results, BeforeAfter, DiagnosisDocument, HeldOut, Nats, Noise, SeparatedBy, Values};
 use crate::results::finite;
 use crate::results::fit::Parameter;
 use palpate_diagnose::{
@@ -30,7 +30,8 @@ fn effect(f: &Found) -> results::Effect {
         sentence: f.sentence.clone(),
         parameters: by_key(&|p| finite(p.1)),
         standard_error: by_key(&|p| p.2.and_then(finite)),
-        p_value: finite(f.p_value),
+        nats: finite(f.nats.0),
+        nats_error: finite(f.nats.1),
         held_out_gain: finite(f.held_out_gain),
         accepted: f.accepted,
         indistinguishable_from: f.indistinguishable_from.clone(),
@@ -74,7 +75,6 @@ fn tried(t: &Tried) -> results::Tried {
         round: t.round,
         kind: t.kind.clone(),
         promised: finite(t.promised),
-        p_value: finite(t.p_value),
         held_out_gain: t.held_out_gain.and_then(finite),
     }
 }
@@ -95,6 +95,10 @@ fn map_entry(done: &Diagnosed, m: &MapEntry) -> results::MapEntry {
     }
 }
 
+fn nats((nats, error): (f64, f64)) -> Nats {
+    Nats { nats: finite(nats), error: finite(error) }
+}
+
 /// What `diagnosis.json` says of a diagnosis.
 pub fn diagnosis_document(done: &Diagnosed) -> DiagnosisDocument {
     let d = &done.diagnosis;
@@ -102,9 +106,7 @@ pub fn diagnosis_document(done: &Diagnosed) -> DiagnosisDocument {
         backend: done.backend.into(),
         verdict: d.verdict.name().into(),
         sentence: d.sentence(),
-        p_value: finite(d.p_value),
-        p_value_after: finite(d.p_value_after),
-        structure: BeforeAfter { before: finite(d.structure.0), after: finite(d.structure.1) },
+        missing: BeforeAfter { before: nats(d.missing), after: nats(d.missing_after) },
         baseline: level(&d.before),
         places: d.places.iter().map(place).collect(),
         effects: d.effects.iter().map(effect).collect(),

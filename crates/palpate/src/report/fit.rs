@@ -4,26 +4,13 @@ use crate::experiment::Experiment;
 use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
-use crate::results::fit::{Cost, FieldReference, FitDocument, Parameter, Residual, ResidualBefore, Run};
+use crate::results::fit::{Cost, FieldReference, FitDocument, Parameter, Parts, Residual, ResidualBefore, Run};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
 
 fn residual(r: &ResidualSummary) -> Residual {
     Residual { rms: finite(r.rms), noise: finite(r.noise), points: r.points, unmatched: r.unmatched, scenes: Vec::new() }
-}
-
-/// A plain word where the result rests on the smaller part of what was observed; `None` where it does not.
-fn mostly_unmatched(fitted: &Fitted) -> Option<String> {
-    let points = fitted.residual().2;
-    let unmatched = unmatched(fitted);
-    (unmatched > points).then(|| {
-        format!(
-            "not to be trusted: {unmatched} of {} observed points meet no part of the simulated body even at the best fit; the values \
-             rest on the other {points}",
-            points + unmatched
-        )
-    })
 }
 
 /// How many independent readings the data are worth, where that is known.
@@ -39,12 +26,21 @@ fn unmatched(fitted: &Fitted) -> usize {
 
 fn parameter(fitted: &Fitted, i: usize) -> Parameter {
     let (number, found) = (&fitted.free[i], &fitted.result.parameters[i]);
+    let headline = fitted.headline(i);
+    let parts = |p: crate::fitting::Parts| Parts {
+        noise: finite(p.noise),
+        discretisation: p.discretisation.and_then(finite),
+        systematic: finite(p.systematic),
+    };
     Parameter {
         path: number.path.clone(),
-        value: finite(found.value),
-        standard_error: found.standard_error.and_then(finite),
+        value: finite(headline.value),
+        standard_error: headline.parts.and_then(|p| finite(p.total())),
+        parts: headline.parts.map(parts),
+        uncorrected: headline.uncorrected.and_then(finite),
         unit: found.unit.clone(),
-        finer_grid_shift: fitted.grid_shift.as_ref().and_then(|s| finite(s[i])),
+        finer_grid_shift: fitted.grid.as_ref().and_then(|g| finite(g.numbers[i].drift)),
+        known: found.known.map(|(value, sd)| [value, sd]),
         scene: number.scene,
         at_bound: found.at_bound,
     }
@@ -72,6 +68,7 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<Fie
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let scenes: Vec<String> = experiments.iter().map(|e| e.scene().path.display().to_string()).collect();
     FitDocument {
+        verdict: fitted.verdict.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
         backend: fitted.backend.into(),
         scene: scenes.first().cloned(),
@@ -95,7 +92,7 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<Fie
         residual_before: before.map(|b| ResidualBefore { rms: finite(total(&b, |r| r.rms)) }),
         best: r.best,
         runs: r.runs.iter().map(|r| run(fitted, r)).collect(),
-        warnings: mostly_unmatched(fitted).into_iter().chain(fitted.warnings.iter().cloned()).collect(),
+        warnings: fitted.warnings.clone(),
         evaluations: r.evaluations,
         seconds: r.seconds,
     }
@@ -128,6 +125,17 @@ pub fn number(x: f64) -> String {
     }
 }
 
+/// What a number was known to be before the recording was looked at, and what that makes of it; empty where nothing was.
+pub(super) fn beforehand(p: &FittedParameter) -> String {
+    let Some((value, sd)) = p.known else { return String::new() };
+    let unit = unit_behind(&p.unit);
+    let known = format!("known to be {} ± {}{unit} beforehand", number(value), number(sd));
+    match p.standard_error {
+        Some(now) => format!("{known}; the recording brings it to ± {}{unit}", number(now)),
+        None => known,
+    }
+}
+
 /// A found field in a line.
 pub(super) fn field_line(f: &FieldReference) -> String {
     let text = |x: Option<f64>| x.map_or("?".into(), number);
@@ -145,17 +153,52 @@ pub(super) fn field_line(f: &FieldReference) -> String {
     )
 }
 
+/// The parts of a number's error, and what was done to its value; empty where there is nothing to say.
+pub(super) fn parts(fitted: &Fitted, i: usize) -> String {
+    let (h, effect) = (fitted.headline(i), fitted.grid.as_ref().map(|g| g.numbers[i]));
+    let Some(parts) = h.parts else { return String::new() };
+    let short = |x: f64| palpate_engine::number(format!("{x:.1e}").parse().unwrap_or(x));
+    let mut all = vec![format!("noise {}", short(parts.noise))];
+    all.extend(parts.discretisation.map(|d| format!("discretisation {}", short(d))));
+    all.extend((parts.systematic > 0.0).then(|| format!("systematic {}", short(parts.systematic))));
+    let mut text = all.join(", ");
+    if let (Some(before), Some(order)) = (h.uncorrected, effect.and_then(|e| e.order)) {
+        text += &format!(
+            "; corrected from {} on these cells, order {order:.1}",
+            stated(before, Some(parts.noise)).split(" ±").next().unwrap_or("")
+        );
+    }
+    text
+}
+
+/// What the check of cells and step was and took; or that there was none.
+pub(super) fn grid_line(fitted: &Fitted) -> String {
+    match &fitted.grid {
+        None => "± is what noise leaves open; what cells and time step add to it was not looked at".into(),
+        Some(g) => {
+            let coarser = match &g.coarser {
+                None => String::new(),
+                Some(Ok(())) => format!(", and one with {} twice as large", g.what),
+                Some(Err(why)) => format!("; none with {} twice as large ({why})", g.what),
+            };
+            format!("discretisation: by an evaluation with {} half as large{coarser}, {:.1} s", g.what, g.seconds)
+        }
+    }
+}
+
 /// Short table for the terminal.
 pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     let width = fitted.free.iter().map(|n| n.label().chars().count()).max().unwrap_or(0);
     let row = |(i, (n, p)): (usize, (&FreeNumber, &FittedParameter))| {
-        let unit = unit_behind(&p.unit);
+        let (unit, h) = (unit_behind(&p.unit), fitted.headline(i));
         let unsure = if p.standard_error.is_none() { " (no standard error)" } else { "" };
-        let shift = fitted.grid_shift.as_ref().map(|s| 100.0 * s[i] / p.value.abs());
-        let shift = shift.map_or(String::new(), |s| format!("; cells and step half as large: {s:+.1} %"));
-        format!("  {:width$}  {}{unit}{unsure}{shift}\n", n.label(), stated(p.value, p.standard_error))
+        let known = if p.known.is_some() { format!(" ({})", beforehand(p)) } else { String::new() };
+        let parts = if fitted.grid.is_some() { parts(fitted, i) } else { String::new() };
+        let parts = if parts.is_empty() { parts } else { format!(" ({parts})") };
+        format!("  {:width$}  {}{unit}{unsure}{parts}{known}\n", n.label(), stated(h.value, h.parts.map(|p| p.total())))
     };
-    let mut text: String = fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row).collect();
+    let mut text = format!("  {}\n", fitted.verdict);
+    text.extend(fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row));
     fields.iter().for_each(|f| text += &format!("  {}\n", field_line(f)));
     text += &fitted.chosen.as_ref().map_or(String::new(), |c| format!("  {c}\n"));
     let (rms, noise, points) = fitted.residual();
@@ -167,10 +210,9 @@ pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
         noise * 1e3
     );
     text += &worth(fitted).map_or(String::new(), |w| format!("\n  {w}"));
-    if fitted.grid_shift.is_none() && fitted.result.parameters.iter().any(|p| p.standard_error.is_some()) {
-        text += "\n  ± is what noise leaves open; what cells and time step add to it, --grid-check finds out";
+    if fitted.result.parameters.iter().any(|p| p.standard_error.is_some()) {
+        text += &format!("\n  {}", grid_line(fitted));
     }
-    text += &mostly_unmatched(fitted).map_or(String::new(), |w| format!("\n  {w}"));
     text
 }
 

@@ -22,12 +22,28 @@ pub struct CheckpointFit {
     pub errors: Vec<Option<f64>>,
     /// Cost per scalar residual.
     pub cost: f64,
-    /// By how much it lowered the cost it started from.
-    pub gained: f64,
+    /// By how much the curvature there promises to lower its cost further.
+    pub promised: f64,
     /// Longest step that it would try next; the largest finite number where there is no limit.
     pub reach: f64,
     /// False when more iterations would go on.
     pub settled: bool,
+    /// How its optimiser stood, for a fit that goes on from there.
+    #[serde(default)]
+    pub lap: CheckpointLap,
+}
+
+/// How the optimiser of a fit stood at its end.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CheckpointLap {
+    /// Damping; `None` before the first step.
+    pub damping: Option<f64>,
+    /// Factor of the damping at the next rejected step.
+    pub growth: f64,
+    /// Rejected steps in a row that changed nothing.
+    pub level: u32,
+    /// Sizes that steps count in, of every number.
+    pub typical: Vec<f64>,
 }
 
 #[cfg(test)]
@@ -43,9 +59,10 @@ mod tests {
             values: vec![1.0 / 3.0, 1e-300],
             errors: vec![None, Some(0.1)],
             cost: 0.5,
-            gained: 0.0,
+            promised: 0.0,
             reach: f64::MAX,
             settled: true,
+            lap: CheckpointLap { damping: Some(0.1), growth: 2.0, level: 1, typical: vec![1.0 / 3.0, 1.0] },
         };
         let text = serde_json::to_string(&fit).expect("it can be written");
         assert_eq!(serde_json::from_str::<CheckpointFit>(&text).expect("it can be read"), fit);

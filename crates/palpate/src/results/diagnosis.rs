@@ -5,7 +5,7 @@ use super::fit::Parameter;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a model lacks (`diagnosis/1`).
+/// What a model lacks (`diagnosis/2`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisDocument {
     /// What computed: `cpu` or `gpu`.
@@ -14,12 +14,8 @@ pub struct DiagnosisDocument {
     pub verdict: String,
     /// The answer in sentences.
     pub sentence: String,
-    /// Probability of the baseline's residual structure when nothing is missing.
-    pub p_value: Option<f64>,
-    /// The same for the corrected model.
-    pub p_value_after: Option<f64>,
-    /// How large that structure is [m].
-    pub structure: BeforeAfter,
+    /// How much better models predict what was left out beside a discrepancy than alone: positive where something is missing.
+    pub missing: BeforeAfter,
     /// How far the baseline is from the measurement.
     pub baseline: Level,
     /// Where the baseline fails.
@@ -58,16 +54,25 @@ pub struct DiagnosisDocument {
 }
 
 impl Document for DiagnosisDocument {
-    const FORMAT: &'static str = "diagnosis/1";
+    const FORMAT: &'static str = "diagnosis/2";
 }
 
-/// Two numbers of one unit.
+/// Of two models.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter {
     /// Of the baseline.
-    pub before: Option<f64>,
+    pub before: Nats,
     /// Of the corrected model.
-    pub after: Option<f64>,
+    pub after: Nats,
+}
+
+/// A difference of log densities.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Nats {
+    /// The difference [nats].
+    pub nats: Option<f64>,
+    /// Its standard error [nats].
+    pub error: Option<f64>,
 }
 
 /// How far measurement and model are apart.
@@ -105,8 +110,10 @@ pub struct Effect {
     pub parameters: BTreeMap<String, Option<f64>>,
     /// Their standard errors.
     pub standard_error: BTreeMap<String, Option<f64>>,
-    /// Probability of such an improvement by chance.
-    pub p_value: Option<f64>,
+    /// How much better the model predicted with it than before [nats], its price paid.
+    pub nats: Option<f64>,
+    /// Standard error of that [nats].
+    pub nats_error: Option<f64>,
     /// Share of the gap that it closed on data left out.
     pub held_out_gain: Option<f64>,
     /// True when it is part of the corrected model.
@@ -174,8 +181,6 @@ pub struct Tried {
     pub kind: String,
     /// Share of the squared residual that it promised.
     pub promised: Option<f64>,
-    /// Probability of the promise by chance.
-    pub p_value: Option<f64>,
     /// Share of the gap that it closed on data left out; `None` when it was not fitted.
     pub held_out_gain: Option<f64>,
 }
@@ -232,9 +237,10 @@ mod tests {
             backend: "cpu".into(),
             verdict: "unexplained".into(),
             sentence: "Something is missing.".into(),
-            p_value: Some(0.002),
-            p_value_after: None,
-            structure: BeforeAfter { before: Some(1e-3), after: Some(1e-4) },
+            missing: BeforeAfter {
+                before: Nats { nats: Some(41.0), error: Some(3.0) },
+                after: Nats { nats: None, error: Some(0.1) },
+            },
             baseline: level.clone(),
             places: vec![Place { scene: 0, time: [0.1, 0.2], region: "top".into(), share: Some(0.3), p_value: Some(0.01) }],
             effects: vec![Effect {
@@ -242,7 +248,8 @@ mod tests {
                 sentence: "a force acts on all of it".into(),
                 parameters: values.clone(),
                 standard_error: values,
-                p_value: Some(1e-9),
+                nats: Some(35.0),
+                nats_error: Some(6.0),
                 held_out_gain: Some(0.97),
                 accepted: true,
                 indistinguishable_from: vec!["density".into()],
@@ -260,13 +267,7 @@ mod tests {
             gap_closed: Some(0.97),
             parameters: Values { before: vec![parameter.clone()], after: vec![parameter] },
             noise: Noise { readings_over_stated: Some(1.1), variance_of_means: Some(3.0) },
-            tried: vec![Tried {
-                round: 1,
-                kind: "adhesion".into(),
-                promised: Some(0.1),
-                p_value: Some(0.5),
-                held_out_gain: None,
-            }],
+            tried: vec![Tried { round: 1, kind: "adhesion".into(), promised: Some(0.1), held_out_gain: None }],
             not_tried: vec!["creep: no time".into()],
             slack: Some(Slack {
                 share: Some(0.6),
@@ -288,8 +289,8 @@ mod tests {
             seconds: 3.5,
         };
         let file = round_trip(&diagnosis);
-        assert!(file["where"].is_array() && file["error"].is_null() && file["p_value_after"].is_null());
+        assert!(file["where"].is_array() && file["error"].is_null() && file["missing"]["after"]["nats"].is_null());
         assert_eq!(keys(&file["parameters"]["after"][0]), ["path", "standard_error", "unit", "value"]);
-        assert_eq!(keys(&file).len(), 24);
+        assert_eq!(keys(&file).len(), 22);
     }
 }

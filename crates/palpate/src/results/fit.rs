@@ -5,9 +5,11 @@ use palpate_fit::AtBound;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a fit found (`fit/1`).
+/// What a fit found (`fit/2`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitDocument {
+    /// What it is worth: the first that there is to know.
+    pub verdict: Verdict,
     /// Version of the program.
     pub version: String,
     /// What computed: `cpu` or `gpu`.
@@ -53,7 +55,50 @@ pub struct FitDocument {
 }
 
 impl Document for FitDocument {
-    const FORMAT: &'static str = "fit/1";
+    const FORMAT: &'static str = "fit/2";
+}
+
+/// What a fit is worth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// In a word.
+    pub word: VerdictWord,
+    /// Why, in sentences; none of a fit that converged.
+    pub reasons: Vec<String>,
+}
+
+/// What a fit is worth, in a word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VerdictWord {
+    /// The best point was found, and nothing speaks against it.
+    #[default]
+    Converged,
+    /// It was cut short; the reasons say what is missing.
+    Interrupted,
+    /// A bound holds a number: the best value may lie beyond it.
+    AtABound,
+    /// The numbers should not be believed.
+    NotToBeTrusted,
+}
+
+impl VerdictWord {
+    /// As files, pages and the terminal write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            VerdictWord::Converged => "converged",
+            VerdictWord::Interrupted => "interrupted",
+            VerdictWord::AtABound => "at-a-bound",
+            VerdictWord::NotToBeTrusted => "not-to-be-trusted",
+        }
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.word.name())?;
+        if self.reasons.is_empty() { Ok(()) } else { write!(f, ": {}", self.reasons.join("; ")) }
+    }
 }
 
 /// How a fit ended.
@@ -73,21 +118,41 @@ pub enum FitStatus {
 pub struct Parameter {
     /// Path in the scene file.
     pub path: String,
-    /// Its value, in `unit`.
+    /// Its value, in `unit`; in the limit of fine cells and steps where it was corrected to that.
     pub value: Option<f64>,
-    /// Standard error in the same unit, from noise alone; `None` at a bound or where the data do not say.
+    /// The whole standard error in the same unit; `None` at a bound or where the data do not say.
     pub standard_error: Option<f64>,
+    /// Its parts, which add as squares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<Parts>,
+    /// The value that fits the recording on the scene's own cells and step, where `value` is corrected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncorrected: Option<f64>,
     /// SI unit, `1` for none.
     pub unit: String,
-    /// How far cells and time step half as large would move it, where that was asked for.
+    /// How far cells and time step half as large would move it, where that was looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finer_grid_shift: Option<f64>,
+    /// Value and standard deviation that were known beforehand (`known` in the scene).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known: Option<[f64; 2]>,
     /// The scene that it belongs to, from 0; absent where all scenes share it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<usize>,
     /// The bound that holds it, if one does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_bound: Option<AtBound>,
+}
+
+/// Parts of a standard error, in the number's unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Parts {
+    /// What averages out over readings.
+    pub noise: Option<f64>,
+    /// What cells and step leave open; `None` where that was not looked at.
+    pub discretisation: Option<f64>,
+    /// What the recording calls systematic.
+    pub systematic: Option<f64>,
 }
 
 /// A found field: what it is, and where its values lie.
@@ -168,7 +233,7 @@ pub struct Run {
     /// Products with the Gauss–Newton matrix used, a tangent and an adjoint each.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub products: usize,
-    /// How it ended: `converged`, `iteration-limit`, `stalled`, `failed`, `interrupted` or `broken-off`.
+    /// How it ended: `converged`, `iteration-limit`, `stalled`, `failed`, `blind`, `interrupted` or `broken-off`.
     pub status: String,
 }
 
@@ -192,12 +257,16 @@ mod tests {
             value: Some(1.0 / 3.0),
             standard_error: Some(0.1 + 0.2),
             finer_grid_shift: Some(-1e-300),
+            known: Some([0.3, 0.1]),
+            parts: Some(Parts { noise: Some(0.1), discretisation: None, systematic: Some(0.0) }),
+            uncorrected: Some(0.3),
             scene: Some(1),
             at_bound: Some(AtBound::Upper),
             ..plain.clone()
         };
         let values: BTreeMap<String, Option<f64>> = [("a".to_string(), Some(0.1)), ("b [scene 2]".to_string(), None)].into();
         let fit = FitDocument {
+            verdict: Verdict { word: VerdictWord::AtABound, reasons: vec!["a is at its upper bound 1".into()] },
             version: "0.1.0".into(),
             backend: "cpu".into(),
             scene: Some("a.toml".into()),
@@ -252,6 +321,7 @@ mod tests {
             "scenes",
             "seconds",
             "status",
+            "verdict",
             "version",
             "warnings",
         ];

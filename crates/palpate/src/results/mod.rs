@@ -1,7 +1,7 @@
 //! What commands write and print as JSON: one file a format, each a struct with a version.
 //!
 //! Numbers are in SI units. One that is infinite or undefined is `None`, and `null` in the file. A document begins with its format,
-//! `{"format": "fit/1", …}`: the number behind the slash grows when a key changes its meaning or goes. Keys that are new may come at any
+//! `{"format": "fit/2", …}`: the number behind the slash grows when a key changes its meaning or goes. Keys that are new may come at any
 //! time, and those that a reader does not know are passed over.
 //!
 //! A quantity that is a field of thousands of values does not belong here: it lies in an array file beside the document, which names it.
@@ -25,7 +25,7 @@ use std::path::Path;
 
 /// A kind of document in its present version.
 pub trait Document: Serialize + DeserializeOwned {
-    /// Name and version, `fit/1`.
+    /// Name and version, `fit/2`.
     const FORMAT: &'static str;
 }
 
@@ -122,8 +122,8 @@ pub(crate) mod tests {
     #[test]
     fn what_is_no_document_is_refused_with_its_place() {
         let read = |text: &str| parse::<fit::FitDocument>(text, "a.json").expect_err("it is none").to_string();
-        assert_eq!(read("{}"), "a.json: format: is missing; \"fit/1\" is expected");
-        assert!(read("{\n\"format\": }").starts_with("a.json:2: is not fit/1: expected value"), "{}", read("{\n\"format\": }"));
-        assert!(read("{\"format\": \"fit/1\"}").starts_with("a.json:1: is not fit/1: missing field"));
+        assert_eq!(read("{}"), "a.json: format: is missing; \"fit/2\" is expected");
+        assert!(read("{\n\"format\": }").starts_with("a.json:2: is not fit/2: expected value"), "{}", read("{\n\"format\": }"));
+        assert!(read("{\"format\": \"fit/2\"}").starts_with("a.json:1: is not fit/2: missing field"));
     }
 }

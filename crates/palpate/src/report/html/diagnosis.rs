@@ -101,7 +101,11 @@ fn distances(d: &Diagnosis) -> Markup {
 }
 
 fn effect(f: &Found) -> Markup {
-    let gain = format!("Closes {:.0} % of the gap on data left out; p = {:.1e}.", 100.0 * f.held_out_gain, f.p_value);
+    let (nats, error) = f.nats;
+    let gain = format!(
+        "Closes {:.0} % of the gap on data left out, which it predicts better by {nats:.1} ± {error:.1} nats, its price paid.",
+        100.0 * f.held_out_gain
+    );
     html! {
         h2 { (f.kind) @if f.accepted { " (added)" } @else { " (not accepted)" } }
         p {
@@ -277,7 +281,6 @@ fn tried(d: &Diagnosis) -> Markup {
         ("round", Text),
         ("candidate", Text),
         ("promised share of the residual", Number),
-        ("p-value", Number),
         ("gap closed on data left out", Number),
     ];
     html! {
@@ -289,7 +292,6 @@ fn tried(d: &Diagnosis) -> Markup {
                     td { (t.round) }
                     td { (t.kind) }
                     td.n { (format!("{:.1} %", 100.0 * t.promised)) }
-                    td.n { (format!("{:.1e}", t.p_value)) }
                     td.n { (t.held_out_gain.map_or("not fitted".into(), |g| format!("{:.0} %", 100.0 * g))) }
                 }
             }

@@ -3,11 +3,11 @@
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
-use crate::report::fit::{field_line, number, worth};
+use crate::report::fit::{beforehand, field_line, grid_line, number, parts, worth};
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::FieldReference;
+use crate::results::fit::{FieldReference, VerdictWord};
 use maud::{Markup, html};
 
 /// What a report is made of.
@@ -33,7 +33,7 @@ pub fn fit_html(input: &ReportInput) -> String {
     let title = if titles.is_empty() { "Fit".to_string() } else { titles.join(" + ") };
     let effort = format!("{} evaluations in {:.1} s", fitted.result.evaluations, fitted.result.seconds);
     let body = html! {
-        (ending(fitted))
+        (verdict(fitted))
         (distances(fitted))
         (parameters(fitted))
         (fields(input))
@@ -49,15 +49,11 @@ pub fn fit_html(input: &ReportInput) -> String {
     page(&title, &body)
 }
 
-/// A word where the fit did not come to its end.
-fn ending(fitted: &Fitted) -> Markup {
+/// The verdict, in the words of `result.json` and the terminal.
+fn verdict(fitted: &Fitted) -> Markup {
+    let good = fitted.verdict.word == VerdictWord::Converged;
     html! {
-        @if fitted.interrupted {
-            p.w { "The fit was interrupted; these are the best values found until then." }
-        }
-        @if let Some(why) = &fitted.result.broken {
-            p.w { "The fit broke off; these are the best values found until then. " (why) }
-        }
+        p.verdict.w[!good] { b { (fitted.verdict.word.name()) } @if !good { ": " (fitted.verdict.reasons.join("; ")) "." } }
     }
 }
 
@@ -71,7 +67,7 @@ fn distances(fitted: &Fitted) -> Markup {
         p {
             "Root mean square distance between measurement and model: " b { (before) } " at the first start, " b { (mm(rms)) }
             " with the values found; measurement noise, and the shape's rounding by cells, would leave " (mm(noise)) " (" (points)
-            " points); what cells and time step change, " code { "--grid-check" } " tells."
+            " points)."
         }
         @if let Some(worth) = worth(fitted) {
             p { (worth) "." }
@@ -84,26 +80,22 @@ fn parameters(fitted: &Fitted) -> Markup {
     html! {
         h2 { "Parameters" }
         table {
-            (heads(&[("parameter", Text), ("value", Number), ("± standard error", Number), ("unit", Text)]))
-            @for (n, f) in fitted.free.iter().zip(&fitted.result.parameters) {
+            (heads(&[("parameter", Text), ("value", Number), ("± standard error", Number), ("unit", Text), ("parts of ±", Text)]))
+            @for (i, (n, f)) in fitted.free.iter().zip(&fitted.result.parameters).enumerate() {
+                @let h = fitted.headline(i);
                 tr {
                     td { code { (n.label()) } }
-                    td.n { (number(f.value)) @if f.at_bound.is_some() { " (at its bound)" } }
-                    td.n { (f.standard_error.map_or("–".to_string(), number)) }
+                    td.n { (number(h.value)) @if f.at_bound.is_some() { " (at its bound)" } }
+                    td.n { (h.parts.map_or("–".to_string(), |p| number(p.total()))) }
                     td { (unit(&f.unit)) }
+                    td { (parts(fitted, i)) }
                 }
             }
         }
-        @if let Some(shift) = &fitted.grid_shift {
-            p {
-                "The standard errors hold noise only. Cells and time step half as large would move "
-                @for (k, (n, f)) in fitted.free.iter().zip(&fitted.result.parameters).enumerate() {
-                    @if k > 0 { ", " }
-                    code { (n.label()) } " by " (format!("{:+.1} %", 100.0 * shift[k] / f.value.abs()))
-                }
-                "."
-            }
+        @for (n, f) in fitted.free.iter().zip(&fitted.result.parameters).filter(|(_, f)| f.known.is_some()) {
+            p { code { (n.label()) } ": " (beforehand(f)) "." }
         }
+        p { (grid_line(fitted)) "." }
     }
 }
 

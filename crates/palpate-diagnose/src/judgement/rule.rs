@@ -1,0 +1,135 @@
+//! The rule: which of two models predicts better, and whether that is clear.
+//!
+//! ```text
+//! something is missing in M     S(M⁺) > S(M°), or three standard deviations from what is known
+//! an effect helps               S(M_j⁺) > S(M₀⁺), by more than two standard errors of elpd(M_j⁺) − elpd(M₀⁺)
+//! the one that is named         the largest S(M_j⁺) of those that help
+//! as good as that               S lower by no more than two standard errors, or than ln O
+//! an explanation                S(M_j°) > S(M₀⁺): as the whole truth it predicts better than "something unknown" does
+//! ```
+
+use super::prior::Prior;
+
+/// Standard errors of a difference from which on it is clear.
+const CLEAR: f64 = 2.0;
+
+/// Standard deviations from what is known beforehand from which on the readings contradict it.
+const CONTRADICTS: f64 = 3.0;
+
+/// What a model predicts of every block that was left out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Judged {
+    /// ln p of every block, the model being the whole truth.
+    pub alone: Vec<f64>,
+    /// The same beside a discrepancy of the size that fits best.
+    pub beside: Vec<f64>,
+    /// That size, in standard deviations of a cell's noise.
+    pub discrepancy: f64,
+    /// ln p of the model.
+    pub log_prior: f64,
+    /// Standard deviations by which readings contradict most what is known beforehand of numbers, or of errors of grid and step.
+    pub conflict: f64,
+}
+
+/// How much better one model predicts than another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Difference of the scores [nats].
+    pub nats: f64,
+    /// Standard error of the part that data decide [nats].
+    pub error: f64,
+}
+
+impl Difference {
+    /// Difference and standard error.
+    pub fn parts(self) -> (f64, f64) {
+        (self.nats, self.error)
+    }
+
+    /// True if the first is better beyond what chance among blocks may do.
+    pub fn is_clear(self) -> bool {
+        self.nats > 0.0 && self.nats > CLEAR * self.error
+    }
+
+    /// True if the first is better, or no worse than chance, or than what one thing more costs, allows.
+    pub fn is_as_good(self) -> bool {
+        -self.nats <= (CLEAR * self.error).max(Prior::odds())
+    }
+}
+
+/// Σ (a − b) over blocks and its standard error, blocks being independent (Vehtari, Gelman & Gabry, *Stat. Comput.* 27, 2017, eq. 24).
+fn difference(a: &[f64], b: &[f64]) -> Difference {
+    let each: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    let n = each.len() as f64;
+    let nats: f64 = each.iter().sum();
+    let variance = each.iter().map(|d| (d - nats / n).powi(2)).sum::<f64>() * n / (n - 1.0).max(1.0);
+    Difference { nats, error: variance.sqrt() }
+}
+
+impl Judged {
+    /// ln p of every block as the better of both ways says it, and the score.
+    fn best(&self) -> (&[f64], f64) {
+        let (alone, beside) = (self.alone.iter().sum::<f64>(), self.beside.iter().sum::<f64>() - Prior::odds());
+        if beside > alone { (&self.beside, beside + self.log_prior) } else { (&self.alone, alone + self.log_prior) }
+    }
+
+    /// S(M⁺), where it is better, or S(M°).
+    pub fn score(&self) -> f64 {
+        self.best().1
+    }
+
+    /// S(M⁺) − S(M°): positive where something is missing.
+    pub fn missing(&self) -> Difference {
+        let d = difference(&self.beside, &self.alone);
+        Difference { nats: d.nats - Prior::odds(), ..d }
+    }
+
+    /// True where something is missing: a discrepancy predicts better, or readings contradict what is known beforehand. What is
+    /// missing must not hide behind an error of the grid that would have to be many times what finer cells show.
+    pub fn is_missing(&self) -> bool {
+        self.missing().nats > 0.0 || self.conflict > CONTRADICTS
+    }
+
+    /// By how much this model predicts better than another.
+    pub fn over(&self, other: &Judged) -> Difference {
+        let ((mine, score), (theirs, against)) = (self.best(), other.best());
+        Difference { nats: score - against, ..difference(mine, theirs) }
+    }
+
+    /// The same of this model as the whole truth.
+    pub fn alone_over(&self, other: &Judged) -> Difference {
+        let (theirs, against) = other.best();
+        let d = difference(&self.alone, theirs);
+        Difference { nats: self.alone.iter().sum::<f64>() + self.log_prior - against, ..d }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(alone: &[f64], beside: &[f64], log_prior: f64) -> Judged {
+        Judged { alone: alone.to_vec(), beside: beside.to_vec(), discrepancy: 1.0, log_prior, conflict: 0.0 }
+    }
+
+    #[test]
+    fn a_difference_has_the_spread_of_its_blocks_as_error() {
+        let d = difference(&[1.0, 2.0, 4.0], &[0.0, 1.0, 0.0]);
+        // Differences 1, 1, 4: mean 2, variance 3, of the sum three times that.
+        assert!((d.nats - 6.0).abs() < 1e-12 && (d.error - 3.0).abs() < 1e-12, "{d:?}");
+        assert!(!d.is_clear() && Difference { nats: 6.1, error: 3.0 }.is_clear());
+        assert!(Difference { nats: -5.9, error: 3.0 }.is_as_good() && !Difference { nats: -6.1, error: 3.0 }.is_as_good());
+    }
+
+    #[test]
+    fn a_model_is_judged_by_the_better_of_both_ways_and_pays_for_a_discrepancy() {
+        let odds = Prior::odds();
+        let right = judged(&[-1.0; 10], &[-1.1; 10], 0.0);
+        let wrong = judged(&[-9.0; 10], &[-2.0; 10], 0.0);
+        assert!(right.missing().nats < 0.0 && wrong.missing().nats > 0.0);
+        assert!((right.over(&wrong).nats - (10.0 + odds)).abs() < 1e-12);
+        // An effect that leaves structure helps, and is no explanation where the unknown predicts better than it does alone.
+        let near = judged(&[-4.0; 10], &[-1.5; 10], -1.0);
+        assert!(near.over(&wrong).is_clear() && near.alone_over(&wrong).nats < 0.0);
+    }
+}

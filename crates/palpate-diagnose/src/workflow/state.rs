@@ -1,0 +1,130 @@
+//! Everything known about one model: its residuals in cells, errors of grid and step, what it says of a second recording, and its score.
+
+use super::{Session, State, linear};
+use crate::cells::{Cells, Table};
+use crate::judgement::density::Blocks;
+use crate::judgement::prior::Prior;
+use crate::judgement::rule::Judged;
+use crate::laboratory::{Field, LabError, Model, Readings};
+
+impl Session<'_> {
+    /// What a finer grid and half the step would change, and what the recording's systematic errors may have changed. A scene that is too
+    /// large to be refined, or fails there, has no estimate, and neither has one whose diagnosis was asked to stop.
+    pub(super) fn finer(&mut self, model: &Model) -> Vec<Field> {
+        let same = |of: &Model| (&of.changes, &of.values) == (&model.changes, &model.values);
+        if let Some((_, known)) = self.finer.iter().find(|(of, _)| same(of)) {
+            return known.clone();
+        }
+        self.lab.say("discretisation error: finer grid, half step");
+        let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
+        all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
+        if !self.lab.interrupted() {
+            self.finer.push((model.clone(), all.clone()));
+        }
+        all
+    }
+
+    /// Brings errors of the discretisation up to date: with another effect in place they are others.
+    pub(super) fn refine(&mut self, state: &mut State) {
+        state.fields = self.finer(&state.model);
+        state.own = true;
+        state.held_out_finer = self.held_out_finer(state);
+        self.remeasure(state);
+    }
+
+    /// Everything known about a model; means of cells that it lost are taken over from another one's. The fields are its `own`, or another's.
+    pub(super) fn state(
+        &mut self,
+        model: Model,
+        readings: Readings,
+        fields: Vec<Field>,
+        own: bool,
+        fallback: Option<&Table>,
+    ) -> Result<State, LabError> {
+        let table = self.cells.table(&readings, fallback);
+        let frame = self.frame(&table, &fields);
+        let predicted = self.predict(&readings, &table, &frame);
+        let (held_out, elsewhere) = match self.lab.held_out(&model) {
+            Ok(readings) => (readings, None),
+            // Who cannot follow a recording that the baseline follows is no explanation.
+            Err(e) if self.second.is_some() => return Err(e),
+            Err(LabError::Interrupted) => return Err(LabError::Interrupted),
+            Err(e) => (None, Some(e.to_string())),
+        };
+        let strange = self.lab.strange(&model);
+        let mut state = State {
+            needed: Vec::new(),
+            judged: Judged::default(),
+            held_out_finer: Vec::new(),
+            model,
+            readings,
+            table,
+            fields,
+            frame,
+            predicted,
+            held_out,
+            elsewhere,
+            own,
+            strange,
+        };
+        self.judge(&mut state);
+        Ok(state)
+    }
+
+    /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.
+    pub(super) fn beside(&mut self, state: &State, model: Model, readings: Readings) -> Result<State, LabError> {
+        let borrowed = |fields: &[Field]| fields.iter().map(Field::borrowed).collect::<Vec<_>>();
+        let mut new = self.state(model, readings, borrowed(&state.fields), false, Some(&state.table))?;
+        new.held_out_finer = borrowed(&state.held_out_finer);
+        self.judge(&mut new);
+        Ok(new)
+    }
+
+    /// How a state predicts what was left out.
+    pub(super) fn judge(&self, state: &mut State) {
+        state.needed = self.needed(state);
+        let own = linear::around(&self.cells, state);
+        let tau = own.discrepancy(&self.blocks);
+        let density = |tau: f64| {
+            let mut all = own.left_out(&self.blocks, tau);
+            all.push(own.known_left_out(&self.blocks, tau));
+            if let Some((readings, (cells, blocks))) = state.held_out.as_ref().zip(self.second.as_ref()) {
+                let taught = own.posterior(&self.blocks, tau);
+                all.extend(linear::elsewhere(cells, readings, state, &taught).left_out(blocks, tau));
+            }
+            all
+        };
+        let prior = Prior { candidates: self.candidates, readings: self.cells.len() };
+        let alone = density(0.0);
+        let beside = if tau > 0.0 { density(tau) } else { alone.clone() };
+        state.judged = Judged {
+            alone,
+            beside,
+            discrepancy: tau,
+            log_prior: prior.log(&state.needed, &state.strange),
+            conflict: own.conflict(&self.blocks, tau),
+        };
+    }
+
+    /// Cells of a second recording, as the baseline meets it.
+    pub(super) fn look_elsewhere(&mut self, state: &mut State) {
+        let Some(readings) = &state.held_out else { return };
+        let mut cells = Cells::new(readings);
+        if cells.is_empty() {
+            return;
+        }
+        let ratio = self.noise_ratio;
+        for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
+            *sd *= if k.stream.sensor.is_camera() { ratio } else { 1.0 } * self.design_effect.sqrt();
+        }
+        let blocks = Blocks::new(&cells);
+        self.second = Some((cells, blocks));
+        self.judge(state);
+    }
+
+    /// What finer computations would change in a state's residuals of data that no fit has seen.
+    pub(super) fn held_out_finer(&mut self, state: &State) -> Vec<Field> {
+        let Some(coarse) = &state.held_out else { return Vec::new() };
+        self.lab.held_out_finer(&state.model, coarse).unwrap_or_default()
+    }
+}

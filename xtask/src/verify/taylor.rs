@@ -1,0 +1,232 @@
+//! The gradient by every kind of parameter: |J(θ + εd) − J(θ) − ε ∇J·d| falls as ε².
+//!
+//! Kinds come from a scene's layout and from the table of effects, so that a new one is tested without a line here.
+
+use super::report::{Requirement, Row};
+use super::scenes;
+use glam::DVec3;
+use palpate_cpu::CpuBackend;
+use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::cutcells::build::SUBDIVISIONS;
+use palpate_model::effects::{ALL, Effect, Law, Site, Unstated};
+use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker};
+use palpate_model::observation::{ObservedPoint, ReadingKind};
+use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
+use palpate_model::params::{ParamKey, Transform};
+use palpate_model::plan::Plan;
+use palpate_model::plan::build::build_plan;
+use palpate_model::scene::{Analytic, PointMass, Scene};
+
+/// Sizes of ε over the parameter's own: each a quarter of the last, from a twentieth on.
+const STEPS: usize = 9;
+/// A remainder that stands this far above zero, over the cost, has three digits: solves leave some 1e-13 of it.
+const CLEAR: f64 = 1e-10;
+
+/// A ball that is thrown into a corner of two planes.
+fn thrown() -> Scene {
+    let mut s = scenes::body(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, -0.002, 0.057) }, 0.03);
+    s.material.youngs_modulus = 5e3;
+    s.material.poisson_ratio = 0.4;
+    s.material.mass_damping = 0.3;
+    s.material.stiffness_damping = 0.004;
+    s.gravity = DVec3::new(0.4, -0.3, -9.0);
+    let wall = scenes::plane(DVec3::new(1.0, 0.2, 0.1));
+    s.planes = vec![
+        scenes::plane(DVec3::new(0.1, 0.05, 1.0)),
+        palpate_model::scene::Plane { point: DVec3::new(-0.045, 0.0, 0.0), ..wall },
+    ];
+    s.masses = vec![PointMass { point: DVec3::new(0.0, 0.02, 0.09), mass: 0.02 }];
+    s.initial.velocity = DVec3::new(-0.3, 0.1, -0.8);
+    s.initial.angular_velocity = DVec3::new(2.0, -5.0, 1.0);
+    s.time = scenes::steps(0.01, 6);
+    s.time.start = 0.002;
+    s.solver.tolerance = 1e-13;
+    s
+}
+
+/// The same with its back in a clamp, let go from rest.
+fn held() -> Scene {
+    let mut s = thrown();
+    (s.initial.velocity, s.initial.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+    s.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.021, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+    s
+}
+
+/// With two fields, one of regions and one of nodes.
+fn varied() -> Scene {
+    let mut s = thrown();
+    let region = |z: f64, value: f64| Region { center: DVec3::new(0.0, 0.0, z), radius: 0.01, value };
+    let regions = Basis::Regions(vec![region(0.03, 1.3), region(0.08, 0.8)], Blend::Harmonic);
+    let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None };
+    s.fields = vec![of(Varied::Modulus, regions), of(Varied::Density, Basis::Nodes), of(Varied::Modulus, Basis::Cells)];
+    s
+}
+
+/// What is seen of a scene: displacements and a marker, or depth where what is tested concerns a camera; of a body 15 % stiffer, so that no
+/// residual is zero, and between steps.
+fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
+    let plain =
+        build_plan(&Scene { effects: Vec::new(), ..scene.clone() }, Observation::default(), &[]).map_err(|e| e.to_string())?;
+    let mut other = plain.clone();
+    other.theta[other.layout.index(ParamKey::YoungsModulus)] *= 1.15;
+    let states = scenes::states(&other)?;
+    let cameras: Vec<Camera> = DVec3::AXES
+        .into_iter()
+        .flat_map(|a| [a, -a])
+        .map(|a| Camera { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a })
+        .collect();
+    let frame = |time: f64| {
+        let k = ((time - scene.time.start) / scene.time.step).round() as usize;
+        let u = &states[k].displacement;
+        let point =
+            |(number, (patch, place)): (usize, (&palpate_model::space::body::Patch, palpate_model::space::stencil::Stencil))| {
+                let off = 0.002 * (1.0 + number as f64).sin();
+                let position = patch.point + place.at(u) + off * patch.normal;
+                let away = |c: &u32| cameras[*c as usize].center.distance(position);
+                ObservedPoint { position, camera: (0..6).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0) }
+            };
+        let moved = |u: &DVec3| *u + DVec3::new(1e-4, -2e-4, 3e-4);
+        Frame {
+            time,
+            points: if depth { plain.body.pieces().enumerate().map(point).collect() } else { Vec::new() },
+            markers: vec![ObservedMarker { site: 0, position: DVec3::new(0.001, 0.012, 0.11) }],
+            displacements: if depth {
+                ObservedDisplacement::of_all(std::iter::empty())
+            } else {
+                ObservedDisplacement::of_all(u.iter().map(moved))
+            },
+        }
+    };
+    let frames = [0.0253, 0.0437, 0.0581].map(frame).into();
+    let channels = vec![
+        Channel::new(ReadingKind::Depth, 1e-3),
+        Channel::new(ReadingKind::Marker, 2e-3),
+        Channel::new(ReadingKind::Displacement, 5e-3),
+    ];
+    let marker =
+        MarkerRest { name: "m".into(), position: DVec3::new(0.0, 0.01, 0.115), surface: Some(DVec3::new(0.0, 0.005, 0.107)) };
+    let observation = Observation { cameras, frames, channels, ..Observation::default() };
+    build_plan(scene, observation, &[marker]).map_err(|e| e.to_string())
+}
+
+/// Without the points that differences may take across a face of the distance's samples, where its slope jumps.
+fn away_from_kinks(plan: Plan) -> Result<Plan, String> {
+    let body = &plan.body;
+    let mut rollout = Rollout::new(CpuBackend, &plan, 1).map_err(|e| e.to_string())?;
+    let rows = rollout.linearise(&plan.theta, &[0]).map_err(|e| e.to_string())?.rows.residuals;
+    let far = |rest: DVec3| {
+        let place = (rest - body.cut().grid.position([0; 3])) * (SUBDIVISIONS as f64 / body.length);
+        (place - place.round()).abs().min_element() > 0.05
+    };
+    let mut observation = (*plan.observation).clone();
+    for (k, f) in observation.frames.iter_mut().enumerate() {
+        let kept = rows.iter().filter(|r| r.frame == k && r.value.is_some() && far(r.rest) && r.source.is_depth());
+        f.points = kept.map(|r| f.points[r.source.item as usize]).collect();
+    }
+    Ok(Plan { observation: observation.into(), ..plan })
+}
+
+/// Order of the remainder in a direction in which all of `places` in θ move, each by its own size.
+fn order(plan: &Plan, places: &[usize]) -> Result<f64, String> {
+    let mut rollout = Rollout::new(CpuBackend, plan, STEPS).map_err(|e| e.to_string())?;
+    let request = Request { gradient: Wanted::All, sensitivities: Vec::new() };
+    let base = rollout.evaluate(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)), &request).remove(0);
+    if let Some(f) = base.failure {
+        return Err(f.to_string());
+    }
+    let size = |i: usize| {
+        let spec = plan.layout.keys[i].spec();
+        match spec.transform {
+            _ if matches!(spec.key, ParamKey::Effect { .. }) => spec.typical,
+            Transform::Linear => spec.typical.min(1.0),
+            _ => plan.theta[i],
+        }
+    };
+    // Of any sign and of unlike sizes, so that errors of two numbers do not cancel.
+    let direction: Vec<(usize, f64)> = places
+        .iter()
+        .enumerate()
+        .map(|(k, i)| (*i, size(*i) * (0.6 + 0.4 * (2.0 + 3.0 * k as f64).sin()) * if k % 2 == 0 { 1.0 } else { -1.0 }))
+        .collect();
+    let step = |k: usize| 0.05 * 0.25f64.powi(k as i32);
+    let moved = |k: usize| {
+        let mut theta = plan.theta.clone();
+        direction.iter().for_each(|(i, d)| theta[*i] += step(k) * d);
+        theta
+    };
+    let costs = rollout.evaluate(&ParamBatch::from_rows(&(0..STEPS).map(moved).collect::<Vec<_>>()), &Request::default());
+    let slope: f64 = direction.iter().map(|(i, d)| base.gradient[*i] * d).sum();
+    let remainder = |k: usize| (costs[k].cost - base.cost - step(k) * slope).abs();
+    // The two shortest steps whose remainders are clear of rounding.
+    let last = (1..STEPS).rev().find(|k| remainder(*k) > CLEAR * base.cost && remainder(*k).is_finite());
+    Ok(last.map_or(f64::NAN, |k| (remainder(k - 1) / remainder(k)).ln() / 4f64.ln()))
+}
+
+/// An effect at work: amplitudes at a third of their typical size, directions along no axis.
+fn at_work(number: usize, law: &Law) -> Effect {
+    let mut effect = Effect::absent(number);
+    for (value, p) in effect.values.iter_mut().zip(law.params) {
+        if let Unstated::Absent(absent) = p.default {
+            let sign = if p.axis == Some(1) { -1.0 } else { 1.0 };
+            *value = Some((absent + sign * 0.3 * p.typical).clamp(p.lower, p.upper));
+        }
+        if let (true, Some(axis)) = (p.is_direction(), p.axis) {
+            *value = Some([0.8, 0.5, 0.4][usize::from(axis)]);
+        }
+    }
+    effect
+}
+
+/// Places in θ of what every scene and fields have, by kind: components of a vector, planes, and the first values of fields share theirs.
+fn kinds(plan: &Plan) -> Vec<(String, Vec<usize>)> {
+    let mut all: Vec<(String, Vec<usize>)> = Vec::new();
+    for (place, key) in plan.layout.keys.iter().enumerate() {
+        let path = key.spec().path;
+        let kind = match key {
+            ParamKey::Field { field, index } if *index < 4 => format!("field.{field}"),
+            ParamKey::Field { .. } => continue,
+            _ => path
+                .split('.')
+                .filter(|p| !["x", "y", "z"].contains(p) && p.parse::<u32>().is_err())
+                .collect::<Vec<_>>()
+                .join("."),
+        };
+        match all.iter_mut().find(|k| k.0 == kind) {
+            Some(known) => known.1.push(place),
+            None => all.push((kind, vec![place])),
+        }
+    }
+    all
+}
+
+/// The study.
+///
+/// # Errors
+/// A scene cannot be built or simulated.
+pub fn run() -> Result<Vec<Row>, String> {
+    let row = |what: String, count: usize, order: f64| {
+        let what = if count == 1 { what } else { format!("{what}, {count} numbers together") };
+        Row::new(what, Requirement::Between { least: 1.95, most: 2.05 }, order, "", "Taylor's theorem")
+    };
+    let mut rows = Vec::new();
+    let plan = observed(&varied(), false)?;
+    for (kind, places) in kinds(&plan) {
+        rows.push(row(format!("`{kind}`"), places.len(), order(&plan, &places)?));
+    }
+    for (number, law) in ALL.iter().enumerate() {
+        let mut scene = if matches!(law.site, Site::Clamps(_) | Site::Edges(_)) { held() } else { thrown() };
+        scene.effects = vec![at_work(number, law)];
+        let depth = matches!(law.site, Site::Readings(_));
+        let plan = observed(&scene, depth)?;
+        let plan = if depth { away_from_kinks(plan)? } else { plan };
+        // A number that says which camera or marker is no parameter.
+        let chosen = |key: &ParamKey| match key {
+            ParamKey::Effect { slot, .. } => !matches!(law.params[usize::from(*slot)].default, Unstated::Choice(_)),
+            _ => false,
+        };
+        let places: Vec<usize> = (0..plan.layout.len()).filter(|i| chosen(&plan.layout.keys[*i])).collect();
+        let found = order(&plan, &places).map_err(|e| format!("{}: {e}", law.kind))?;
+        rows.push(row(format!("effect {}", law.kind), places.len(), found));
+    }
+    Ok(rows)
+}
