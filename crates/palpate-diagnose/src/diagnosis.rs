@@ -33,11 +33,6 @@ impl Verdict {
     }
 }
 
-/// Mean square, over what noise and discretisation would leave, up to which a model is close to a measurement.
-const CLOSE: f64 = 2.0;
-/// The same from which on it is far, whatever chance may do: bodies with nothing missing stay below 1.5.
-const FAR: f64 = 4.0;
-
 /// How far measurement and model are apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Level {
@@ -51,16 +46,6 @@ impl Level {
     /// What noise does not explain [m²], not negative.
     pub fn gap(&self) -> f64 {
         (self.rms * self.rms - self.noise * self.noise).max(0.0)
-    }
-
-    /// True where little more is left than noise and discretisation: an explanation is not looked for elsewhere then.
-    pub fn is_close(&self) -> bool {
-        self.rms * self.rms <= CLOSE * self.noise * self.noise
-    }
-
-    /// True where so much more is left that no chance can be the reason.
-    pub fn is_far(&self) -> bool {
-        self.rms * self.rms > FAR * self.noise * self.noise
     }
 }
 

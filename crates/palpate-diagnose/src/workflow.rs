@@ -240,10 +240,10 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
             Err(e) => return Err(e),
         }
     }
-    // With enough effects anything is followed roughly: the last one must explain what is left better than "something unknown" does.
+    // With enough effects anything is followed roughly: the last one must explain more of what was missing than it leaves.
     while let Some((mut before, accepted)) = rounds.pop() {
         s.remeasure(&mut before);
-        if !state.judged.is_missing() || state.judged.alone_over(&before.judged).nats > 0.0 {
+        if state.judged.explains(&before.judged) {
             break;
         }
         out.close = std::mem::replace(&mut out.accepted, accepted).into_iter().last().into_iter().collect();

@@ -44,6 +44,15 @@ impl Blocks {
     }
 }
 
+/// ln p of something that was left out, but for the constant of a normal density.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LogDensity {
+    /// At what was read.
+    pub seen: f64,
+    /// Its mean over what would be read, were the model the whole truth.
+    pub expected: f64,
+}
+
 /// Residuals around a fit.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
@@ -120,7 +129,7 @@ impl Linear {
     }
 
     /// ln p of every block's residuals given those of the other folds, beside a discrepancy of size `tau`, but for the constant.
-    pub fn left_out(&self, blocks: &Blocks, tau: f64) -> Vec<f64> {
+    pub fn left_out(&self, blocks: &Blocks, tau: f64) -> Vec<LogDensity> {
         let w = self.whitened(blocks, tau);
         let k = self.moves.len();
         let folds = blocks.fold.iter().max().map_or(0, |f| f + 1);
@@ -150,7 +159,8 @@ impl Linear {
             let mut off = Mat::from_fn(n, 1, |i, _| r[(i, k)] - predicted[(i, 0)]);
             let own = factor(&covariance);
             forward(&own, &mut off);
-            -0.5 * squares(off.as_ref()) - half_log_det(&own) - scale
+            let volume = half_log_det(&own) + scale;
+            LogDensity { seen: -0.5 * squares(off.as_ref()) - volume, expected: -0.5 * n as f64 - volume }
         };
         w.rows.iter().zip(&blocks.fold).zip(&w.scale).map(density).collect()
     }
@@ -171,8 +181,11 @@ impl Linear {
 
     /// ln p of what is known beforehand of the moves, each left out in its turn like any other reading: what all readings
     /// ask for against the prior's 0 ± 1. What nobody knows beforehand (a stiffness) is no reading.
-    pub fn known_left_out(&self, blocks: &Blocks, tau: f64) -> f64 {
-        self.against_known(blocks, tau).iter().map(|(z, free)| -0.5 * z * z + 0.5 * free.ln()).sum()
+    pub fn known_left_out(&self, blocks: &Blocks, tau: f64) -> LogDensity {
+        let all = self.against_known(blocks, tau);
+        let volume: f64 = all.iter().map(|(_, free)| -0.5 * free.ln()).sum();
+        let squares: f64 = all.iter().map(|(z, _)| z * z).sum();
+        LogDensity { seen: -0.5 * squares - volume, expected: -0.5 * all.len() as f64 - volume }
     }
 
     /// By how many standard deviations the readings contradict most what is known of one move.
@@ -301,7 +314,7 @@ mod tests {
             let both: Vec<usize> = rest.iter().chain(&b.cells[k]).copied().collect();
             // p(block | rest) = p(block, rest) / p(rest).
             let conditional = of(&both) - of(&rest);
-            assert!((density - conditional).abs() < 1e-9, "{density} {conditional}");
+            assert!((density.seen - conditional).abs() < 1e-9, "{density:?} {conditional}");
         }
     }
 
@@ -330,6 +343,31 @@ mod tests {
     }
 
     #[test]
+    fn what_is_expected_is_the_mean_over_recordings_of_the_model() {
+        let (b, mut rng) = (blocks(), ChaCha8Rng::seed_from_u64(21));
+        let l = sample(22, 3);
+        let root = covariance(&l, &b, 0.0).llt(Side::Lower).unwrap();
+        let draws = 4000;
+        let mut sum = vec![0.0; b.len()];
+        let mut squares = vec![0.0; b.len()];
+        for _ in 0..draws {
+            let z: Vec<f64> = (0..CELLS).map(|_| StandardNormal.sample(&mut rng)).collect();
+            let y = (0..CELLS).map(|i| (0..=i).map(|j| root.L()[(i, j)] * z[j]).sum()).collect();
+            let read = Linear { y, ..l.clone() }.left_out(&b, 0.0);
+            read.iter().zip(sum.iter_mut().zip(&mut squares)).for_each(|(d, (s, q))| {
+                *s += d.seen;
+                *q += d.seen * d.seen;
+            });
+        }
+        for ((d, s), q) in l.left_out(&b, 0.0).iter().zip(sum).zip(squares) {
+            let mean = s / f64::from(draws);
+            let error = ((q / f64::from(draws) - mean * mean) / f64::from(draws)).sqrt();
+            // Four standard errors of the mean of so many draws.
+            assert!((mean - d.expected).abs() < 4.0 * error, "{mean} ± {error}, {d:?}");
+        }
+    }
+
+    #[test]
     fn what_is_known_is_left_out_like_a_reading() {
         let (b, tau) = (blocks(), 0.8);
         let mut l = sample(7, 2);
@@ -342,7 +380,7 @@ mod tests {
         let spread = 1.0 + variance;
         let expected = -0.5 * (wide * mean[1]).powi(2) / spread - 0.5 * spread.ln();
         l.known = vec![false, true];
-        let found = l.known_left_out(&b, tau);
+        let found = l.known_left_out(&b, tau).seen;
         assert!((found - expected).abs() < 1e-5 * expected.abs(), "{found} {expected}");
     }
 

@@ -5,7 +5,9 @@
 //! an effect helps               S(M_j⁺) > S(M₀⁺), by more than two standard errors of elpd(M_j⁺) − elpd(M₀⁺)
 //! the one that is named         the largest S(M_j⁺) of those that help
 //! as good as that               S lower by no more than two standard errors, or than ln O
-//! an explanation                S(M_j°) > S(M₀⁺): as the whole truth it predicts better than "something unknown" does
+//! an explanation                S(M_j⁺) − S(M₀⁺) > S*(M_j) − S(M_j⁺): it explains more than it leaves
+//!
+//! S* is what the model would score in the mean, were it the whole truth.
 //! ```
 
 use super::prior::Prior;
@@ -21,7 +23,9 @@ const CONTRADICTS: f64 = 3.0;
 pub struct Judged {
     /// ln p of every block, the model being the whole truth.
     pub alone: Vec<f64>,
-    /// The same beside a discrepancy of the size that fits best.
+    /// Mean of these over recordings of that truth, of all blocks together.
+    pub expected: f64,
+    /// ln p of every block beside a discrepancy of the size that fits best.
     pub beside: Vec<f64>,
     /// That size, in standard deviations of a cell's noise.
     pub discrepancy: f64,
@@ -96,11 +100,14 @@ impl Judged {
         Difference { nats: score - against, ..difference(mine, theirs) }
     }
 
-    /// The same of this model as the whole truth.
-    pub fn alone_over(&self, other: &Judged) -> Difference {
-        let (theirs, against) = other.best();
-        let d = difference(&self.alone, theirs);
-        Difference { nats: self.alone.iter().sum::<f64>() + self.log_prior - against, ..d }
+    /// What would be gained by whatever is missing beside this model: S* − S, of a right model near zero [nats].
+    pub fn left(&self) -> f64 {
+        self.expected + self.log_prior - self.score()
+    }
+
+    /// True if this model explains more of what another lacks than it leaves.
+    pub fn explains(&self, other: &Judged) -> bool {
+        self.over(other).nats > self.left()
     }
 }
 
@@ -109,7 +116,8 @@ mod tests {
     use super::*;
 
     fn judged(alone: &[f64], beside: &[f64], log_prior: f64) -> Judged {
-        Judged { alone: alone.to_vec(), beside: beside.to_vec(), discrepancy: 1.0, log_prior, conflict: 0.0 }
+        let expected = -1.0 * alone.len() as f64;
+        Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), discrepancy: 1.0, log_prior, conflict: 0.0 }
     }
 
     #[test]
@@ -128,8 +136,10 @@ mod tests {
         let wrong = judged(&[-9.0; 10], &[-2.0; 10], 0.0);
         assert!(right.missing().nats < 0.0 && wrong.missing().nats > 0.0);
         assert!((right.over(&wrong).nats - (10.0 + odds)).abs() < 1e-12);
-        // An effect that leaves structure helps, and is no explanation where the unknown predicts better than it does alone.
-        let near = judged(&[-4.0; 10], &[-1.5; 10], -1.0);
-        assert!(near.over(&wrong).is_clear() && near.alone_over(&wrong).nats < 0.0);
+        // Of what a recording of the truth would score, −1 a block, the first leaves ½ and its price, and gains 1.5; the second the other way round.
+        let (most, some) = (judged(&[-9.0; 10], &[-1.5; 10], -1.0), judged(&[-9.0; 10], &[-2.5; 10], -1.0));
+        let far = judged(&[-9.0; 10], &[-3.0; 10], 0.0);
+        assert!(most.over(&far).is_clear() && most.explains(&far));
+        assert!(some.over(&far).is_clear() && !some.explains(&far));
     }
 }

@@ -202,8 +202,9 @@ fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
             known: vec![false, false, true],
             rough: vec![times(&change, field.rough)],
         };
-        let beside = model.left_out(&blocks, model.discrepancy(&blocks));
-        let judged = Judged { alone: model.left_out(&blocks, 0.0), beside, ..Judged::default() };
+        let seen = |tau: f64| model.left_out(&blocks, tau).iter().map(|d| d.seen).collect();
+        let beside = seen(model.discrepancy(&blocks));
+        let judged = Judged { alone: seen(0.0), beside, ..Judged::default() };
         alarms += usize::from(judged.missing().nats > 0.0);
     }
     let rate = alarms as f64 / RECORDINGS as f64;

@@ -70,12 +70,9 @@ impl Session<'_> {
         self.remeasure(&mut base);
         let is_missing = |s: &State| s.judged.is_missing() || s.strange.iter().any(|x| x.deviations > STRANGE);
         let remains = is_missing(&state);
-        let explained = state.judged.alone_over(&base.judged).nats;
-        // What there was no time for may explain more than what was found.
-        let is_open = self.no_time && state.judged.missing().nats > explained;
         let verdict = match out.accepted.len() {
             0 if !remains => Verdict::Adequate,
-            1.. if explained > 0.0 && !is_open => Verdict::MissingEffect,
+            1.. if state.judged.explains(&base.judged) => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if out.interrupted || self.no_time => Verdict::Undecided,
             _ => Verdict::Unexplained,

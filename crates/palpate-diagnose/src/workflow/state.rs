@@ -2,7 +2,7 @@
 
 use super::{Session, State, linear};
 use crate::cells::{Cells, Table};
-use crate::judgement::density::Blocks;
+use crate::judgement::density::{Blocks, LogDensity};
 use crate::judgement::prior::Prior;
 use crate::judgement::rule::Judged;
 use crate::laboratory::{Field, LabError, Model, Readings};
@@ -96,10 +96,11 @@ impl Session<'_> {
         };
         let prior = Prior { candidates: self.candidates, readings: self.cells.len() };
         let alone = density(0.0);
-        let beside = if tau > 0.0 { density(tau) } else { alone.clone() };
+        let seen = |all: &[LogDensity]| all.iter().map(|d| d.seen).collect::<Vec<_>>();
         state.judged = Judged {
-            alone,
-            beside,
+            alone: seen(&alone),
+            expected: alone.iter().map(|d| d.expected).sum(),
+            beside: seen(&if tau > 0.0 { density(tau) } else { alone.clone() }),
             discrepancy: tau,
             log_prior: prior.log(&state.needed, &state.strange),
             conflict: own.conflict(&self.blocks, tau),
