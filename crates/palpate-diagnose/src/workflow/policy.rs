@@ -29,6 +29,8 @@ pub struct Policy {
     /// Change of a fitted number, relative to its size, from which on it may lie in another valley; and from which on what shows there shows
     /// nothing of the body, so that candidates start where the fit began first.
     pub strayed: (f64, f64),
+    /// Multiples of its typical size that an effect at an unknown place is tried at there, where small amounts of it tell nothing.
+    pub sizes: [f64; 2],
     /// Most numbers of a plain effect, and of a freer one beside a plain one.
     pub plain: (usize, usize),
     /// Share of the sum of squares that a pair must promise to take away, and how much of it beyond its better half.
@@ -55,6 +57,7 @@ impl Default for Policy {
             walls: (3, 0.3),
             elsewhere: (10, 3),
             strayed: (0.3, 10.0),
+            sizes: [1.0, 3.0],
             plain: (3, 9),
             promise: (0.8, 0.05),
             pairs: (2, 8, 3),

@@ -174,7 +174,9 @@ fn start(state: &State, v: &Variant, share: f64) -> Start {
     for (k, c) in v.columns.iter().enumerate() {
         y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
     }
-    let own = state.model.values.iter().zip(moves(state, &y)).map(|(v, d)| v + d);
+    // Of what is tried by its size nobody knows how the residuals go with it.
+    let with = if v.blunt.is_some() { vec![0.0; state.model.values.len()] } else { moves(state, &y) };
+    let own = state.model.values.iter().zip(with).map(|(v, d)| v + d);
     let values = own.chain((0..v.numbers.len()).map(|k| v.numbers[k].after(step(k)))).collect();
     Start { changes, values, reach: f64::INFINITY }
 }

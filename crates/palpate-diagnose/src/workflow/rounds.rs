@@ -6,6 +6,7 @@ use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number};
 use crate::separation::Separated;
+use palpate_model::effects::Trial;
 use std::rc::Rc;
 
 /// Iterations that a candidate of a race takes in the mean, and fewest candidates that race however little time there is.
@@ -207,8 +208,11 @@ impl Session<'_> {
         let frame = self.frame(&table, &state.fields);
         let there = State { model: Model { values, ..model.clone() }, readings, table, frame, ..state.clone() };
         let mut variants = self.variants(&there)?;
+        // So far from what was fitted little of an effect tells nothing of more: a load that halves the frequency brings every swing out of step.
+        variants.extend(self.sized(&there, &variants, Trial::Starts, &policy.sizes));
         variants.sort_by(most_promising);
-        let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) = variants.into_iter().partition(|v| is_wall(&policy, v));
+        let (mut walls, mut others): (Vec<Variant>, Vec<Variant>) =
+            variants.into_iter().partition(|v| is_wall(&policy, v) && !v.changes.iter().all(|c| c.is_tried(Trial::Starts)));
         walls.truncate(policy.walls.0);
         keep_first(&mut others, |v| v.candidate);
         others.truncate(policy.fits * 3 / 4);

@@ -66,12 +66,18 @@ impl Session<'_> {
         let within = |n: CandidateId| scored.iter().any(|v| v.candidate == n && v.score.gain >= reach * best);
         let more: Vec<_> = later.into_iter().filter(|(n, _)| within(*n)).collect();
         scored.extend(self.scored(state, more)?);
-        let saturates = |v: &&Variant| v.changes.iter().all(|c| c.is_tried(Trial::Saturates));
-        let sized = |v: &Variant| Variant { blunt: Some(v.changes.iter().flat_map(Change::typical).collect()), ..v.clone() };
-        let mut sizes: Vec<Variant> = scored.iter().filter(saturates).map(sized).collect();
-        self.score_by_size(state, &mut sizes);
+        let sizes = self.sized(state, &scored, Trial::Saturates, &[1.0]);
         scored.extend(sizes);
         Ok(scored)
+    }
+
+    /// Variants that are tried so, scored by what multiples of their typical size really do.
+    pub(super) fn sized(&mut self, state: &State, all: &[Variant], how: Trial, times: &[f64]) -> Vec<Variant> {
+        let typical = |v: &Variant, times: f64| v.changes.iter().flat_map(Change::typical).map(|x| times * x).collect();
+        let sized = |v: &Variant| times.iter().map(|x| Variant { blunt: Some(typical(v, *x)), ..v.clone() }).collect::<Vec<_>>();
+        let mut sizes: Vec<Variant> = all.iter().filter(|v| v.changes.iter().all(|c| c.is_tried(how))).flat_map(sized).collect();
+        self.score_by_size(state, &mut sizes);
+        sizes
     }
 
     /// These variants (their candidate, change), scored where they are absent.
