@@ -1,6 +1,7 @@
 //! The measured recordings: every scene of `assets/scenes` that fits one, and what its fit says beside what was measured. The tables of
 //! `docs/real-data.md` and the README are printed by [`run`].
 
+pub mod diagnoses;
 pub mod models;
 pub mod report;
 mod studies;

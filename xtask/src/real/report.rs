@@ -1,5 +1,6 @@
 //! What `cargo xtask real` stores in `bench/real.json`: tables, each with the day and the commit that measured it.
 
+use super::diagnoses::{self, Answer};
 use super::models::{self, Variant};
 use crate::table;
 use serde::{Deserialize, Serialize};
@@ -21,10 +22,12 @@ pub enum Slice {
     Variants,
     /// Both beams with materials and schemes.
     Models,
+    /// What the models lack.
+    Diagnoses,
 }
 
 /// When a table was measured, and by what.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Made {
     /// Day.
     pub date: String,
@@ -117,6 +120,8 @@ pub struct Report {
     pub variants: Vec<Row>,
     /// [`Slice::Models`].
     pub models: Vec<Variant>,
+    /// [`Slice::Diagnoses`].
+    pub diagnoses: Vec<Answer>,
 }
 
 impl Report {
@@ -141,6 +146,7 @@ impl Report {
             Slice::Loads => print("How the load of 52 g acts", &self.loads),
             Slice::Variants => print("Cantilevers with one thing changed", &self.variants),
             Slice::Models => println!("\nMaterials and schemes\n{}", models::markdown(&self.models)),
+            Slice::Diagnoses => println!("\nWhat the models lack\n{}", diagnoses::markdown(&self.diagnoses)),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::report::{Made, Pair, Report, Row, Slice};
 use super::tracks::{Sighting, rms, track};
-use super::{fit, found, height_at_rest, models, open, scene_path, swings};
+use super::{diagnoses, fit, found, height_at_rest, models, open, scene_path, swings};
 use crate::table;
 use clap::ValueEnum;
 use glam::DVec3;
@@ -20,7 +20,7 @@ pub(super) struct Recorded {
     pub scene: &'static str,
     marker: Option<(&'static str, f64)>,
     /// Texts of the scene that end it before the recording does, and what they are where it does not.
-    whole: &'static [(&'static str, &'static str)],
+    pub(super) whole: &'static [(&'static str, &'static str)],
 }
 
 pub(super) const BEAMS: [Recorded; 2] = [
@@ -279,6 +279,15 @@ pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
                 Slice::Loads => report.loads = loads(&data)?,
                 Slice::Variants => report.variants = variants(&data)?,
                 Slice::Models => report.models = models::measure(&data)?,
+                Slice::Diagnoses => {
+                    let mut rows = std::mem::take(&mut report.diagnoses);
+                    let mut keep = |rows: &[diagnoses::Answer]| {
+                        report.diagnoses = rows.to_vec();
+                        table::save("real", &report).map(|_| ()).map_err(Error::Failed)
+                    };
+                    diagnoses::measure(&data, &made, &mut rows, &mut keep)?;
+                    report.diagnoses = rows;
+                }
             }
             report.made.insert(*slice, made.clone());
         }
