@@ -102,7 +102,10 @@ enum Verb {
         /// Instead: score answers of another method
         #[arg(long, value_name = "FILE", conflicts_with = "report")]
         score: Option<PathBuf>,
-        /// Instead: print the table of all that was measured, and store it
+        /// Instead: measure the cases once more for every number of the search, changed (--first 3 keeps it affordable)
+        #[arg(long, conflicts_with_all = ["calibrate", "record", "score", "report", "method"])]
+        ablate: bool,
+        /// Instead: print the tables of all that was measured, and store them
         #[arg(long)]
         report: bool,
     },
@@ -193,8 +196,9 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Coverage { only, slice, fits, fresh, report } => {
             coverage::run(&coverage::Options { only, slice, fits, fresh, report })?;
         }
-        Verb::Suite { only, method, first, slice, budget, fresh, keep, verbose, calibrate, record, score, report } => {
+        Verb::Suite { only, method, first, slice, budget, fresh, keep, verbose, calibrate, record, score, ablate, report } => {
             let instead = match (calibrate, record, score, report) {
+                _ if ablate => suite::Instead::Ablate,
                 (true, ..) => suite::Instead::Calibrate,
                 (_, Some(folder), ..) => suite::Instead::Record(folder),
                 (_, _, Some(file), _) => suite::Instead::Score(file),

@@ -60,9 +60,6 @@ pub struct Answer {
     /// Direction in which a load that nobody knows pulls, where the method says one.
     #[serde(default)]
     pub pull: Option<[f64; 3]>,
-    /// Probability of the given model's residuals by chance.
-    #[serde(default)]
-    pub p_value: Option<f64>,
     /// Distance of measurement and model before and after, and what noise and discretisation explain [m].
     #[serde(default)]
     pub distance: Option<[f64; 3]>,
@@ -121,7 +118,6 @@ impl Answer {
             modulus: [modulus(&d.baseline.numbers, &d.baseline.values), modulus(&d.model.numbers, &d.model.values)],
             parameters: d.model.numbers.iter().zip(&d.model.values).map(|(n, v)| (n.path.clone(), *v)).collect(),
             pull,
-            p_value: None,
             distance: Some([d.before.rms, d.after.rms, d.after.noise]),
             gap_closed: Some(d.gap_closed),
             seconds: found.seconds,

@@ -1,5 +1,6 @@
 //! Methods that answer the cases: palpate's diagnosis and what it is measured against.
 
+use super::ablation;
 use super::answer::Answer;
 use super::baselines;
 use super::case::Recorded;
@@ -18,10 +19,12 @@ pub enum Method {
     Field,
     /// A Gaussian-process discrepancy beside the model.
     Process,
+    /// `palpate diagnose` with another search: a place in [`ablation::ALL`].
+    Ablated(usize),
 }
 
 impl Method {
-    /// All of them.
+    /// All that are compared.
     pub const ALL: [Method; 4] = [Method::Palpate, Method::Plain, Method::Field, Method::Process];
 
     /// Name in rows.
@@ -31,6 +34,7 @@ impl Method {
             Method::Plain => "plain",
             Method::Field => "field",
             Method::Process => "process",
+            Method::Ablated(k) => ablation::ALL[k].name,
         }
     }
 
@@ -51,13 +55,16 @@ impl Method {
             Method::Plain => baselines::plain(case, &recorded.seen).map(timed),
             Method::Field => baselines::field::answer(case, &recorded.seen).map(timed),
             Method::Process => baselines::process::answer(case, &recorded.seen).map(timed),
-            Method::Palpate => {
-                let options = DiagnoseOptions {
+            Method::Palpate | Method::Ablated(_) => {
+                let mut options = DiagnoseOptions {
                     backend: Backend::Cpu,
                     budget: Some(budget),
                     on_progress: Some(say),
                     ..DiagnoseOptions::default()
                 };
+                if let Method::Ablated(k) = self {
+                    (ablation::ALL[k].set)(&mut options.statistics.search);
+                }
                 let found = diagnose(std::slice::from_ref(&recorded.seen), recorded.other.as_ref(), options)?;
                 Ok(Answer::of(case, &found))
             }

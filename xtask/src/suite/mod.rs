@@ -2,6 +2,7 @@
 //! recordings with nothing hidden, with two things at once, and with what the library does not know. What palpate and methods beside it say of
 //! each, how often they are right, and the same recordings for methods of others. `benchmark/README.md` says how it is scored.
 
+mod ablation;
 pub mod answer;
 mod baselines;
 mod calibrate;
@@ -69,6 +70,8 @@ pub enum Instead {
     Record(PathBuf),
     /// Score answers of another method.
     Score(PathBuf),
+    /// Measure the suite with a search of other numbers.
+    Ablate,
     /// Print and store the report.
     Report,
 }
@@ -106,14 +109,22 @@ pub fn run(options: &Options) -> Result<(), String> {
     let list = List::read()?;
     match &options.instead {
         Instead::Calibrate => return calibrate(list, options),
-        Instead::Report => return report::write(&table_path()),
+        Instead::Report => {
+            report::write(&rows::path("suite"))?;
+            return ablation::write(&rows::load(&rows::path("ablation"))?);
+        }
         Instead::Record(folder) => return record(&options.wanted(list.cases()?)?, folder),
         Instead::Score(file) => return score_file(&list.cases()?, file),
-        Instead::Nothing => {}
+        Instead::Nothing | Instead::Ablate => {}
     }
-    let methods: Vec<Method> = options.method.split(',').map(|m| m.trim().parse()).collect::<Result<_, String>>()?;
+    let (methods, path): (Vec<Method>, _) = if options.instead == Instead::Ablate {
+        let others = (0..ablation::ALL.len()).map(Method::Ablated);
+        (std::iter::once(Method::Palpate).chain(others).collect(), rows::path("ablation"))
+    } else {
+        let named = options.method.split(',').map(|m| m.trim().parse()).collect::<Result<_, String>>()?;
+        (named, rows::path("suite"))
+    };
     let made = rows::measured()?;
-    let path = rows::path("suite");
     let known: Vec<Row> = rows::load(&path)?;
     let is_known = |c: &Case, m: Method| {
         let same = |r: &&Row| r.case == c.name && r.method == m.name() && (options.keep || r.commit == made.commit);
@@ -232,10 +243,6 @@ fn score_file(cases: &[Case], file: &Path) -> Result<(), String> {
     }
     report::print(&all);
     Ok(())
-}
-
-fn table_path() -> PathBuf {
-    rows::path("suite")
 }
 
 /// A case of the tests on the small ball: what is hidden, nothing, or a magnet; calibrated in `folder`.

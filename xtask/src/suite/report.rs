@@ -21,12 +21,11 @@ pub fn line(r: &Row) -> String {
     let apart = r.distance.map_or(String::new(), |[a, b, n]| format!(", {:.3} → {:.3} mm ({:.3})", 1e3 * a, 1e3 * b, 1e3 * n));
     let why = if r.verdict == "failed" { format!(" {}", r.sentence) } else { String::new() };
     format!(
-        "{}: {:.1} σ: {} {}{more}, p {:.3}{apart}, rank {}, size off {}, F1 {}, E off {} → {}, {:.1} s, score {}{why}",
+        "{}: {:.1} σ: {} {}{more}{apart}, rank {}, size off {}, F1 {}, E off {} → {}, {:.1} s, score {}{why}",
         r.method,
         r.strength,
         r.verdict,
         r.named.join(" + "),
-        r.p_value.unwrap_or(f64::NAN),
         r.rank.map_or("–".into(), |k| k.to_string()),
         percent(r.size_error),
         r.f1.map_or("–".into(), |f| format!("{f:.2}")),

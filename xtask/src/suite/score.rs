@@ -42,8 +42,6 @@ pub struct Row {
     pub modulus_error: [Option<f64>; 2],
     /// Share of the gap closed on data left out.
     pub gap_closed: Option<f64>,
-    /// Probability of the given model's residuals by chance.
-    pub p_value: Option<f64>,
     /// Distance of measurement and model before and after, and what noise and discretisation explain [m].
     pub distance: Option<[f64; 3]>,
     /// Cosine between the pull that the answer states and the direction to a magnet.
@@ -94,7 +92,6 @@ pub fn score(made: &Made, method: &str, case: &Case, truth: &Truth, a: &Answer) 
         f1: if a.map.is_empty() { None } else { truth.bins.f1(&truth.acts, &a.map) },
         modulus_error: a.modulus.map(error),
         gap_closed: a.gap_closed,
-        p_value: a.p_value,
         distance: a.distance,
         points_at,
         seconds: (10.0 * a.seconds).round() / 10.0,

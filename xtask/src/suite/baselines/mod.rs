@@ -137,7 +137,6 @@ impl Linear {
             map: self.cells.iter().zip(missing).map(block).collect(),
             modulus: [self.fitted, if sees { after } else { self.fitted }],
             parameters: self.values.clone(),
-            p_value: Some(p_value),
             distance: Some([self.distance[0], self.distance[0], self.distance[1]]),
             ..Answer::default()
         }
