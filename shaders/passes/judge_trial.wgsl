@@ -1,5 +1,6 @@
 //! Judges a trial of the line search: takes it where it halves the residual or lowers the potential enough (Armijo 1966), else
-//! halves the step. A taken trial becomes the new increment. A trial where the material does not exist is never taken: the step is halved, and
+//! halves the step. A full step at whose end the potential still falls steeply is doubled as long as that lowers the potential: directions that
+//! conjugate gradients cut short at a negative curvature are far too short. A taken trial becomes the new increment. A trial where the material does not exist is never taken: the step is halved, and
 //! of a guess half the way from the old state that is left.
 // use shared/mix
 // use shared/hyper
@@ -10,11 +11,17 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
 var<storage, read> sizes: array<vec4<f32>>;
 var<storage, read> trial: array<vec4<f32>>;
+var<storage, read> direction: array<vec4<f32>>;
 var<storage, read_write> increment: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 
 // A step shorter than this is taken whatever it brings.
 const MOST_TRIALS = 12u;
+// Part of the slope at the beginning of a step that is left at its end where the step is too short: a direction that is right leaves none, one
+// from a solve that is as coarse as it may be a tenth.
+const STEEP = 0.5;
+// The longest step, over a full one.
+const FARTHEST = 1024.0;
 
 // Way of free flight.
 fn flight(a: u32, m: Member) -> vec3<f32> {
@@ -36,28 +43,47 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let a = at_node(p.member, i);
         let r = residual[a];
         var squared = 0.0;
+        var slope = 0.0;
         if !first {
             squared = dot(r.xyz, scaled(a, r.xyz));
+            slope = dot(r.xyz, direction[a].xyz);
         }
-        state += vec4(squared, r.w, sizes[a].w, 0.0);
+        state += vec4(squared, r.w, sizes[a].w, slope);
     }
     let s = total(local, state);
     let after = sqrt(max(s.x, 0.0));
     let outside = s.z >= NOWHERE_FROM;
     var taken = first;
+    var farther = false;
     if !first {
         // Close to the solution the change drowns in rounding of the nodes' shares; then the step is as good as any.
         let rounding = 1e-7 * (n.shares + s.z);
         let lower = s.y <= n.potential + 1e-4 * n.length * n.slope + rounding;
-        taken = (n.length == 1.0 && after <= 0.5 * n.norm) || lower || n.trial >= MOST_TRIALS;
+        let halved = n.length == 1.0 && after <= 0.5 * n.norm;
+        taken = halved || lower || n.trial >= MOST_TRIALS;
+        if n.length >= 1.0 && n.trial == 0u && !halved {
+            // The change has to be more than rounding, and from the second doubling on more than what the step before brought.
+            let falls = s.y < n.potential - rounding;
+            taken = select(falls, taken, n.length == 1.0);
+            farther = falls && s.w < STEEP * n.slope && n.length < FARTHEST;
+        }
         if !(s.x <= 3e38 && abs(s.y) <= 3e38) {
             taken = n.trial >= MOST_TRIALS;
+            farther = false;
         }
     }
     taken = taken && !outside;
-    if !taken {
+    farther = farther && !outside;
+    if farther {
+        // What was reached is what the next trial is compared with.
+        n.potential = s.y;
+        n.shares = s.z;
+        n.length *= 2.0;
+        taken = false;
+    } else if !taken {
+        // Back from a doubling to where it began is not asked again.
+        n.trial = select(n.trial + 1u, MOST_TRIALS, n.length > 1.0);
         n.length *= 0.5;
-        n.trial += 1u;
     } else {
         n.potential = s.y;
         n.shares = s.z;

@@ -182,8 +182,7 @@ fn a_beam_that_is_let_go_swings_as_timoshenko_says() {
     let mut s = beam(4, 0.3);
     s.gravity = DVec3::new(0.0, 0.0, -0.0981);
     let theory = timoshenko(0.3);
-    s.time =
-        Time { step: TAU / theory / PER_SWING, steps: (4.7 * PER_SWING) as usize, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: TAU / theory / PER_SWING, steps: (4.7 * PER_SWING) as usize, start: 0.0, ..Time::weighted(0.5) };
     let plan = scenes::plan(&s);
     let mode = modes::first(&plan, DVec3::Z);
     let swing: Vec<f64> = run::states(&plan).iter().map(|s| mode.of(&s.displacement)).collect();

@@ -15,7 +15,7 @@ fn body(density: f64, steps: usize) -> Scene {
     let shape = Analytic::Box { min: DVec3::new(-0.031, -0.012, -0.013), max: DVec3::new(0.033, 0.011, 0.014) };
     let mut s = scenes::body(shape, 0.01);
     s.material.inertia = Inertia::Density(density);
-    s.time = Time { step: 0.01, steps, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps, start: 0.0, ..Time::weighted(0.6) };
     s.solver.tolerance = 1e-13;
     s
 }

@@ -18,7 +18,7 @@ fn contact_force_of_a_resting_body_is_its_weight() {
         s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::Z)];
         s.material.mass_damping = 40.0;
         s.material.stiffness_damping = 0.01;
-        s.time = Time { step: 0.01, steps: 150, start: 0.0, theta, ..Time::default() };
+        s.time = Time { step: 0.01, steps: 150, start: 0.0, ..Time::weighted(theta) };
         let plan = scenes::plan(&s);
         let end = run::states(&plan).pop().unwrap();
         let plane = PlaneNow {
@@ -42,7 +42,7 @@ fn stiff_contact_limits_no_time_step() {
     let mut s = scenes::body(Analytic::Ball { radius: 0.04, center: DVec3::new(0.0, 0.0, 0.06) }, 0.012);
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.planes = vec![Plane { stiffness: Some(5000.0 / 0.012 * 1e4), ..scenes::plane(DVec3::ZERO, DVec3::Z) }];
-    s.time = Time { step: 0.01, steps: 60, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 60, start: 0.0, ..Time::weighted(0.6) };
     let plan = scenes::plan(&s);
     let body = &plan.body;
     let states = run::states(&plan);

@@ -15,7 +15,7 @@ fn mass_damping_slows_a_free_body_as_the_scheme_says() {
         s.initial.velocity = start;
         // Iterations stop where 1e-8 of the forces is left, 2e-7 of the velocity: this is about the scheme.
         s.solver.linear = LinearSolver::Cholesky;
-        s.time = Time { step: 0.01, steps: 60, start: 0.0, theta, ..Time::default() };
+        s.time = Time { step: 0.01, steps: 60, start: 0.0, ..Time::weighted(theta) };
         let states = run::states(&scenes::plan(&s));
         // (v₁ − v₀)/Δt = g − α (θ v₁ + (1 − θ) v₀): towards g/α by the same factor every step.
         let terminal = gravity / alpha;
@@ -47,7 +47,7 @@ fn ratio(mode: &Mode, mass: f64, stiffness: f64, theta: f64) -> (f64, f64) {
     s.material.mass_damping = mass * mode.omega;
     s.material.stiffness_damping = stiffness / mode.omega;
     // A hundred steps a period, three periods.
-    s.time = Time { step: std::f64::consts::TAU / mode.omega / 100.0, steps: 300, start: 0.0, theta, ..Time::default() };
+    s.time = Time { step: std::f64::consts::TAU / mode.omega / 100.0, steps: 300, start: 0.0, ..Time::weighted(theta) };
     let states = run::states(&scenes::plan(&s));
     // The mode's share in the motion, free of all other modes.
     let q: Vec<f64> = states.iter().map(|s| mode.of(&s.displacement)).collect();

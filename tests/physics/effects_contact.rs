@@ -41,14 +41,14 @@ fn block(height: f64, young: f64) -> Scene {
 
 #[test]
 fn friction_stops_a_sliding_block_where_it_should() {
-    // It lies 0.4 mm high where the contact's layer carries its weight of 196 Pa.
-    let mut s = block(0.4e-3, 2e5);
+    // It lies 0.2 mm high where the contact's layer carries its weight of 196 Pa.
+    let mut s = block(0.2e-3, 2e5);
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.material.stiffness_damping = 0.002;
     s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::Z)];
     s.initial.velocity = DVec3::new(0.5, 0.0, 0.0);
     s.effects = vec![effect("coulomb-friction", &[("coefficient", 0, 0.4)])];
-    s.time = Time { step: 0.004, steps: 40, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.004, steps: 40, start: 0.0, ..Time::weighted(0.6) };
     let plan = scenes::plan(&s);
     let states = run::states(&plan);
     let (way, speed) = mean(&plan, states.last().unwrap());
@@ -69,7 +69,7 @@ fn a_ball_rolls_as_a_rigid_one_does_whatever_the_step() {
         s.gravity = DVec3::new(0.0, 0.0, -9.81);
         s.planes = vec![scenes::plane(DVec3::ZERO, slope)];
         s.effects = vec![effect("coulomb-friction", &[("coefficient", 0, 0.4)])];
-        s.time = Time { step: time / f64::from(steps), steps: steps as usize, start: 0.0, theta: 0.5, ..Time::default() };
+        s.time = Time { step: time / f64::from(steps), steps: steps as usize, start: 0.0, ..Time::weighted(0.5) };
         let plan = scenes::plan(&s);
         let way = mean(&plan, run::states(&plan).last().unwrap()).0;
         let along = (way - slope * way.dot(slope)).length();
@@ -89,7 +89,7 @@ fn adhesion_holds_less_than_its_pull_off_pressure() {
         s.gravity = DVec3::new(0.0, 0.0, -9.81);
         s.planes = vec![scenes::plane(DVec3::ZERO, -DVec3::Z)];
         s.effects = vec![effect("adhesion", &[("pressure", 0, factor * 1000.0 * 9.81 * 0.02), ("range", 0, 2e-3)])];
-        s.time = Time { step: 0.005, steps: 20, start: 0.0, theta: 0.6, ..Time::default() };
+        s.time = Time { step: 0.005, steps: 20, start: 0.0, ..Time::weighted(0.6) };
         let plan = scenes::plan(&s);
         let fallen = -mean(&plan, run::states(&plan).last().unwrap()).0.z;
         println!("{factor} of the weight: {:.3} mm lower after 0.1 s", fallen * 1e3);
@@ -147,7 +147,7 @@ fn restitution(dissipation: f64) -> f64 {
     // 200 rad/s on this layer: it sinks in 5 mm, ten times the blend, and a sixtieth of that is strain of the block.
     s.planes = vec![Plane { stiffness: Some(200.0 * 200.0 * 1000.0 * 0.02), ..scenes::plane(DVec3::ZERO, DVec3::Z) }];
     s.effects = vec![effect("contact-dissipation", &[("dissipation", 0, dissipation)])];
-    s.time = Time { step: 2e-4, steps: 100, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: 2e-4, steps: 100, start: 0.0, ..Time::weighted(0.5) };
     let plan = scenes::plan(&s);
     mean(&plan, run::states(&plan).last().unwrap()).1.z
 }

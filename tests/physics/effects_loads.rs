@@ -19,7 +19,7 @@ fn drag_leads_to_terminal_velocity() {
     let mut s = block();
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.effects = vec![effect("air-drag", &[("coefficient", 0, 25.0)])];
-    s.time = Time { step: 0.02, steps: 60, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: 0.02, steps: 60, start: 0.0, ..Time::weighted(0.5) };
     let plan = scenes::plan(&s);
     let states = run::states(&plan);
     let terminal = (MASS * 9.81 / (0.5 * 1.2 * 25.0 * plan.body.area)).sqrt();
@@ -59,7 +59,7 @@ fn a_hung_mass_follows_up_and_down_but_not_sideways() {
         s.gravity = DVec3::new(0.0, 0.0, -9.81);
         let load = [("mass", 0, 0.5 * MASS), ("radius", 0, 1e4), ("hung", 0, hung)];
         s.effects = vec![effect("point-mass", &load), effect("uniform-force", &[("force", 0, push), ("force", 2, push)])];
-        s.time = Time { step: 0.01, steps: 10, start: 0.0, theta: 0.5, ..Time::default() };
+        s.time = Time { step: 0.01, steps: 10, start: 0.0, ..Time::weighted(0.5) };
         let plan = scenes::plan(&s);
         mean(&plan, run::states(&plan).last().unwrap()).1
     };
@@ -107,7 +107,7 @@ fn tethered_block_swings_about_its_anchor() {
     s.effects = vec![effect("tether", &[("stiffness", 0, k), ("anchor", 1, away), ("radius", 0, 1e4)])];
     s.initial.velocity = DVec3::new(v, 0.0, 0.0);
     // 100 steps make five quarters of a period.
-    s.time = Time { step: 2.5 * std::f64::consts::PI / omega / 100.0, steps: 100, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: 2.5 * std::f64::consts::PI / omega / 100.0, steps: 100, start: 0.0, ..Time::weighted(0.5) };
     let plan = scenes::plan(&s);
     let way = mean(&plan, run::states(&plan).last().unwrap()).0;
     println!("swung to {:.4} mm, expected {:.4} mm, and across {:.4} mm, expected 5", way.x * 1e3, v / omega * 1e3, way.y * 1e3);
@@ -160,7 +160,7 @@ fn absent_effects_change_no_bit() {
     s.planes = vec![scenes::plane(DVec3::new(0.0, 0.0, -0.0102), DVec3::Z)];
     s.clamps = vec![scenes::clamp(DVec3::new(-0.02, -0.02, -0.02), DVec3::new(-0.0149, 0.02, 0.02))];
     s.initial.angular_velocity = DVec3::new(0.0, 5.0, 0.0);
-    s.time = Time { step: 0.005, steps: 12, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.005, steps: 12, start: 0.0, ..Time::weighted(0.6) };
     let plain = run::states(&scenes::plan(&s)).pop().unwrap();
     assert!(plain.displacement.iter().any(|u| u.length() > 1e-4), "it moves");
     // Those of the measurement act on what a camera sees, not on the body.

@@ -142,7 +142,7 @@ fn linear_power_law_is_stiffness_damping() {
         s.initial.state = InitialShape::Rest;
         s.gravity = DVec3::new(3.0, 1.0, 0.0);
         s.material.stiffness_damping = damping;
-        s.time = Time { step: 0.002, steps: 40, start: 0.0, theta: 0.5, ..Time::default() };
+        s.time = Time { step: 0.002, steps: 40, start: 0.0, ..Time::weighted(0.5) };
         tip(&s)
     };
     let law = effect("power-law-viscosity", &[("coefficient", &[0.003]), ("exponent", &[1.0])]);
@@ -167,7 +167,7 @@ fn structural_damping_does_not_depend_on_frequency() {
         s.initial.state = InitialShape::Rest;
         // Amplitude 4 % of the length.
         s.initial.velocity = DVec3::new(0.04 * LENGTH * omega, 0.0, 0.0);
-        s.time = Time { step: period / 60.0, steps: 240, start: 0.0, theta: 0.5, ..Time::default() };
+        s.time = Time { step: period / 60.0, steps: 240, start: 0.0, ..Time::weighted(0.5) };
         let plan = scenes::plan(&s);
         let node = run::nearest(&plan, DVec3::new(LENGTH, 0.0, 0.0));
         let samples: Vec<(f64, f64)> =
@@ -186,7 +186,7 @@ fn structural_damping_does_not_depend_on_frequency() {
 fn creeping_bar_gives_way_to_the_end() {
     let mut s = bar(vec![effect("creep", &[("fraction", &[0.5]), ("time", &[0.05])])]);
     s.material.mass_damping = 200.0;
-    s.time = Time { step: 0.01, steps: 60, start: 3.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 60, start: 3.0, ..Time::weighted(0.6) };
     close("creep", tip(&s), 2.0 * tip(&bar(Vec::new())));
 }
 
@@ -200,7 +200,7 @@ fn stress_free_shape_is_found_and_kept() {
     let mut free = held.clone();
     free.clamps = Vec::new();
     free.initial.state = InitialShape::Rest;
-    free.time = Time { step: 0.01, steps: 5, start: 0.0, theta: 0.6, ..Time::default() };
+    free.time = Time { step: 0.01, steps: 5, start: 0.0, ..Time::weighted(0.6) };
     for (name, scene, anchor) in [("held", held, 0.5 * CELL), ("free", free, 0.5 * LENGTH)] {
         let plan = scenes::plan(&scene);
         let states = run::states(&plan);

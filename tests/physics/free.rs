@@ -15,7 +15,7 @@ fn free_fall_follows_the_schemes_closed_form() {
         let mut s = block();
         s.gravity = DVec3::new(0.3, -9.81, 1.0);
         s.material.stiffness_damping = 0.01;
-        s.time = Time { step: 0.01, steps: 20, start: 0.0, theta, ..Time::default() };
+        s.time = Time { step: 0.01, steps: 20, start: 0.0, ..Time::weighted(theta) };
         let plan = scenes::plan(&s);
         let states = run::states(&plan);
         for (k, state) in states.iter().enumerate() {
@@ -34,7 +34,7 @@ fn loss(steps: usize, theta: f64) -> f64 {
     // One turn a second; stiff enough that centrifugal stretch stays small.
     s.material.youngs_modulus = 2.0e4;
     s.initial.angular_velocity = DVec3::new(0.0, 0.0, std::f64::consts::TAU);
-    s.time = Time { step: 1.0 / steps as f64, steps, start: 0.0, theta, ..Time::default() };
+    s.time = Time { step: 1.0 / steps as f64, steps, start: 0.0, ..Time::weighted(theta) };
     let plan = scenes::plan(&s);
     let m = run::masses(&plan, 1000.0);
     let states = run::states(&plan);
@@ -74,7 +74,7 @@ fn undamped_vibration_keeps_its_energy() {
     // The first stretching mode along the longest side; 24 steps a period, 50 periods after the contact.
     let period = 2.0 * 0.064 / (5.0e4f64 / 1000.0).sqrt();
     let contact = 150;
-    s.time = Time { step: period / 24.0, steps: contact + 1200, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: period / 24.0, steps: contact + 1200, start: 0.0, ..Time::weighted(0.5) };
     s.solver.tolerance = 1e-10;
     let plan = scenes::plan(&s);
     let m = run::masses(&plan, 1000.0);
@@ -104,7 +104,7 @@ fn turned_scene_gives_the_turned_result() {
         s.gravity = turn * DVec3::new(1.0, -3.0, -9.0);
         s.initial.angular_velocity = turn * DVec3::new(3.0, 1.0, 5.0);
         s.planes = vec![scenes::plane(turn * DVec3::new(0.0, 0.0, -0.02), turn * DVec3::new(0.1, 0.0, 1.0))];
-        s.time = Time { step: 0.005, steps: 20, start: 0.0, theta: 0.6, ..Time::default() };
+        s.time = Time { step: 0.005, steps: 20, start: 0.0, ..Time::weighted(0.6) };
         s.solver.tolerance = 1e-12;
         let plan = scenes::plan(&s);
         let end = run::states(&plan).pop().unwrap();

@@ -16,7 +16,7 @@ fn coarse_balls_of_every_material_fall_and_bounce() {
             (s.material.model, s.material.youngs_modulus) = (model, young);
             s.gravity = DVec3::new(0.0, 0.0, -9.81);
             s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::Z)];
-            s.time = Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6, ..Time::default() };
+            s.time = Time { step: 0.01, steps: 40, start: 0.0, ..Time::weighted(0.6) };
             let plan = scenes::plan(&s);
             let body = &plan.body;
             let height = |s: &palpate_engine::Snapshot| {

@@ -28,7 +28,7 @@ fn bar() -> Scene {
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.clamps = vec![scenes::clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.02, 0.1, 0.1))];
     s.initial.state = InitialShape::StaticEquilibrium;
-    s.time = Time { step: 1.0, steps: 0, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 1.0, steps: 0, start: 0.0, ..Time::weighted(0.6) };
     s
 }
 
@@ -37,7 +37,7 @@ fn falling_ball() -> Scene {
     let mut s = scenes::body(Analytic::Ball { radius: 0.04, center: DVec3::ZERO }, 0.016);
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.initial.velocity = DVec3::new(0.8, 0.0, 0.0);
-    s.time = Time { step: 0.01, steps: 6, start: 0.0, theta: 0.5, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 6, start: 0.0, ..Time::weighted(0.5) };
     s
 }
 

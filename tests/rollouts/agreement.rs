@@ -16,7 +16,7 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
     s.planes = vec![scenes::plane(DVec3::ZERO, DVec3::new(0.1, 0.0, 1.0))];
     s.initial.angular_velocity = DVec3::new(0.0, 3.0, 0.0);
     s.material.stiffness_damping = 0.002;
-    s.time = Time { step: 0.01, steps: 8, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 8, start: 0.0, ..Time::weighted(0.6) };
     s.solver.linear = linear;
     s.solver.tolerance = 1e-10;
     let nodes = scenes::plan(&s).body.nodes.len();
@@ -39,7 +39,7 @@ fn plan_of_tets() -> Plan {
     };
     s.initial.angular_velocity = DVec3::new(0.0, 3.0, 0.0);
     s.material.stiffness_damping = 0.002;
-    s.time = Time { step: 0.01, steps: 2, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 2, start: 0.0, ..Time::weighted(0.6) };
     let nodes = scenes::plan(&s).body.nodes.len();
     // Several parts of rows, several tasks of points and of nodes.
     assert!(nodes > 600, "{nodes}");

@@ -28,7 +28,7 @@ pub(super) fn ball() -> Scene {
     s.masses = vec![PointMass { point: DVec3::new(0.0, 0.02, 0.09), mass: 0.02 }];
     s.initial.velocity = DVec3::new(-0.3, 0.1, -0.8);
     s.initial.angular_velocity = DVec3::new(2.0, -5.0, 1.0);
-    s.time = Time { step: 0.01, steps: 6, start: 0.002, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 6, start: 0.002, ..Time::weighted(0.6) };
     s.solver.tolerance = 1e-13;
     s
 }

@@ -31,7 +31,7 @@ pub fn body(shape: Analytic, cell_size: f64) -> Scene {
         effects: Vec::new(),
         fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.005, steps: 10, start: 0.0, theta: 0.5, ..Time::default() },
+        time: Time { step: 0.005, steps: 10, start: 0.0, ..Time::weighted(0.5) },
         solver: Solver::default(),
         observation: None,
         fit: None,

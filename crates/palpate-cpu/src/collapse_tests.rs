@@ -48,7 +48,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
         effects: Vec::new(),
         fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6, ..Time::default() },
+        time: Time { step: 0.01, steps: 40, start: 0.0, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
         fit: None,

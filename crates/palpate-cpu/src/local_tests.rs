@@ -98,7 +98,7 @@ fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
             pivot: None,
             state: InitialShape::StaticEquilibrium,
         },
-        time: Time { step: 0.01, steps: 3, start: 0.05, theta: 0.55, ..Time::default() },
+        time: Time { step: 0.01, steps: 3, start: 0.05, ..Time::weighted(0.55) },
         solver: Solver::default(),
         observation: None,
         fit: None,

@@ -36,6 +36,12 @@ const CLOSE: f64 = 0.01;
 /// Share of the tolerance that steps with a factor from before must reach.
 const STRICT: f64 = 0.01;
 
+/// Part of the slope at the beginning of a step that is left at its end where the step is too short: a tangent that is right leaves none, a
+/// solve for the direction that is as coarse as it may be a tenth.
+const STEEP: f64 = 0.5;
+/// Times that such a step is doubled.
+const MOST_DOUBLINGS: usize = 10;
+
 /// Times that a guess is halved: from a whole step to a millionth of it.
 const RETREATS: usize = 20;
 
@@ -234,7 +240,9 @@ fn direction(
 }
 
 /// Takes the full step where it halves the residual; otherwise the longest of the steps 1, ½, ¼ … that lowers the potential
-/// (Armijo 1966). Returns the residual there and its norm.
+/// (Armijo 1966), or one of 2, 4, 8 … while the potential falls nearly as fast at the end of the step as at its beginning: there the tangent,
+/// made positive where contact squeezes a cell flat, is far too stiff, and thirty full steps were seen to lead nowhere. Returns the residual
+/// there and its norm.
 fn line_search(
     equation: &mut Equation,
     diagonal: &BlockJacobi,
@@ -253,8 +261,8 @@ fn line_search(
     let slope = dot(residual, d);
     let before = equation.potential(&start);
     let mut step = 1.0;
+    let mut after = equation.potential(u1);
     for _ in 0..30 {
-        let after = equation.potential(u1);
         // Close to the solution the change drowns in rounding; then the step is as good as any.
         let rounding = 1e-12 * (before.abs() + after.abs());
         if after <= before + 1e-4 * step * slope + rounding {
@@ -263,8 +271,26 @@ fn line_search(
         step *= 0.5;
         u1.copy_from_slice(&start);
         add_scaled(u1, step, d);
+        after = equation.potential(u1);
     }
-    let residual = if step == 1.0 { full } else { equation.residual(u1) };
+    let mut residual = if step == 1.0 { full } else { equation.residual(u1) };
+    if step == 1.0 {
+        for _ in 0..MOST_DOUBLINGS {
+            if dot(&residual, d) > STEEP * slope {
+                break;
+            }
+            let mut farther = start.clone();
+            add_scaled(&mut farther, 2.0 * step, d);
+            let there = equation.potential(&farther);
+            let found = equation.residual(&farther);
+            // False for NaN as well.
+            if !(there < after && is_finite(&found)) {
+                break;
+            }
+            (step, after, residual) = (2.0 * step, there, found);
+            u1.copy_from_slice(&farther);
+        }
+    }
     let norm = diagonal.norm(&residual);
     (residual, norm)
 }

@@ -258,6 +258,13 @@ impl Default for Time {
     }
 }
 
+impl Time {
+    /// No step at all of the θ-scheme with this weight of the new state.
+    pub fn weighted(theta: f64) -> Time {
+        Time { theta, scheme: scheme::theta(), ..Time::default() }
+    }
+}
+
 /// Numerical choices; the defaults are what a user wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
@@ -267,7 +274,8 @@ pub struct Solver {
     pub linear: LinearSolver,
     /// Relative accuracy of the nonlinear solve of a step.
     pub tolerance: f64,
-    /// Most Newton iterations of a step.
+    /// Most Newton iterations of a step. A body that its weight crushes to several hundred per cent takes 30 to 60 where cells turn inside out
+    /// one after another; others end after three to five.
     pub newton_iterations: usize,
     /// Ghost penalty γ, dimensionless.
     pub ghost: f64,
@@ -275,7 +283,7 @@ pub struct Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Solver { element: Element::Enhanced, linear: LinearSolver::Auto, tolerance: 1e-8, newton_iterations: 30, ghost: 0.02 }
+        Solver { element: Element::Enhanced, linear: LinearSolver::Auto, tolerance: 1e-8, newton_iterations: 60, ghost: 0.02 }
     }
 }
 

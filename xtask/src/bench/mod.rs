@@ -177,7 +177,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
         clamps: Vec::new(),
         masses: Default::default(),
-        clock: Clock { step: 0.01, steps, theta: 0.6, scheme: &palpate_model::plan::scheme::ALL[0] },
+        clock: Clock { step: 0.01, steps, theta: 0.6, scheme: palpate_model::plan::scheme::theta() },
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),

@@ -33,7 +33,7 @@ fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
         effects: Vec::new(),
         fields: Vec::new(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.01, steps: 20, start: 0.0, theta: 0.6, ..Time::default() },
+        time: Time { step: 0.01, steps: 20, start: 0.0, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
         fit: None,
@@ -50,7 +50,7 @@ pub fn torus(cell: f64) -> Scene {
     let center = DVec3::new(0.001, 0.002, reach + 0.05);
     let mut s = body(Analytic::Torus { major, minor, center, axis }, cell, 5000.0);
     s.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, stiffness: None }];
-    s.time = Time { step: 0.01, steps: 40, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 40, start: 0.0, ..Time::weighted(0.6) };
     s
 }
 

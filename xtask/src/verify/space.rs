@@ -83,7 +83,7 @@ fn error(model: usize, corners: [DVec3; 2], cell: f64) -> Result<f64, String> {
     let nu = s.material.poisson_ratio;
     let moduli = [nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu)];
     // Row sums for masses: the springs are to be positive.
-    s.time = Time { steps: 1, theta: 0.6, ..s.time };
+    s.time = Time { steps: 1, ..Time::weighted(0.6) };
     let plan = scenes::plan(&s)?;
     let mut world = CpuBackend.build(&plan, 1).map_err(|e| e.to_string())?;
     CpuBackend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));

@@ -47,7 +47,7 @@ fn lost(time: Time) -> Result<[f64; 2], String> {
 /// The block cannot be simulated.
 pub fn run() -> Result<Vec<Row>, String> {
     let default = scenes::steps(1.0, 1);
-    let half = Time { theta: 0.5, ..default };
+    let half = Time::weighted(0.5);
     let mut rows = Vec::new();
     for (name, time) in [(format!("default scheme ({})", default.scheme.name), default), ("θ = ½".into(), half)] {
         let [momentum, energy] = lost(time)?;

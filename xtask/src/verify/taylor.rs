@@ -109,21 +109,61 @@ fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
     build_plan(scene, observation, &[marker]).map_err(|e| e.to_string())
 }
 
-/// Without the points that differences may take across a face of the distance's samples, where its slope jumps.
-fn away_from_kinks(plan: Plan) -> Result<Plan, String> {
+/// Step from which on steps are so small that a point which jumps does so to another match, not by the step.
+const SMALL: usize = 3;
+
+/// Without the points that differences may take across a face of the distance's samples, where its slope jumps, and without those whose match
+/// jumps over a small step of `places`, as it may where a fold of the body's surroundings offers two.
+fn away_from_kinks(plan: Plan, places: &[usize]) -> Result<Plan, String> {
     let body = &plan.body;
     let mut rollout = Rollout::new(CpuBackend, &plan, 1).map_err(|e| e.to_string())?;
-    let rows = rollout.linearise(&plan.theta, &[0]).map_err(|e| e.to_string())?.rows.residuals;
+    let mut rows_at = |theta: &[f64]| rollout.linearise(theta, &[0]).map(|l| l.rows.residuals).map_err(|e| e.to_string());
+    let rows = rows_at(&plan.theta)?;
+    let near = (SMALL..STEPS).map(|k| rows_at(&moved(&plan, places, k))).collect::<Result<Vec<_>, _>>()?;
+    let jumps = |i: usize| near.iter().any(|r| r[i].value.is_none() || r[i].rest.distance(rows[i].rest) > 0.05 * body.length);
     let far = |rest: DVec3| {
         let place = (rest - body.cut().grid.position([0; 3])) * (SUBDIVISIONS as f64 / body.length);
         (place - place.round()).abs().min_element() > 0.05
     };
     let mut observation = (*plan.observation).clone();
     for (k, f) in observation.frames.iter_mut().enumerate() {
-        let kept = rows.iter().filter(|r| r.frame == k && r.value.is_some() && far(r.rest) && r.source.is_depth());
-        f.points = kept.map(|r| f.points[r.source.item as usize]).collect();
+        let kept = rows
+            .iter()
+            .enumerate()
+            .filter(|(i, r)| r.frame == k && r.value.is_some() && r.source.is_depth() && far(r.rest) && !jumps(*i));
+        f.points = kept.map(|(_, r)| f.points[r.source.item as usize]).collect();
     }
     Ok(Plan { observation: observation.into(), ..plan })
+}
+
+/// Places that move, each by its own size.
+fn direction(plan: &Plan, places: &[usize]) -> Vec<(usize, f64)> {
+    let size = |i: usize| {
+        let spec = plan.layout.keys[i].spec();
+        match spec.transform {
+            _ if matches!(spec.key, ParamKey::Effect { .. }) => spec.typical,
+            Transform::Linear => spec.typical.min(1.0),
+            _ => plan.theta[i],
+        }
+    };
+    // Of any sign and of unlike sizes, so that errors of two numbers do not cancel.
+    places
+        .iter()
+        .enumerate()
+        .map(|(k, i)| (*i, size(*i) * (0.6 + 0.4 * (2.0 + 3.0 * k as f64).sin()) * if k % 2 == 0 { 1.0 } else { -1.0 }))
+        .collect()
+}
+
+/// ε of step k.
+fn step(k: usize) -> f64 {
+    0.05 * 0.25f64.powi(k as i32)
+}
+
+/// θ after step k.
+fn moved(plan: &Plan, places: &[usize], k: usize) -> Vec<f64> {
+    let mut theta = plan.theta.clone();
+    direction(plan, places).iter().for_each(|(i, d)| theta[*i] += step(k) * d);
+    theta
 }
 
 /// Order of the remainder in a direction in which all of `places` in θ move, each by its own size.
@@ -134,27 +174,9 @@ fn order(plan: &Plan, places: &[usize]) -> Result<f64, String> {
     if let Some(f) = base.failure {
         return Err(f.to_string());
     }
-    let size = |i: usize| {
-        let spec = plan.layout.keys[i].spec();
-        match spec.transform {
-            _ if matches!(spec.key, ParamKey::Effect { .. }) => spec.typical,
-            Transform::Linear => spec.typical.min(1.0),
-            _ => plan.theta[i],
-        }
-    };
-    // Of any sign and of unlike sizes, so that errors of two numbers do not cancel.
-    let direction: Vec<(usize, f64)> = places
-        .iter()
-        .enumerate()
-        .map(|(k, i)| (*i, size(*i) * (0.6 + 0.4 * (2.0 + 3.0 * k as f64).sin()) * if k % 2 == 0 { 1.0 } else { -1.0 }))
-        .collect();
-    let step = |k: usize| 0.05 * 0.25f64.powi(k as i32);
-    let moved = |k: usize| {
-        let mut theta = plan.theta.clone();
-        direction.iter().for_each(|(i, d)| theta[*i] += step(k) * d);
-        theta
-    };
-    let costs = rollout.evaluate(&ParamBatch::from_rows(&(0..STEPS).map(moved).collect::<Vec<_>>()), &Request::default());
+    let direction = direction(plan, places);
+    let costs = rollout
+        .evaluate(&ParamBatch::from_rows(&(0..STEPS).map(|k| moved(plan, places, k)).collect::<Vec<_>>()), &Request::default());
     let slope: f64 = direction.iter().map(|(i, d)| base.gradient[*i] * d).sum();
     let remainder = |k: usize| (costs[k].cost - base.cost - step(k) * slope).abs();
     // The two shortest steps whose remainders are clear of rounding.
@@ -218,13 +240,13 @@ pub fn run() -> Result<Vec<Row>, String> {
         scene.effects = vec![at_work(number, law)];
         let depth = matches!(law.site, Site::Readings(_));
         let plan = observed(&scene, depth)?;
-        let plan = if depth { away_from_kinks(plan)? } else { plan };
         // A number that says which camera or marker is no parameter.
         let chosen = |key: &ParamKey| match key {
             ParamKey::Effect { slot, .. } => !matches!(law.params[usize::from(*slot)].default, Unstated::Choice(_)),
             _ => false,
         };
         let places: Vec<usize> = (0..plan.layout.len()).filter(|i| chosen(&plan.layout.keys[*i])).collect();
+        let plan = if depth { away_from_kinks(plan, &places)? } else { plan };
         let found = order(&plan, &places).map_err(|e| format!("{}: {e}", law.kind))?;
         rows.push(row(format!("effect {}", law.kind), places.len(), found));
     }

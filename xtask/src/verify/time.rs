@@ -47,7 +47,7 @@ pub fn run() -> Result<Vec<Row>, String> {
         start: 0.0,
         theta,
         open: None,
-        scheme: scheme::find(name).unwrap_or(&scheme::ALL[0]),
+        scheme: scheme::find(name).unwrap_or(scheme::theta()),
     };
     let mut rows = Vec::new();
     for model in [0, 1] {

@@ -157,10 +157,11 @@ fn compare(plan: &Plan, keys: &[ParamKey], changes: &[&[f64]], faults: &[Fault])
 
 #[test]
 fn evaluations_of_a_falling_ball_agree() {
-    let center = DVec3::new(0.003, 0.001, 0.051);
+    // Its lowest point is in the contact layer, so that Young's modulus matters.
+    let center = DVec3::new(0.003, 0.001, 0.0502);
     let plan = seen(&scene(Analytic::Ball { radius: 0.05, center }, 0.03));
     let keys = [ParamKey::YoungsModulus, ParamKey::PoissonRatio, ParamKey::Density, ParamKey::TimeStart, ParamKey::Gravity(2)];
-    // It does not touch the ground, and is hardly damped.
+    // It hardly touches the ground, and is hardly damped.
     let faults = [&BALANCE[..3], &FAULTS[1..2]].concat();
     compare(&plan, &keys, &[&[1.3, 0.95, 1.1, 1.03, 1.0], &[0.8, 1.05, 1.0, 0.96, 1.02]], &faults);
 }

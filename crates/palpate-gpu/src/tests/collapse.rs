@@ -80,7 +80,7 @@ fn pressed() -> Scene {
     s.material.stiffness_damping = 0.002;
     s.initial.velocity = DVec3::ZERO;
     s.initial.angular_velocity = DVec3::ZERO;
-    s.time = Time { step: 0.01, steps: 6, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps: 6, start: 0.0, ..Time::weighted(0.6) };
     let (far, turn) = (DVec3::new(0.004, 0.002, -0.05), DQuat::from_rotation_y(0.1));
     let motion = RigidMotion {
         times: vec![-0.06, 0.0, 0.06, 0.12],
@@ -163,7 +163,7 @@ fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
     s.material.stiffness_damping = 0.002;
     s.initial.velocity = DVec3::new(0.3, 0.1, -4.0);
     s.initial.angular_velocity = DVec3::new(0.5, 1.0, 0.3);
-    s.time = Time { step: 0.01, steps, start: 0.0, theta: 0.6, ..Time::default() };
+    s.time = Time { step: 0.01, steps, start: 0.0, ..Time::weighted(0.6) };
     s
 }
 

@@ -80,7 +80,7 @@ pub fn ball(h: f64) -> Scene {
             pivot: None,
             state: InitialShape::Rest,
         },
-        time: Time { step: 0.01, steps: 6, start: 0.05, theta: 0.6, ..Time::default() },
+        time: Time { step: 0.01, steps: 6, start: 0.05, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
         fit: None,

@@ -36,7 +36,7 @@ pub(super) fn apart(plan: &Plan, a: &[[Vec<DVec3>; 2]], b: &[[Vec<DVec3>; 2]]) -
 
 /// Schemes beside the θ-scheme.
 pub(super) fn schemes() -> impl Iterator<Item = &'static Scheme> {
-    ALL.iter().skip(1)
+    ALL.iter().filter(|s| !s.leaves_theta_open())
 }
 
 /// A ball that spins and falls onto the ground, damped.

@@ -245,8 +245,10 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     let step = given.ok_or_else(|| t.missing("step", "a number > 0 (s), or duration instead of steps"))?;
     let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
     let schemes: Vec<(&str, &'static Scheme)> = scheme::ALL.iter().map(|s| (s.name, s)).collect();
-    let scheme = t.optional_choice("scheme", &schemes)?.unwrap_or(&scheme::ALL[0]);
-    if let (Some(_), false) = (theta, scheme.solves.iter().any(|s| s.theta.is_none())) {
+    // Who states θ means its scheme.
+    let unstated = if theta.is_some() { scheme::theta() } else { Time::default().scheme };
+    let scheme = t.optional_choice("scheme", &schemes)?.unwrap_or(unstated);
+    if theta.is_some() && !scheme.leaves_theta_open() {
         return Err(t.error("theta", format!("belongs to scheme = \"theta\"; \"{}\" has none", scheme.name)));
     }
     let default = Time::default();

@@ -44,9 +44,22 @@ fn fit_error(parameter: &str) -> String {
 }
 
 #[test]
+fn who_states_theta_means_its_scheme() {
+    let scheme = |text: &str| {
+        let base = BASE.replace("step = 0.008333", &format!("step = 0.008333\n{text}"));
+        parse_scene(&base, Path::new("s.toml")).map(|r| (r.value.time.scheme.name, r.value.time.theta))
+    };
+    assert_eq!(scheme("theta = 0.5").unwrap(), ("theta", 0.5));
+    assert_eq!(scheme("scheme = \"theta\"").unwrap(), ("theta", 0.6));
+    let refused = scheme("scheme = \"tr-bdf2\"\ntheta = 0.5").unwrap_err().to_string();
+    assert!(refused.contains("tr-bdf2") && refused.contains("has none"), "{refused}");
+}
+
+#[test]
 fn absent_keys_take_the_documented_defaults() {
     let s = read("").unwrap().value;
-    assert_eq!(s.time, Time { step: 0.008333, steps: 180, start: 0.0, theta: 0.6, ..Time::default() });
+    assert_eq!(s.time, Time { step: 0.008333, steps: 180, start: 0.0, ..Time::default() });
+    assert_eq!(s.time.scheme.name, "tr-bdf2");
     assert_eq!(s.gravity, DVec3::new(0.0, 0.0, -9.81));
     assert_eq!(s.solver, Solver::default());
     assert_eq!(s.planes[0].normal, DVec3::Z);

@@ -24,7 +24,7 @@ pub const OLD: usize = 3;
 pub const VELOCITY: usize = 6;
 /// Place of gravity [m/s²].
 pub const GRAVITY: usize = 9;
-/// Place of the default contact stiffness, 10 E/h [Pa/m].
+/// Place of the default contact stiffness, 20 E/h [Pa/m].
 pub const STIFFNESS: usize = 12;
 /// Place of the plane's unit normal (3), height [m] and penalty stiffness [Pa/m]; zero where there is no plane.
 pub const PLANE: usize = 13;

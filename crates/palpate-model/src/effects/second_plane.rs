@@ -24,7 +24,7 @@ const POINT: &str = "point that the distance is counted from";
 const NORMAL: &str = "from the plane to the side where the body stays";
 
 const PARAMS: [EffectParam; 8] = [
-    number("stiffness", "1", [0.0, 1e3, 1.0], Unstated::Absent(0.0), "contact stiffness over the default 10 E/h"),
+    number("stiffness", "1", [0.0, 1e3, 1.0], Unstated::Absent(0.0), "contact stiffness over the default 20 E/h"),
     number(
         "distance",
         "m",

@@ -11,7 +11,6 @@ use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
 use crate::effects::check_choices;
-use crate::mechanics::contact;
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
@@ -64,7 +63,7 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
         error(key, e.to_string())
     })?;
     // Only where the step is of second order: where it damps, heavy surfaces make up for some of what it takes from a body that lands.
-    if scene.clamps.is_empty() && contact::acts_along(scene.time.theta) {
+    if scene.clamps.is_empty() && scene.time.scheme.is_of_second_order(scene.time.theta) {
         parts.body.mend_moments();
     }
     Ok((parts, shape))

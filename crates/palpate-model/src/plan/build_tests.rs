@@ -33,7 +33,7 @@ fn scene() -> Scene {
         effects: Vec::new(),
         fields: Vec::new(),
         initial: Initial { velocity: DVec3::X, angular_velocity: DVec3::Y, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.01, steps: 10, start: 0.5, theta: 0.6, ..Time::default() },
+        time: Time { step: 0.01, steps: 10, start: 0.5, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
         fit: None,

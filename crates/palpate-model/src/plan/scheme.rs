@@ -10,6 +10,8 @@
 //!
 //! A solve from more than one past state has θ = 1, so only forces that depend on a rate see the past states.
 
+use crate::mechanics::contact::acts_along;
+
 /// A past state that a solve starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Past {
@@ -68,12 +70,17 @@ const TR_BDF2_STEP: &[Solve] = &[
 ];
 
 /// All schemes; the first is the default.
+///
+/// A default has to be of second order, or a fit takes for the material's what the scheme damps. It also has to damp what the step does not
+/// resolve: vibrations that landings leave behind pile up at θ = ½, until Newton's method finds no way through them. An undamped block
+/// of 5 or 100 kPa and 10 cm, thrown onto the ground in steps of 4 or 10 ms, stalls so within 3 s, on a soft contact layer and a stiff one;
+/// both other schemes simulate it. Of these BDF2 takes too much: 1.3 % of a free spin's energy in ten turns of 100 steps, against 0.09 %.
 pub static ALL: &[Scheme] = &[
     Scheme {
-        name: "theta",
-        doc: "one step from the present state; `theta` weighs the new state's forces: ½ conserves energy, more damps numerically",
-        solves: THETA_STEP,
-        first: THETA_STEP,
+        name: "tr-bdf2",
+        doc: "a trapezoidal and a backward part, two solves a step: the most accurate of those that damp what the step does not resolve",
+        solves: TR_BDF2_STEP,
+        first: TR_BDF2_STEP,
     },
     Scheme {
         name: "bdf2",
@@ -82,12 +89,17 @@ pub static ALL: &[Scheme] = &[
         first: TR_BDF2_STEP,
     },
     Scheme {
-        name: "tr-bdf2",
-        doc: "a trapezoidal and a backward part, two solves a step: the most accurate of those that damp what the step does not resolve",
-        solves: TR_BDF2_STEP,
-        first: TR_BDF2_STEP,
+        name: "theta",
+        doc: "one step from the present state; `theta` weighs the new state's forces: ½ conserves energy, more damps numerically",
+        solves: THETA_STEP,
+        first: THETA_STEP,
     },
 ];
+
+/// The θ-scheme.
+pub fn theta() -> &'static Scheme {
+    &ALL[2]
+}
 
 /// The scheme of this name.
 pub fn find(name: &str) -> Option<&'static Scheme> {
@@ -142,6 +154,17 @@ impl Scheme {
         stages
     }
 
+    /// True where a step with this weight of the new state, where the table leaves it open, is of second order.
+    pub fn is_of_second_order(&self, theta: f64) -> bool {
+        // Of the θ-scheme as far as contact acts along the way: its error is of first order times θ − ½.
+        !self.leaves_theta_open() || acts_along(theta)
+    }
+
+    /// True where the scene states the weight of the new state.
+    pub fn leaves_theta_open(&self) -> bool {
+        self.solves.iter().any(|s| s.theta.is_none())
+    }
+
     /// (x, ẋ) of ẍ = −x after `steps` steps of `step` from (1, 0).
     fn oscillate(&self, step: f64, steps: usize, theta: f64) -> [f64; 2] {
         let mut states = vec![[1.0, 0.0]];
@@ -168,11 +191,23 @@ impl Scheme {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Time;
 
     /// Error of an oscillation at t = 3, with θ = ½ where it is open.
     fn error(scheme: &Scheme, steps: usize) -> f64 {
         let [u, v] = scheme.oscillate(3.0 / steps as f64, steps, 0.5);
         (u - 3f64.cos()).hypot(v + 3f64.sin())
+    }
+
+    #[test]
+    fn the_scheme_that_leaves_theta_open_is_found_as_such() {
+        assert_eq!(theta(), find("theta").unwrap());
+        for scheme in ALL {
+            assert_eq!(scheme.leaves_theta_open(), scheme == theta(), "{}", scheme.name);
+            assert!(scheme.is_of_second_order(0.5));
+            assert_eq!(scheme.is_of_second_order(0.6), scheme != theta(), "{}", scheme.name);
+        }
+        assert!(ALL[0].is_of_second_order(Time::default().theta));
     }
 
     #[test]
