@@ -171,7 +171,7 @@ fn who_stops_before_the_noise_is_known_is_told_no_more_than_that() {
     bench.stopped = true;
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     assert_eq!(d.verdict, Verdict::Undecided);
-    assert!(d.interrupted && d.unsure && d.effects.is_empty());
+    assert!(d.interrupted && d.unsure.is_some() && d.effects.is_empty());
     assert!(d.sentence().starts_with("Nothing is decided: the diagnosis was interrupted"), "{}", d.sentence());
 }
 
