@@ -1,7 +1,7 @@
 //! The answer of a diagnosis.
 
-use crate::laboratory::Model;
 use crate::judgement::prior::Strange;
+use crate::laboratory::Model;
 use crate::locate::{Place, direction};
 use crate::movement::Movement;
 use crate::quantity::{millimetres as mm, stated};
@@ -269,7 +269,8 @@ impl Diagnosis {
                 });
                 let open = if open { self.open() } else { String::new() };
                 // Where what is left has no structure, candidates that promise something are why the search went on.
-                let what = if self.remains || !self.effects.is_empty() { "Something is missing" } else { "Something may be missing" };
+                let what =
+                    if self.remains || !self.effects.is_empty() { "Something is missing" } else { "Something may be missing" };
                 format!("{what}{why}: {apart}{place}; {close}{slack}.{open}")
             }
             Verdict::MissingEffect => {

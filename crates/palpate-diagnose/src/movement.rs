@@ -38,8 +38,8 @@ pub(crate) fn largest(
     errors: &[Option<f64>],
     fitted: bool,
 ) -> Option<Movement> {
-    let of = |(k, n): (usize, &Number)| {
-        let (before, after) = (baseline.values[k], values[k]);
+    let of = |(k, (n, after)): (usize, (&Number, &f64))| {
+        let (before, after) = (baseline.values[k], *after);
         let known = [baseline.errors[k], errors.get(k).copied().flatten()];
         let error = known.into_iter().flatten().filter(|e| e.is_finite() && *e > 0.0).reduce(f64::max);
         let positive = n.bounds.0 >= 0.0 && before > 0.0 && after > 0.0;
@@ -49,7 +49,7 @@ pub(crate) fn largest(
         let size = if positive { (after / before).ln().abs() } else { (after - before).abs() / n.scale.max(f64::MIN_POSITIVE) };
         (m.is_beyond_error(), size, m)
     };
-    let all = baseline.numbers.iter().enumerate().map(of).filter(|(_, size, _)| size.is_finite());
+    let all = baseline.numbers.iter().zip(values).enumerate().map(of).filter(|(_, size, _)| size.is_finite());
     all.max_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)).map(|(.., m)| m)
 }
 
@@ -82,7 +82,9 @@ impl Movement {
             Some(f) if !self.fitted && f < 1.0 / LINEAR => "less than half as large".into(),
             Some(f) if f >= TIMES || f <= 1.0 / TIMES => format!("{} times", two(f)),
             Some(f) => format!("{}{} %", if f < 1.0 { "−" } else { "+" }, two(100.0 * (f - 1.0).abs())),
-            None => errors.map_or_else(|| format!("by {}", self.with_unit((self.after - self.before).abs())), |e| format!("by {e}")),
+            None => {
+                errors.map_or_else(|| format!("by {}", self.with_unit((self.after - self.before).abs())), |e| format!("by {e}"))
+            }
         }
     }
 
@@ -150,9 +152,8 @@ mod tests {
     #[test]
     fn the_number_that_moves_most_is_named_with_a_factor_per_cent_or_standard_errors() {
         let base = model(&[("material.youngs_modulus", "Pa", 458.0, Some(3.0)), ("initial.velocity.x", "m/s", -0.5, Some(0.01))]);
-        let said = |values: &[f64], fitted| {
-            largest("coulomb-friction", &base, values, &[Some(2.0), None], fitted).unwrap().sentence()
-        };
+        let said =
+            |values: &[f64], fitted| largest("coulomb-friction", &base, values, &[Some(2.0), None], fitted).unwrap().sentence();
         let with = "With coulomb-friction";
         let cases = [
             ([1958.0, -0.51], format!("{with} material.youngs_modulus is 1958 Pa instead of 458.0 Pa (4.3 times).")),

@@ -269,7 +269,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         // What the fit held on a device is free for what follows.
         drop(problem);
         // Whoever stops does not want to wait for what is only compared with.
-        let before = |(e, t): (&Experiment, &Vec<f64>)| if hurried || interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
+        let before =
+            |(e, t): (&Experiment, &Vec<f64>)| if hurried || interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
         let before = experiments.iter().zip(&theta_before).map(before).collect();
         Ok((result, theta_before, before, after, notes))
     })?;

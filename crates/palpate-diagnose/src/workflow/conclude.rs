@@ -103,7 +103,8 @@ impl Session<'_> {
         }
         let mut effects = out.accepted;
         effects.extend(out.close);
-        let mut movements = named_movements(&baseline, &state.model, &effects);
+        let told = if verdict == Verdict::Adequate { &[] } else { effects.as_slice() };
+        let mut movements = named_movements(&baseline, &state.model, told);
         movements.extend(if stopped { self.open_movements() } else { Vec::new() });
         let unexplained = verdict == Verdict::Unexplained;
         let course = course(&base.readings, if unexplained { &base.readings } else { &state.readings });

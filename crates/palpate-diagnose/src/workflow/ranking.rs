@@ -56,6 +56,9 @@ impl Session<'_> {
             let plain = c.variants.iter().filter(|v| !v.is_tried(palpate_model::effects::Trial::Walls));
             wanted.extend(plain.step_by(by).map(|v| (CandidateId::Single(n), v.clone())));
         }
+        // What is read of a motion costs least, and of what is not ranked anywhere yet least is known.
+        let ranked: BTreeSet<&str> = self.ranked.iter().map(|r| r.kind.as_str()).collect();
+        wanted.sort_by_key(|(_, c): &(CandidateId, Change)| (!c.is_read(), ranked.contains(c.kind())));
         let (scored, _) = self.columns(state, wanted)?;
         self.rank(state, round, &scored);
         self.early = Early { model: Some(state.model.clone()), variants: scored };

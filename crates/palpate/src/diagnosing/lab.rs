@@ -17,7 +17,8 @@ use crate::experiment::Experiment;
 use crate::fitting::{self, FitOptions, Fitted, fingerprint};
 use palpate_cpu::CpuBackend;
 use palpate_diagnose::{
-    Baseline, Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start, Strange,
+    Baseline, Change, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Regions, Separation, Setting, Start,
+    Strange,
 };
 use palpate_engine::Rollout;
 use palpate_fit::{FitScene, FreeParameter, Problem, Sample, Status, Want};
@@ -41,11 +42,13 @@ const BASELINE: f64 = 1e-6;
 const AGAIN: f64 = 1.25;
 /// Reasons of a fit that was cut short that are told: how far it came, and how far away the optimum is.
 const REASONS: usize = 2;
-/// Share of the time left that is taken for what bodies touch, and for what finer computations change, before the search begins.
+/// Shares of the time left that are taken for the look at the starting model, for what bodies touch, and for what finer computations change.
+const LOOKED: f64 = 1.0 / 3.0;
 const SETTLED: f64 = 0.2;
 const REFINED: f64 = 0.5;
-/// Hypotheses that a thread computes together at first.
-const FIRST: usize = 8;
+/// Hypotheses that a thread computes together at first; twice as many each time, as long as they take no more than this share of the time left.
+const FIRST: usize = 1;
+const WAVE: f64 = 0.5;
 /// What a last look may take after somebody asked to stop: the half of what he is told that it takes.
 const GRACE: Duration = Duration::from_secs(1);
 
@@ -497,13 +500,16 @@ impl Laboratory for Lab<'_> {
     }
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
-        let (base, limits) = (&self.base, &self.search());
+        // Before the baseline is fitted it must not take the time of that.
+        let all = self.search();
+        let (base, limits) = (&self.base, &if self.open { all.share(LOOKED) } else { all });
         let threads = rayon::current_num_threads();
         // As few simulations as there are threads, where tangents leave room: each costs its steps and one factorisation per step. A few
         // hypotheses come first, so that a search that is stopped has something, and knows what more of them take.
         let nodes = base.iter().map(|e| e.plan.body.nodes.len()).max().unwrap_or(1);
         let most = (MEMORY / (TANGENT * nodes)).max(1);
-        let (mut out, mut together) = (Vec::with_capacity(tries.len()), FIRST);
+        let read = tries.iter().take_while(|t| t.0.last().is_some_and(Change::is_read)).count();
+        let (mut out, mut together) = (Vec::with_capacity(tries.len()), FIRST.max(read.div_ceil(threads)));
         while out.len() < tries.len() {
             let open = &tries[out.len()..];
             let each = together.min(open.len().div_ceil(threads)).clamp(1, most);
@@ -516,10 +522,10 @@ impl Laboratory for Lab<'_> {
             }
             together = 2 * each;
             if let Some(left) = limits.left() {
-                // More of them at once take no longer for each.
-                let fits = left.as_secs_f64() / (limits.elapsed() - began).as_secs_f64().max(1e-9) * each as f64;
-                together = together.min(fits as usize);
-                if together == 0 {
+                // More of them at once take no longer for each; what is cut short is lost.
+                let fits = WAVE * left.as_secs_f64() / (limits.elapsed() - began).as_secs_f64().max(1e-9) * each as f64;
+                together = together.min((fits as usize).max(1));
+                if fits < WAVE {
                     out.resize_with(tries.len(), || Err(LabError::NoTime));
                 }
             }

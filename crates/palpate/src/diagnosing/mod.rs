@@ -27,7 +27,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// What there is to say where the starting model could not be simulated once.
-const TOO_SHORT: &str = "the budget was over before the scene had been simulated once: allow more time, or fewer frames or larger cells";
+const TOO_SHORT: &str =
+    "the budget was over before the scene had been simulated once: allow more time, or fewer frames or larger cells";
 
 /// How to run a diagnosis.
 #[derive(Default)]

@@ -41,12 +41,7 @@ struct Trial {
 
 /// What several measurements would read of every rival, the models after the first, against the first one; those that could be simulated
 /// before `stop`.
-pub(super) fn separations(
-    base: &[Experiment],
-    backend: Backend,
-    models: &[&Model],
-    stop: &Stop,
-) -> Vec<Separation> {
+pub(super) fn separations(base: &[Experiment], backend: Backend, models: &[&Model], stop: &Stop) -> Vec<Separation> {
     let ready: Result<Vec<Prepared>, _> = models.iter().map(|m| prepare(base, &m.changes)).collect();
     let (Ok(ready), watch) = (ready, Watch::new(&base[0])) else { return Vec::new() };
     let mut out = Vec::new();

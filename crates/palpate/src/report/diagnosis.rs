@@ -5,8 +5,8 @@ use crate::results::diagnosis::{self as results, BeforeAfter, DiagnosisDocument,
 use crate::results::finite;
 use crate::results::fit::Parameter;
 use palpate_diagnose::{
-    Diagnosis, Found, FoundNumber, Level, MapEntry, Model, Movement, Number, Place, Separated, Slack, SlackWindow, Strange, Tried,
-    stated,
+    Diagnosis, Found, FoundNumber, Level, MapEntry, Model, Movement, Number, Place, Separated, Slack, SlackWindow, Strange,
+    Tried, stated,
 };
 use palpate_engine::Stream;
 use palpate_model::params::unit_behind;

@@ -1,11 +1,11 @@
 //! The report of a diagnosis.
 
 use super::{Column, figure, heads, page, plot, reproduce, unit};
-use crate::report::plots::Curve;
 use crate::diagnosing::Diagnosed;
 use crate::report::diagnosis::{fitted, stream};
 use crate::report::fit::number;
 use crate::report::pictures::FramePicture;
+use crate::report::plots::Curve;
 use maud::{Markup, html};
 use palpate_diagnose::{Diagnosis, Found, Instant, Level, MapEntry, Movement, Tried, Verdict, direction, millimetres, stated};
 
