@@ -40,6 +40,9 @@ const CLOSE: f64 = 2.0;
 /// The same from which on it is far, whatever chance may do: bodies with nothing missing stay below 1.5.
 const FAR: f64 = 4.0;
 
+/// What is said of candidates that there was no time to score.
+pub(crate) const NOT_SCORED: &str = "not even scored";
+
 /// Candidates that a sentence names where they were not fitted.
 const TOLD: usize = 3;
 
@@ -324,10 +327,17 @@ impl Diagnosis {
         let all = self.not_yet_fitted();
         let one = |t: &&Tried| format!("{} ({:.0} % of the squared residual)", t.kind, 100.0 * t.promised);
         let told: Vec<String> = all.iter().take(TOLD).map(one).collect();
-        match all.len() {
+        let more = match all.len().saturating_sub(TOLD) {
             0 => String::new(),
-            n if n <= TOLD => format!(" Not yet fitted, by what sensitivities promise: {}.", told.join(", ")),
-            n => format!(" Not yet fitted, by what sensitivities promise: {} and {} more.", told.join(", "), n - TOLD),
+            n => format!(" and {n} more"),
+        };
+        let unscored = match self.not_tried.iter().filter(|n| n.contains(NOT_SCORED)).count() {
+            0 => String::new(),
+            n => format!(" Not even scored: {n} candidates."),
+        };
+        match all.len() {
+            0 => unscored,
+            _ => format!(" Not yet fitted, by what sensitivities promise: {}{more}.{unscored}", told.join(", ")),
         }
     }
 

@@ -4,7 +4,7 @@ use super::race::linear_moves;
 use super::variants::{Variant, most_promising};
 use super::{CandidateId, Session, State, keep_first};
 use crate::change::{Change, candidates};
-use crate::diagnosis::Tried;
+use crate::diagnosis::{NOT_SCORED, Tried};
 use crate::judgement::prior::Prior;
 use crate::laboratory::{LabError, Model};
 use crate::movement::{Movement, largest};
@@ -102,7 +102,7 @@ impl Session<'_> {
         }
         for c in candidates(self.lab.setting()) {
             if known.insert(c.kind().into()) {
-                self.not_tried.push(format!("{}: not even scored: {why}", c.kind()));
+                self.not_tried.push(format!("{}: {NOT_SCORED}: {why}", c.kind()));
             }
         }
     }

@@ -500,9 +500,9 @@ impl Laboratory for Lab<'_> {
     }
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
-        // Before the baseline is fitted it must not take the time of that.
-        let all = self.search();
-        let (base, limits) = (&self.base, &if self.open { all.share(LOOKED) } else { all });
+        let (base, limits) = (&self.base, &self.search());
+        // Before the baseline is fitted it must not take the time of that, but for the first ones: there must be some.
+        let planned = if self.open { limits.share(LOOKED) } else { limits.clone() };
         let threads = rayon::current_num_threads();
         // As few simulations as there are threads, where tangents leave room: each costs its steps and one factorisation per step. A few
         // hypotheses come first, so that a search that is stopped has something, and knows what more of them take.
@@ -521,7 +521,7 @@ impl Laboratory for Lab<'_> {
                 break;
             }
             together = 2 * each;
-            if let Some(left) = limits.left() {
+            if let Some(left) = planned.left() {
                 // More of them at once take no longer for each; what is cut short is lost.
                 let fits = WAVE * left.as_secs_f64() / (limits.elapsed() - began).as_secs_f64().max(1e-9) * each as f64;
                 together = together.min((fits as usize).max(1));
