@@ -14,12 +14,13 @@ mod race;
 mod ranking;
 mod replace;
 mod rounds;
+mod session;
 mod state;
 mod variants;
 
 use crate::cells::{Cells, Table};
-use crate::change::{Change, candidates};
-use crate::crossval::{Predicted, foldings, predict};
+use crate::change::Change;
+use crate::crossval::{Predicted, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::judgement::density::Blocks;
 use crate::judgement::prior::{Prior, Strange};
@@ -158,9 +159,6 @@ struct Session<'a> {
 const STRANGE: f64 = 3.0;
 /// Share of the baseline's readings that a model must meet for its residuals to tell of the noise.
 const KEPT: f64 = 0.95;
-/// Times that the residual map and the judgement of one model take, that are kept for the answer: what is known by then is judged again for it.
-const ANSWER: f64 = 3.0;
-
 /// Diagnoses a scene from where the fit of its own numbers starts, or from their fitted values. From the first residuals on there is an answer,
 /// and whatever ends the search ends with what is known by then: a ranking of candidates by their sensitivities at the start, the same at the
 /// fitted values, and then what the rounds bring.
@@ -315,74 +313,6 @@ fn met(readings: &Readings) -> usize {
 
 fn one<T>(answers: Vec<Result<T, LabError>>) -> Result<T, LabError> {
     answers.into_iter().next().unwrap_or_else(|| Err(LabError::failed("the laboratory gave no answer")))
-}
-
-impl<'a> Session<'a> {
-    /// A session that has seen nothing yet.
-    fn new(lab: &'a mut dyn Laboratory, options: &'a Options, first: &Model) -> Session<'a> {
-        Session {
-            lab,
-            options,
-            cells: Cells::new(&Readings::default()),
-            folds: Vec::new(),
-            blocks: Blocks::default(),
-            second: None,
-            candidates: 0,
-            noise_ratio: 1.0,
-            design_effect: 1.0,
-            noise: Shapes::default(),
-            scored: None,
-            early: Early::default(),
-            ranked: Vec::new(),
-            rivals: Vec::new(),
-            base: first.clone(),
-            unrefined: false,
-            finer: Vec::new(),
-            tried: Vec::new(),
-            not_tried: Vec::new(),
-            no_time: false,
-        }
-    }
-
-    /// The state where the fit of the baseline starts, with the candidates that were ranked there; `None` where a fit may still find what to look
-    /// at.
-    fn first_look(&mut self, start: &Model) -> Result<Option<State>, LabError> {
-        let readings = match one(self.lab.linearise(&[(start.changes.clone(), start.values.clone())])) {
-            Ok(readings) => readings,
-            Err(LabError::Failed(_)) => return Ok(None),
-            Err(why) => return Err(why),
-        };
-        if self.begin(start, &readings).is_err() {
-            return Ok(None);
-        }
-        let began = self.lab.seconds();
-        let state = self.alone(start.clone(), readings, Vec::new(), None);
-        self.keep_back(began);
-        self.look(&state, 0, false)?;
-        Ok(Some(state))
-    }
-
-    /// Keeps time for the answer, from when something began that takes as long.
-    fn keep_back(&mut self, began: f64) {
-        let seconds = self.lab.seconds() - began;
-        self.lab.keep_back(ANSWER * seconds);
-    }
-
-    /// Looks at the recordings through another model: its cells, and the noise that it shows.
-    fn begin(&mut self, base: &Model, readings: &Readings) -> Result<(), LabError> {
-        self.cells = Cells::new(readings);
-        if self.cells.is_empty() {
-            return Err(LabError::failed("no part of the recording meets the simulated body: nothing can be diagnosed"));
-        }
-        self.noise_ratio = noise_over_stated(self.lab, readings);
-        for (sd, k) in self.cells.sd.iter_mut().zip(&self.cells.keys) {
-            *sd *= if k.stream.sensor.is_camera() { self.noise_ratio } else { 1.0 };
-        }
-        (self.folds, self.blocks) = (foldings(&self.cells), Blocks::new(&self.cells));
-        self.candidates = candidates(self.lab.setting()).len();
-        self.base = base.clone();
-        Ok(())
-    }
 }
 
 impl Session<'_> {

@@ -184,10 +184,13 @@ fn named_movements(baseline: &Model, model: &Model, effects: &[Found]) -> Vec<Mo
     all
 }
 
+/// Time and residuals of a frame.
+type Frame = (f64, Vec<(Source, Option<f64>)>);
+
 /// Root mean square distances of every instant of two models.
 fn course(before: &Readings, after: &Readings) -> Vec<Instant> {
     let by_frame = |readings: &Readings| {
-        let mut frames: BTreeMap<(usize, usize), (f64, Vec<(Source, Option<f64>)>)> = BTreeMap::new();
+        let mut frames: BTreeMap<(usize, usize), Frame> = BTreeMap::new();
         let put = |r: &Reading| {
             let frame = frames.entry((r.scene, r.row.frame)).or_insert((r.time, Vec::new()));
             frame.1.push((r.row.source, r.row.value));
@@ -199,7 +202,7 @@ fn course(before: &Readings, after: &Readings) -> Vec<Instant> {
     let met = |values: &[(Source, Option<f64>)]| values.iter().any(|(_, v)| v.is_some());
     let both = before.into_iter().filter_map(|(key, b)| Some((key.0, b, after.get(&key)?)));
     let seen = both.filter(|(_, b, a)| met(&b.1) && met(&a.1));
-    let instant = |(scene, b, a): (usize, (f64, Vec<_>), &(f64, Vec<_>))| Instant {
+    let instant = |(scene, b, a): (usize, Frame, &Frame)| Instant {
         scene,
         time: b.0,
         before: rms(b.1.into_iter()),

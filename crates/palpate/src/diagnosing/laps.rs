@@ -1,8 +1,8 @@
 //! Fits in laps: one that goes on where an earlier one ended takes over its damping and the sizes that its steps count in, so that two laps
 //! of three iterations are one fit of six.
 
-use super::lab::{NEWTON, problem};
 use super::limits::Limits;
+use super::simulate::{NEWTON, problem};
 use crate::engine::Backend;
 use crate::experiment::Experiment;
 use crate::fitting::errors;

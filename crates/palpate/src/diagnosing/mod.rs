@@ -8,6 +8,7 @@ mod limits;
 mod others;
 mod refined;
 mod separate;
+mod simulate;
 mod systematic;
 mod walls;
 mod world;

@@ -1,8 +1,8 @@
 //! Other data and other looks: a second recording of the same body, times of contact, frames at rest.
 
 use super::hypothesis::{Prepared, is_own, lab_error, prepare};
-use super::lab::along;
 use super::limits::Limits;
+use super::simulate::along;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;

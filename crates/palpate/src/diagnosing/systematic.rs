@@ -2,8 +2,8 @@
 //! one, would change. The measuring effects `marker-offset` and `depth-bias` say it, so that their formulas exist once.
 
 use super::hypothesis::{lab_error, prepare};
-use super::lab::linearise;
 use super::limits::Limits;
+use super::simulate::linearise;
 use crate::experiment::Experiment;
 use palpate_diagnose::{Change, Field, LabError, Reading};
 use palpate_engine::Source;

@@ -1,8 +1,8 @@
 //! Planes that the measured body does not cross and the simulated one does: where something flat that the scene does not know would stand.
 
 use super::hypothesis::{Prepared, lab_error, prepare};
-use super::lab::linearise;
 use super::limits::Limits;
+use super::simulate::linearise;
 use crate::embed::Embedding;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
