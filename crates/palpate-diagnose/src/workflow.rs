@@ -188,7 +188,8 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
     };
     s.begin(&baseline, &readings)?;
     let mut state = s.state(baseline.clone(), readings, Vec::new(), true, None)?;
-    s.look(&state, 1, !out.cut)?;
+    let complete = s.look(&state, 1, !out.cut)?;
+    s.no_time |= !complete && !s.lab.interrupted();
     if !out.cut {
         state.fields = s.finer(&baseline);
         state.held_out_finer = s.held_out_finer(&state);
@@ -198,7 +199,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
         let why = if s.lab.interrupted() { "the diagnosis was interrupted" } else { "the time was over" };
         out.unsure.get_or_insert_with(|| format!("{why} before the baseline and its noise were known"));
     }
-    s.correlate(&mut state, !out.cut);
+    s.correlate(&mut state, complete && !out.cut);
     s.look_elsewhere(&mut state);
     let mut first = (state.readings.clone(), s.grid(&state));
     let mut blocks;

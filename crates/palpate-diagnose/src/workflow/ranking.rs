@@ -45,8 +45,8 @@ impl Early {
 
 impl Session<'_> {
     /// Scores candidates at a state before anything else is asked of it, and ranks them; of effects at an unknown place one start, or the few of a
-    /// `whole` look. What there was no time for is left out.
-    pub(super) fn look(&mut self, state: &State, round: usize, whole: bool) -> Result<(), LabError> {
+    /// `whole` look. False where there was no time for all.
+    pub(super) fn look(&mut self, state: &State, round: usize, whole: bool) -> Result<bool, LabError> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
         let mut wanted = Vec::new();
@@ -56,13 +56,14 @@ impl Session<'_> {
             let plain = c.variants.iter().filter(|v| !v.is_tried(palpate_model::effects::Trial::Walls));
             wanted.extend(plain.step_by(by).map(|v| (CandidateId::Single(n), v.clone())));
         }
-        // What is read of a motion costs least, and of what is not ranked anywhere yet least is known.
-        let ranked: BTreeSet<&str> = self.ranked.iter().map(|r| r.kind.as_str()).collect();
-        wanted.sort_by_key(|(_, c): &(CandidateId, Change)| (!c.is_read(), ranked.contains(c.kind())));
-        let (scored, _) = self.columns(state, wanted)?;
+        // What is read of a motion costs least, of what is not ranked yet least is known, and what promised most before may again.
+        let share = |c: &Change| self.ranked.iter().find(|r| r.kind == c.kind()).map_or(f64::INFINITY, |r| r.share);
+        let order = |a: &Change, b: &Change| b.is_read().cmp(&a.is_read()).then(share(b).total_cmp(&share(a)));
+        wanted.sort_by(|(_, a): &(CandidateId, Change), (_, b)| order(a, b));
+        let (scored, missed) = self.columns(state, wanted)?;
         self.rank(state, round, &scored);
         self.early = Early { model: Some(state.model.clone()), variants: scored };
-        Ok(())
+        Ok(missed.is_empty())
     }
 
     /// Ranks what was scored, before what was ranked elsewhere and is not among it.

@@ -6,7 +6,7 @@ use super::hypothesis::{Prepared, held, lab_error, prepare};
 use super::laps::{Lap, Laps, fit};
 use super::limits::Limits;
 use super::others::{contact_times, held_out, still_frames};
-use super::refined::{GRID, STEP, difference, finer, halved};
+use super::refined::{FINER, GRID, STEP, difference, finer, halved};
 use super::separate::separations;
 use super::simulate::{Try, cost, in_waves, linearise};
 use super::systematic::systematic;
@@ -32,7 +32,7 @@ const BASELINE: f64 = 1e-6;
 const AGAIN: f64 = 1.25;
 /// Reasons of a fit that was cut short that are told: how far it came, and how far away the optimum is.
 const REASONS: usize = 2;
-/// Shares of the time left that are taken for the look at the starting model, for what bodies touch, and for what finer computations change.
+/// Shares of the time left that are taken for a look at candidates, for what bodies touch, and for what finer computations change.
 const LOOKED: f64 = 1.0 / 3.0;
 const SETTLED: f64 = 0.2;
 const REFINED: f64 = 0.5;
@@ -337,10 +337,9 @@ impl Laboratory for Lab<'_> {
     }
 
     fn linearise_new(&mut self, tries: &[Try], from: usize) -> Vec<Result<Readings, LabError>> {
-        // Before the baseline is fitted it must not take the time of that.
+        // A look must not take the time of the fits that follow it.
         let limits = self.search();
-        let planned = if self.open { limits.share(LOOKED) } else { limits.clone() };
-        in_waves(&self.base, tries, from, &limits, &planned)
+        in_waves(&self.base, tries, from, &limits, &limits.share(LOOKED))
     }
 
     fn finer(&mut self, changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
@@ -348,6 +347,11 @@ impl Laboratory for Lab<'_> {
         whole.check()?;
         // The first one is the baseline's, after which there is a search.
         let limits = if self.finer.is_none() { whole.share(REFINED) } else { whole };
+        // As many times as long as there are more nodes, at the least: what cannot come to its end leaves its time to others.
+        let least = self.seconds * (1.0 + FINER.powi(3));
+        if limits.left().is_some_and(|left| left.as_secs_f64() < least) {
+            return Err(LabError::NoTime);
+        }
         let began = Instant::now();
         let ready = prepare(&self.base, changes).map_err(lab_error)?;
         let none = ready.free.len();
