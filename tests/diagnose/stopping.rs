@@ -94,12 +94,8 @@ fn a_clock_that_a_test_moves_ends_a_diagnosis_where_it_says() {
         diagnose(std::slice::from_ref(&experiment), None, options).map(|d| d.diagnosis)
     };
     assert!(answer(Some(0)).is_err(), "not even the start is known");
-    let mut known = 0;
-    for limit in [400, 1000] {
-        let d = answer(Some(limit)).unwrap();
-        assert_eq!(d.verdict.name(), "undecided", "{limit}: {}", d.sentence());
-        assert!(!d.interrupted && !d.not_yet_fitted().is_empty(), "{limit}: {}", d.sentence());
-        known = known.max(d.not_yet_fitted().len());
-    }
-    assert!(known > 10, "{known}");
+    // After the first look, and before anything is fitted.
+    let d = answer(Some(400)).unwrap();
+    assert_eq!(d.verdict.name(), "undecided", "{}", d.sentence());
+    assert!(!d.interrupted && !d.not_yet_fitted().is_empty(), "{}", d.sentence());
 }
