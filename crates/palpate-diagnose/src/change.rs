@@ -2,7 +2,7 @@
 
 use crate::laboratory::{Setting, Wall};
 use glam::DVec3;
-use palpate_model::effects::{ALL, Effect, EffectParam, Family, Numbered, Trial, Unstated};
+use palpate_model::effects::{ALL, Effect, EffectParam, Family, Numbered, Site, Trial, Unstated};
 use palpate_model::params::ParamKey;
 
 /// One change of a scene.
@@ -100,6 +100,11 @@ impl Change {
                 paths.iter().map(stem).collect()
             }
         }
+    }
+
+    /// True for an effect on what is read of a motion, and not on the motion: its sensitivities take no solve.
+    pub fn is_read(&self) -> bool {
+        matches!(self, Change::Effect(e) if matches!(e.law().site, Site::Readings(_) | Site::Clock | Site::Marker))
     }
 
     /// True for an effect that is tried so.

@@ -1,7 +1,9 @@
 //! The answer of a diagnosis.
 
+use crate::judgement::prior::Strange;
 use crate::laboratory::Model;
 use crate::locate::{Place, direction};
+use crate::movement::Movement;
 use crate::quantity::{millimetres as mm, stated};
 use crate::separation::Separated;
 use glam::DVec3;
@@ -32,6 +34,12 @@ impl Verdict {
         }
     }
 }
+
+/// What is said of candidates that there was no time to score.
+pub(crate) const NOT_SCORED: &str = "not even scored";
+
+/// Candidates that a sentence names where they were not fitted.
+const TOLD: usize = 3;
 
 /// How far measurement and model are apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,6 +77,8 @@ pub struct Found {
     pub accepted: bool,
     /// Other candidates that predict data left out as well.
     pub indistinguishable_from: Vec<String>,
+    /// What it, and each of those, does to the baseline's numbers.
+    pub movements: Vec<Movement>,
     /// Measurement that would tell it best from them; `None` when there was none to be told from, or no time to look for one.
     pub separated_by: Option<Separated>,
 }
@@ -76,7 +86,7 @@ pub struct Found {
 /// A candidate's score where it is absent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tried {
-    /// Round of the search, from 1.
+    /// Round of the search, from 1; 0 where the baseline's fit began.
     pub round: usize,
     /// Name.
     pub kind: String,
@@ -84,6 +94,21 @@ pub struct Tried {
     pub promised: f64,
     /// Share of the gap that it closed on data left out; `None` when it was not fitted.
     pub held_out_gain: Option<f64>,
+    /// True where it was not fitted because the search ended before.
+    pub open: bool,
+}
+
+/// Residuals of one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instant {
+    /// Scene.
+    pub scene: usize,
+    /// Its time [s].
+    pub time: f64,
+    /// Root mean square distance of the baseline [m].
+    pub before: f64,
+    /// The same of the corrected model.
+    pub after: f64,
 }
 
 /// One stretch of time of the slack force field.
@@ -169,6 +194,12 @@ pub struct Diagnosis {
     pub tried: Vec<Tried>,
     /// Candidates that there was no time for.
     pub not_tried: Vec<String>,
+    /// What candidates do to the free numbers: those that are named, those that are as good, and those that promise most of what was not fitted.
+    pub movements: Vec<Movement>,
+    /// What is strange about the numbers of the baseline, and of the corrected model.
+    pub strange: (Vec<Strange>, Vec<Strange>),
+    /// Residuals over time, instant by instant of every scene.
+    pub course: Vec<Instant>,
     /// The corrected model.
     pub model: Model,
     /// Its distance from the measurement.
@@ -191,9 +222,8 @@ pub struct Diagnosis {
     pub remains: bool,
     /// True when it was stopped before its end.
     pub interrupted: bool,
-    /// True when that was before the baseline was fitted, or before it was known what cells and step explain: then it is not even sure that
-    /// something is missing.
-    pub unsure: bool,
+    /// Why it is not even sure that something is missing: the baseline's fit was cut short, or it is not known what cells and step explain.
+    pub unsure: Option<String>,
 }
 
 impl Diagnosis {
@@ -208,21 +238,15 @@ impl Diagnosis {
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
         match self.verdict {
             Verdict::Adequate => format!("Nothing is missing that these data could show: {apart}."),
-            Verdict::Undecided if self.unsure => {
-                format!(
-                    "Nothing is decided: the diagnosis was interrupted before the baseline and its noise were known; so far {apart}."
-                )
+            Verdict::Undecided if self.unsure.is_some() => {
+                let why = self.unsure.as_deref().unwrap_or_default();
+                let close = self.effects.first().map_or(String::new(), |e| format!("; {}", helps(e)));
+                format!("Nothing is decided: {why}; so far {apart}{close}.{}", self.open())
             }
             Verdict::Unexplained | Verdict::Undecided => {
                 let open = self.verdict == Verdict::Undecided;
                 let none = if open { "nothing helps so far" } else { "no known effect helps" };
-                let close = self.effects.first().map_or(none.to_string(), |e| {
-                    format!(
-                        "the known effect that helps most, {}, closes {:.0} % of the gap on data left out",
-                        e.kind,
-                        100.0 * e.held_out_gain
-                    )
-                });
+                let close = self.effects.first().map_or(none.to_string(), helps);
                 let why = match (open, self.interrupted) {
                     (false, _) => " that no known effect explains",
                     (true, true) => ", and the search was interrupted before every known effect was tried",
@@ -231,7 +255,11 @@ impl Diagnosis {
                 let slack = self.slack.as_ref().map_or(String::new(), |s| {
                     format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
                 });
-                format!("Something is missing{why}: {apart}{place}; {close}{slack}.")
+                let open = if open { self.open() } else { String::new() };
+                // Where what is left has no structure, candidates that promise something are why the search went on.
+                let what =
+                    if self.remains || !self.effects.is_empty() { "Something is missing" } else { "Something may be missing" };
+                format!("{what}{why}: {apart}{place}; {close}{slack}.{open}")
             }
             Verdict::MissingEffect => {
                 let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();
@@ -252,16 +280,49 @@ impl Diagnosis {
                     .collect();
                 format!(
                     "The model lacks something{place}: {}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of \
-                     the gap on data left out.{}{}",
+                     the gap on data left out.{}{}{}",
                     what.join("; and "),
                     mm(self.before.rms),
                     mm(self.after.rms),
                     mm(self.after.noise),
                     100.0 * self.gap_closed,
+                    self.moved(),
                     if self.remains { self.caution() } else { String::new() },
                     self.unfinished()
                 )
             }
+        }
+    }
+
+    /// What the corrected model does to the free number that it moves most, where that is more than its error.
+    fn moved(&self) -> String {
+        let first = self.movements.first().filter(|m| m.fitted && m.is_beyond_error());
+        first.map_or(String::new(), |m| format!(" {}", m.sentence()))
+    }
+
+    /// Candidates that were not fitted because the search ended before, the most promising first.
+    pub fn not_yet_fitted(&self) -> Vec<&Tried> {
+        let mut all: Vec<&Tried> = self.tried.iter().filter(|t| t.open).collect();
+        all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+        all
+    }
+
+    /// The first of these in words.
+    fn open(&self) -> String {
+        let all = self.not_yet_fitted();
+        let one = |t: &&Tried| format!("{} ({:.0} % of the squared residual)", t.kind, 100.0 * t.promised);
+        let told: Vec<String> = all.iter().take(TOLD).map(one).collect();
+        let more = match all.len().saturating_sub(TOLD) {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let unscored = match self.not_tried.iter().filter(|n| n.contains(NOT_SCORED)).count() {
+            0 => String::new(),
+            n => format!(" Not even scored: {n} candidates."),
+        };
+        match all.len() {
+            0 => unscored,
+            _ => format!(" Not yet fitted, by what sensitivities promise: {}{more}.{unscored}", told.join(", ")),
         }
     }
 
@@ -284,6 +345,11 @@ impl Diagnosis {
             n => format!(" The search {why} before it had tried to the end: {} and {} more.", open[..3].join(", "), n - 3),
         }
     }
+}
+
+/// The effect that came closest, in words.
+fn helps(e: &Found) -> String {
+    format!("the known effect that helps most, {}, closes {:.0} % of the gap on data left out", e.kind, 100.0 * e.held_out_gain)
 }
 
 #[cfg(test)]

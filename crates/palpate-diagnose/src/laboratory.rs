@@ -216,8 +216,44 @@ impl Field {
     }
 }
 
-/// Whoever simulates and fits.
+/// The fitted model that a diagnosis begins with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baseline {
+    /// The best that its fit found.
+    pub model: Model,
+    /// Why its fit ended before its end, if it did.
+    pub cut: Option<String>,
+}
+
+/// Whoever simulates and fits. What is asked of it ends with [`LabError::NoTime`] or [`LabError::Interrupted`] as soon as its time is over or
+/// somebody asks to stop, wherever it is.
 pub trait Laboratory {
+    /// True where the scene's own numbers are still to be fitted.
+    fn is_fitted(&self) -> bool {
+        true
+    }
+    /// Fits the scene's own numbers. It leaves the time that the same sensitivities as before take once more; the scene's character is that of
+    /// the fitted scene from then on.
+    ///
+    /// # Errors
+    /// The fit has no result.
+    fn baseline(&mut self, start: Model) -> Result<Baseline, LabError> {
+        Ok(Baseline { model: start, cut: None })
+    }
+    /// Residuals and derivatives of a model, also where somebody has asked to stop, if that is a matter of a second.
+    ///
+    /// # Errors
+    /// It cannot be computed, or it takes too long.
+    fn last_look(&mut self, model: &Model) -> Result<Readings, LabError> {
+        let all = self.linearise(&[(model.changes.clone(), model.values.clone())]);
+        all.into_iter().next().unwrap_or(Err(LabError::Interrupted))
+    }
+    /// Time since the beginning [s].
+    fn seconds(&self) -> f64 {
+        0.0
+    }
+    /// Keeps time of the search's for what whoever asks computes himself before the answer [s].
+    fn keep_back(&mut self, _seconds: f64) {}
     /// The scene's character.
     fn setting(&self) -> &Setting;
     /// Free numbers of the scene with these changes.

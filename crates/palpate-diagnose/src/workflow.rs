@@ -11,26 +11,30 @@ mod pairs;
 mod policy;
 mod prune;
 mod race;
+mod ranking;
 mod replace;
 mod rounds;
+mod session;
 mod state;
 mod variants;
 
 use crate::cells::{Cells, Table};
-use crate::change::{Change, candidates};
-use crate::crossval::{Predicted, foldings, predict};
+use crate::change::Change;
+use crate::crossval::{Predicted, predict};
 use crate::diagnosis::{Diagnosis, Found, Tried};
 use crate::judgement::density::Blocks;
 use crate::judgement::prior::{Prior, Strange};
 use crate::judgement::rule::Judged;
 use crate::laboratory::{Field, LabError, Laboratory, Model, Reading, Readings};
 use crate::locate::{Place, locate};
+use crate::movement::Movement;
 use crate::noise::{Shapes, design_effect, neighbour_ratio};
 use crate::null::{Block, Frame, extended, map};
 use crate::score::Score;
 use crate::still::still_ratio;
 use candidate::CandidateId;
 pub use policy::Policy;
+use ranking::{Early, Ranked};
 use variants::{Variant, most_promising};
 
 /// How to diagnose.
@@ -133,6 +137,16 @@ struct Session<'a> {
     noise: Shapes,
     /// Variants of the baseline, scored while the noise was being found out; the first round takes them over.
     scored: Option<Vec<Variant>>,
+    /// Candidates from the first look at the baseline.
+    early: Early,
+    /// Candidates by what their sensitivities promise.
+    ranked: Vec<Ranked>,
+    /// What candidates that were fitted, and are no worse than the model without them, do to the free numbers.
+    rivals: Vec<Movement>,
+    /// The baseline, which movements begin at.
+    base: Model,
+    /// True where there was no time to find out what cells and step explain of the baseline.
+    unrefined: bool,
     /// Answers of [`Session::finer`], with the models that it was asked about: a candidate that is chosen was measured already.
     finer: Vec<(Model, Vec<Field>)>,
     tried: Vec<Tried>,
@@ -145,63 +159,71 @@ struct Session<'a> {
 const STRANGE: f64 = 3.0;
 /// Share of the baseline's readings that a model must meet for its residuals to tell of the noise.
 const KEPT: f64 = 0.95;
-/// Diagnoses a scene from its fitted baseline.
+/// Diagnoses a scene from where the fit of its own numbers starts, or from their fitted values. From the first residuals on there is an answer,
+/// and whatever ends the search ends with what is known by then: a ranking of candidates by their sensitivities at the start, the same at the
+/// fitted values, and then what the rounds bring.
 ///
 /// # Errors
-/// The baseline cannot be computed, or it was interrupted before anything was known.
-pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) -> Result<Diagnosis, LabError> {
-    lab.say("residuals of the baseline");
-    let readings = one(lab.linearise(&[(baseline.changes.clone(), baseline.values.clone())]))?;
-    let mut cells = Cells::new(&readings);
-    if cells.is_empty() {
-        return Err(LabError::failed("no part of the recording meets the simulated body: nothing can be diagnosed"));
-    }
-    let noise_ratio = noise_over_stated(lab, &readings);
-    for (sd, k) in cells.sd.iter_mut().zip(&cells.keys) {
-        *sd *= if k.stream.sensor.is_camera() { noise_ratio } else { 1.0 };
-    }
-    let (folds, blocks, count) = (foldings(&cells), Blocks::new(&cells), candidates(lab.setting()).len());
-    let mut s = Session {
-        lab,
-        options,
-        cells,
-        folds,
-        blocks,
-        second: None,
-        candidates: count,
-        noise_ratio,
-        design_effect: 1.0,
-        noise: Shapes::default(),
-        scored: None,
-        finer: Vec::new(),
-        tried: Vec::new(),
-        not_tried: Vec::new(),
-        no_time: false,
+/// The starting model or the baseline cannot be computed, or it was stopped before anything was known.
+pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Result<Diagnosis, LabError> {
+    lab.say("residuals of the model");
+    let mut s = Session::new(lab, options, &start);
+    let (mut baseline, mut out) = (start, Progress::default());
+    let readings = if s.lab.is_fitted() {
+        one(s.lab.linearise(&[(baseline.changes.clone(), baseline.values.clone())]))?
+    } else {
+        let early = s.first_look(&baseline)?;
+        let fitted = s.lab.baseline(baseline)?;
+        out.cut = fitted.cut.is_some();
+        out.unsure = fitted.cut.map(|why| format!("the baseline's fit was cut short: {why}"));
+        baseline = fitted.model;
+        match (s.lab.last_look(&baseline), early) {
+            (Ok(readings), _) => readings,
+            // What is known is known of the start.
+            (Err(why @ (LabError::NoTime | LabError::Interrupted)), Some(early)) => {
+                return Ok(s.conclude_early(early, baseline, out, &why));
+            }
+            (Err(why), _) => return Err(why),
+        }
     };
-    let fields = s.finer(&baseline);
-    let unsure = s.lab.interrupted();
-    let mut state = s.state(baseline.clone(), readings, fields, true, None)?;
-    state.held_out_finer = s.held_out_finer(&state);
-    s.correlate(&mut state);
+    s.begin(&baseline, &readings)?;
+    let mut state = s.state(baseline.clone(), readings, Vec::new(), true, None)?;
+    let complete = s.look(&state, 1, !out.cut)?;
+    s.no_time |= !complete && !s.lab.interrupted();
+    if !out.cut {
+        state.fields = s.finer(&baseline);
+        state.held_out_finer = s.held_out_finer(&state);
+        s.remeasure(&mut state);
+    }
+    if s.unrefined {
+        let why = if s.lab.interrupted() { "the diagnosis was interrupted" } else { "the time was over" };
+        out.unsure.get_or_insert_with(|| format!("{why} before the baseline and its noise were known"));
+    }
+    s.correlate(&mut state, complete && !out.cut);
     s.look_elsewhere(&mut state);
     let mut first = (state.readings.clone(), s.grid(&state));
-    let mut out = Progress { unsure, ..Progress::default() };
     let mut blocks;
     let mut base = state.clone();
     let mut rounds: Vec<(State, Vec<Found>)> = Vec::new();
     loop {
+        let began = s.lab.seconds();
         blocks = s.map(&state);
+        s.keep_back(began);
         if out.places.is_none() {
             out.places = Some(locate(&s.cells, &blocks, s.lab.setting()));
             out.blocks.clone_from(&blocks);
         }
         out.interrupted = s.lab.interrupted();
-        if !s.is_worth_a_look(&state) || out.accepted.len() >= options.search.rounds || out.interrupted {
+        let wanted = out.cut || (s.is_worth_a_look(&state) && out.accepted.len() < options.search.rounds);
+        if !wanted {
             break;
         }
-        if s.lab.out_of_time() {
-            s.no_time = true;
-            s.not_tried.push("whatever a further round would have tried: no time left".into());
+        if out.interrupted || out.cut || s.lab.out_of_time() {
+            out.open = true;
+            s.no_time |= !out.interrupted;
+            if !out.accepted.is_empty() && !out.interrupted {
+                s.not_tried.push("whatever a further round would have tried: no time left".into());
+            }
             break;
         }
         match s.round(&state, out.accepted.len() + 1) {
@@ -210,6 +232,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, baseline: Model, options: &Options) ->
                     state = better;
                     if out.accepted.is_empty() {
                         (base, out.places) = (state.clone(), None);
+                        s.base = base.model.clone();
                         first = (state.readings.clone(), s.grid(&state));
                     }
                     continue;
@@ -265,7 +288,12 @@ struct Progress {
     /// The baseline's residuals in blocks.
     blocks: Vec<Block>,
     interrupted: bool,
-    unsure: bool,
+    /// True where the baseline's fit ended before its end.
+    cut: bool,
+    /// True where there was a reason to look for what is missing, and no time.
+    open: bool,
+    /// Why it is not even sure that something is missing.
+    unsure: Option<String>,
 }
 
 /// Noise of single depth readings over the stated one, by whichever look at it finds more.
@@ -334,10 +362,11 @@ impl Session<'_> {
         self.judge(state);
     }
 
-    /// Finds how much more cells scatter than independent readings would, and rescales everything by it.
-    fn correlate(&mut self, state: &mut State) {
-        // Asked to stop: what is known without any candidate.
-        let variants = self.variants(state).unwrap_or_default();
+    /// Finds how much more cells scatter than independent readings would, beside all candidates or those of the first look, and rescales
+    /// everything by it.
+    fn correlate(&mut self, state: &mut State, all: bool) {
+        let more = if all && !self.lab.interrupted() { self.variants(state).ok() } else { None };
+        let variants = more.filter(|v| !v.is_empty()).unwrap_or_else(|| self.early.variants.clone());
         let mut saturated = state.frame.absorbed.clone();
         let mut best: Vec<&Variant> = variants.iter().collect();
         best.sort_by(|a, b| most_promising(a, b));
@@ -363,6 +392,8 @@ impl Session<'_> {
                 Score { gain: v.score.share * state.squares(), ..std::mem::take(&mut v.score) }
             };
         }
+        self.rank(state, 1, &variants);
+        self.early = Early::default();
         self.scored = Some(variants);
     }
 

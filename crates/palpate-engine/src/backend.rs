@@ -152,6 +152,10 @@ pub trait Backend: Send {
         None
     }
 
+    /// Waits until what is still to be computed of the stages that were handed over is no more than a few of them: a rollout that may be
+    /// stopped calls it between stages, because nothing that was handed over can be taken back.
+    fn keep_pace(&self, _world: &mut Self::World) {}
+
     /// True when every member has failed, so that the rest of the rollout can be skipped. A backend that would have to
     /// wait for the answer returns `false`.
     fn all_failed(&self, tally: &Self::Tally) -> bool;

@@ -11,6 +11,7 @@ mod product;
 mod residuals;
 mod rollout;
 mod rows;
+mod stop;
 mod tape;
 
 pub use backend::{Backend, BuildError};
@@ -19,3 +20,4 @@ pub use failure::{Failure, FailureKind, number};
 pub use residuals::{FrameResiduals, Misfit, ReadingResidual};
 pub use rollout::{Rollout, Snapshot};
 pub use rows::{Linearised, ResidualRow, Rows, Source, Stream};
+pub use stop::Stop;

@@ -4,9 +4,9 @@ use crate::backend::Backend;
 use crate::evaluate::{Direction, Evaluation, Request, Wanted};
 use crate::failure::Failure;
 use crate::rollout::stopped;
+use crate::stop::Stop;
 use crate::tape::{Adjoints, Tape};
 use palpate_model::plan::scheme::Stage;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Every state of one member at one θ `[P]`.
 pub(crate) struct Held<B: Backend> {
@@ -18,7 +18,7 @@ pub(crate) struct Held<B: Backend> {
 pub(crate) fn product<B: Backend>(
     b: &B,
     w: &mut B::World,
-    (stages, stop): (&[Stage], &AtomicBool),
+    (stages, stop): (&[Stage], &Stop),
     states: &Tape<B::State>,
     v: &[f64],
     wanted: &Wanted,
@@ -29,7 +29,10 @@ pub(crate) fn product<B: Backend>(
     b.start_tangent(w, states.get(0), &mut first, &mut tally);
     let mut tangents = Tape::new(stages, first, true);
     for s in stages {
-        if stop.load(Ordering::SeqCst) {
+        if stop.can_end() {
+            b.keep_pace(w);
+        }
+        if stop.is_over() {
             b.read(w, &tally);
             return Err(stopped());
         }
@@ -50,7 +53,10 @@ pub(crate) fn product<B: Backend>(
         adjoints.put(0, adj_now);
     }
     for s in stages.iter().rev() {
-        if stop.load(Ordering::SeqCst) {
+        if stop.can_end() {
+            b.keep_pace(w);
+        }
+        if stop.is_over() {
             b.read(w, &tally);
             return Err(stopped());
         }

@@ -6,13 +6,12 @@ use crate::failure::{Failure, FailureKind};
 use crate::product::{Held, product};
 use crate::residuals::FrameResiduals;
 use crate::rows::{Linearised, Rows};
+use crate::stop::Stop;
 use crate::tape::{Adjoints, Tape};
 use glam::DVec3;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A plan on a backend, ready to be evaluated for batches of θ.
 pub struct Rollout<B: Backend> {
@@ -23,8 +22,8 @@ pub struct Rollout<B: Backend> {
     members: usize,
     /// The way forward that products were last asked for; it holds as long as the world has its θ.
     held: Option<Held<B>>,
-    /// Ends an evaluation at its next stage when set.
-    stop: Arc<AtomicBool>,
+    /// Ends an evaluation at its next stage.
+    stop: Stop,
 }
 
 /// One instant of one member, for reports.
@@ -54,7 +53,7 @@ struct Moment<'a, B: Backend> {
 struct Forward<'a, B: Backend> {
     backend: &'a B,
     stages: &'a [Stage],
-    stop: &'a AtomicBool,
+    stop: &'a Stop,
     /// What tangents are taken along, if they are wanted: single residuals are read beside them, also where there are none.
     directions: Option<&'a [Direction]>,
     /// Every state is kept, for the way back.
@@ -90,7 +89,10 @@ impl<B: Backend> Forward<'_, B> {
         let now = states.last();
         let mut flow = visit(Moment { world: w, step: None, ends: [now; 2], tangents: start, tally });
         for s in self.stages {
-            if self.stop.load(Ordering::SeqCst) {
+            if self.stop.can_end() {
+                b.keep_pace(w);
+            }
+            if self.stop.is_over() {
                 // What was begun is waited for, so that the world is idle when it is used again.
                 b.read(w, tally);
                 return ControlFlow::Break(());
@@ -135,7 +137,10 @@ impl<B: Backend> Forward<'_, B> {
             adjoints.put(0, adj_now);
         }
         for s in self.stages.iter().rev() {
-            if self.stop.load(Ordering::SeqCst) {
+            if self.stop.can_end() {
+                b.keep_pace(w);
+            }
+            if self.stop.is_over() {
                 b.read(w, tally);
                 return ControlFlow::Break(());
             }
@@ -159,13 +164,13 @@ impl<B: Backend> Rollout<B> {
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
         let stages = plan.clock.stages();
-        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), held: None, stop: Arc::default() })
+        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), held: None, stop: Stop::default() })
     }
 
-    /// The same rollout, whose evaluations end at their next step once `stop` is set; every member then fails as
+    /// The same rollout, whose evaluations end at their next stage once `stop` says so; every member then fails as
     /// [`FailureKind::Stopped`].
     #[must_use]
-    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+    pub fn stopped_by(self, stop: Stop) -> Self {
         Rollout { stop, ..self }
     }
 
@@ -182,12 +187,12 @@ impl<B: Backend> Rollout<B> {
     /// Evaluates a batch of at most as many members as there is room for.
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
         self.held = None;
-        let (b, stop, stages) = (&self.backend, &*self.stop, &self.stages);
+        let (b, stop, stages) = (&self.backend, &self.stop, &self.stages);
         let directions = Direction::parameters(&request.sensitivities);
         let wanted = Some(directions.as_slice()).filter(|d| !d.is_empty());
         let forward = Forward { backend: b, stages, stop, directions: wanted, keep: request.gradient.any() };
         let attempt = |w: &mut B::World| {
-            if stop.load(Ordering::SeqCst) {
+            if stop.is_over() {
                 return None;
             }
             b.set_params(w, theta);
@@ -220,7 +225,7 @@ impl<B: Backend> Rollout<B> {
     ) -> Result<Evaluation, Failure> {
         self.held = None;
         let (b, dt) = (&self.backend, self.plan.clock.step);
-        let (stages, stop) = (&self.stages, &*self.stop);
+        let (stages, stop) = (&self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: false };
         b.rollout(&mut self.world, true, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
@@ -248,7 +253,7 @@ impl<B: Backend> Rollout<B> {
         self.held = None;
         let b = &self.backend;
         let along = Direction::parameters(directions);
-        let (stages, stop) = (&self.stages, &*self.stop);
+        let (stages, stop) = (&self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: Some(&along), keep: false };
         b.rollout(&mut self.world, true, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
@@ -299,7 +304,7 @@ impl<B: Backend> Rollout<B> {
             return Ok(());
         }
         self.held = None;
-        let (b, stages, stop) = (&self.backend, &self.stages, &*self.stop);
+        let (b, stages, stop) = (&self.backend, &self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: true };
         let states = b.rollout(&mut self.world, false, |w| {
             b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
@@ -349,7 +354,7 @@ impl<B: Backend> Evaluate for Rollout<B> {
 
     fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
         self.hold(theta)?;
-        let (b, ways) = (&self.backend, (&self.stages[..], &*self.stop));
+        let (b, ways) = (&self.backend, (&self.stages[..], &self.stop));
         let states = &self.held.as_ref().expect("a way forward was just kept").states;
         b.rollout(&mut self.world, false, |w| product(b, w, ways, states, v, wanted))
     }

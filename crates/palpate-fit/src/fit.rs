@@ -8,9 +8,8 @@ use crate::optimise::{Sample, Status};
 use crate::problem::{Problem, Want};
 use crate::settings::{ErrorModel, Settings, Walk};
 use crate::uncertainty::{self, Uncertainty};
-use palpate_engine::MOST_SENSITIVITIES;
+use palpate_engine::{MOST_SENSITIVITIES, Stop};
 use palpate_model::params::Transform;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Why a fit has no result.
@@ -65,9 +64,9 @@ pub type Lead<'a> = dyn FnMut(&[Vec<f64>]) -> Vec<Option<Vec<f64>>> + 'a;
 pub struct Hooks<'a> {
     /// Called for every iteration of every start, in the same order in every run.
     pub on_iteration: Option<&'a mut dyn FnMut(&Progress)>,
-    /// When set, every start stops before its next evaluation and keeps its best point; an evaluation that the physics itself cut
-    /// short ([`palpate_engine::FailureKind::Stopped`]) ends its start alike.
-    pub interrupt: Option<&'a AtomicBool>,
+    /// Once it says so, every start stops before its next evaluation and keeps its best point; an evaluation that the physics itself
+    /// cut short ([`palpate_engine::FailureKind::Stopped`]) ends its start alike.
+    pub interrupt: Stop,
     /// Journal of evaluations, for resuming.
     pub journal: Option<JournalFile>,
     /// Told θ of every scene at the best point, says how many residuals count as one independent reading there; 1 without it.
@@ -220,7 +219,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     let z = starts[best].outcome.z.clone();
     let cut = match &broken {
         Some(_) => Some("the fit broke off"),
-        None => hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst)).then_some("the fit was interrupted"),
+        None => hooks.interrupt.is_over().then_some("the fit was interrupted"),
     };
     let theta: Vec<Vec<f64>> = (0..problem.scenes().len()).map(|s| problem.theta(s, &values)).collect();
     // Data whose errors go together say less; never more.

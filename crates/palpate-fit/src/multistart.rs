@@ -12,7 +12,6 @@ use crate::settings::{Settings, Walk};
 use palpate_engine::FailureKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// A start whose first evaluation fails is drawn anew so many times.
@@ -295,7 +294,7 @@ fn broker(
         if asked.iter().all(Option::is_none) {
             return Ok(done.into_iter().flatten().collect());
         }
-        let interrupted = hooks.interrupt.is_some_and(|i| i.load(Ordering::SeqCst));
+        let interrupted = hooks.interrupt.is_over();
         let mut stop = broken.clone().map(Stop::Broken).or(interrupted.then_some(Stop::Interrupted));
         // Samples wait for the starts that still want products, so that they are computed together.
         let wait = asked.iter().any(|a| matches!(a, Some(Ask::Product(..))));

@@ -234,6 +234,10 @@ impl Backend for GpuBackend {
         }))
     }
 
+    fn keep_pace(&self, world: &mut World) {
+        world.keep_pace();
+    }
+
     fn all_failed(&self, _tally: &Tally) -> bool {
         // The answer lies on the device; a broken device is known here and ends the rollout.
         self.gpu.troubled()

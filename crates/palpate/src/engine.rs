@@ -5,14 +5,13 @@ use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{
-    Backend as _, Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Wanted,
+    Backend as _, Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Stop, Wanted,
 };
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::observation::Frame;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -211,14 +210,14 @@ impl Backend {
     /// # Errors
     /// There is no usable adapter, or the backend refuses the plan.
     pub fn evaluator(self, plan: &Plan, members: usize) -> Result<Box<dyn Evaluate>, Error> {
-        self.evaluator_until(plan, members, Arc::default())
+        self.evaluator_until(plan, members, Stop::default())
     }
 
-    /// The same, whose evaluations end at their next time step once `stop` is set.
+    /// The same, whose evaluations end at their next stage once `stop` says so.
     ///
     /// # Errors
     /// There is no usable adapter, or the backend refuses the plan.
-    pub fn evaluator_until(self, plan: &Plan, members: usize, stop: Arc<AtomicBool>) -> Result<Box<dyn Evaluate>, Error> {
+    pub fn evaluator_until(self, plan: &Plan, members: usize, stop: Stop) -> Result<Box<dyn Evaluate>, Error> {
         match self.resolve(plan, members).0 {
             Backend::Gpu => {
                 let device = gpu_for(members)?;
@@ -240,13 +239,27 @@ impl Backend {
         theta: &[f64],
         visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
+        self.visit_until(plan, theta, Stop::default(), visit)
+    }
+
+    /// The same, which ends at its next stage once `stop` says so.
+    ///
+    /// # Errors
+    /// As [`Backend::visit`], and where it was stopped.
+    pub fn visit_until(
+        self,
+        plan: &Plan,
+        theta: &[f64],
+        stop: Stop,
+        visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
+    ) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
             Backend::Gpu => {
                 let device = gpu_for(1)?;
                 let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                Ok(Rollout::new(device, plan, 1)?.visit(theta, visit)?)
+                Ok(Rollout::new(device, plan, 1)?.stopped_by(stop).visit(theta, visit)?)
             }
-            _ => Ok(Rollout::new(CpuBackend, plan, 1)?.visit(theta, visit)?),
+            _ => Ok(Rollout::new(CpuBackend, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
         }
     }
 

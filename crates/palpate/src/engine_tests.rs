@@ -238,7 +238,9 @@ fn residuals_of_a_result_come_from_the_cpu_where_the_device_has_none() {
     let e = Experiment::open(&file).unwrap_or_else(|e| panic!("{e}"));
     let theta = &e.plan().theta;
     let mut notes = Vec::new();
-    let at = |backend, notes: &mut Vec<String>| crate::fitting::residuals_at(&e, backend, theta, notes).map(|r| r.rms);
+    let at = |backend, notes: &mut Vec<String>| {
+        crate::fitting::residuals_at(&e, backend, theta, &Stop::default(), notes).map(|r| r.rms)
+    };
     let cpu = at(Backend::Cpu, &mut notes);
     assert!(cpu.as_ref().is_ok_and(|rms| *rms > 0.0) && notes.is_empty(), "{cpu:?} {notes:?}");
     assert_eq!(at(Backend::Gpu, &mut notes).ok(), cpu.ok());

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::fitting::{self, FitOptions, Fitted};
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
-use palpate_engine::{Snapshot, number};
+use palpate_engine::{Snapshot, Stop, number};
 use palpate_io::recording::{ObservationError, Recording};
 use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_error};
 use palpate_model::effects::sensors::Sensors;
@@ -253,7 +253,7 @@ impl Experiment {
     /// # Errors
     /// [`Error::Simulation`] when that fails.
     pub fn residuals(&self, backend: Backend, theta: &[f64]) -> Result<ResidualSummary, Error> {
-        ResidualSummary::new(self, backend, theta)
+        ResidualSummary::new(self, backend, theta, &Stop::default())
     }
 
     /// Finds the free parameters of the scene's `[fit]` table.

@@ -10,7 +10,7 @@ use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
 use crate::results::fit::{FitStatus, Verdict};
 use crate::scatter::Excess;
-use palpate_engine::{Evaluate, Evaluation, Failure, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
+use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, MOST_SENSITIVITIES, ParamBatch, Request, Stop, Wanted};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
 use palpate_io::InputError;
 use palpate_model::observation::ReadingKind;
@@ -53,6 +53,8 @@ pub struct FitOptions<'a> {
     pub threads: Option<usize>,
     /// Stops the fit in good order.
     pub interrupt: Interrupt,
+    /// Once asked to stop nothing more is simulated, also where a report would lack it: who hurries has no use for a report of the fit.
+    pub hurried: bool,
     /// Journal of evaluations, and whether to go on with what it holds.
     pub journal: Option<(PathBuf, bool)>,
     /// Hears of every iteration of every start.
@@ -223,6 +225,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         lead::Guide { experiments, free: &free, backend, settings: &settings, interrupt: &options.interrupt, notes: Vec::new() };
     let mut problem = Problem::new(scenes, free.clone()).map_err(|e| InputError::file(&first.scene().path, e))?;
     let interrupt = options.interrupt.clone();
+    let hurried = options.hurried;
+    let stop = if hurried { interrupt.at_once() } else { Stop::default() };
     let mut history = Vec::new();
     let journal = options.journal.take().map(|(path, resume)| JournalFile { path, resume });
     let mut told = options.on_iteration.take();
@@ -238,9 +242,10 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         let mut after: Vec<ResidualSummary> = Vec::new();
         let mut fault = None;
         let mut worth = |theta: &[Vec<f64>]| {
-            let at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &mut notes);
+            let at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &stop, &mut notes);
             match experiments.iter().zip(theta).map(at).collect() {
                 Ok(all) => after = all,
+                Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => {}
                 Err(e) => fault = Some(e),
             }
             let mut excess = Excess::default();
@@ -250,7 +255,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         let mut lead = |starts: &[Vec<f64>]| guide.lead(starts);
         let hooks = Hooks {
             on_iteration: Some(&mut hear),
-            interrupt: Some(interrupt.flag()),
+            interrupt: interrupt.in_turn(),
             journal,
             design_effect: Some(&mut worth),
             lead: Some(&mut lead),
@@ -264,7 +269,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         // What the fit held on a device is free for what follows.
         drop(problem);
         // Whoever stops does not want to wait for what is only compared with.
-        let before = |(e, t): (&Experiment, &Vec<f64>)| if interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
+        let before =
+            |(e, t): (&Experiment, &Vec<f64>)| if hurried || interrupt.is_urgent() { None } else { e.residuals(backend, t).ok() };
         let before = experiments.iter().zip(&theta_before).map(before).collect();
         Ok((result, theta_before, before, after, notes))
     })?;
@@ -302,12 +308,13 @@ pub(crate) fn residuals_at(
     e: &Experiment,
     backend: Backend,
     theta: &[f64],
+    stop: &Stop,
     notes: &mut Vec<String>,
 ) -> Result<ResidualSummary, Error> {
-    match e.residuals(backend, theta) {
-        Err(why) if backend == Backend::Gpu => {
+    match ResidualSummary::new(e, backend, theta, stop) {
+        Err(why) if backend == Backend::Gpu && !stop.is_over() => {
             notes.push(format!("the residuals of the result were computed on the CPU: {why}"));
-            e.residuals(Backend::Cpu, theta)
+            ResidualSummary::new(e, Backend::Cpu, theta, stop)
         }
         done => done,
     }

@@ -1,15 +1,47 @@
 //! Asking a long computation to stop in good order.
 
+use palpate_engine::Stop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
-/// A request to stop: a running evaluation ends at its next time step; a budget ends between evaluations. Clones share it.
-#[derive(Clone, Debug)]
+/// Time since something began. Clones share the beginning.
+#[derive(Clone)]
+pub struct Clock(Arc<dyn Fn() -> Duration + Send + Sync>);
+
+impl Clock {
+    /// A clock that begins now.
+    pub fn start() -> Clock {
+        let began = Instant::now();
+        Clock::new(move || began.elapsed())
+    }
+
+    /// A clock that shows what this says.
+    pub fn new(elapsed: impl Fn() -> Duration + Send + Sync + 'static) -> Clock {
+        Clock(Arc::new(elapsed))
+    }
+
+    /// Time since the beginning.
+    pub fn elapsed(&self) -> Duration {
+        (self.0)()
+    }
+}
+
+impl Default for Clock {
+    fn default() -> Clock {
+        Clock::start()
+    }
+}
+
+/// A request to stop: a running evaluation ends at its next stage; a budget of evaluations ends between them. Clones share it.
+#[derive(Clone)]
 pub struct Interrupt {
     raised: Arc<AtomicBool>,
     /// Set by [`Interrupt::raise`] alone: the last round of a budget is finished.
     now: Arc<AtomicBool>,
     remaining: Arc<AtomicU64>,
+    /// From when on it counts as raised; each clone may have its own.
+    deadline: Option<(Clock, Duration)>,
 }
 
 impl Default for Interrupt {
@@ -22,7 +54,13 @@ impl Interrupt {
     /// An interrupt that raises itself after so many rounds of evaluations: a budget.
     pub fn after(rounds: u64) -> Interrupt {
         let raised = Arc::new(AtomicBool::new(rounds == 0));
-        Interrupt { raised, now: Arc::default(), remaining: Arc::new(AtomicU64::new(rounds)) }
+        Interrupt { raised, now: Arc::default(), remaining: Arc::new(AtomicU64::new(rounds)), deadline: None }
+    }
+
+    /// The same request, which raises itself at a time of a clock as well; running evaluations end then.
+    #[must_use]
+    pub fn until(&self, clock: &Clock, end: Duration) -> Interrupt {
+        Interrupt { deadline: Some((clock.clone(), end)), ..self.clone() }
     }
 
     /// Asks to stop.
@@ -33,22 +71,29 @@ impl Interrupt {
 
     /// True once it has been raised.
     pub fn is_raised(&self) -> bool {
-        self.raised.load(Ordering::SeqCst)
+        self.raised.load(Ordering::SeqCst) || self.is_late()
     }
 
-    /// The flag that running evaluations look at.
-    pub(crate) fn at_once(&self) -> Arc<AtomicBool> {
-        self.now.clone()
+    /// What running evaluations look at.
+    pub(crate) fn at_once(&self) -> Stop {
+        let own = self.clone();
+        Stop::when(move || own.is_urgent())
     }
 
-    /// True from the moment that somebody asked to stop: what only adds to the answer is left out then.
+    /// What searches look at between evaluations.
+    pub(crate) fn in_turn(&self) -> Stop {
+        let own = self.clone();
+        Stop::when(move || own.is_raised())
+    }
+
+    /// True from the moment that somebody asked to stop, or that the time is over: what only adds to the answer is left out then.
     pub(crate) fn is_urgent(&self) -> bool {
-        self.now.load(Ordering::SeqCst)
+        self.now.load(Ordering::SeqCst) || self.is_late()
     }
 
-    /// The flag itself.
-    pub(crate) fn flag(&self) -> &AtomicBool {
-        &self.raised
+    /// True once its time is over.
+    pub(crate) fn is_late(&self) -> bool {
+        self.deadline.as_ref().is_some_and(|(clock, end)| clock.elapsed() >= *end)
     }
 
     /// Counts a round of evaluations that begins; the last one of the budget raises the flag, and is still finished.
@@ -58,6 +103,12 @@ impl Interrupt {
         if left == 0 {
             self.raised.store(true, Ordering::SeqCst);
         }
+    }
+}
+
+impl std::fmt::Debug for Interrupt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Interrupt").field("raised", &self.is_raised()).finish_non_exhaustive()
     }
 }
 
@@ -71,9 +122,24 @@ mod tests {
         a.clone().count();
         assert!(!a.is_raised());
         a.count();
-        assert!(a.clone().is_raised() && !a.at_once().load(Ordering::SeqCst), "its last round is finished");
+        assert!(a.clone().is_raised() && !a.at_once().is_over(), "its last round is finished");
         a.raise();
-        assert!(a.clone().at_once().load(Ordering::SeqCst));
+        assert!(a.clone().at_once().is_over());
         assert!(!Interrupt::default().is_raised() && Interrupt::after(0).is_raised());
+    }
+
+    #[test]
+    fn a_deadline_ends_the_clone_that_has_it_and_whoever_asks_ends_all() {
+        let time = Arc::new(AtomicU64::new(0));
+        let shown = time.clone();
+        let clock = Clock::new(move || Duration::from_secs(shown.load(Ordering::SeqCst)));
+        let whole = Interrupt::default();
+        let (part, all) = (whole.until(&clock, Duration::from_secs(3)), whole.until(&clock, Duration::from_secs(5)));
+        time.store(2, Ordering::SeqCst);
+        assert!(!part.at_once().is_over());
+        time.store(3, Ordering::SeqCst);
+        assert!(part.at_once().is_over() && part.is_raised() && !all.is_raised() && !whole.is_raised());
+        whole.raise();
+        assert!(all.at_once().is_over() && all.in_turn().is_over() && !all.is_late());
     }
 }

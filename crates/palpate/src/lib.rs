@@ -63,6 +63,6 @@ pub use error::Error;
 pub use experiment::{Experiment, Simulation};
 pub use fitting::{FitOptions, Fitted, FreeNumber, Headline, Parts, fit};
 pub use grid::{GridCheck, GridEffect, grid_check};
-pub use interrupt::Interrupt;
+pub use interrupt::{Clock, Interrupt};
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};

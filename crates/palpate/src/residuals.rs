@@ -15,7 +15,7 @@ use crate::experiment::Experiment;
 use crate::render::{DepthImage, Pinhole, rasterise};
 use crate::scatter::{Excess, Scatter};
 use glam::DVec3;
-use palpate_engine::{FrameResiduals, Misfit, Snapshot};
+use palpate_engine::{FrameResiduals, Misfit, Snapshot, Stop};
 use palpate_io::recording::RecordedCamera;
 use palpate_model::cutcells::band_lookup::BandLookup;
 use palpate_model::effects::sensors::Sensors;
@@ -92,7 +92,8 @@ fn mean_square(observation: &Observation, kind: ReadingKind, shortened: f64) -> 
 }
 
 impl ResidualSummary {
-    pub(crate) fn new(experiment: &Experiment, backend: Backend, theta: &[f64]) -> Result<ResidualSummary, Error> {
+    /// Of a simulation with parameters θ `[P]`; an error where it was stopped.
+    pub(crate) fn new(experiment: &Experiment, backend: Backend, theta: &[f64], stop: &Stop) -> Result<ResidualSummary, Error> {
         let plan = experiment.plan();
         let observation = &plan.observation;
         let with_points: Vec<usize> =
@@ -102,7 +103,7 @@ impl ResidualSummary {
         let mut frames = BTreeMap::new();
         let (mut cos2, mut seen) = (0.0, 0usize);
         let mut scatter = Scatter::default();
-        let cost = visit_frames(plan, backend, theta, |frame, displacement, r| {
+        let cost = visit_frames(plan, backend, theta, stop, |frame, displacement, r| {
             scatter.add(plan, r);
             frames.insert(frame, FrameResidual::new(observation.frames[frame].time, r));
             if wanted.contains(&frame) {
@@ -149,16 +150,17 @@ pub(crate) fn spread(numbers: &[usize], count: usize) -> Vec<usize> {
 }
 
 /// Simulates and hands every frame to `visit`: its number, the displacement at its time (computed when asked for) and its
-/// residuals. Returns the cost.
+/// residuals. Returns the cost; an error where it was stopped.
 pub(crate) fn visit_frames(
     plan: &Plan,
     backend: Backend,
     theta: &[f64],
+    stop: &Stop,
     mut visit: impl FnMut(usize, &dyn Fn() -> Vec<DVec3>, &FrameResiduals),
 ) -> Result<f64, Error> {
     let start = theta[plan.layout.index(ParamKey::TimeStart)] + Sensors::new(&plan.layout, theta).ahead();
     let mut last: Option<Snapshot> = None;
-    let evaluation = backend.visit(plan, theta, |_, state, residuals| {
+    let evaluation = backend.visit_until(plan, theta, stop.clone(), |_, state, residuals| {
         for r in &residuals {
             let time = plan.observation.frames[r.frame].time - start;
             let displacement = || last.as_ref().map_or_else(|| state.displacement.clone(), |a| between(a, &state, time));

@@ -320,3 +320,45 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
     assert!(second["cost"]["final"].as_f64() <= first["cost"]["final"].as_f64(), "{first} {second}");
     assert!(path("out/previous-1/result.json").exists(), "the first result is kept");
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_diagnosis_ends_within_two_seconds_with_what_it_knows() {
+    let (folder, scene) = scene();
+    let path = |name: &str| folder.path().join(name);
+    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
+    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\niterations = 20\n\
+               [[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1.0e4\n";
+    // Cells so small that the whole diagnosis takes minutes.
+    let fine = BLOCK.replace("cell_size = 0.02", "cell_size = 0.008");
+    assert_ne!(fine, BLOCK);
+    fs::write(path("fine.toml"), fine + fit).expect("writable");
+    let size = |name: &str| fs::metadata(path(name)).map_or(0, |m| m.len());
+    // In the fit of the baseline, and in the search.
+    for begun in ["out/journal.jsonl", "out/checkpoint.jsonl"] {
+        let mut diagnosis = program();
+        diagnosis.arg("diagnose").arg(path("fine.toml")).args(["--backend", "cpu", "--out"]).arg(path("out"));
+        let mut diagnosis = Running(diagnosis.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts"));
+        let clock = Instant::now();
+        while size(begun) < 200 {
+            assert!(diagnosis.0.try_wait().expect("it can be waited for").is_none(), "it has ended");
+            assert!(clock.elapsed() < Duration::from_secs(300), "nothing happens");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let asked = Instant::now();
+        assert!(Command::new("kill").args(["-INT", &diagnosis.0.id().to_string()]).status().expect("kill is there").success());
+        let code = diagnosis.0.wait().expect("it ends").code();
+        let taken = asked.elapsed();
+        assert_eq!(code, Some(130));
+        assert!(taken < Duration::from_secs(2), "{begun}: {taken:?}");
+        let text = fs::read_to_string(path("out/diagnosis.json")).expect("what is known is written");
+        let result: Value = serde_json::from_str(&text).expect("it is JSON");
+        assert_eq!((&result["verdict"], &result["interrupted"]), (&"undecided".into(), &true.into()), "{begun}");
+        let tried = result["tried"].as_array().expect("candidates are listed");
+        let open = tried.iter().filter(|t| t["status"] == "not yet fitted" && t["promised"].is_number());
+        assert!(open.count() > 10, "{begun}: {text}");
+        assert!(path("out/report.html").exists() && path("out/model.toml").exists(), "{begun}");
+        fs::remove_dir_all(path("out")).expect("removable");
+    }
+}

@@ -22,6 +22,13 @@ pub struct Strange {
     pub deviations: f64,
 }
 
+impl Strange {
+    /// True where it says something against the model.
+    pub fn is_evidence(&self) -> bool {
+        self.deviations > 0.0
+    }
+}
+
 /// Prior of models of one recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {

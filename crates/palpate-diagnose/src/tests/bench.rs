@@ -31,6 +31,10 @@ pub struct Bench {
     pub no_slack: bool,
     /// True once somebody has asked to stop.
     pub stopped: bool,
+    /// True while its own numbers are still to be fitted.
+    pub unfitted: bool,
+    /// Simulations that it makes before it answers everything so.
+    pub limit: Option<(usize, LabError)>,
     /// Iterations that there is time for.
     pub iterations: usize,
     /// Stiffness beyond which no fit gets anywhere.
@@ -124,11 +128,37 @@ impl Bench {
             slow: Vec::new(),
             no_slack: false,
             stopped: false,
+            unfitted: false,
+            limit: None,
             iterations: usize::MAX,
             marsh: f64::INFINITY,
             grid: 2e-4,
             body: 0.05,
         }
+    }
+
+    /// Where the fit of its own numbers starts: a little off.
+    pub fn start(&self) -> Model {
+        let numbers = self.numbers(&[]).unwrap();
+        let values: Vec<f64> = numbers.iter().map(|n| n.start + 5.0 * NOISE).collect();
+        Model { changes: Vec::new(), errors: vec![Some(0.1 * NOISE); values.len()], values, numbers }
+    }
+
+    /// Counts a simulation, as long as there may be another one.
+    fn simulate(&mut self) -> Result<(), LabError> {
+        match &mut self.limit {
+            Some((0, why)) => Err(why.clone()),
+            Some((left, _)) => {
+                *left -= 1;
+                Ok(())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Why there will be no other simulation, if so.
+    fn over(&self) -> Option<&LabError> {
+        self.limit.as_ref().filter(|(left, _)| *left == 0).map(|(_, why)| why)
     }
 
     /// Name of the pattern of the first number of an effect.
@@ -213,15 +243,43 @@ impl Laboratory for Bench {
         Ok(out)
     }
 
+    fn is_fitted(&self) -> bool {
+        !self.unfitted
+    }
+
+    /// One simulation for each of three steps: a third of the way, two thirds, all of it.
+    fn baseline(&mut self, start: Model) -> Result<Baseline, LabError> {
+        self.unfitted = false;
+        let best = {
+            let mut whole = Bench { limit: None, ..Bench::new(0, &[], false) };
+            (whole.rough, whole.hidden) = (self.rough.clone(), self.hidden.clone());
+            whole.baseline()
+        };
+        let mut model = start.clone();
+        for step in 1..=3 {
+            if self.simulate().is_err() {
+                return Ok(Baseline { model, cut: Some(format!("the search was stopped after {} iterations", step - 1)) });
+            }
+            let way = f64::from(step) / 3.0;
+            model.values = start.values.iter().zip(&best.values).map(|(a, b)| a + way * (b - a)).collect();
+        }
+        Ok(Baseline { model, cut: None })
+    }
+
     fn costs(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<f64> {
-        tries.iter().map(|(c, v)| self.readings(c, v, v.len()).cost).collect()
+        let mut one = |(c, v): &(Vec<Change>, Vec<f64>)| match self.simulate() {
+            Ok(()) => self.readings(c, v, v.len()).cost,
+            Err(_) => f64::INFINITY,
+        };
+        tries.iter().map(&mut one).collect()
     }
 
     fn fit(&mut self, tries: &[Start], _: usize, _: f64) -> Vec<Result<Fit, LabError>> {
-        let one = |Start { changes, values, .. }: &Start| {
+        let mut one = |Start { changes, values, .. }: &Start| {
             if changes.last().is_some_and(|c| self.slow.contains(&c.kind())) {
                 return Err(LabError::NoTime);
             }
+            self.simulate()?;
             let r = self.readings(changes, values, 0);
             let columns: Vec<Vec<f64>> =
                 (0..r.columns).map(|k| r.sensitivity.iter().skip(k).step_by(r.columns).copied().collect()).collect();
@@ -240,7 +298,7 @@ impl Laboratory for Bench {
                 settled: true,
             })
         };
-        tries.iter().map(one).collect()
+        tries.iter().map(&mut one).collect()
     }
 
     fn linearise(&mut self, tries: &[(Vec<Change>, Vec<f64>)]) -> Vec<Result<Readings, LabError>> {
@@ -249,14 +307,28 @@ impl Laboratory for Bench {
 
     fn linearise_new(&mut self, tries: &[(Vec<Change>, Vec<f64>)], from: usize) -> Vec<Result<Readings, LabError>> {
         let is_slack = |c: &[Change]| c.last().is_some_and(|c| c.kind() == "slack");
-        let one = |(c, v): &(Vec<Change>, Vec<f64>)| match self.no_slack && is_slack(c) {
-            true => Err(LabError::NoTime),
-            false => Ok(self.readings(c, v, from)),
-        };
-        tries.iter().map(one).collect()
+        let mut out = Vec::new();
+        // Eight of them take one simulation.
+        for chunk in tries.chunks(8) {
+            let simulated = self.simulate();
+            let one = |(c, v): &(Vec<Change>, Vec<f64>)| match self.no_slack && is_slack(c) {
+                true => Err(LabError::NoTime),
+                false => Ok(self.readings(c, v, from)),
+            };
+            match simulated {
+                Ok(()) => out.extend(chunk.iter().map(one)),
+                Err(why) => out.resize_with(tries.len(), || Err(why.clone())),
+            }
+        }
+        out.truncate(tries.len());
+        out
     }
 
     fn finer(&mut self, _: &[Change], _: &[f64]) -> Result<Vec<Field>, LabError> {
+        if self.stopped {
+            return Err(LabError::Interrupted);
+        }
+        self.simulate()?;
         let at = |i: usize| pattern("grid", self.rest[i % POINTS], (i / POINTS) as f64 / FRAMES as f64);
         let change = (0..FRAMES * POINTS).map(|i| Some(self.grid * at(i))).collect();
         Ok(vec![Field::refined("grid", change)])
@@ -271,7 +343,7 @@ impl Laboratory for Bench {
     }
 
     fn out_of_time(&self) -> bool {
-        false
+        matches!(self.over(), Some(LabError::NoTime))
     }
 
     fn iterations_left(&self) -> usize {
@@ -279,7 +351,7 @@ impl Laboratory for Bench {
     }
 
     fn interrupted(&self) -> bool {
-        self.stopped
+        self.stopped || matches!(self.over(), Some(LabError::Interrupted))
     }
 
     fn say(&mut self, what: &str) {

@@ -2,10 +2,11 @@
 
 use super::bench::{Bench, NOISE};
 use crate::cells::Cells;
-use crate::diagnosis::Verdict;
+use crate::change::candidates;
+use crate::diagnosis::{Diagnosis, Verdict};
 use crate::judgement::density::{Blocks, Linear};
 use crate::judgement::rule::Judged;
-use crate::laboratory::Laboratory;
+use crate::laboratory::{LabError, Laboratory};
 use crate::linear::dot;
 use crate::noise::design_effect;
 use crate::null::Frame;
@@ -171,8 +172,92 @@ fn who_stops_before_the_noise_is_known_is_told_no_more_than_that() {
     bench.stopped = true;
     let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
     assert_eq!(d.verdict, Verdict::Undecided);
-    assert!(d.interrupted && d.unsure && d.effects.is_empty());
+    assert!(d.interrupted && d.unsure.is_some() && d.effects.is_empty());
     assert!(d.sentence().starts_with("Nothing is decided: the diagnosis was interrupted"), "{}", d.sentence());
+}
+
+/// Kinds that an answer lists, fitted or not.
+fn listed(d: &Diagnosis) -> std::collections::BTreeSet<String> {
+    let named = d.tried.iter().map(|t| t.kind.as_str());
+    named.chain(d.not_tried.iter().filter_map(|n| n.split(": ").next())).map(String::from).collect()
+}
+
+#[test]
+fn whatever_stops_it_there_is_a_ranking_from_the_first_residuals_on() {
+    let hidden = Bench::first_pattern("uniform-force");
+    let kinds = candidates(Bench::new(9, &[], false).setting()).iter().map(|c| c.kind().to_string()).collect();
+    for why in [LabError::NoTime, LabError::Interrupted] {
+        let mut cut = 0;
+        for simulations in [0, 1, 2, 4, 8, 9, 10, 11, 12, 13, 14, 20, 40] {
+            let mut bench = Bench::new(9, &[(&hidden, -2.0 * NOISE)], false);
+            (bench.unfitted, bench.limit) = (true, Some((simulations, why.clone())));
+            let start = bench.start();
+            let answer = diagnose(&mut bench, start, &Options::default());
+            if simulations == 0 {
+                assert!(answer.is_err(), "not even the starting model is known");
+                continue;
+            }
+            let d = answer.unwrap();
+            let said = d.sentence();
+            assert_eq!(d.verdict, Verdict::Undecided, "{simulations}: {said}");
+            assert_eq!(d.interrupted, matches!(why, LabError::Interrupted), "{simulations}: {said}");
+            let all: std::collections::BTreeSet<String> = listed(&d);
+            assert!(all.is_superset(&kinds), "{simulations}: {all:?}");
+            let early = said.starts_with("Nothing is decided: the baseline's fit was cut short: the search was stopped after ");
+            cut += usize::from(early);
+            // One simulation tells of eight candidates.
+            assert!(simulations < 2 || d.not_yet_fitted().len() >= 8, "{simulations}: {said}");
+            if simulations > 10 {
+                let best = d.not_yet_fitted()[0];
+                assert_eq!(best.kind, "uniform-force", "{simulations}: {said}");
+                assert!(best.promised > 0.8 && d.movements.iter().any(|m| m.candidate == best.kind && !m.fitted));
+            }
+        }
+        // Each of its three iterations, and those in which nothing is left for it.
+        assert!(cut >= 3, "{cut}");
+    }
+}
+
+#[test]
+fn a_fit_of_the_baseline_on_the_way_changes_nothing_where_there_is_time() {
+    let hidden = [(Bench::first_pattern("uniform-force"), -1.5 * NOISE)];
+    let hidden: Vec<(&str, f64)> = hidden.iter().map(|(n, x)| (n.as_str(), *x)).collect();
+    let mut bench = Bench::new(5, &hidden, false);
+    let baseline = bench.baseline();
+    let fitted = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    (bench.unfitted, bench.limit) = (true, None);
+    let start = bench.start();
+    let whole = diagnose(&mut bench, start, &Options::default()).unwrap();
+    assert_eq!((whole.verdict, whole.effects.len()), (Verdict::MissingEffect, fitted.effects.len()), "{}", whole.sentence());
+    assert_eq!(whole.tried.iter().map(|t| &t.kind).collect::<Vec<_>>(), fitted.tried.iter().map(|t| &t.kind).collect::<Vec<_>>());
+    assert!(whole.tried.iter().all(|t| !t.open) && whole.not_tried.is_empty(), "{:?}", whole.not_tried);
+}
+
+#[test]
+fn what_is_named_is_said_to_move_the_free_numbers() {
+    // A force, as the second pattern of which a share is what stiffness does.
+    let force = Bench::first_pattern("uniform-force");
+    let mut bench = Bench::new(5, &[(&force, -20.0 * NOISE)], false);
+    let mut baseline = bench.baseline();
+    baseline.errors = vec![Some(1e-5); baseline.values.len()];
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!((d.verdict, d.effects[0].kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", d.sentence());
+    let moved = &d.movements[0];
+    let k = d.baseline.numbers.iter().position(|n| n.path == moved.path).unwrap();
+    assert!(moved.fitted && moved.before == d.baseline.values[k] && moved.after == d.model.values[k], "{moved:?}");
+    let farthest = (0..2).map(|k| (d.model.values[k] - d.baseline.values[k]).abs()).fold(0.0, f64::max);
+    assert!((moved.after - moved.before).abs() == farthest && d.sentence().contains(&moved.sentence()), "{}", d.sentence());
+}
+
+#[test]
+fn an_adequate_answer_says_what_it_does_not_exclude() {
+    // Amplitudes that leave less than they cost, in a bench whose numbers are said to be known well.
+    let mut bench = Bench::new(7, &[(&Bench::first_pattern("uniform-force"), -0.08 * NOISE)], false);
+    let mut baseline = bench.baseline();
+    baseline.errors = vec![Some(1e-7); baseline.values.len()];
+    let d = diagnose(&mut bench, baseline, &Options::default()).unwrap();
+    assert_eq!(d.verdict, Verdict::Adequate, "{}", d.sentence());
+    assert!(d.sentence().contains("Not excluded: ") && d.sentence().contains(" standard errors"), "{}", d.sentence());
 }
 
 #[test]

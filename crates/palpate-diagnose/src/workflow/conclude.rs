@@ -2,11 +2,14 @@
 
 use super::{Progress, STRANGE, Session, State};
 use crate::crossval::rms;
-use crate::diagnosis::{Diagnosis, Level, MapEntry, Verdict};
-use crate::laboratory::{Field, Readings};
+use crate::diagnosis::{Diagnosis, Found, Instant, Level, MapEntry, Verdict};
+use crate::laboratory::{Field, LabError, Model, Reading, Readings};
 use crate::linear::least_squares;
+use crate::movement::{Movement, largest};
 use crate::null::{Block, LARGEST};
 use crate::quantity::millimetres;
+use palpate_engine::Source;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Standard deviations outside the known world from which on an answer says so.
 const WORTH_SAYING: f64 = 2.0;
@@ -70,11 +73,13 @@ impl Session<'_> {
         self.remeasure(&mut base);
         let is_missing = |s: &State| s.judged.is_missing() || s.strange.iter().any(|x| x.deviations > STRANGE);
         let remains = is_missing(&state);
+        let stopped = out.interrupted || self.no_time;
         let verdict = match out.accepted.len() {
-            0 if !remains => Verdict::Adequate,
+            0 if !(remains || out.open || out.cut) => Verdict::Adequate,
+            _ if out.unsure.is_some() => Verdict::Undecided,
             1.. if state.judged.explains(&base.judged) => Verdict::MissingEffect,
             // What was not tried may explain it.
-            _ if out.interrupted || self.no_time => Verdict::Undecided,
+            _ if stopped => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
         // Of all that is missing, not of what a rejected explanation leaves.
@@ -82,6 +87,12 @@ impl Session<'_> {
         let mut caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
         let strange = if verdict == Verdict::Unexplained { &base.strange } else { &state.strange };
         caveats.extend(strange.iter().filter(|s| s.deviations >= WORTH_SAYING).map(|s| format!("The fit ends with {}.", s.what)));
+        if verdict == Verdict::Adequate {
+            caveats.extend(self.not_excluded().map(|m| format!("Not excluded: {}", m.sentence())));
+        }
+        if stopped {
+            self.note_open(if out.interrupted { &LabError::Interrupted } else { &LabError::NoTime });
+        }
         let baseline = base.model.clone();
         if verdict == Verdict::Unexplained {
             // Part of an explanation is not one: it is shown, but not believed.
@@ -89,6 +100,11 @@ impl Session<'_> {
         }
         let mut effects = out.accepted;
         effects.extend(out.close);
+        let told = if verdict == Verdict::Adequate { &[] } else { effects.as_slice() };
+        let mut movements = named_movements(&baseline, &state.model, told);
+        movements.extend(if stopped { self.open_movements() } else { Vec::new() });
+        let unexplained = verdict == Verdict::Unexplained;
+        let course = course(&base.readings, if unexplained { &base.readings } else { &state.readings });
         Diagnosis {
             verdict,
             missing: base.judged.missing().parts(),
@@ -100,8 +116,11 @@ impl Session<'_> {
             effects,
             tried: std::mem::take(&mut self.tried),
             not_tried: std::mem::take(&mut self.not_tried),
-            model: if verdict == Verdict::Unexplained { baseline } else { state.model },
-            after: if verdict == Verdict::Unexplained { before } else { after },
+            movements,
+            strange: (base.strange, if unexplained { Vec::new() } else { state.strange }),
+            course,
+            model: if unexplained { baseline } else { state.model },
+            after: if unexplained { before } else { after },
             held_out,
             predicted,
             gap_closed,
@@ -113,6 +132,24 @@ impl Session<'_> {
             interrupted: out.interrupted,
             unsure: out.unsure,
         }
+    }
+
+    /// The answer where nothing is known but of the start: the search ended in the baseline's fit, or before the fitted values were simulated.
+    pub(super) fn conclude_early(&mut self, start: State, fitted: Model, mut out: Progress, why: &LabError) -> Diagnosis {
+        out.interrupted = matches!(why, LabError::Interrupted);
+        self.no_time |= !out.interrupted;
+        let ended = if out.interrupted { "the diagnosis was interrupted" } else { "the time was over" };
+        out.unsure.get_or_insert_with(|| format!("{ended} before the baseline was known"));
+        (out.cut, out.open) = (true, true);
+        let blocks = self.map(&start);
+        out.blocks.clone_from(&blocks);
+        let before = self.level(&start);
+        let mut d = self.conclude((start.clone(), before), start, &blocks, out);
+        if d.model.values != fitted.values {
+            d.caveats.push("Distances and candidates are those of the starting values, numbers the best of the fit.".into());
+        }
+        (d.baseline, d.model) = (fitted.clone(), fitted);
+        d
     }
 
     fn entry(&self, before: &Block, after: &Block) -> MapEntry {
@@ -127,6 +164,50 @@ impl Session<'_> {
             after: after.z,
         }
     }
+}
+
+/// What the effects that are named, and those that are as good, do to the baseline's numbers.
+fn named_movements(baseline: &Model, model: &Model, effects: &[Found]) -> Vec<Movement> {
+    let accepted: Vec<&Found> = effects.iter().filter(|f| f.accepted).collect();
+    let mut all: Vec<Movement> = Vec::new();
+    // All of them together do what the table of values shows.
+    if !accepted.is_empty() {
+        let kinds: Vec<&str> = accepted.iter().map(|f| f.kind.as_str()).collect();
+        all.extend(largest(&kinds.join(" + "), baseline, &model.values, &model.errors, true));
+    }
+    all.extend(effects.iter().flat_map(|f| f.movements.iter().cloned()));
+    let mut seen = BTreeSet::new();
+    all.retain(|m| seen.insert(m.candidate.clone()));
+    all
+}
+
+/// Time and residuals of a frame.
+type Frame = (f64, Vec<(Source, Option<f64>)>);
+
+/// Root mean square distances of every instant of two models.
+fn course(before: &Readings, after: &Readings) -> Vec<Instant> {
+    let by_frame = |readings: &Readings| {
+        let mut frames: BTreeMap<(usize, usize), Frame> = BTreeMap::new();
+        let put = |r: &Reading| {
+            let frame = frames.entry((r.scene, r.row.frame)).or_insert((r.time, Vec::new()));
+            frame.1.push((r.row.source, r.row.value));
+        };
+        readings.rows.iter().for_each(put);
+        frames
+    };
+    let (before, after) = (by_frame(before), by_frame(after));
+    let met = |values: &[(Source, Option<f64>)]| values.iter().any(|(_, v)| v.is_some());
+    let both = before.into_iter().filter_map(|(key, b)| Some((key.0, b, after.get(&key)?)));
+    let seen = both.filter(|(_, b, a)| met(&b.1) && met(&a.1));
+    let instant = |(scene, b, a): (usize, Frame, &Frame)| Instant {
+        scene,
+        time: b.0,
+        before: rms(b.1.into_iter()),
+        after: rms(a.1.iter().copied()),
+    };
+    let mut all: Vec<Instant> = seen.map(instant).collect();
+    all.sort_by(|a, b| (a.scene, a.time).partial_cmp(&(b.scene, b.time)).unwrap_or(std::cmp::Ordering::Equal));
+    all
 }
 
 /// What to know of the second recording: distances before and after, and why it could not be simulated, if so.

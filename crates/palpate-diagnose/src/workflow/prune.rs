@@ -134,6 +134,11 @@ pub(super) mod tests {
             design_effect: 1.0,
             noise: Default::default(),
             scored: None,
+            early: Default::default(),
+            ranked: Vec::new(),
+            rivals: Vec::new(),
+            base: model.clone(),
+            unrefined: false,
             finer: Vec::new(),
             tried: Vec::new(),
             not_tried: Vec::new(),
@@ -148,6 +153,7 @@ pub(super) mod tests {
             held_out_gain: 1.0,
             accepted: true,
             indistinguishable_from: Vec::new(),
+            movements: Vec::new(),
             separated_by: None,
         };
         let mut accepted = accepted.map(found).to_vec();

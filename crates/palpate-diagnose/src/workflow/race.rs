@@ -151,10 +151,37 @@ fn going_on(policy: &Policy, before: f64, running: &[Runner]) -> Vec<bool> {
     (0..running.len()).map(|i| promise(&running[i]) <= worst && !behind.contains(&i)).collect()
 }
 
+/// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer.
+fn free_moves(state: &State, y: &[f64]) -> Vec<f64> {
+    let columns: Vec<&[f64]> = state.table.columns.iter().map(Vec::as_slice).collect();
+    least_squares(&columns, y, RIDGE).unwrap_or_else(|| vec![0.0; columns.len()])
+}
+
+/// Residuals beside a candidate at these steps.
+fn beside(state: &State, v: &Variant, step: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut y = state.table.y.clone();
+    for (k, c) in v.columns.iter().enumerate() {
+        y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
+    }
+    y
+}
+
+/// Where a candidate takes a state's numbers by its linear estimate: along the logarithm of what has a size, within bounds.
+pub(super) fn linear_moves(state: &State, v: &Variant) -> Vec<f64> {
+    let alone = free_moves(state, &state.table.y);
+    let moves = free_moves(state, &beside(state, v, |k| v.score.step[k]));
+    let to = |(((v, d), alone), n): (((&f64, &f64), &f64), &Number)| {
+        // What they move by without it is no doing of the candidate.
+        let d = d - alone;
+        let to = if n.bounds.0 >= 0.0 && *v > 0.0 { v * (d / v).exp() } else { v + d };
+        to.clamp(n.bounds.0, n.bounds.1)
+    };
+    state.model.values.iter().zip(&moves).zip(&alone).zip(&state.model.numbers).map(to).collect()
+}
+
 /// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer, within bounds.
 pub(super) fn moves(state: &State, y: &[f64]) -> Vec<f64> {
-    let columns: Vec<&[f64]> = state.table.columns.iter().map(Vec::as_slice).collect();
-    let moves = least_squares(&columns, y, RIDGE).unwrap_or_else(|| vec![0.0; columns.len()]);
+    let moves = free_moves(state, y);
     let within = |((d, v), n): ((f64, &f64), &Number)| {
         let most = MOVES * v.abs().max(n.scale);
         (v + d.clamp(-most, most)).clamp(n.bounds.0, n.bounds.1) - v
@@ -170,10 +197,7 @@ fn start(state: &State, v: &Variant, share: f64) -> Start {
         let (least, most) = v.numbers[k].room();
         share * v.score.step[k].clamp(least, most)
     };
-    let mut y = state.table.y.clone();
-    for (k, c) in v.columns.iter().enumerate() {
-        y.iter_mut().zip(c).for_each(|(y, c)| *y += step(k) * c);
-    }
+    let y = beside(state, v, step);
     // Of what is tried by its size nobody knows how the residuals go with it.
     let with = if v.blunt.is_some() { vec![0.0; state.model.values.len()] } else { moves(state, &y) };
     let own = state.model.values.iter().zip(with).map(|(v, d)| v + d);

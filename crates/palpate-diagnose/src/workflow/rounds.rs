@@ -5,6 +5,7 @@ use super::{CandidateId, Fitted, Session, State, Variant, keep_first, most_promi
 use crate::change::Change;
 use crate::diagnosis::{Found, Level, Tried};
 use crate::laboratory::{LabError, Model, Number};
+use crate::movement::{Movement, largest};
 use crate::separation::Separated;
 use palpate_model::effects::Trial;
 use std::rc::Rc;
@@ -150,7 +151,7 @@ impl Session<'_> {
 
     /// Notes that a candidate is looked at.
     fn note(&mut self, round: usize, v: &Variant) {
-        self.tried.push(Tried { round, kind: v.kind(), promised: v.score.share, held_out_gain: None });
+        self.tried.push(Tried { round, kind: v.kind(), promised: v.score.share, held_out_gain: None, open: false });
     }
 
     /// Fits variants, judges what arrives, and adds it to what was fitted before.
@@ -248,12 +249,15 @@ impl Session<'_> {
     #[expect(clippy::type_complexity, reason = "as `round`")]
     fn decide(&mut self, state: &State, fitted: Vec<Fitted>) -> Result<(Option<(Vec<Found>, State)>, Vec<Found>), LabError> {
         let Some((winner, equal)) = self.choose(state, &fitted) else {
+            let rivals = fitted.iter().filter(|f| f.state.judged.over(&state.judged).is_as_good());
+            self.rivals = rivals.filter_map(|f| self.movement(f)).collect();
             return Ok((None, fitted.iter().take(3).flat_map(|f| self.found(f, false)).collect()));
         };
         let mut found = self.found(&fitted[winner], true);
         // The winner itself, and the same with something added to it, are nothing else.
         let others: Vec<&Fitted> = equal.iter().map(|i| &fitted[*i]).filter(|f| !fitted[winner].is_within(f)).collect();
         found[0].indistinguishable_from.extend(others.iter().map(|f| f.kind()));
+        found[0].movements.extend(others.iter().filter_map(|f| self.movement(f)));
         if !others.is_empty() {
             self.lab.say("looking for a measurement that separates candidates");
             let rivals: Vec<&Model> = others.iter().map(|f| &f.state.model).collect();
@@ -273,6 +277,12 @@ impl Session<'_> {
         Ok((Some((found, next)), Vec::new()))
     }
 
+    /// What a candidate does to the baseline's numbers, with what was added before.
+    fn movement(&self, f: &Fitted) -> Option<Movement> {
+        let model = &f.state.model;
+        largest(&Change::kinds(&model.changes), &self.base, &model.values, &model.errors, true)
+    }
+
     /// What a candidate adds, effect by effect.
     pub(super) fn found(&self, f: &Fitted, accepted: bool) -> Vec<Found> {
         let model = &f.state.model;
@@ -288,6 +298,7 @@ impl Session<'_> {
                 held_out_gain: f.gain.clamp(0.0, 1.0),
                 accepted,
                 indistinguishable_from: Vec::new(),
+                movements: self.movement(f).into_iter().collect(),
                 separated_by: None,
             }
         };

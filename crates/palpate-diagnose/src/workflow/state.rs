@@ -16,17 +16,27 @@ impl Session<'_> {
             return known.clone();
         }
         self.lab.say("discretisation error: finer grid, half step");
-        let mut all = self.lab.finer(&model.changes, &model.values).unwrap_or_default();
-        all.extend(self.lab.systematic(&model.changes, &model.values).unwrap_or_default());
-        if !self.lab.interrupted() {
+        let refined = self.lab.finer(&model.changes, &model.values);
+        let systematic = self.lab.systematic(&model.changes, &model.values);
+        let late = |e: &LabError| matches!(e, LabError::NoTime | LabError::Interrupted);
+        let cut = refined.as_ref().err().is_some_and(late) || systematic.as_ref().err().is_some_and(late);
+        let all: Vec<Field> = refined.into_iter().flatten().chain(systematic.into_iter().flatten()).collect();
+        if cut {
+            self.unrefined |= *model == self.base;
+        } else {
             self.finer.push((model.clone(), all.clone()));
         }
         all
     }
 
     /// Brings errors of the discretisation up to date: with another effect in place they are others.
+    /// Without time for that those of another model stand for its own.
     pub(super) fn refine(&mut self, state: &mut State) {
-        state.fields = self.finer(&state.model);
+        let own = self.finer(&state.model);
+        if own.is_empty() && (self.lab.interrupted() || self.lab.out_of_time()) {
+            return;
+        }
+        state.fields = own;
         state.own = true;
         state.held_out_finer = self.held_out_finer(state);
         self.remeasure(state);
@@ -41,16 +51,24 @@ impl Session<'_> {
         own: bool,
         fallback: Option<&Table>,
     ) -> Result<State, LabError> {
-        let table = self.cells.table(&readings, fallback);
-        let frame = self.frame(&table, &fields);
-        let predicted = self.predict(&readings, &table, &frame);
         let (held_out, elsewhere) = match self.lab.held_out(&model) {
             Ok(readings) => (readings, None),
             // Who cannot follow a recording that the baseline follows is no explanation.
             Err(e) if self.second.is_some() => return Err(e),
-            Err(LabError::Interrupted) => return Err(LabError::Interrupted),
             Err(e) => (None, Some(e.to_string())),
         };
+        let mut state = State { held_out, elsewhere, own, ..self.alone(model, readings, fields, fallback) };
+        if state.held_out.is_some() && self.second.is_some() {
+            self.judge(&mut state);
+        }
+        Ok(state)
+    }
+
+    /// The same without any other recording, of a model with fields of its own.
+    pub(super) fn alone(&mut self, model: Model, readings: Readings, fields: Vec<Field>, fallback: Option<&Table>) -> State {
+        let table = self.cells.table(&readings, fallback);
+        let frame = self.frame(&table, &fields);
+        let predicted = self.predict(&readings, &table, &frame);
         let strange = self.lab.strange(&model);
         let mut state = State {
             needed: Vec::new(),
@@ -62,13 +80,13 @@ impl Session<'_> {
             fields,
             frame,
             predicted,
-            held_out,
-            elsewhere,
-            own,
+            held_out: None,
+            elsewhere: None,
+            own: true,
             strange,
         };
         self.judge(&mut state);
-        Ok(state)
+        state
     }
 
     /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.

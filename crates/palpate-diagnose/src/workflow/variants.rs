@@ -41,6 +41,9 @@ impl Variant {
     }
 }
 
+/// Variants by their columns, and kinds that are missing among them with the reason.
+type Columned = (Vec<Variant>, Vec<(String, LabError)>);
+
 impl Session<'_> {
     /// Variants of every candidate, scored where it is absent: of effects at an unknown place first a few, the others only of those that
     /// promise much.
@@ -52,11 +55,10 @@ impl Session<'_> {
     pub(super) fn variants_of(&mut self, state: &State, wanted: impl Fn(&Change) -> bool) -> Result<Vec<Variant>, LabError> {
         self.lab.say("scoring candidates");
         let all = candidates(self.lab.setting());
-        let (places, reach) = self.options.search.places;
-        let stride = |c: &Candidate| if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(places).max(1) };
+        let reach = self.options.search.places.1;
         let (mut first, mut later) = (Vec::new(), Vec::new());
         for (n, c) in all.iter().enumerate() {
-            let by = stride(c);
+            let by = self.stride(c);
             for (i, v) in c.variants.iter().enumerate().filter(|(_, v)| wanted(v)) {
                 if i % by == 0 { &mut first } else { &mut later }.push((CandidateId::Single(n), v.clone()));
             }
@@ -80,8 +82,23 @@ impl Session<'_> {
         sizes
     }
 
-    /// These variants (their candidate, change), scored where they are absent.
+    /// Of so many starts of a candidate one is scored first.
+    pub(super) fn stride(&self, c: &Candidate) -> usize {
+        let places = self.options.search.places.0;
+        if self.cells.few_instants() { 1 } else { c.variants.len().div_ceil(places).max(1) }
+    }
+
+    /// These variants (their candidate, change), scored where they are absent; what there was no time for is left out and noted.
     pub(super) fn scored(&mut self, state: &State, wanted: Vec<(CandidateId, Change)>) -> Result<Vec<Variant>, LabError> {
+        let (mut kept, missed) = self.columns(state, wanted)?;
+        let late = missed.iter().filter(|(_, why)| matches!(why, LabError::NoTime));
+        late.for_each(|(kind, why)| self.missed(kind, why));
+        self.score_by_size(state, &mut kept);
+        Ok(kept)
+    }
+
+    /// The same by their columns alone, those that are known already among them; and kinds of which there was no time for all.
+    pub(super) fn columns(&mut self, state: &State, wanted: Vec<(CandidateId, Change)>) -> Result<Columned, LabError> {
         let mut tries = Vec::new();
         let mut out: Vec<Variant> = Vec::new();
         let own = state.model.values.len();
@@ -107,29 +124,34 @@ impl Session<'_> {
             });
             tries.push((changes, values));
         }
-        let answers = self.lab.linearise_new(&tries, own);
-        let mut kept = Vec::new();
-        for (mut v, answer) in out.into_iter().zip(answers) {
-            match answer {
-                Ok(readings) => {
-                    v.columns = self.cells.table(&readings, None).columns;
-                    v.score = self.score(state, &v);
-                    kept.push(v);
+        let known: Vec<bool> = out.iter().map(|v| self.early.find(&state.model, &v.changes[0]).is_some()).collect();
+        let mut open = known.iter();
+        tries.retain(|_| open.next() == Some(&false));
+        let mut answers = self.lab.linearise_new(&tries, own).into_iter();
+        let (mut kept, mut missed) = (Vec::new(), Vec::new());
+        for (mut v, known) in out.into_iter().zip(known) {
+            let answer = if known { None } else { answers.next() };
+            v.columns = match answer {
+                None => self.early.find(&state.model, &v.changes[0]).cloned().unwrap_or_default(),
+                Some(Ok(readings)) => self.cells.table(&readings, None).columns,
+                Some(Err(LabError::Failed(_))) => continue,
+                Some(Err(why)) => {
+                    missed.push((v.kind(), why));
+                    continue;
                 }
-                Err(LabError::Interrupted) => return Err(LabError::Interrupted),
-                Err(LabError::Failed(_)) => {}
-                Err(LabError::NoTime) => self.missed(&v.kind(), &LabError::NoTime),
-            }
+            };
+            v.score = self.score(state, &v);
+            kept.push(v);
         }
-        self.score_by_size(state, &mut kept);
-        Ok(kept)
+        Ok((kept, missed))
     }
 
     /// Scores variants of which small amplitudes tell nothing by what amplitudes of typical size really do: a body that has fallen deep through a
     /// wall is thrown out of it by the softest one.
-    fn score_by_size(&mut self, state: &State, variants: &mut [Variant]) {
+    /// What there was no time for is dropped.
+    fn score_by_size(&mut self, state: &State, variants: &mut Vec<Variant>) {
         let mut blunt: Vec<(&mut Variant, Vec<f64>)> = Vec::new();
-        for v in variants {
+        for v in variants.iter_mut() {
             if let Some(sizes) = v.blunt.clone() {
                 blunt.push((v, sizes));
             }
@@ -144,10 +166,25 @@ impl Session<'_> {
             })
             .collect();
         let whole = state.squares();
-        for ((v, sizes), cost) in blunt.into_iter().zip(self.lab.costs(&tries)) {
+        if tries.is_empty() {
+            return;
+        }
+        let costs = self.lab.costs(&tries);
+        let stopped = self.lab.interrupted() || self.lab.out_of_time();
+        let mut late = Vec::new();
+        for ((v, sizes), cost) in blunt.into_iter().zip(costs) {
+            if stopped && !cost.is_finite() {
+                late.push(v.kind());
+                v.columns.clear();
+                continue;
+            }
             v.columns.iter_mut().flatten().for_each(|c| *c = 0.0);
             let share = (1.0 - cost / state.readings.cost).max(0.0);
             v.score = Score { gain: share * whole, share, step: sizes, ..self.score(state, v) };
+        }
+        variants.retain(|v| v.blunt.is_none() || !v.columns.is_empty());
+        if !self.lab.interrupted() {
+            late.iter().for_each(|kind| self.missed(kind, &LabError::NoTime));
         }
     }
 

@@ -5,6 +5,7 @@ use crate::*;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request};
 use palpate_model::params::Transform;
 use palpate_model::scene::Optimizer;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub const ALL: [Optimizer; 6] = [
@@ -260,7 +261,7 @@ fn every_residual_counts_once_in_a_joint_cost() {
 #[test]
 fn an_interrupted_fit_keeps_its_best() {
     for optimizer in ALL {
-        let flag = AtomicBool::new(false);
+        let flag = Arc::new(AtomicBool::new(false));
         let mut lowest = f64::INFINITY;
         let mut stop = |p: &Progress| {
             lowest = lowest.min(p.cost);
@@ -268,7 +269,7 @@ fn an_interrupted_fit_keeps_its_best() {
                 flag.store(true, Ordering::SeqCst);
             }
         };
-        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: Some(&flag), ..Hooks::default() };
+        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: flag.clone().into(), ..Hooks::default() };
         let settings = Settings { starts: 3, ..settings(optimizer) };
         let result = fit(&mut oscillator_problem(), &settings, hooks).expect("something was evaluated");
         assert!(result.runs.iter().all(|r| r.status == Status::Interrupted), "{optimizer:?}");
@@ -282,14 +283,14 @@ fn an_interrupted_fit_keeps_its_best() {
     // In the last iteration as well: that the iterations are used up is not why it ended.
     let settings_of_two = Settings { iterations: 2, ..settings(Optimizer::Rprop) };
     for (at, said) in [(2, false), (usize::MAX, true)] {
-        let flag = AtomicBool::new(false);
+        let flag = Arc::new(AtomicBool::new(false));
         let mut stop = |p: &Progress| flag.store(p.iteration == at, Ordering::SeqCst);
-        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: Some(&flag), ..Hooks::default() };
+        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: flag.clone().into(), ..Hooks::default() };
         let result = fit(&mut oscillator_problem(), &settings_of_two, hooks).expect("something was evaluated");
         assert_eq!(result.warnings.iter().any(|w| w.contains("used up its 2 iterations")), said, "{:?}", result.warnings);
     }
-    let flag = AtomicBool::new(true);
-    let hooks = Hooks { interrupt: Some(&flag), ..Hooks::default() };
+    let flag = Arc::new(AtomicBool::new(true));
+    let hooks = Hooks { interrupt: flag.clone().into(), ..Hooks::default() };
     let error = fit(&mut rosenbrock(), &settings(Optimizer::Lbfgs), hooks).expect_err("nothing was evaluated");
     assert!(matches!(error, FitError::Interrupted));
 }

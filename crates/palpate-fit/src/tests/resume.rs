@@ -5,6 +5,7 @@ use super::models::*;
 use crate::*;
 use palpate_model::scene::Optimizer;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 fn with_journal<'a>(path: &Path, resume: bool) -> Hooks<'a> {
@@ -23,9 +24,9 @@ fn a_resumed_fit_equals_an_uninterrupted_one() {
         let settings = Settings { starts: 4, iterations: 40, ..settings(optimizer) };
         let whole = timeless(fit(&mut oscillator_problem(), &settings, Hooks::default()).expect("it can be evaluated"));
 
-        let flag = AtomicBool::new(false);
+        let flag = Arc::new(AtomicBool::new(false));
         let mut stop = |p: &Progress| flag.store(p.iteration >= 5 || flag.load(Ordering::SeqCst), Ordering::SeqCst);
-        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: Some(&flag), ..with_journal(&path, false) };
+        let hooks = Hooks { on_iteration: Some(&mut stop), interrupt: flag.clone().into(), ..with_journal(&path, false) };
         let part = fit(&mut oscillator_problem(), &settings, hooks).expect("something was evaluated");
         assert!(part.evaluations < whole.evaluations);
         // A crash in the middle of writing a line.

@@ -57,7 +57,10 @@ fn products_with_the_gauss_newton_matrix_are_those_of_the_cpu() {
             let length = known.iter().map(|a| (right[*a] / size[*a]).powi(2)).sum::<f64>().sqrt();
             let off = |b: &[f64]| known.iter().map(|a| (found[*a] - b[*a]).abs() / size[*a]).fold(0.0, f64::max) / length;
             println!("{steps} steps, {} numbers: {:.1e}", chosen.len(), off(&right));
-            println!("E {young}"); if steps == 0 { continue; }
+            println!("E {young}");
+            if steps == 0 {
+                continue;
+            }
             assert!(off(&right) < 1e-3, "{:.1e}", off(&right));
             // One percent of the largest entry shows.
             let largest =

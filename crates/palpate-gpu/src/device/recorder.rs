@@ -173,12 +173,11 @@ impl<'a> Recorder<'a> {
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
-    /// Hands the work to the device; does not wait, unless passes are timed: then adds their times.
-    pub fn submit(mut self, times: &mut HashMap<&'static str, PassTime>) {
+    /// Hands the work to the device, and says which it is; does not wait, unless passes are timed: then adds their times.
+    pub fn submit(mut self, times: &mut HashMap<&'static str, PassTime>) -> wgpu::SubmissionIndex {
         self.open = None;
         let Some(timer) = self.timer.take().filter(|t| !t.passes.is_empty()) else {
-            self.gpu.queue.submit([self.encoder.finish()]);
-            return;
+            return self.gpu.queue.submit([self.encoder.finish()]);
         };
         let count = 2 * timer.passes.len() as u32;
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
@@ -191,7 +190,7 @@ impl<'a> Recorder<'a> {
         for (set, first) in timer.sets.iter().zip((0..count).step_by(QUERIES as usize)) {
             self.encoder.resolve_query_set(set, 0..(count - first).min(QUERIES), &resolved, 8 * u64::from(first));
         }
-        self.gpu.queue.submit([self.encoder.finish()]);
+        let submitted = self.gpu.queue.submit([self.encoder.finish()]);
         match self.gpu.download::<u64>(&resolved, count as usize) {
             Ok(ticks) => {
                 let tick = f64::from(self.gpu.tick().unwrap_or(1.0));
@@ -203,5 +202,6 @@ impl<'a> Recorder<'a> {
             }
             Err(e) => self.gpu.keep(e),
         }
+        submitted
     }
 }

@@ -42,8 +42,11 @@ use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Stages that a device may still have to compute while the next one is recorded.
+const AHEAD: usize = 3;
 
 /// Directions, and what changes along them.
 type Known = (Vec<Direction>, Arc<Vec<Rates>>);
@@ -65,6 +68,9 @@ pub struct World {
     /// Time on the device per pass, when asked for.
     pub(crate) times: RefCell<HashMap<&'static str, PassTime>>,
     pub(crate) timed: bool,
+    /// The work handed over last, and the ends of the latest stages.
+    last: RefCell<Option<wgpu::SubmissionIndex>>,
+    ahead: VecDeque<wgpu::SubmissionIndex>,
     /// True when many workgroups share the solve of a member.
     pub(crate) many: bool,
     pub(crate) product: Product,
@@ -96,6 +102,8 @@ impl World {
             groups: RefCell::default(),
             rates: RefCell::default(),
             times: RefCell::default(),
+            last: RefCell::default(),
+            ahead: VecDeque::new(),
             timed: false,
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
@@ -196,7 +204,17 @@ impl World {
         let mut groups = self.groups.borrow_mut();
         let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut groups, self.timed);
         record(&mut recorder);
-        recorder.submit(&mut self.times.borrow_mut());
+        self.last.replace(Some(recorder.submit(&mut self.times.borrow_mut())));
+    }
+
+    /// Waits for all but the last stages that were handed over: enough of them keep the device busy.
+    pub(crate) fn keep_pace(&mut self) {
+        self.ahead.extend(self.last.take());
+        while self.ahead.len() > AHEAD {
+            let wait = wgpu::PollType::Wait { submission_index: self.ahead.pop_front(), timeout: None };
+            // A device that was lost says so when its results are read.
+            let _ = self.gpu.device.poll(wait);
+        }
     }
 
     /// A buffer of `vectors` per node and member, from the pool.

@@ -5,11 +5,13 @@ use crate::diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::interrupt::{Clock, Interrupt};
 use crate::options::{BackendName, out_folder};
-use crate::report::{DiagnosisInput, diagnosis_document, diagnosis_html, diagnosis_summary, pictures};
+use crate::report::{DiagnosisInput, FramePicture, diagnosis_document, diagnosis_html, diagnosis_summary, pictures};
 use crate::results;
 use crate::results::diagnosis::DiagnosisDocument;
 use clap::Args;
+use palpate_engine::FailureKind;
 use palpate_io::output::{make_folder, write_file};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -18,12 +20,12 @@ const AFTER_HELP: &str = "\
 Examples:
   palpate diagnose ball.toml                          result in out/ball-diagnosis/
   palpate diagnose ball.toml --held-out ball-2.toml   decide on a second recording of the same body
-  palpate diagnose ball.toml --budget 10 --out why    stop the search after ten minutes and say what was not tried
+  palpate diagnose ball.toml --budget 10 --out why    answer within ten minutes and say what was not tried
   palpate diagnose ball.toml --out why --resume       go on with an interrupted diagnosis
 
 The scene's [fit] says what is free in the baseline. The folder gets diagnosis.json (format diagnosis/2), model.toml (the scene with
-the effects that were found, readable by simulate, fit and diagnose), report.html, and checkpoints. Ctrl-C stops after the current
-stage, writes what is known, and exits with 130.";
+the effects that were found, readable by simulate, fit and diagnose), report.html, and checkpoints. Ctrl-C writes what is known within
+two seconds, and exits with 130.";
 
 /// Find out whether a model lacks something, where, and what
 #[derive(Clone, Debug, Args)]
@@ -41,7 +43,7 @@ pub struct Arguments {
     /// A scene with another recording of the same body, that no fit sees
     #[arg(long, value_name = "SCENE2")]
     held_out: Option<PathBuf>,
-    /// Minutes that the search may take [default: no limit]
+    /// Minutes that all of it may take, fit and report among it [default: no limit]
     #[arg(long, value_name = "MIN", allow_negative_numbers = true)]
     budget: Option<f64>,
     /// Go on with the checkpoints in the output folder
@@ -65,6 +67,7 @@ fn write_all(
     experiments: &[Experiment],
     done: &Diagnosed,
     backend: Backend,
+    limits: &Interrupt,
 ) -> Result<DiagnosisDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
     let result = diagnosis_document(done);
@@ -76,23 +79,44 @@ fn write_all(
         let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
         text(&name, &model)?;
     }
-    let (mut residuals, mut both) = (Vec::new(), Vec::new());
+    // The page without pictures, which take simulations: there may be no time for them.
+    let page = |pictures| diagnosis_html(&DiagnosisInput { done, pictures, command: command(a) });
+    text("report.html", &page(None))?;
+    if let Some(pictures) = draw(a, experiments, done, backend, limits)? {
+        text("report.html", &page(Some(pictures)))?;
+    }
+    Ok(result)
+}
+
+/// Pictures of a scene before and after.
+type Pictures = (Vec<FramePicture>, Vec<FramePicture>);
+
+/// Pictures of every scene; `None` where they were stopped.
+fn draw(
+    a: &Arguments,
+    experiments: &[Experiment],
+    done: &Diagnosed,
+    backend: Backend,
+    limits: &Interrupt,
+) -> Result<Option<Vec<Pictures>>, Error> {
     let d = &done.diagnosis;
     let scale = 2.0 * d.before.rms.max(d.before.noise).max(1e-9);
-    // Whoever interrupts does not want to wait for pictures.
-    let count = if d.interrupted { 0 } else { a.pictures };
     // A device that failed may fail again; the report needs none.
     let backend = if done.broken.is_some() { Backend::Cpu } else { backend };
-    for (s, e) in experiments.iter().enumerate() {
-        let after = &done.experiments[s];
-        residuals.push((e.residuals(backend, &done.theta_before[s])?, after.residuals(backend, &after.plan().theta)?));
-        both.push((
-            pictures(e, backend, &done.theta_before[s], count, scale)?,
-            pictures(after, backend, &after.plan().theta, count, scale)?,
-        ));
+    let of = |e: &Experiment, theta: &[f64]| pictures(e, backend, theta, a.pictures, scale, &limits.at_once());
+    let mut all = Vec::new();
+    for ((e, theta), after) in experiments.iter().zip(&done.theta_before).zip(&done.experiments) {
+        // Whoever interrupts does not want to wait, and neither does who has set a limit.
+        if a.pictures == 0 || d.interrupted || limits.is_raised() {
+            return Ok(None);
+        }
+        match of(e, theta).and_then(|before| Ok((before, of(after, &after.plan().theta)?))) {
+            Ok(both) => all.push(both),
+            Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => return Ok(None),
+            Err(e) => return Err(e),
+        }
     }
-    text("report.html", &diagnosis_html(&DiagnosisInput { done, residuals, pictures: both, command: command(a) }))?;
-    Ok(result)
+    Ok(Some(all))
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
@@ -101,6 +125,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     {
         return Err(Error::option("budget", b, "must be > 0 and below 1000000 (minutes)"));
     }
+    // Opening the scenes counts as well.
+    let clock = Clock::start();
+    let budget = a.budget.map(|m| Duration::from_secs_f64(60.0 * m));
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     let (backend, note) = a.backend.choose(experiments[0].plan(), 1)?;
     let held_out = a.held_out.as_ref().map(Experiment::open).transpose()?;
@@ -115,7 +142,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         held_out.as_ref(),
         DiagnoseOptions {
             backend,
-            budget: a.budget.map(|m| Duration::from_secs_f64(60.0 * m)),
+            budget,
+            clock: clock.clone(),
             interrupt: console.interrupt.clone(),
             checkpoints: Some((folder.clone(), a.resume)),
             on_progress: Some(&mut hear),
@@ -123,7 +151,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         },
     )?;
     track.finish();
-    let result = write_all(a, &folder, &experiments, &done, backend)?;
+    let limits = budget.map_or_else(|| console.interrupt.clone(), |end| console.interrupt.until(&clock, end));
+    let result = write_all(a, &folder, &experiments, &done, backend, &limits)?;
     if console.json() {
         console.print(&results::line(&result));
     } else {

@@ -12,6 +12,7 @@ use crate::report::{FramePicture, ReportInput, fit_document, fit_html, history_c
 use crate::results;
 use crate::results::fit::{FitDocument, FitStatus};
 use clap::{Args, ValueEnum};
+use palpate_engine::Stop;
 use palpate_fit::Progress;
 use palpate_io::output::{make_folder, write_file};
 use palpate_model::scene::Optimizer;
@@ -162,8 +163,9 @@ type Pair = (Vec<FramePicture>, Vec<FramePicture>);
 
 fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, count: usize, scale: f64) -> Result<Pair, Error> {
     let theta = &fitted.theta_start[s];
-    let before = pictures(e, backend, theta, count, scale).unwrap_or_default();
-    Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale)?))
+    let stop = Stop::default();
+    let before = pictures(e, backend, theta, count, scale, &stop).unwrap_or_default();
+    Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale, &stop)?))
 }
 
 fn write_all(
@@ -309,6 +311,7 @@ pub fn run_in(
             tolerance: None,
             threads: a.threads.map(|n| n as usize),
             interrupt: console.interrupt.clone(),
+            hurried: false,
             journal: Some((journal, resume)),
             on_iteration: Some(&mut hear),
         },

@@ -1,17 +1,16 @@
 //! Fits in laps: one that goes on where an earlier one ended takes over its damping and the sizes that its steps count in, so that two laps
 //! of three iterations are one fit of six.
 
-use super::lab::{NEWTON, problem};
 use super::limits::Limits;
+use super::simulate::{NEWTON, problem};
 use crate::engine::Backend;
 use crate::experiment::Experiment;
 use crate::fitting::errors;
 use crate::results::checkpoint::CheckpointLap;
 use palpate_diagnose::{Change, Fit, LabError, Model, Start};
-use palpate_fit::{Hooks, Progress, Settings, Status, Tolerance, Walk};
+use palpate_fit::{Hooks, Settings, Status, Tolerance, Walk};
 use palpate_model::scene::Optimizer;
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How a fit stood at its end.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,7 +59,7 @@ impl Laps {
 pub(super) fn fit(
     base: &[Experiment],
     backend: Backend,
-    limits: Limits,
+    limits: &Limits,
     Start { changes, values, reach }: &Start,
     (iterations, tolerance): (usize, f64),
     before: Option<&Lap>,
@@ -75,11 +74,9 @@ pub(super) fn fit(
         errors: errors(base),
         ..Settings::new(Optimizer::GaussNewton)
     };
-    let stop = AtomicBool::new(false);
-    let mut watch = |_: &Progress| stop.store(limits.check().is_err(), Ordering::SeqCst);
-    let hooks = Hooks { interrupt: Some(&stop), on_iteration: Some(&mut watch), ..Hooks::default() };
+    let hooks = Hooks { interrupt: limits.interrupt().in_turn(), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
-        palpate_fit::FitError::Interrupted => LabError::Interrupted,
+        palpate_fit::FitError::Interrupted => limits.stopped(),
         e => LabError::failed(e),
     })?;
     if let Some(why) = result.broken {

@@ -8,6 +8,7 @@ mod limits;
 mod others;
 mod refined;
 mod separate;
+mod simulate;
 mod systematic;
 mod walls;
 mod world;
@@ -15,19 +16,20 @@ mod world;
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::{FitOptions, Fitted, fit};
-use crate::interrupt::Interrupt;
+use crate::fitting::Fitted;
+use crate::interrupt::{Clock, Interrupt};
 use lab::Lab;
-use palpate_diagnose::{Change, Diagnosis, Laboratory, Model};
+use palpate_diagnose::{Change, Diagnosis, LabError, Model};
 use palpate_io::InputError;
 use palpate_model::effects::Effect;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::ObservationSpec;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Relative decrease of the cost at which the baseline has arrived: what its numbers move by after that is projected out of everything.
-const BASELINE: f64 = 1e-6;
+/// What there is to say where the starting model could not be simulated once.
+const TOO_SHORT: &str =
+    "the budget was over before the scene had been simulated once: allow more time, or fewer frames or larger cells";
 
 /// How to run a diagnosis.
 #[derive(Default)]
@@ -36,8 +38,10 @@ pub struct DiagnoseOptions<'a> {
     pub backend: Backend,
     /// Statistical choices.
     pub statistics: palpate_diagnose::Options,
-    /// Time for the search; the stage that runs when it is over is finished. `None` = no limit.
+    /// Time for everything, the baseline's fit and the answer among it. `None` = no limit.
     pub budget: Option<Duration>,
+    /// What the budget is counted by; it begins when the options are made.
+    pub clock: Clock,
     /// Stops in good order.
     pub interrupt: Interrupt,
     /// Folder for journal and checkpoints, and whether to go on with what they hold.
@@ -73,14 +77,13 @@ pub struct Diagnosed {
 ///
 /// # Errors
 /// [`Error::Scene`] when there is nothing to compare with or `held_out` shows nothing new, [`Error::File`] when it shows another body,
-/// [`Error::Fit`] or [`Error::Diagnosis`] when the baseline cannot be computed, [`Error::Interrupted`] when it was stopped before the
-/// baseline was known.
+/// [`Error::Fit`] or [`Error::Diagnosis`] when the baseline cannot be computed, [`Error::Interrupted`] or [`Error::Failed`] when it was
+/// stopped, or its time was over, before the starting model had been simulated once.
 pub fn diagnose(
     experiments: &[Experiment],
     held_out: Option<&Experiment>,
     mut options: DiagnoseOptions,
 ) -> Result<Diagnosed, Error> {
-    let clock = Instant::now();
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     check(experiments, held_out)?;
     let mut told = options.on_progress.take();
@@ -89,15 +92,13 @@ pub fn diagnose(
             f(what);
         }
     };
-    let (base, fitted) = baseline(experiments, &options, &mut say)?;
-    let plain = hypothesis::prepare(&base, &[])?;
     let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
-    let (backend, known, free, values) = (options.backend, &base, fitted.as_ref(), plain.own_values());
-    let (diagnosis, broken) = with_threads(threads, move || {
-        let deadline = options.budget.map(|b| clock + b);
-        let lab = Lab::new(known, held_out, &options, deadline, &mut say)?;
-        search(lab, free, values, &options.statistics)
+    let (backend, clock) = (options.backend, options.clock.clone());
+    let Searched { diagnosis, base, fitted, broken } = with_threads(threads, move || {
+        let lab = Lab::new(experiments, held_out, &options, &mut say)?;
+        search(lab, &options.statistics)
     })??;
+    let plain = hypothesis::prepare(&base, &[])?;
     let theta_before = (0..base.len()).map(|s| plain.theta(s, &diagnosis.baseline.values)).collect();
     let (experiments, values) = corrected(&base, &diagnosis.model)?;
     let added = diagnosis.model.changes.iter().filter(|c| matches!(c, Change::Effect(_))).count();
@@ -126,55 +127,27 @@ fn check(experiments: &[Experiment], held_out: Option<&Experiment>) -> Result<()
     held_out.map_or(Ok(()), |other| same_body(experiments, other))
 }
 
-/// The experiments with the values that fit best as they are, and that fit; `None` where they leave nothing free.
-fn baseline(
-    experiments: &[Experiment],
-    options: &DiagnoseOptions,
-    say: &mut dyn FnMut(&str),
-) -> Result<(Vec<Experiment>, Option<Fitted>), Error> {
-    let is_free = |e: &Experiment| e.scene().fit.as_ref().is_some_and(|f| !f.parameters.is_empty());
-    let mut base = experiments.to_vec();
-    if !experiments.iter().any(is_free) {
-        return Ok((base, None));
-    }
-    say("baseline fit");
-    let fitted = fit(
-        experiments,
-        FitOptions {
-            backend: options.backend,
-            tolerance: Some(BASELINE),
-            interrupt: options.interrupt.clone(),
-            journal: options.checkpoints.as_ref().map(|(folder, resume)| (folder.join("journal.jsonl"), *resume)),
-            ..FitOptions::default()
-        },
-    )?;
-    if let Some(why) = &fitted.result.broken {
-        return Err(Error::Failed(format!("the baseline's fit: {why}")));
-    }
-    for (e, theta) in base.iter_mut().zip(&fitted.result.theta) {
-        e.plan.theta.clone_from(theta);
-    }
-    Ok((base, Some(fitted)))
+/// What a search leaves.
+struct Searched {
+    diagnosis: Diagnosis,
+    /// The experiments with the baseline's values.
+    base: Vec<Experiment>,
+    fitted: Option<Fitted>,
+    /// Why the device failed on the way, if it did.
+    broken: Option<String>,
 }
 
-/// The answer, from the baseline's values and their errors; and why the device failed on the way, if it did.
-fn search(
-    mut lab: Lab,
-    fitted: Option<&Fitted>,
-    values: Vec<f64>,
-    statistics: &palpate_diagnose::Options,
-) -> Result<(Diagnosis, Option<String>), Error> {
-    let numbers = lab.numbers(&[])?;
-    let errors = numbers.iter().map(|n| {
-        let parameters = fitted.iter().flat_map(|f| f.free.iter().zip(&f.result.parameters));
-        parameters.filter(|(f, _)| f.label() == n.path).find_map(|(_, p)| p.standard_error)
-    });
-    let model = Model { changes: Vec::new(), values, errors: errors.collect(), numbers };
-    let found = palpate_diagnose::diagnose(&mut lab, model, statistics);
-    match (found, lab.broken()) {
-        (Ok(diagnosis), broken) => Ok((diagnosis, broken)),
-        (Err(_), Some(why)) => Err(Error::Failed(why)),
-        (Err(e), None) => Err(e.into()),
+fn search(mut lab: Lab, statistics: &palpate_diagnose::Options) -> Result<Searched, Error> {
+    let start = lab.start()?;
+    let found = palpate_diagnose::diagnose(&mut lab, start, statistics);
+    let broken = lab.broken();
+    let (base, fitted, fault) = lab.finish();
+    match (found, fault, &broken) {
+        (Ok(diagnosis), ..) => Ok(Searched { diagnosis, base, fitted, broken }),
+        (Err(_), Some(fault), _) => Err(fault),
+        (Err(_), None, Some(why)) => Err(Error::Failed(why.clone())),
+        (Err(LabError::NoTime), ..) => Err(Error::Failed(TOO_SHORT.into())),
+        (Err(e), ..) => Err(e.into()),
     }
 }
 

@@ -1,21 +1,22 @@
 //! Other data and other looks: a second recording of the same body, times of contact, frames at rest.
 
 use super::hypothesis::{Prepared, is_own, lab_error, prepare};
-use super::lab::along;
 use super::limits::Limits;
+use super::simulate::along;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use glam::DVec3;
 use palpate_diagnose::{Change, LabError, Model, Readings};
-use palpate_fit::{FitScene, Hooks, Problem, Settings};
+use palpate_engine::Stop;
+use palpate_fit::{FitError, FitScene, Hooks, Problem, Settings};
 use palpate_model::observation::ReadingKind;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::Optimizer;
 use std::ops::ControlFlow;
 
 /// Times [s] between which a simulation touches a plane, with its own values.
-pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64, f64)>, Error> {
+pub(super) fn contact_times(e: &Experiment, backend: Backend, stop: &Stop) -> Result<Vec<(f64, f64)>, Error> {
     let mut out: Vec<(f64, f64)> = Vec::new();
     if e.plan.planes.is_empty() {
         return Ok(out);
@@ -28,7 +29,7 @@ pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64
     let step = e.plan.clock.step;
     // Where contact forces begin to act.
     let reach = 0.05 * e.plan.body.length;
-    backend.visit(&e.plan, theta, |_, s, _| {
+    backend.visit_until(&e.plan, theta, stop.clone(), |_, s, _| {
         let x = surface.deform(&s.displacement);
         let time = physics.start + s.time;
         if planes.iter().any(|(n, d)| x.iter().any(|x| n.dot(*x) - d < reach)) {
@@ -43,7 +44,7 @@ pub(super) fn contact_times(e: &Experiment, backend: Backend) -> Result<Vec<(f64
 }
 
 /// Frames until the next of which no point of the simulated body moves by more than a tenth of the noise of a depth reading.
-pub(super) fn still_frames(e: &Experiment, backend: Backend) -> Result<Vec<usize>, Error> {
+pub(super) fn still_frames(e: &Experiment, backend: Backend, stop: &Stop) -> Result<Vec<usize>, Error> {
     let o = &e.plan.observation;
     let times: Vec<f64> = o.frames.iter().map(|f| f.time).collect();
     if times.len() < 3 || o.cameras.is_empty() {
@@ -52,7 +53,7 @@ pub(super) fn still_frames(e: &Experiment, backend: Backend) -> Result<Vec<usize
     let start = palpate_model::plan::Physics::new(&e.plan.layout, &e.plan.theta).start;
     let mut ways = vec![0.0; times.len() - 1];
     let mut last: Option<(f64, Vec<DVec3>)> = None;
-    backend.visit(&e.plan, &e.plan.theta, |_, s, _| {
+    backend.visit_until(&e.plan, &e.plan.theta, stop.clone(), |_, s, _| {
         let now = start + s.time;
         if let Some((before, u)) = &last {
             let way = u.iter().zip(&s.displacement).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
@@ -71,7 +72,7 @@ pub(super) fn held_out(
     e: &Experiment,
     base: &[Experiment],
     backend: Backend,
-    limits: Limits,
+    limits: &Limits,
     model: &Model,
 ) -> Result<Readings, LabError> {
     let trained = prepare(base, &model.changes).map_err(lab_error)?;
@@ -124,7 +125,7 @@ pub(super) fn held_out(
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: ready.theta(0, &values),
-            evaluate: backend.evaluator(plan, 1).map_err(lab_error)?,
+            evaluate: backend.evaluator_until(plan, 1, limits.stop()).map_err(lab_error)?,
         };
         let free = open.iter().map(|k| {
             let mut f = ready.free[*k].clone();
@@ -134,15 +135,21 @@ pub(super) fn held_out(
         });
         let mut problem = Problem::new(vec![scene], free.collect()).map_err(LabError::failed)?;
         let settings = Settings { iterations: 12, ..Settings::new(Optimizer::GaussNewton) };
-        let found = palpate_fit::fit(&mut problem, &settings, Hooks::default()).map_err(LabError::failed)?;
+        let hooks = Hooks { interrupt: limits.interrupt().in_turn(), ..Hooks::default() };
+        let found = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
+            FitError::Interrupted => limits.stopped(),
+            e => LabError::failed(e),
+        })?;
         if let Some(why) = found.broken {
             return Err(limits.break_off(why));
         }
+        // A fit that was cut short says nothing of how well the other recording is met.
+        limits.check()?;
         open.iter().zip(&found.parameters).for_each(|(k, p)| values[*k] = p.value);
     }
     let shared = model.values.len();
     for (i, k) in open.iter().enumerate() {
         directions.extend(ready.free[*k].slots.iter().map(|s| (shared + i, s.place, s.factor)));
     }
-    along(&ready.experiments[0], 0, &ready.theta(0, &values), &directions, shared + open.len())
+    along(&ready.experiments[0], 0, &ready.theta(0, &values), &directions, shared + open.len(), limits)
 }

@@ -5,7 +5,7 @@ use crate::experiment::Experiment;
 use palpate_diagnose::{Field, Readings};
 
 /// Cells of the finer grid per cell along an edge: the cheapest that shows the error well.
-const FINER: f64 = 1.5;
+pub(super) const FINER: f64 = 1.5;
 /// The error of the grid, which falls with the square of the cell, over what the finer grid changes.
 pub(super) const GRID: f64 = 1.0 / (1.0 - 1.0 / (FINER * FINER));
 /// The error of the step, which falls with it, over what half the step changes.

@@ -10,7 +10,7 @@ use crate::residuals::{pinhole, spread};
 use crate::synthetic::read_depths;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_diagnose::{Model, Separation, direction};
-use palpate_engine::Snapshot;
+use palpate_engine::{Snapshot, Stop};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::mechanics::rotation::Polar;
 use palpate_model::observation::{Observation, ReadingKind};
@@ -40,18 +40,13 @@ struct Trial {
 }
 
 /// What several measurements would read of every rival, the models after the first, against the first one; those that could be simulated
-/// while `goes_on` says so.
-pub(super) fn separations(
-    base: &[Experiment],
-    backend: Backend,
-    models: &[&Model],
-    goes_on: &(dyn Fn() -> bool + Sync),
-) -> Vec<Separation> {
+/// before `stop`.
+pub(super) fn separations(base: &[Experiment], backend: Backend, models: &[&Model], stop: &Stop) -> Vec<Separation> {
     let ready: Result<Vec<Prepared>, _> = models.iter().map(|m| prepare(base, &m.changes)).collect();
     let (Ok(ready), watch) = (ready, Watch::new(&base[0])) else { return Vec::new() };
     let mut out = Vec::new();
     let simulate = |trial: &Trial| -> Option<Vec<Motion>> {
-        let one = |(m, r): (&&Model, &Prepared)| if goes_on() { watch.motion(r, &m.values, trial, backend) } else { None };
+        let one = |(m, r): (&&Model, &Prepared)| watch.motion(r, &m.values, trial, backend, stop);
         models.par_iter().zip(&ready).map(one).collect()
     };
     let mut compare = |measurement: String, motions: &[Motion], cameras: &[Pinhole], markers: bool| {
@@ -155,8 +150,8 @@ impl Watch {
         }
     }
 
-    /// Simulates a model of the first scene; `None` where that fails.
-    fn motion(&self, ready: &Prepared, values: &[f64], trial: &Trial, backend: Backend) -> Option<Motion> {
+    /// Simulates a model of the first scene; `None` where that fails or is stopped.
+    fn motion(&self, ready: &Prepared, values: &[f64], trial: &Trial, backend: Backend, stop: &Stop) -> Option<Motion> {
         let plan = Plan { observation: self.observation.clone(), ..ready.experiments[0].plan.clone() };
         let mut theta = ready.theta(0, values);
         let place = |key| plan.layout.index(key);
@@ -177,7 +172,7 @@ impl Watch {
             last = Some(state);
             ControlFlow::Continue(())
         };
-        backend.visit(&plan, &theta, visit).ok()?;
+        backend.visit_until(&plan, &theta, stop.clone(), visit).ok()?;
         // A body at rest has one state, and the last one is held.
         let last = last?;
         frames.extend(waiting.map(|_| last.displacement.clone()));
@@ -319,7 +314,7 @@ mod tests {
     }
 
     fn best(base: &[Experiment], models: &[&Model], names: &[&str]) -> (Separated, Vec<Separation>) {
-        let ways = separations(base, Backend::Cpu, models, &|| true);
+        let ways = separations(base, Backend::Cpu, models, &Stop::default());
         println!("{ways:#?}");
         let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
         (Separated::best(&ways, &names).unwrap(), ways)

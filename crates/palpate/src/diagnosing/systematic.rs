@@ -2,7 +2,8 @@
 //! one, would change. The measuring effects `marker-offset` and `depth-bias` say it, so that their formulas exist once.
 
 use super::hypothesis::{lab_error, prepare};
-use super::lab::linearise;
+use super::limits::Limits;
+use super::simulate::linearise;
 use crate::experiment::Experiment;
 use palpate_diagnose::{Change, Field, LabError, Reading};
 use palpate_engine::Source;
@@ -19,7 +20,12 @@ fn effect(kind: &str, choice: Option<usize>) -> Option<Change> {
 }
 
 /// One field for every marker and axis, for every camera, and for every axis of tracked points, of every recording that states `noise_systematic`.
-pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]) -> Result<Vec<Field>, LabError> {
+pub(super) fn systematic(
+    base: &[Experiment],
+    changes: &[Change],
+    values: &[f64],
+    limits: &Limits,
+) -> Result<Vec<Field>, LabError> {
     let sizes = |kind: ReadingKind| base.iter().map(|e| e.plan.observation.systematic(kind)).collect::<Vec<_>>();
     let [depth, marker, track] = [ReadingKind::Depth, ReadingKind::Marker, ReadingKind::Track].map(sizes);
     let mut all = changes.to_vec();
@@ -40,7 +46,7 @@ pub(super) fn systematic(base: &[Experiment], changes: &[Change], values: &[f64]
     let from = values.len();
     let mut at: Vec<f64> = values.to_vec();
     at.resize(ready.free.len(), 0.0);
-    let readings = linearise(&ready, &at, from)?;
+    let readings = linearise(&ready, &at, from, limits)?;
     // What an error changes of every reading that is its sensor's.
     let field = |name: &'static str, mine: &dyn Fn(usize, &Source) -> bool, change: &dyn Fn(usize) -> f64| {
         let rows = readings.rows.iter().enumerate();

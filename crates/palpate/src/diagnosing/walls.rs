@@ -1,7 +1,8 @@
 //! Planes that the measured body does not cross and the simulated one does: where something flat that the scene does not know would stand.
 
 use super::hypothesis::{Prepared, lab_error, prepare};
-use super::lab::linearise;
+use super::limits::Limits;
+use super::simulate::linearise;
 use crate::embed::Embedding;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
@@ -33,7 +34,7 @@ const ALIKE: f64 = 0.9;
 
 /// Walls around the recordings of all experiments, the one that keeps out most of the simulation first: with the values of the baseline, and with
 /// those that its fit started from, for a body that something keeps up may have been made stiff enough to stay where it was seen.
-pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
+pub(super) fn walls(base: &[Experiment], limits: &Limits) -> Result<Vec<Wall>, LabError> {
     let ready = prepare(base, &[]).map_err(lab_error)?;
     let starts: Vec<f64> = ready.numbers().iter().map(|n| n.start).collect();
     let mut all = vec![ready.own_values(), starts];
@@ -41,7 +42,8 @@ pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
     let mut found = Vec::new();
     for values in all {
         // A start that cannot be simulated shows nothing.
-        found.extend(crossed(&ready, &values).unwrap_or_default());
+        found.extend(crossed(&ready, &values, limits).unwrap_or_default());
+        limits.check()?;
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut out: Vec<Wall> = Vec::new();
@@ -54,8 +56,8 @@ pub(super) fn walls(base: &[Experiment]) -> Result<Vec<Wall>, LabError> {
 }
 
 /// Walls that the simulation with these values crosses, and how far beyond what lies against them would be [m], in all.
-fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabError> {
-    let readings = linearise(ready, values, ready.free.len())?;
+fn crossed(ready: &Prepared, values: &[f64], limits: &Limits) -> Result<Vec<(f64, Wall)>, LabError> {
+    let readings = linearise(ready, values, ready.free.len(), limits)?;
     let noise = readings.rows.iter().map(|r| r.row.noise).fold(0.0, f64::max);
     let center = ready.experiments[0].plan.body.center;
     // Where the measured body is, and where the simulated one.
@@ -65,14 +67,14 @@ fn crossed(ready: &Prepared, values: &[f64]) -> Result<Vec<(f64, Wall)>, LabErro
         let places = patches.iter().step_by(patches.len().div_ceil(PLACES).max(1)).map(|p| p.point).collect();
         let surface = Embedding::new(&e.plan.body, places);
         let shifts = shifts(e, scene, &readings);
-        visit_frames(&e.plan, Backend::Cpu, &ready.theta(scene, values), |frame, displacement, _| {
+        visit_frames(&e.plan, Backend::Cpu, &ready.theta(scene, values), &limits.stop(), |frame, displacement, _| {
             let Some(shift) = &shifts[frame] else { return };
             for (rest, x) in surface.rest.iter().zip(surface.deform(&displacement())) {
                 simulated.push(x - center);
                 measured.push(x + shift.at(*rest) - center);
             }
         })
-        .map_err(lab_error)?;
+        .map_err(|e| limits.error(e))?;
     }
     if measured.len() <= BEYOND {
         return Ok(Vec::new());
@@ -148,6 +150,7 @@ fn shifts(e: &Experiment, scene: usize, readings: &Readings) -> Vec<Option<Shift
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interrupt::{Clock, Interrupt};
     use crate::render::{Pinhole, Sensor};
     use crate::synthetic::{Observers, observe};
     use std::ops::ControlFlow;
@@ -186,8 +189,9 @@ steps = 20
         let folder = std::env::temp_dir().join(format!("palpate-walls-{}", std::process::id()));
         palpate_io::write_recording(&folder, &recording).unwrap();
         let seen = format!("[observation]\nrecording = {:?}\ncost = \"sparse-surface\"\n", folder.display().to_string());
-        let found = walls(&[experiment(&format!("{BALL}{seen}"))]);
-        let known = walls(&[experiment(&format!("{BALL}{floor}{seen}"))]);
+        let limits = Limits::new(&Interrupt::default(), &Clock::start(), None);
+        let found = walls(&[experiment(&format!("{BALL}{seen}"))], &limits);
+        let known = walls(&[experiment(&format!("{BALL}{floor}{seen}"))], &limits);
         std::fs::remove_dir_all(&folder).unwrap();
         // Who knows the floor does not go through it.
         assert_eq!(known.unwrap(), []);

@@ -28,10 +28,13 @@ pub(super) fn strange(ready: &Prepared, values: &[f64], errors: &[Option<f64>]) 
         // What the readings leave open of it says nothing against the model.
         let of = ready.names.iter().zip(errors).filter(|(n, _)| n.path.starts_with("world.gravity"));
         let open = of.filter_map(|(_, e)| *e).map(|e| e * e).sum::<f64>();
-        out.extend(sizes.into_iter().map(|found| Strange {
-            path: "world.gravity".into(),
-            what: format!("gravity of {found:.2} m/s², where the Earth has {} m/s²", GRAVITY.0),
-            deviations: (found - GRAVITY.0).abs() / (GRAVITY.1.powi(2) + open).sqrt(),
+        out.extend(sizes.into_iter().map(|found| {
+            let deviations = (found - GRAVITY.0).abs() / (GRAVITY.1.powi(2) + open).sqrt();
+            let what = format!(
+                "gravity of {found:.2} m/s², which is {deviations:.0} standard deviations from the {} m/s² of the Earth",
+                GRAVITY.0
+            );
+            Strange { path: "world.gravity".into(), what, deviations }
         }));
     }
     for ((n, f), v) in ready.names.iter().zip(&ready.free).zip(values).take(ready.given) {

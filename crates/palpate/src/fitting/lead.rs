@@ -61,7 +61,7 @@ impl Guide<'_> {
         let (mut values, mut width) = (start.to_vec(), widest);
         while width > 1.0 && !self.interrupt.is_urgent() {
             let mut problem = self.problem(width, &values).ok()?;
-            let hooks = Hooks { interrupt: Some(self.interrupt.flag()), ..Hooks::default() };
+            let hooks = Hooks { interrupt: self.interrupt.in_turn(), ..Hooks::default() };
             let settings = Settings { starts: 1, ..self.settings.clone() };
             let found = fit(&mut problem, &settings, hooks).ok()?;
             values = found.parameters.iter().map(|p| p.value).collect();

@@ -5,11 +5,15 @@ use crate::results::diagnosis::{self as results, BeforeAfter, DiagnosisDocument,
 use crate::results::finite;
 use crate::results::fit::Parameter;
 use palpate_diagnose::{
-    Diagnosis, Found, FoundNumber, Level, MapEntry, Model, Number, Place, Separated, Slack, SlackWindow, Tried, stated,
+    Diagnosis, Found, FoundNumber, Level, MapEntry, Model, Movement, Number, Place, Separated, Slack, SlackWindow, Strange,
+    Tried, stated,
 };
 use palpate_engine::Stream;
 use palpate_model::params::unit_behind;
 use std::collections::BTreeMap;
+
+/// Candidates that were not yet fitted which the terminal lists.
+const LISTED: usize = 8;
 
 fn level(l: &Level) -> results::Level {
     results::Level { rms: finite(l.rms), noise: finite(l.noise) }
@@ -76,7 +80,37 @@ fn tried(t: &Tried) -> results::Tried {
         kind: t.kind.clone(),
         promised: finite(t.promised),
         held_out_gain: t.held_out_gain.and_then(finite),
+        status: match t {
+            t if t.held_out_gain.is_some() => "fitted",
+            t if t.open => "not yet fitted",
+            _ => "not fitted",
+        }
+        .into(),
     }
+}
+
+fn movement(m: &Movement) -> results::Movement {
+    results::Movement {
+        candidate: m.candidate.clone(),
+        fitted: m.fitted,
+        path: m.path.clone(),
+        unit: m.unit.clone(),
+        before: finite(m.before),
+        after: finite(m.after),
+        factor: m.factor().and_then(finite),
+        standard_errors: m.standard_errors().and_then(finite),
+        sentence: m.sentence(),
+    }
+}
+
+fn strange<'a>(model: &'a str, all: &'a [Strange]) -> impl Iterator<Item = results::Strange> + 'a {
+    let one = move |s: &Strange| results::Strange {
+        model: model.into(),
+        path: s.path.clone(),
+        deviations: finite(s.deviations),
+        what: s.what.clone(),
+    };
+    all.iter().filter(|s| s.is_evidence()).map(one)
 }
 
 fn slack(s: &Slack) -> results::Slack {
@@ -117,6 +151,8 @@ pub fn diagnosis_document(done: &Diagnosed) -> DiagnosisDocument {
         noise: Noise { readings_over_stated: finite(d.noise_ratio), variance_of_means: finite(d.design_effect) },
         tried: d.tried.iter().map(tried).collect(),
         not_tried: d.not_tried.clone(),
+        movements: d.movements.iter().map(movement).collect(),
+        strange: strange("before", &d.strange.0).chain(strange("after", &d.strange.1)).collect(),
         slack: d.slack.as_ref().map(slack),
         map: d.map.iter().map(|m| map_entry(done, m)).collect(),
         caveats: d.caveats.clone(),
@@ -145,6 +181,14 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
         if let Some(next) = &f.separated_by {
             text += &format!("  {}: {}\n", f.kind, next.sentence());
         }
+    }
+    // The first one is part of the answer.
+    let told = d.sentence();
+    for m in d.movements.iter().map(Movement::sentence).filter(|m| !told.contains(m.as_str())) {
+        text += &format!("  {m}\n");
+    }
+    for t in d.not_yet_fitted().into_iter().take(LISTED) {
+        text += &format!("  not yet fitted: {}, which promises {:.0} % of the squared residual\n", t.kind, 100.0 * t.promised);
     }
     let model = if done.experiments.len() == 1 { "model.toml" } else { "model-1.toml …" };
     let what = if d.model == d.baseline { "scene with these values" } else { "corrected scene" };

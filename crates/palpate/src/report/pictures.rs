@@ -6,7 +6,7 @@ use crate::experiment::Experiment;
 use crate::render::{Picture, Pinhole, residual_colour, shade};
 use crate::residuals::{pinhole, spread, visit_frames};
 use glam::DVec3;
-use palpate_engine::FrameResiduals;
+use palpate_engine::{FrameResiduals, Stop};
 
 /// Widest picture in a report [pixels].
 const WIDTH: usize = 480;
@@ -25,20 +25,21 @@ pub struct FramePicture {
 /// the simulated one's place in the same colours.
 ///
 /// # Errors
-/// [`Error::Simulation`] when that fails.
+/// [`Error::Simulation`] when that fails or is stopped.
 pub fn pictures(
     experiment: &Experiment,
     backend: Backend,
     theta: &[f64],
     count: usize,
     scale: f64,
+    stop: &Stop,
 ) -> Result<Vec<FramePicture>, Error> {
     let plan = experiment.plan();
     let all: Vec<usize> = (0..plan.observation.frames.len()).collect();
     let wanted = spread(&all, count);
     let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let mut out = Vec::new();
-    visit_frames(plan, backend, theta, |frame, displacement, residuals| {
+    visit_frames(plan, backend, theta, stop, |frame, displacement, residuals| {
         if wanted.contains(&frame) {
             let vertices = surface.deform(&displacement());
             let camera = camera(experiment, frame, &vertices);

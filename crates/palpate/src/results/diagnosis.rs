@@ -37,6 +37,10 @@ pub struct DiagnosisDocument {
     pub tried: Vec<Tried>,
     /// Candidates that there was no time for, each with the reason.
     pub not_tried: Vec<String>,
+    /// What candidates do to the free numbers.
+    pub movements: Vec<Movement>,
+    /// Numbers that leave the known world or end at a bound.
+    pub strange: Vec<Strange>,
     /// What any load could explain; only where nothing else does.
     pub slack: Option<Slack>,
     /// Residual map, block by block.
@@ -183,6 +187,44 @@ pub struct Tried {
     pub promised: Option<f64>,
     /// Share of the gap that it closed on data left out; `None` when it was not fitted.
     pub held_out_gain: Option<f64>,
+    /// `fitted`, `not fitted` (it promised too little), or `not yet fitted` (the search ended before).
+    pub status: String,
+}
+
+/// What a candidate does to the free number that it moves most.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Movement {
+    /// The candidate, with those that were added before it.
+    pub candidate: String,
+    /// True where a fit says so; false where sensitivities do, as a linear estimate.
+    pub fitted: bool,
+    /// Path of the number in the scene file.
+    pub path: String,
+    /// Its SI unit.
+    pub unit: String,
+    /// Its value in the baseline.
+    pub before: Option<f64>,
+    /// Its value beside the candidate.
+    pub after: Option<f64>,
+    /// The second over the first; `None` where the number has no size.
+    pub factor: Option<f64>,
+    /// By how many standard errors it moves, of whichever value is known worse; `None` where no error is known.
+    pub standard_errors: Option<f64>,
+    /// The same in words.
+    pub sentence: String,
+}
+
+/// A number that leaves the known world or ends at a bound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Strange {
+    /// Whose number: that of the model `before` or `after`.
+    pub model: String,
+    /// Its path in the scene file.
+    pub path: String,
+    /// By how many standard deviations it counts.
+    pub deviations: Option<f64>,
+    /// What is strange about it.
+    pub what: String,
 }
 
 /// What any load could explain.
@@ -267,8 +309,31 @@ mod tests {
             gap_closed: Some(0.97),
             parameters: Values { before: vec![parameter.clone()], after: vec![parameter] },
             noise: Noise { readings_over_stated: Some(1.1), variance_of_means: Some(3.0) },
-            tried: vec![Tried { round: 1, kind: "adhesion".into(), promised: Some(0.1), held_out_gain: None }],
+            tried: vec![Tried {
+                round: 1,
+                kind: "adhesion".into(),
+                promised: Some(0.1),
+                held_out_gain: None,
+                status: "not yet fitted".into(),
+            }],
             not_tried: vec!["creep: no time".into()],
+            movements: vec![Movement {
+                candidate: "uniform-force".into(),
+                fitted: true,
+                path: "material.density".into(),
+                unit: "kg/m³".into(),
+                before: Some(1e3),
+                after: Some(2e3),
+                factor: Some(2.0),
+                standard_errors: None,
+                sentence: "With uniform-force it is twice as dense.".into(),
+            }],
+            strange: vec![Strange {
+                model: "before".into(),
+                path: "world.gravity".into(),
+                deviations: Some(50.0),
+                what: "gravity of 14.9 m/s²".into(),
+            }],
             slack: Some(Slack {
                 share: Some(0.6),
                 direction: "pulls towards +x".into(),
@@ -291,6 +356,6 @@ mod tests {
         let file = round_trip(&diagnosis);
         assert!(file["where"].is_array() && file["error"].is_null() && file["missing"]["after"]["nats"].is_null());
         assert_eq!(keys(&file["parameters"]["after"][0]), ["path", "standard_error", "unit", "value"]);
-        assert_eq!(keys(&file).len(), 22);
+        assert_eq!(keys(&file).len(), 24);
     }
 }

@@ -1,22 +1,20 @@
 //! The report of a diagnosis.
 
-use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
+use super::{Column, figure, heads, page, plot, reproduce, unit};
 use crate::diagnosing::Diagnosed;
 use crate::report::diagnosis::{fitted, stream};
 use crate::report::fit::number;
 use crate::report::pictures::FramePicture;
-use crate::residuals::ResidualSummary;
+use crate::report::plots::Curve;
 use maud::{Markup, html};
-use palpate_diagnose::{Diagnosis, Found, Level, MapEntry, Verdict, direction, millimetres, stated};
+use palpate_diagnose::{Diagnosis, Found, Instant, Level, MapEntry, Movement, Tried, Verdict, direction, millimetres, stated};
 
 /// What a report of a diagnosis is made of, scene by scene.
 pub struct DiagnosisInput<'a> {
     /// The diagnosis.
     pub done: &'a Diagnosed,
-    /// Residuals before and after.
-    pub residuals: Vec<(ResidualSummary, ResidualSummary)>,
-    /// Pictures before and after.
-    pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
+    /// Pictures before and after; `None` where there was no time for them.
+    pub pictures: Option<Vec<(Vec<FramePicture>, Vec<FramePicture>)>>,
     /// The command that reproduces it.
     pub command: String,
 }
@@ -31,10 +29,11 @@ pub fn diagnosis_html(input: &DiagnosisInput) -> String {
         @for f in &d.effects {
             (effect(f))
         }
+        (movements(d))
         (values(d))
         (places(d))
         (map(done))
-        @for s in 0..input.residuals.len() {
+        @for s in 0..done.experiments.len() {
             (scene(input, s))
         }
         (slack(d))
@@ -49,7 +48,7 @@ fn title(d: &Diagnosis) -> &'static str {
         Verdict::Adequate => "Diagnosis: nothing is missing",
         Verdict::MissingEffect => "Diagnosis: an effect is missing",
         Verdict::Unexplained => "Diagnosis: something is missing that no known effect explains",
-        Verdict::Undecided if d.unsure => "Diagnosis: interrupted before anything was known",
+        Verdict::Undecided if d.unsure.is_some() => "Diagnosis: nothing is decided",
         Verdict::Undecided => "Diagnosis: something is missing, and the search is not finished",
     }
 }
@@ -127,6 +126,25 @@ fn effect(f: &Found) -> Markup {
     }
 }
 
+/// What candidates do to the free numbers.
+fn movements(d: &Diagnosis) -> Markup {
+    let list = |fitted: bool| -> Vec<&Movement> { d.movements.iter().filter(|m| m.fitted == fitted).collect() };
+    html! {
+        @if !d.movements.is_empty() {
+            h2 { "What it does to the answer" }
+            ul {
+                @for m in list(true) { li { (m.sentence()) } }
+            }
+            @if !list(false).is_empty() {
+                p { "Not yet fitted, by sensitivities alone:" }
+                ul {
+                    @for m in list(false) { li { (m.sentence()) } }
+                }
+            }
+        }
+    }
+}
+
 fn values(d: &Diagnosis) -> Markup {
     use Column::{Number, Text};
     if d.baseline.numbers.is_empty() {
@@ -153,6 +171,11 @@ fn values(d: &Diagnosis) -> Markup {
                     @if changed { td.n { (fitted(&d.model, k)) } }
                     td { (unit(&n.unit)) }
                 }
+            }
+        }
+        @for (model, all) in [("before", &d.strange.0), ("after", &d.strange.1)] {
+            @for s in all.iter().filter(|s| s.is_evidence() && (changed || model == "before")) {
+                p.w { @if changed { "The fit " (model) " ends with " } @else { "The fit ends with " } (s.what) "." }
             }
         }
     }
@@ -235,9 +258,13 @@ fn colour(z: f64) -> String {
 }
 
 fn scene(input: &DiagnosisInput, s: usize) -> Markup {
-    let (before, after) = &input.residuals[s];
-    let lines = [over_time("after", after), over_time("before", before)];
-    let pictures = input.pictures.get(s).into_iter().flat_map(|(b, a)| b.iter().zip(a));
+    let course: Vec<&Instant> = input.done.diagnosis.course.iter().filter(|i| i.scene == s).collect();
+    let line = |label: &str, rms: fn(&Instant) -> f64| Curve {
+        label: label.into(),
+        points: course.iter().map(|i| (i.time, rms(i) * 1e3)).collect(),
+    };
+    let lines = [line("after", |i| i.after), line("before", |i| i.before)];
+    let pictures = input.pictures.iter().flat_map(|all| all.get(s)).flat_map(|(b, a)| b.iter().zip(a));
     html! {
         @if let Some(drawing) = plot(&lines, "time [s]", "rms distance [mm]", false) {
             h2 { "Residual over time, scene " (s + 1) }
@@ -272,6 +299,11 @@ fn slack(d: &Diagnosis) -> Markup {
     }
 }
 
+/// Why a candidate was not fitted: it promised too little, or the search did not come to it.
+fn not_fitted(t: &Tried) -> &'static str {
+    if t.open { "not yet fitted" } else { "not fitted" }
+}
+
 fn tried(d: &Diagnosis) -> Markup {
     use Column::{Number, Text};
     if d.tried.is_empty() {
@@ -292,7 +324,7 @@ fn tried(d: &Diagnosis) -> Markup {
                     td { (t.round) }
                     td { (t.kind) }
                     td.n { (format!("{:.1} %", 100.0 * t.promised)) }
-                    td.n { (t.held_out_gain.map_or("not fitted".into(), |g| format!("{:.0} %", 100.0 * g))) }
+                    td.n { (t.held_out_gain.map_or(not_fitted(t).into(), |g| format!("{:.0} %", 100.0 * g))) }
                 }
             }
         }
