@@ -24,15 +24,15 @@ start = 1.5e4
 "#;
 
 /// Records the block with `hidden` in its scene, on cells two thirds as large with a shorter step, and diagnoses it with a scene that
-/// does not know.
-fn diagnosed(hidden: &str) -> (tempfile::TempDir, Value) {
+/// does not know; the noise of a depth reading in metres.
+fn diagnosed(hidden: &str, noise: &str) -> (tempfile::TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name);
     fs::write(file("truth.toml"), format!("{BLOCK}{hidden}")).unwrap();
     fs::write(file("scene.toml"), format!("{BLOCK}{SEEN}")).unwrap();
     let (truth, seen, scene, out) = (file("truth.toml"), file("seen"), file("scene.toml"), file("why"));
     let camera = "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30";
-    let observe = ["observe", arg(&truth), "--camera", camera, "--noise", "0.0005", "--depth-scale", "0.0001"];
+    let observe = ["observe", arg(&truth), "--camera", camera, "--noise", noise, "--depth-scale", "0.0001"];
     succeed(&[&observe[..], &["--refine", "1.5", "--seed", "5", "--out", arg(&seen)]].concat());
     succeed(&["diagnose", arg(&scene), "--out", arg(&out), "--backend", "cpu"]);
     let result = json(out.join("diagnosis.json"));
@@ -50,7 +50,7 @@ fn named(d: &Value) -> Vec<String> {
 
 #[test]
 fn nothing_is_found_where_nothing_is_missing() {
-    let (folder, d) = diagnosed("");
+    let (folder, d) = diagnosed("", "0.0005");
     assert_eq!((&d["format"], &d["verdict"]), (&"diagnosis/2".into(), &"adequate".into()));
     assert!(d["effects"].as_array().is_none_or(|e| e.iter().all(|e| e["accepted"] != true)));
     assert!(folder.path().join("why/report.html").exists());
@@ -58,7 +58,7 @@ fn nothing_is_found_where_nothing_is_missing() {
 
 #[test]
 fn a_sideways_force_is_named_with_its_size_and_its_twin() {
-    let (folder, d) = diagnosed("[[effect]]\nkind = \"uniform-force\"\nforce = [0.0, 2500.0, 0.0]\n");
+    let (folder, d) = diagnosed("[[effect]]\nkind = \"uniform-force\"\nforce = [0.0, 2500.0, 0.0]\n", "0.0005");
     assert_eq!(d["verdict"], "missing-effect");
     let names = named(&d);
     // In a body of even density a force per volume and another gravity are the same thing: both must be told.
@@ -79,7 +79,7 @@ fn a_sideways_force_is_named_with_its_size_and_its_twin() {
 
 #[test]
 fn a_sensor_that_reads_too_far_is_not_sold_as_physics() {
-    let (_, d) = diagnosed("[[effect]]\nkind = \"depth-bias\"\nbias = 0.004\n");
+    let (_, d) = diagnosed("[[effect]]\nkind = \"depth-bias\"\nbias = 0.004\n", "0.0005");
     assert_eq!(d["verdict"], "missing-effect");
     let names = named(&d);
     assert_eq!(names[0], "depth-bias", "{names:?}");
@@ -97,7 +97,7 @@ fn a_sensor_that_reads_too_far_is_not_sold_as_physics() {
 
 #[test]
 fn a_second_recording_that_is_not_met_is_spoken_of_and_another_body_is_refused() {
-    let (folder, _) = diagnosed("");
+    let (folder, _) = diagnosed("", "0.0005");
     let file = |name: &str| folder.path().join(name);
     let scene = file("scene.toml");
     let run = |other: &str| {

@@ -92,6 +92,8 @@ impl State {
 struct Fitted {
     candidate: CandidateId,
     state: State,
+    /// How it predicted beside the errors of grid and step that the model before has.
+    lent: Judged,
     /// How much better it predicts than the model before, and the standard error of that [nats].
     nats: (f64, f64),
     gain: f64,

@@ -25,9 +25,9 @@ pub struct Judged {
     pub alone: Vec<f64>,
     /// Mean of these over recordings of that truth, of all blocks together.
     pub expected: f64,
-    /// ln p of every block beside a discrepancy of the size that fits best.
+    /// ln p of every block beside a discrepancy of mixed size.
     pub beside: Vec<f64>,
-    /// That size, in standard deviations of a cell's noise.
+    /// Its root mean square, in standard deviations of a cell's noise.
     pub discrepancy: f64,
     /// ln p of the model.
     pub log_prior: f64,

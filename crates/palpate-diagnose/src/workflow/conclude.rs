@@ -77,7 +77,7 @@ impl Session<'_> {
         let verdict = match out.accepted.len() {
             0 if !(remains || out.open || out.cut) => Verdict::Adequate,
             _ if out.unsure.is_some() => Verdict::Undecided,
-            1.. if state.judged.explains(&base.judged) => Verdict::MissingEffect,
+            1.. if state.judged.explains(&base.judged) && !(stopped && remains) => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if stopped => Verdict::Undecided,
             _ => Verdict::Unexplained,

@@ -2,7 +2,7 @@
 
 use super::State;
 use crate::cells::{Cells, Table};
-use crate::judgement::density::Linear;
+use crate::judgement::density::{Blocks, Linear};
 use crate::laboratory::{Field, Model, Readings};
 use crate::linear::dot;
 use faer::Mat;
@@ -61,6 +61,17 @@ pub(super) fn around(cells: &Cells, state: &State) -> Linear {
         out.rough.extend(rough(f, &change));
     }
     out
+}
+
+/// Standard errors of a model's numbers by all of it: noise, errors of grid and step and of the sensors, and a discrepancy; `None` where nothing
+/// is read of a number.
+pub(super) fn errors(state: &State, own: &Linear, blocks: &Blocks) -> Vec<Option<f64>> {
+    let (_, factor) = own.posterior(blocks, own.discrepancy(blocks));
+    let number = |(k, m): (usize, Mover)| {
+        let share = (0..factor.ncols()).map(|j| factor[(k, j)].powi(2)).sum::<f64>().sqrt();
+        (m.sd > 0.0).then_some(m.sd * share)
+    };
+    numbers(&state.model, &state.table).into_iter().enumerate().map(number).collect()
 }
 
 /// What of a field is not known, anew in every block.

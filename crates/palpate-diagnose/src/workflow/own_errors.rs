@@ -7,13 +7,17 @@ use super::{Fitted, Session, State};
 const MEASURED: usize = 10;
 
 impl Session<'_> {
-    /// Measures the errors of candidates, the best first, until the best of all and those as good as it have their own.
+    /// Measures the errors of candidates, the best first, until the best of all and those as good as it have their own. Beside its own errors a model
+    /// predicts better than beside another's, so that those count as well who were as good before.
     pub(super) fn measure_rivals(&mut self, before: &State, fitted: &mut [Fitted]) {
         for _ in 0..self.options.search.rivals {
             let score = |k: &usize| fitted[*k].state.judged.score();
             let order = |a: &usize, b: &usize| score(a).total_cmp(&score(b));
             let Some(best) = (0..fitted.len()).max_by(order).filter(|k| score(k) > before.judged.score()) else { return };
-            let rival = |k: &usize| fitted[*k].state.judged.over(&fitted[best].state.judged).is_as_good();
+            let rival = |k: &usize| {
+                let (a, b) = (&fitted[*k], &fitted[best]);
+                a.lent.over(&b.lent).is_as_good() || a.state.judged.over(&b.state.judged).is_as_good()
+            };
             let open = (0..fitted.len()).filter(|k| !fitted[*k].state.own && rival(k)).max_by(order);
             let Some(next) = open.filter(|_| self.lab.iterations_left() >= MEASURED) else { return };
             self.refine(&mut fitted[next].state);

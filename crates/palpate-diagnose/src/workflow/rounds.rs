@@ -226,7 +226,8 @@ impl Session<'_> {
         let effects = v.changes.len();
         let needed = state.needed[state.needed.len() - effects..].iter().sum();
         let (gain, nats) = (self.gain(before, &state), state.judged.over(&before.judged).parts());
-        Fitted { candidate: v.candidate, state, nats, gain, freedom: v.columns.len(), needed, effects }
+        let lent = state.judged.clone();
+        Fitted { candidate: v.candidate, state, lent, nats, gain, freedom: v.columns.len(), needed, effects }
     }
 
     /// Share of the gap that one model leaves which another closes, on data left out, in whichever way of leaving some out it is least.

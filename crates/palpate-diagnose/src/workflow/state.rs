@@ -2,9 +2,10 @@
 
 use super::{Session, State, linear};
 use crate::cells::{Cells, Table};
-use crate::judgement::density::{Blocks, LogDensity};
+use crate::judgement::density::Blocks;
 use crate::judgement::prior::Prior;
 use crate::judgement::rule::Judged;
+use crate::judgement::stack::{SIZES, stacked};
 use crate::laboratory::{Field, LabError, Model, Readings};
 
 impl Session<'_> {
@@ -69,7 +70,6 @@ impl Session<'_> {
         let table = self.cells.table(&readings, fallback);
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
-        let strange = self.lab.strange(&model);
         let mut state = State {
             needed: Vec::new(),
             judged: Judged::default(),
@@ -83,7 +83,7 @@ impl Session<'_> {
             held_out: None,
             elsewhere: None,
             own: true,
-            strange,
+            strange: Vec::new(),
         };
         self.judge(&mut state);
         state
@@ -102,7 +102,8 @@ impl Session<'_> {
     pub(super) fn judge(&self, state: &mut State) {
         state.needed = self.needed(state);
         let own = linear::around(&self.cells, state);
-        let tau = own.discrepancy(&self.blocks);
+        state.model.errors = linear::errors(state, &own, &self.blocks);
+        state.strange = self.lab.strange(&state.model);
         let density = |tau: f64| {
             let mut all = own.left_out(&self.blocks, tau);
             all.push(own.known_left_out(&self.blocks, tau));
@@ -113,15 +114,17 @@ impl Session<'_> {
             all
         };
         let prior = Prior { candidates: self.candidates, readings: self.cells.len() };
-        let alone = density(0.0);
-        let seen = |all: &[LogDensity]| all.iter().map(|d| d.seen).collect::<Vec<_>>();
+        let all = SIZES.map(density);
+        let seen: Vec<Vec<f64>> = all.iter().map(|d| d.iter().map(|d| d.seen).collect()).collect();
+        let (beside, weights) = stacked(&seen);
         state.judged = Judged {
-            alone: seen(&alone),
-            expected: alone.iter().map(|d| d.expected).sum(),
-            beside: seen(&if tau > 0.0 { density(tau) } else { alone.clone() }),
-            discrepancy: tau,
+            expected: all[0].iter().map(|d| d.expected).sum(),
+            beside,
+            discrepancy: weights.iter().zip(SIZES).map(|(w, tau)| w * tau * tau).sum::<f64>().sqrt(),
             log_prior: prior.log(&state.needed, &state.strange),
-            conflict: own.conflict(&self.blocks, tau),
+            // Beside the size that readings have on the whole: numbers that were left to follow them contradict nothing.
+            conflict: own.conflict(&self.blocks, own.discrepancy(&self.blocks)),
+            alone: seen.into_iter().next().unwrap_or_default(),
         };
     }
 
