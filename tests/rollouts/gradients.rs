@@ -93,7 +93,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
 
 /// Without the points that differences may take across a face of the distance's samples, where its slope jumps: differences over a kink are
 /// no derivatives.
-fn away_from_kinks(plan: Plan) -> Plan {
+pub(super) fn away_from_kinks(plan: Plan) -> Plan {
     let body = &plan.body;
     let rows = Rollout::new(CpuBackend, &plan, 1).unwrap().linearise(&plan.theta, &[0]).unwrap().rows.residuals;
     let far = |rest: DVec3| {

@@ -1,7 +1,7 @@
 //! Measurement effects: adjoint = sensitivities = differences, for each and for all at once.
 
 use super::effects::{check, with};
-use super::gradients::{ball, observed};
+use super::gradients::{away_from_kinks, ball, observed};
 use glam::DVec3;
 use palpate_model::effects::{ALL, Effect, Family};
 use palpate_model::observation::Camera;
@@ -30,7 +30,8 @@ fn watched(scene: &Scene) -> Plan {
         assert!(kept.len() > 20, "{} points", kept.len());
         frame.points = kept;
     }
-    plan
+    // Other cameras find other places for some points.
+    away_from_kinks(plan)
 }
 
 #[test]

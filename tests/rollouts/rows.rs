@@ -6,6 +6,7 @@ use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Source, Wanted};
 use palpate_model::observation::ObservedPoint;
 use palpate_model::params::ParamKey::*;
 use palpate_model::plan::Plan;
+use std::sync::Arc;
 
 #[test]
 fn rows_add_up_to_cost_gradient_and_curvature() {
@@ -101,16 +102,21 @@ fn a_frame_counts_by_its_points() {
     };
     let still = [0.0; 2];
     let (both, many, few) = (sums(&with([500, 5], still)), sums(&with([500, 0], still)), sums(&with([0, 5], still)));
-    let often = sums(&with([0, 10], still));
+    let mut twice = with([0, 5], still);
+    Arc::make_mut(&mut twice.observation).frames[1].points.extend_from_within(..);
+    let twice = sums(&twice);
     for k in 0..3 {
         // The same terms in another order.
         assert!((both[k] - many[k] - few[k]).abs() < 1e-9 * both[k].abs().max(many[k].abs()), "{both:?} {many:?} {few:?}");
     }
-    // Curvature is a sum of squares that hardly depend on where the points are: a hundredth of the points has about a hundredth of it (more
-    // here, because the later frame has had longer to move), and twice as many points have about twice as much.
-    println!("curvature: {:.3e} of 500 points, {:.3e} of 5, {:.3e} of 10", many[2], few[2], often[2]);
+    // Curvature is a sum of squares. Each goes by how much its surface faces along the motion, and by whether that part has landed, so that five
+    // points are some way off the mean; and the later frame has had longer to move. A hundredth of the points has about a hundredth of it.
+    println!("curvature: {:.3e} of 500 points, {:.3e} of 5, {:.3e} of these twice", many[2], few[2], twice[2]);
     assert!(few[2] > 0.3 * 0.01 * many[2] && few[2] < 10.0 * 0.01 * many[2], "{few:?} {many:?}");
-    assert!(often[2] > 1.5 * few[2] && often[2] < 2.7 * few[2], "{often:?} {few:?}");
+    // The same points twice have twice as much of everything.
+    for k in 0..3 {
+        assert!((twice[k] - 2.0 * few[k]).abs() < 1e-9 * few[k].abs(), "{twice:?} {few:?}");
+    }
     // A millimetre of error in one of the frames moves the answer by as much as its share of the curvature lets it.
     let answer = |shift: [f64; 2]| {
         let [_, gradient, curvature] = sums(&with([500, 5], shift));

@@ -34,8 +34,7 @@ fn products_with_the_gauss_newton_matrix_are_those_of_the_cpu() {
     let mut scene = held(0.03);
     scene.observation = watched();
     scene.effects = ["marker-offset", "depth-bias", "time-offset"].map(|kind| Effect::absent(find(kind).unwrap())).to_vec();
-    for (steps, young) in [(0, 4700.0), (0, 4900.0), (0, 5000.0), (0, 5050.0), (0, 5200.0), (3, 5000.0)] {
-        scene.material.youngs_modulus = young;
+    for steps in [0, 3] {
         scene.time.steps = steps;
         let plan = plan(&scene);
         let p = plan.layout.len();
@@ -57,10 +56,6 @@ fn products_with_the_gauss_newton_matrix_are_those_of_the_cpu() {
             let length = known.iter().map(|a| (right[*a] / size[*a]).powi(2)).sum::<f64>().sqrt();
             let off = |b: &[f64]| known.iter().map(|a| (found[*a] - b[*a]).abs() / size[*a]).fold(0.0, f64::max) / length;
             println!("{steps} steps, {} numbers: {:.1e}", chosen.len(), off(&right));
-            println!("E {young}");
-            if steps == 0 {
-                continue;
-            }
             assert!(off(&right) < 1e-3, "{:.1e}", off(&right));
             // One percent of the largest entry shows.
             let largest =

@@ -42,7 +42,7 @@ pub(super) const CLOSE: [f64; 2] = [5e-7, 1e-4];
 #[test]
 fn steps_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
-    // One falls onto the ground; the other is held and does not reach it.
+    // One falls onto the ground; the other is held, and what it presses on the ground with is little beside the rest.
     let mut falling = busy(ball(0.03));
     falling.initial.velocity.z = -1.5;
     // It hardly moves: damping must be strong to show.

@@ -155,6 +155,9 @@ fn evaluations_of_bodies_of_every_material_agree() {
 fn evaluations_of_a_body_of_a_material_and_laws_agree() {
     let mut s = thrown(palpate_model::materials::find("neo-hookean").unwrap_or_else(|| panic!("it is there")));
     s.material.youngs_modulus *= 2.0;
+    // At the others' 1 m/s one point of the first frame lies on a seam of its cell's distances, where their slope jumps: in single precision
+    // it takes the other side's.
+    s.initial.velocity.z = -0.8;
     s.time.steps = 2;
     with(&mut s, "structural-damping", &[("loss", &[1.0])]);
     with(&mut s, "rest-shape", &[("stretch", &[0.04, -0.02, 0.03])]);

@@ -87,7 +87,11 @@ pub fn ball(h: f64) -> Scene {
     }
 }
 
-/// The ball held at its top by a clamp that moves and turns, hanging from the start.
+/// The ball held at its top by a clamp that moves and turns, hanging from the start into the layer of the ground.
+///
+/// The ground is 1.2 mm higher than the free ball's, so that the lowest patches lie well within its layer, of 0.75 mm to either side where
+/// cells are 3 cm. Where the free ball's ground is, one patch grazes the layer by a twentieth of it. Contact's stiffness goes by the square
+/// of that depth, so that the 1e-7 m of single precision would make some 3e-3 of what a plane does to the body.
 pub fn held(h: f64) -> Scene {
     let motion = RigidMotion {
         times: vec![-1.0, 0.0, 1.0],
@@ -95,6 +99,7 @@ pub fn held(h: f64) -> Scene {
         rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_z(0.1), DQuat::from_rotation_y(0.4)],
     };
     let mut scene = ball(h);
+    scene.planes[0].point.z = 0.0012;
     let min = DVec3::new(-1.0, -1.0, 0.07);
     scene.clamps.push(Clamp { min, max: DVec3::ONE, object_frame: false, motion: Some(motion), motion_path: None });
     scene.initial.state = InitialShape::StaticEquilibrium;

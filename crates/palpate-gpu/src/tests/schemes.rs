@@ -91,7 +91,9 @@ fn evaluations_by_every_scheme_agree() {
         s.observation = watched();
         with(&mut s, "structural-damping", &[("loss", &[1.0])]);
         with(&mut s, "contact-dissipation", &[("dissipation", &[2.0])]);
-        compare_within(&seen(&s), 3e-4);
+        // A solve to 2e-6 of the forces, of which each of four kinds moves the body by its 1 cm a step, leaves 8e-8 m if all nodes share it, and
+        // up to √114 times that, 9e-7 m, in one of its 114. That is 3e-4 of the noise, 3 mm; there are two steps.
+        compare_within(&seen(&s), 6e-4);
     }
 }
 
