@@ -67,7 +67,10 @@ fn a_budget_of_a_second_ends_in_time_with_a_ranking() {
     // A tenth of 1.2 s, and a second for a machine on which other tests run.
     assert!(taken < 1.2 * 1.1 + 1.0, "{taken} s");
     let d = json(out.join("diagnosis.json"));
-    assert_eq!((&d["verdict"], &d["interrupted"]), (&"undecided".into(), &false.into()), "{}", d["sentence"]);
+    // A fast machine gets as far as to name something; that others may explain it as well is said then.
+    assert!(["undecided", "missing-effect"].iter().any(|v| d["verdict"] == *v) && d["interrupted"] == false, "{}", d["sentence"]);
+    let told = d["sentence"].as_str().unwrap().contains("The search ended before it had tried to the end: ");
+    assert!(told || d["verdict"] == "undecided", "{}", d["sentence"]);
     let open = not_yet_fitted(&d);
     assert!(open.len() > 10 && open.iter().all(|t| t["promised"].is_number()), "{}", d["tried"]);
     assert!(a.out.contains("not yet fitted: "), "{}", a.out);

@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     fn judged(alone: &[f64], beside: &[f64], log_prior: f64) -> Judged {
-        let expected = -1.0 * alone.len() as f64;
+        let expected = -(alone.len() as f64);
         Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), discrepancy: 1.0, log_prior, conflict: 0.0 }
     }
 
