@@ -6,6 +6,7 @@ use crate::{Interrupt, Liveliness};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::MutexGuard;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The shared device, for one test at a time; `None` where there is none and none is required.
@@ -171,19 +172,26 @@ fn a_batch_whose_device_is_lost_goes_on_with_another() {
 fn a_diagnosis_whose_device_is_lost_says_so_and_blames_no_candidate() {
     let Some((_alone, _)) = shared() else { return };
     let folder = recorded();
-    let (scene, out) = (folder.path().join("slow.toml"), folder.path().join("why"));
+    let scene = folder.path().join("slow.toml");
     let slow =
         BLOCK.replace("[0.6, 0.0, 0.0]", "[0.2, 0.0, 0.0]") + "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n";
     std::fs::write(&scene, slow).expect("writable");
-    let arguments =
-        ["diagnose", &scene.display().to_string(), "--backend", "gpu", "--pictures", "0", "--out", &out.display().to_string()]
-            .map(String::from);
-    let (code, err) = std::thread::scope(|scope| {
-        let run = scope.spawn(|| command(&arguments.each_ref().map(String::as_str)));
-        // Every fit opens a device where there is none, so one is lost again and again, from when the search begins.
+    let experiment = Experiment::open(&scene).unwrap_or_else(|e| panic!("{e}"));
+    let fits = AtomicBool::new(false);
+    let mut hear = |what: &str| fits.store(what.starts_with("fitting"), Ordering::SeqCst);
+    let found = std::thread::scope(|scope| {
+        let run = scope.spawn(|| {
+            let options = crate::DiagnoseOptions {
+                backend: Backend::Gpu,
+                on_progress: Some(&mut hear),
+                ..crate::DiagnoseOptions::default()
+            };
+            crate::diagnose(std::slice::from_ref(&experiment), None, options)
+        });
+        // Every fit opens a device where there is none, so one is lost again and again, from when candidates are fitted.
         while !run.is_finished() {
             std::thread::sleep(Duration::from_millis(20));
-            if out.join("checkpoint.jsonl").exists()
+            if fits.load(Ordering::SeqCst)
                 && let Ok(device) = gpu()
             {
                 device.gpu().destroy();
@@ -191,11 +199,11 @@ fn a_diagnosis_whose_device_is_lost_says_so_and_blames_no_candidate() {
         }
         run.join().expect("a diagnosis does not panic")
     });
-    ends_with_the_device(code, &err, "slow.toml");
-    let text = std::fs::read_to_string(out.join("diagnosis.json")).expect("what was known is written");
-    let known: Value = serde_json::from_str(&text).expect("it is JSON");
-    assert_eq!((&known["verdict"], &known["interrupted"]), (&"undecided".into(), &true.into()), "{text}");
-    assert!(known["error"].as_str().is_some_and(|e| e.contains("lost")), "{text}");
+    let found = found.unwrap_or_else(|e| panic!("{e}"));
+    assert!(found.broken.as_ref().is_some_and(|e| e.contains("lost")), "{:?}", found.broken);
+    let d = &found.diagnosis;
+    assert!(d.verdict == palpate_diagnose::Verdict::Undecided && d.interrupted, "{}", d.sentence());
+    assert!(!d.not_tried.iter().any(|n| n.contains("lost")), "{:?}", d.not_tried);
 }
 
 /// What `inspect` says before, and what the device's allocator says during the fit: starts side by side with a tape, and one start

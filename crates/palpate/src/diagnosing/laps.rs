@@ -77,6 +77,7 @@ pub(super) fn fit(
     let hooks = Hooks { interrupt: limits.interrupt().in_turn(), ..Hooks::default() };
     let result = palpate_fit::fit(&mut problem, &settings, hooks).map_err(|e| match e {
         palpate_fit::FitError::Interrupted => limits.stopped(),
+        palpate_fit::FitError::Broken(why) => limits.break_off(why),
         e => LabError::failed(e),
     })?;
     if let Some(why) = result.broken {
