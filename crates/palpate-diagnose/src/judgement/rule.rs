@@ -27,8 +27,6 @@ pub struct Judged {
     pub expected: f64,
     /// ln p of every block beside a discrepancy of mixed size.
     pub beside: Vec<f64>,
-    /// Its root mean square, in standard deviations of a cell's noise.
-    pub discrepancy: f64,
     /// ln p of the model.
     pub log_prior: f64,
     /// Standard deviations by which readings contradict most what is known beforehand of numbers, or of errors of grid and step.
@@ -117,7 +115,7 @@ mod tests {
 
     fn judged(alone: &[f64], beside: &[f64], log_prior: f64) -> Judged {
         let expected = -(alone.len() as f64);
-        Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), discrepancy: 1.0, log_prior, conflict: 0.0 }
+        Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), log_prior, conflict: 0.0 }
     }
 
     #[test]

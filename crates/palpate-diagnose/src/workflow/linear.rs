@@ -63,10 +63,10 @@ pub(super) fn around(cells: &Cells, state: &State) -> Linear {
     out
 }
 
-/// Standard errors of a model's numbers by all of it: noise, errors of grid and step and of the sensors, and a discrepancy; `None` where nothing
+/// Standard errors of a model's numbers by all of it: noise, errors of grid and step and of the sensors, and a discrepancy of this size; `None` where nothing
 /// is read of a number.
-pub(super) fn errors(state: &State, own: &Linear, blocks: &Blocks) -> Vec<Option<f64>> {
-    let (_, factor) = own.posterior(blocks, own.discrepancy(blocks));
+pub(super) fn errors(state: &State, own: &Linear, blocks: &Blocks, size: f64) -> Vec<Option<f64>> {
+    let (_, factor) = own.posterior(blocks, size);
     let number = |(k, m): (usize, Mover)| {
         let share = (0..factor.ncols()).map(|j| factor[(k, j)].powi(2)).sum::<f64>().sqrt();
         (m.sd > 0.0).then_some(m.sd * share)

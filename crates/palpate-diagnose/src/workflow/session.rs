@@ -51,7 +51,7 @@ impl<'a> Session<'a> {
             return Ok(None);
         }
         let began = self.lab.seconds();
-        let state = self.alone(start.clone(), readings, Vec::new(), None);
+        let state = self.alone(start.clone(), readings, Vec::new());
         self.keep_back(began);
         self.look(&state, 0, false)?;
         Ok(Some(state))

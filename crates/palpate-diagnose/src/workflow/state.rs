@@ -52,25 +52,42 @@ impl Session<'_> {
         own: bool,
         fallback: Option<&Table>,
     ) -> Result<State, LabError> {
+        let mut state = self.unjudged(model, readings, fields, own, fallback)?;
+        self.judge(&mut state);
+        Ok(state)
+    }
+
+    /// The same without any other recording, of a model with fields of its own.
+    pub(super) fn alone(&mut self, model: Model, readings: Readings, fields: Vec<Field>) -> State {
+        let mut state = self.unread(model, readings, fields, None);
+        self.judge(&mut state);
+        state
+    }
+
+    /// A state before it is judged.
+    fn unjudged(
+        &mut self,
+        model: Model,
+        readings: Readings,
+        fields: Vec<Field>,
+        own: bool,
+        fallback: Option<&Table>,
+    ) -> Result<State, LabError> {
         let (held_out, elsewhere) = match self.lab.held_out(&model) {
             Ok(readings) => (readings, None),
             // Who cannot follow a recording that the baseline follows is no explanation.
             Err(e) if self.second.is_some() => return Err(e),
             Err(e) => (None, Some(e.to_string())),
         };
-        let mut state = State { held_out, elsewhere, own, ..self.alone(model, readings, fields, fallback) };
-        if state.held_out.is_some() && self.second.is_some() {
-            self.judge(&mut state);
-        }
-        Ok(state)
+        Ok(State { held_out, elsewhere, own, ..self.unread(model, readings, fields, fallback) })
     }
 
-    /// The same without any other recording, of a model with fields of its own.
-    pub(super) fn alone(&mut self, model: Model, readings: Readings, fields: Vec<Field>, fallback: Option<&Table>) -> State {
+    /// The same before any other recording is read.
+    fn unread(&self, model: Model, readings: Readings, fields: Vec<Field>, fallback: Option<&Table>) -> State {
         let table = self.cells.table(&readings, fallback);
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
-        let mut state = State {
+        State {
             needed: Vec::new(),
             judged: Judged::default(),
             held_out_finer: Vec::new(),
@@ -84,15 +101,13 @@ impl Session<'_> {
             elsewhere: None,
             own: true,
             strange: Vec::new(),
-        };
-        self.judge(&mut state);
-        state
+        }
     }
 
     /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.
     pub(super) fn beside(&mut self, state: &State, model: Model, readings: Readings) -> Result<State, LabError> {
         let borrowed = |fields: &[Field]| fields.iter().map(Field::borrowed).collect::<Vec<_>>();
-        let mut new = self.state(model, readings, borrowed(&state.fields), false, Some(&state.table))?;
+        let mut new = self.unjudged(model, readings, borrowed(&state.fields), false, Some(&state.table))?;
         new.held_out_finer = borrowed(&state.held_out_finer);
         self.judge(&mut new);
         Ok(new)
@@ -102,7 +117,9 @@ impl Session<'_> {
     pub(super) fn judge(&self, state: &mut State) {
         state.needed = self.needed(state);
         let own = linear::around(&self.cells, state);
-        state.model.errors = linear::errors(state, &own, &self.blocks);
+        // The size that readings have on the whole.
+        let size = own.discrepancy(&self.blocks);
+        state.model.errors = linear::errors(state, &own, &self.blocks, size);
         state.strange = self.lab.strange(&state.model);
         let density = |tau: f64| {
             let mut all = own.left_out(&self.blocks, tau);
@@ -116,14 +133,13 @@ impl Session<'_> {
         let prior = Prior { candidates: self.candidates, readings: self.cells.len() };
         let all = SIZES.map(density);
         let seen: Vec<Vec<f64>> = all.iter().map(|d| d.iter().map(|d| d.seen).collect()).collect();
-        let (beside, weights) = stacked(&seen);
+        let (beside, _) = stacked(&seen);
         state.judged = Judged {
             expected: all[0].iter().map(|d| d.expected).sum(),
             beside,
-            discrepancy: weights.iter().zip(SIZES).map(|(w, tau)| w * tau * tau).sum::<f64>().sqrt(),
             log_prior: prior.log(&state.needed, &state.strange),
-            // Beside the size that readings have on the whole: numbers that were left to follow them contradict nothing.
-            conflict: own.conflict(&self.blocks, own.discrepancy(&self.blocks)),
+            // Beside that size: numbers that were left to follow the readings contradict nothing.
+            conflict: own.conflict(&self.blocks, size),
             alone: seen.into_iter().next().unwrap_or_default(),
         };
     }
