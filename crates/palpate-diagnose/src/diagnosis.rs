@@ -60,6 +60,15 @@ impl Level {
 /// A number of an effect: path in the changed scene, value, standard error, unit.
 pub type FoundNumber = (String, f64, Option<f64>, String);
 
+/// Numbers of an effect in words, each with its error and unit.
+pub fn in_words(numbers: &[FoundNumber]) -> String {
+    let number = |(path, value, error, unit): &FoundNumber| {
+        let name = path.splitn(3, '.').last().unwrap_or(path);
+        format!("{name} {}{}", stated(*value, *error), unit_behind(unit))
+    };
+    numbers.iter().map(number).collect::<Vec<_>>().join(", ")
+}
+
 /// An effect that was fitted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
@@ -266,16 +275,12 @@ impl Diagnosis {
                 let what: Vec<String> = accepted
                     .iter()
                     .map(|e| {
-                        let numbers = e.parameters.iter().map(|(path, v, se, unit)| {
-                            let name = path.splitn(3, '.').last().unwrap_or(path);
-                            format!("{name} {}{}", stated(*v, *se), unit_behind(unit))
-                        });
                         let others = if e.indistinguishable_from.is_empty() {
                             String::new()
                         } else {
                             format!("; these data cannot tell it from {}", e.indistinguishable_from.join(", "))
                         };
-                        format!("{} ({}: {}{others})", e.sentence, e.kind, numbers.collect::<Vec<_>>().join(", "))
+                        format!("{} ({}: {}{others})", e.sentence, e.kind, in_words(&e.parameters))
                     })
                     .collect();
                 format!(

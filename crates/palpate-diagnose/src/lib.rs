@@ -22,7 +22,7 @@ mod workflow;
 
 pub use cells::Regions;
 pub use change::{Candidate, Change, can_be_freed, candidates};
-pub use diagnosis::{Diagnosis, Found, FoundNumber, Instant, Level, MapEntry, Slack, SlackWindow, Tried, Verdict};
+pub use diagnosis::{Diagnosis, Found, FoundNumber, Instant, Level, MapEntry, Slack, SlackWindow, Tried, Verdict, in_words};
 pub use judgement::prior::Strange;
 pub use laboratory::{Baseline, Field, Fit, LabError, Laboratory, Model, Number, Reading, Readings, Setting, Start, Wall};
 pub use linear::least_squares;

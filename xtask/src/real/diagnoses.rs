@@ -3,8 +3,7 @@
 use super::report::Made;
 use super::{open, studies};
 use palpate::{DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
-use palpate_diagnose::stated;
-use palpate_model::params::unit_behind;
+use palpate_diagnose::{FoundNumber, in_words, stated};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -89,7 +88,7 @@ pub struct Effect {
     /// Name.
     pub kind: String,
     /// Its numbers, with standard errors and units.
-    pub numbers: Vec<(String, f64, Option<f64>, String)>,
+    pub numbers: Vec<FoundNumber>,
     /// How much better data left out are predicted with it, and the standard error of that [nats].
     pub nats: (f64, f64),
     /// What explains the recording as well.
@@ -214,11 +213,6 @@ pub fn markdown(all: &[Answer]) -> String {
 }
 
 fn words(e: &Effect) -> String {
-    let number = |(path, value, error, unit): &(String, f64, Option<f64>, String)| {
-        let name = path.splitn(3, '.').last().unwrap_or(path);
-        format!("{name} {}{}", stated(*value, *error), unit_behind(unit))
-    };
-    let numbers = e.numbers.iter().map(number).collect::<Vec<_>>().join(", ");
     let as_good = if e.as_good.is_empty() { String::new() } else { format!(" (as good: {})", e.as_good.join(", ")) };
-    format!("{}: {numbers}{as_good}", e.kind)
+    format!("{}: {}{as_good}", e.kind, in_words(&e.numbers))
 }
