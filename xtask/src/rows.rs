@@ -7,7 +7,6 @@ use serde::de::DeserializeOwned;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// `bench/NAME.jsonl`.
 pub fn path(name: &str) -> PathBuf {
@@ -40,14 +39,8 @@ pub fn append(path: &Path, row: &impl Serialize) -> Result<(), String> {
 /// # Errors
 /// Git does not answer.
 pub fn measured() -> Result<Made, String> {
-    let git = |arguments: &[&str]| {
-        let out = Command::new("git").current_dir(table::root()).args(arguments).output();
-        let out = out.map_err(|e| format!("git: {e}"))?;
-        let text = String::from_utf8_lossy(if out.status.success() { &out.stdout } else { &out.stderr }).trim().to_string();
-        if out.status.success() { Ok(text) } else { Err(format!("git {}: {text}", arguments.join(" "))) }
-    };
-    let differs = !git(&["status", "--porcelain", "--untracked-files=no", "--", "crates", "shaders"])?.is_empty();
-    let commit = git(&["log", "-1", "--format=%h", "--", "crates", "shaders"])?;
+    let differs = !table::git(&["status", "--porcelain", "--untracked-files=no", "--", "crates", "shaders"])?.is_empty();
+    let commit = table::git(&["log", "-1", "--format=%h", "--", "crates", "shaders"])?;
     Ok(Made { date: table::today(), commit: commit + if differs { "+" } else { "" } })
 }
 

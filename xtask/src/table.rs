@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Prints rows with columns as wide as their widest cell; the first row is the heading.
 pub fn print(title: &str, rows: &[Vec<String>]) {
@@ -85,6 +86,16 @@ pub fn replace(page: &str, name: &str, text: &str) -> Result<(), String> {
 pub fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_path_buf()
+}
+
+/// What git says in the workspace.
+///
+/// # Errors
+/// It does not answer, or refuses.
+pub fn git(arguments: &[&str]) -> Result<String, String> {
+    let out = Command::new("git").current_dir(root()).args(arguments).output().map_err(|e| format!("git: {e}"))?;
+    let text = String::from_utf8_lossy(if out.status.success() { &out.stdout } else { &out.stderr }).trim().to_string();
+    if out.status.success() { Ok(text) } else { Err(format!("git {}: {text}", arguments.join(" "))) }
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@ use crate::table;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 /// A table that can be measured by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
@@ -41,15 +40,8 @@ impl Made {
     /// # Errors
     /// Git does not answer.
     pub fn now() -> Result<Made, String> {
-        let git = |arguments: &[&str]| {
-            let out = Command::new("git").current_dir(table::root()).args(arguments).output();
-            let out = out.map_err(|e| format!("git: {e}"))?;
-            let text = if out.status.success() { &out.stdout } else { &out.stderr };
-            let text = String::from_utf8_lossy(text).trim().to_string();
-            if out.status.success() { Ok(text) } else { Err(format!("git {}: {text}", arguments.join(" "))) }
-        };
-        let differs = !git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
-        let commit = git(&["rev-parse", "--short", "HEAD"])?;
+        let differs = !table::git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
+        let commit = table::git(&["rev-parse", "--short", "HEAD"])?;
         Ok(Made { date: table::today(), commit: commit + if differs { "+" } else { "" } })
     }
 }
