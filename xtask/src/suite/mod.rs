@@ -158,9 +158,14 @@ pub fn run(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
+/// A folder of its own that goes when the case is done.
+fn folder() -> Result<tempfile::TempDir, String> {
+    tempfile::tempdir().map_err(|e| format!("no folder for recordings: {e}"))
+}
+
 /// The answers of some methods to one case, scored. Failures are answers too.
 fn measure(c: &Case, methods: &[Method], options: &Options, made: &crate::real::report::Made) -> Result<Vec<Row>, String> {
-    let folder = Folder::new(&c.name)?;
+    let folder = folder()?;
     let clock = Instant::now();
     let mut say = |what: &str| {
         if options.verbose {
@@ -169,7 +174,7 @@ fn measure(c: &Case, methods: &[Method], options: &Options, made: &crate::real::
     };
     let truth = c.truth().map_err(|e| e.to_string())?;
     say("recordings");
-    let recorded = c.record(&folder.0);
+    let recorded = c.record(folder.path());
     let budget = Duration::from_secs_f64(options.budget);
     let mut row = |m: &Method| {
         let answer = match &recorded {
@@ -198,8 +203,8 @@ fn calibrate(mut list: List, options: &Options) -> Result<(), String> {
             println!("the slice is over");
             return Ok(());
         }
-        let folder = Folder::new(&c.name)?;
-        match c.calibrate(&folder.0, &strong) {
+        let folder = folder()?;
+        match c.calibrate(folder.path(), &strong) {
             Ok(()) => {
                 let amplitudes: Vec<f64> = c.hidden.iter().filter_map(|h| h.amplitude).collect();
                 println!("{}: {:.2} σ, amplitude {amplitudes:?}", c.name, c.strength.unwrap_or(0.0));
@@ -280,24 +285,6 @@ pub fn answered(c: &Case, folder: &Path, budget: Duration) -> Result<Row, palpat
     let answer = Method::Palpate.answer(&c.name, &recorded, budget, &mut |_| ())?;
     let made = crate::real::report::Made { date: String::new(), commit: String::new() };
     Ok(score::score(&made, Method::Palpate.name(), c, &c.truth()?, &answer))
-}
-
-/// A folder of its own that goes when the case is done.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Result<Folder, String> {
-        let path = std::env::temp_dir().join(format!("palpate-suite-{}-{}", std::process::id(), name.replace(' ', "-")));
-        std::fs::create_dir_all(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-        Ok(Folder(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // Nothing depends on it any more.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 #[cfg(test)]
