@@ -7,7 +7,6 @@ use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, ALL, Family};
 use palpate_model::params::ParamKey::{self, *};
-use palpate_model::params::Transform;
 use palpate_model::plan::Plan;
 use palpate_model::scene::InitialShape;
 use support::scenes;
@@ -54,14 +53,7 @@ pub(super) fn check(plan: &Plan, name: &str) {
     let adjoint = evaluate(&here, Request { gradient: Wanted::All, sensitivities: Vec::new() }).remove(0).gradient;
     let along = Request { gradient: Wanted::Nothing, sensitivities: chosen.clone() };
     let forward = evaluate(&here, along).remove(0).curvature.unwrap().gradient;
-    let size = |i: usize| {
-        let spec = plan.layout.keys[i].spec();
-        match spec.transform {
-            _ if matches!(spec.key, ParamKey::Effect { .. }) => spec.typical,
-            Transform::Linear => spec.typical.min(1.0),
-            _ => plan.theta[i],
-        }
-    };
+    let size = |i: usize| plan.layout.keys[i].spec().size_at(plan.theta[i]);
     let parts: Vec<f64> = chosen.iter().map(|&i| adjoint[i] * size(i)).collect();
     let largest = parts.iter().map(|p| p.abs()).fold(0.0, f64::max);
     for (k, &i) in chosen.iter().enumerate() {

@@ -12,7 +12,7 @@ use palpate_model::effects::{ALL, Effect, Law, Site, Unstated};
 use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker};
 use palpate_model::observation::{ObservedPoint, ReadingKind};
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
-use palpate_model::params::{ParamKey, Transform};
+use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, PointMass, Scene};
@@ -138,14 +138,7 @@ fn away_from_kinks(plan: Plan, places: &[usize]) -> Result<Plan, String> {
 
 /// Places that move, each by its own size.
 fn direction(plan: &Plan, places: &[usize]) -> Vec<(usize, f64)> {
-    let size = |i: usize| {
-        let spec = plan.layout.keys[i].spec();
-        match spec.transform {
-            _ if matches!(spec.key, ParamKey::Effect { .. }) => spec.typical,
-            Transform::Linear => spec.typical.min(1.0),
-            _ => plan.theta[i],
-        }
-    };
+    let size = |i: usize| plan.layout.keys[i].spec().size_at(plan.theta[i]);
     // Of any sign and of unlike sizes, so that errors of two numbers do not cancel.
     places
         .iter()

@@ -112,6 +112,17 @@ pub struct ParamSpec {
     pub doc: &'static str,
 }
 
+impl ParamSpec {
+    /// A change that matters where the parameter has this value: of what is fitted by its logarithm, or within bounds, the value itself.
+    pub fn size_at(&self, value: f64) -> f64 {
+        match self.transform {
+            _ if matches!(self.key, ParamKey::Effect { .. }) => self.typical,
+            Transform::Linear => self.typical.min(1.0),
+            _ => value,
+        }
+    }
+}
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl ParamKey {
