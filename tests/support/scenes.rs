@@ -8,34 +8,18 @@ use palpate_model::scene::*;
 
 /// A body in free space at rest, E = 5 kPa, ν = 0.4, 1000 kg/m³, no damping, no gravity, 10 steps of 5 ms at θ = ½.
 pub fn body(shape: Analytic, cell_size: f64) -> Scene {
-    Scene {
-        path: "in-code.toml".into(),
-        title: String::new(),
-        object: Object {
-            source: BodySource::Analytic(shape),
-            pose: DAffine3::IDENTITY,
-            resolution: Resolution::CellSize(cell_size),
-        },
-        material: Material {
-            model: &palpate_model::materials::ALL[0],
-            inertia: Inertia::Density(1000.0),
-            youngs_modulus: 5000.0,
-            poisson_ratio: 0.4,
-            mass_damping: 0.0,
-            stiffness_damping: 0.0,
-        },
-        gravity: DVec3::ZERO,
-        clamps: Vec::new(),
-        planes: Vec::new(),
-        masses: Vec::new(),
-        effects: Vec::new(),
-        fields: Vec::new(),
-        initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.005, steps: 10, start: 0.0, ..Time::weighted(0.5) },
-        solver: Solver::default(),
-        observation: None,
-        fit: None,
-    }
+    let object =
+        Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell_size) };
+    let material = Material {
+        model: &palpate_model::materials::ALL[0],
+        inertia: Inertia::Density(1000.0),
+        youngs_modulus: 5000.0,
+        poisson_ratio: 0.4,
+        mass_damping: 0.0,
+        stiffness_damping: 0.0,
+    };
+    let time = Time { step: 0.005, steps: 10, ..Time::weighted(0.5) };
+    Scene { time, ..Scene::at_rest("in-code.toml", object, material) }
 }
 
 /// A clamp that holds still.

@@ -13,31 +13,18 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// A body under gravity above nothing, with the paper's Rayleigh damping.
 fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
-    Scene {
-        path: "study.toml".into(),
-        title: String::new(),
-        object: Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) },
-        material: Material {
-            model: &palpate_model::materials::ALL[0],
-            // A foam: weight over stiffness ρ g L / E is 0.05 for the torus, like the paper's (there 80 · 3 / 5000 in its own units).
-            inertia: Inertia::Density(100.0),
-            youngs_modulus,
-            poisson_ratio: 0.4,
-            mass_damping: 0.1,
-            stiffness_damping: 0.01,
-        },
-        gravity: DVec3::new(0.0, 0.0, -9.81),
-        clamps: Vec::new(),
-        planes: Vec::new(),
-        masses: Vec::new(),
-        effects: Vec::new(),
-        fields: Vec::new(),
-        initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: Time { step: 0.01, steps: 20, start: 0.0, ..Time::weighted(0.6) },
-        solver: Solver::default(),
-        observation: None,
-        fit: None,
-    }
+    let object = Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) };
+    let material = Material {
+        model: &palpate_model::materials::ALL[0],
+        // A foam: weight over stiffness ρ g L / E is 0.05 for the torus, like the paper's (there 80 · 3 / 5000 in its own units).
+        inertia: Inertia::Density(100.0),
+        youngs_modulus,
+        poisson_ratio: 0.4,
+        mass_damping: 0.1,
+        stiffness_damping: 0.01,
+    };
+    let time = Time { step: 0.01, steps: 20, ..Time::weighted(0.6) };
+    Scene { gravity: DVec3::new(0.0, 0.0, -9.81), time, ..Scene::at_rest("study.toml", object, material) }
 }
 
 /// A tilted torus (radii 0.1 m and 0.04 m) that falls 5 cm to the ground and bounces; E = 5000 Pa. At a cell of 0.02 m it has

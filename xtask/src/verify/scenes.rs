@@ -20,30 +20,16 @@ pub fn body(shape: Analytic, cell: f64) -> Scene {
 
 /// The same of any source.
 pub fn of(source: BodySource, cell: f64) -> Scene {
-    Scene {
-        path: "verify.toml".into(),
-        title: String::new(),
-        object: Object { source, pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) },
-        material: Material {
-            model: &palpate_model::materials::ALL[0],
-            inertia: Inertia::Density(1000.0),
-            youngs_modulus: 1e5,
-            poisson_ratio: 0.3,
-            mass_damping: 0.0,
-            stiffness_damping: 0.0,
-        },
-        gravity: DVec3::ZERO,
-        clamps: Vec::new(),
-        planes: Vec::new(),
-        masses: Vec::new(),
-        effects: Vec::new(),
-        fields: Vec::new(),
-        initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-        time: steps(1.0, 0),
-        solver: Solver::default(),
-        observation: None,
-        fit: None,
-    }
+    let object = Object { source, pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) };
+    let material = Material {
+        model: &palpate_model::materials::ALL[0],
+        inertia: Inertia::Density(1000.0),
+        youngs_modulus: 1e5,
+        poisson_ratio: 0.3,
+        mass_damping: 0.0,
+        stiffness_damping: 0.0,
+    };
+    Scene::at_rest("verify.toml", object, material)
 }
 
 /// Steps of the scheme that scenes have by default.
