@@ -157,8 +157,9 @@ fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, blocks: &[Block], rng: &mu
         let s = gauss();
         y.iter_mut().zip(f).for_each(|(y, f)| *y += s * f);
         for b in blocks.iter().filter(|_| *share > 0.0) {
-            let rough = share * gauss();
-            b.cells.iter().for_each(|i| y[*i] += rough * f[*i]);
+            let (times, anywhere) = (share * gauss(), share * gauss());
+            let size = (b.cells.iter().map(|i| f[*i].powi(2)).sum::<f64>() / b.cells.len() as f64).sqrt();
+            b.cells.iter().for_each(|i| y[*i] += times * f[*i] + anywhere * size);
         }
     }
     let mut left = frame.absorbed.without(&extended(&y, frame.fields.len()));

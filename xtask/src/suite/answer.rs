@@ -66,6 +66,9 @@ pub struct Answer {
     /// Share of the gap closed on data left out.
     #[serde(default)]
     pub gap_closed: Option<f64>,
+    /// How much better data left out are predicted beside a discrepancy, of the model as it is given and of the answer's [nats].
+    #[serde(default)]
+    pub missing: Option<[f64; 2]>,
     /// Wall-clock time [s].
     #[serde(default)]
     pub seconds: f64,
@@ -120,6 +123,7 @@ impl Answer {
             pull,
             distance: Some([d.before.rms, d.after.rms, d.after.noise]),
             gap_closed: Some(d.gap_closed),
+            missing: Some([d.missing.0, d.missing_after.0]),
             seconds: found.seconds,
             sentence: d.sentence(),
         }

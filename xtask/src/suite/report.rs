@@ -19,9 +19,10 @@ pub fn line(r: &Row) -> String {
     let percent = |x: Option<f64>| x.map_or("–".to_string(), |v| format!("{:.0} %", 100.0 * v));
     let more = if r.as_good.is_empty() { String::new() } else { format!(" (as good: {})", r.as_good.join(", ")) };
     let apart = r.distance.map_or(String::new(), |[a, b, n]| format!(", {:.3} → {:.3} mm ({:.3})", 1e3 * a, 1e3 * b, 1e3 * n));
+    let nats = r.missing.map_or(String::new(), |[a, b]| format!(", {a:.1} → {b:.1} nats missing"));
     let why = if r.verdict == "failed" { format!(" {}", r.sentence) } else { String::new() };
     format!(
-        "{}: {:.1} σ: {} {}{more}{apart}, rank {}, size off {}, F1 {}, E off {} → {}, {:.1} s, score {}{why}",
+        "{}: {:.1} σ: {} {}{more}{apart}{nats}, rank {}, size off {}, F1 {}, E off {} → {}, {:.1} s, score {}{why}",
         r.method,
         r.strength,
         r.verdict,

@@ -42,6 +42,9 @@ pub struct Row {
     pub modulus_error: [Option<f64>; 2],
     /// Share of the gap closed on data left out.
     pub gap_closed: Option<f64>,
+    /// How much better data left out are predicted beside a discrepancy, before and after [nats].
+    #[serde(default)]
+    pub missing: Option<[f64; 2]>,
     /// Distance of measurement and model before and after, and what noise and discretisation explain [m].
     pub distance: Option<[f64; 3]>,
     /// Cosine between the pull that the answer states and the direction to a magnet.
@@ -92,6 +95,7 @@ pub fn score(made: &Made, method: &str, case: &Case, truth: &Truth, a: &Answer) 
         f1: if a.map.is_empty() { None } else { truth.bins.f1(&truth.acts, &a.map) },
         modulus_error: a.modulus.map(error),
         gap_closed: a.gap_closed,
+        missing: a.missing,
         distance: a.distance,
         points_at,
         seconds: (10.0 * a.seconds).round() / 10.0,

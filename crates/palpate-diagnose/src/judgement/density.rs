@@ -38,6 +38,16 @@ impl Blocks {
         Blocks { cells: groups.into_values().collect(), fold }
     }
 
+    /// Root mean square of a column over each cell's block.
+    pub fn size(&self, column: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; column.len()];
+        for cells in &self.cells {
+            let square = cells.iter().map(|i| column[*i].powi(2)).sum::<f64>() / cells.len() as f64;
+            cells.iter().for_each(|i| out[*i] = square.sqrt());
+        }
+        out
+    }
+
     /// Number of blocks.
     pub fn len(&self) -> usize {
         self.cells.len()

@@ -39,7 +39,7 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// ln O: what a model pays for a discrepancy beside it, and every effect for being there.
+    /// ln O: what a model pays for anything more.
     pub fn odds() -> f64 {
         ODDS.ln()
     }
@@ -47,6 +47,11 @@ impl Prior {
     /// What a number costs that the recording asks for.
     pub fn number(self) -> f64 {
         0.5 * (self.readings.max(1) as f64).ln()
+    }
+
+    /// What a model pays for a discrepancy beside it: for being there, and for one number, its size.
+    pub fn discrepancy(self) -> f64 {
+        Prior::odds() + self.number()
     }
 
     /// ln p of a model with effects of so many needed numbers, and with what is strange about it.

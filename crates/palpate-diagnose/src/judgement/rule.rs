@@ -29,6 +29,8 @@ pub struct Judged {
     pub beside: Vec<f64>,
     /// ln p of the model.
     pub log_prior: f64,
+    /// What the discrepancy costs, which is one thing more with one number, its size [nats].
+    pub price: f64,
     /// Standard deviations by which readings contradict most what is known beforehand of numbers, or of errors of grid and step.
     pub conflict: f64,
 }
@@ -71,7 +73,7 @@ fn difference(a: &[f64], b: &[f64]) -> Difference {
 impl Judged {
     /// ln p of every block as the better of both ways says it, and the score.
     fn best(&self) -> (&[f64], f64) {
-        let (alone, beside) = (self.alone.iter().sum::<f64>(), self.beside.iter().sum::<f64>() - Prior::odds());
+        let (alone, beside) = (self.alone.iter().sum::<f64>(), self.beside.iter().sum::<f64>() - self.price);
         if beside > alone { (&self.beside, beside + self.log_prior) } else { (&self.alone, alone + self.log_prior) }
     }
 
@@ -83,7 +85,7 @@ impl Judged {
     /// S(M⁺) − S(M°): positive where something is missing.
     pub fn missing(&self) -> Difference {
         let d = difference(&self.beside, &self.alone);
-        Difference { nats: d.nats - Prior::odds(), ..d }
+        Difference { nats: d.nats - self.price, ..d }
     }
 
     /// True where something is missing: a discrepancy predicts better, or readings contradict what is known beforehand. What is
@@ -115,7 +117,7 @@ mod tests {
 
     fn judged(alone: &[f64], beside: &[f64], log_prior: f64) -> Judged {
         let expected = -(alone.len() as f64);
-        Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), log_prior, conflict: 0.0 }
+        Judged { alone: alone.to_vec(), expected, beside: beside.to_vec(), log_prior, price: Prior::odds(), conflict: 0.0 }
     }
 
     #[test]

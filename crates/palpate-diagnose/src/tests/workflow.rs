@@ -5,6 +5,7 @@ use crate::cells::Cells;
 use crate::change::candidates;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::judgement::density::{Blocks, Linear};
+use crate::judgement::prior::Prior;
 use crate::judgement::rule::Judged;
 use crate::judgement::stack::{SIZES, stacked};
 use crate::laboratory::{LabError, Laboratory};
@@ -291,11 +292,16 @@ fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
             y: table.y.iter().zip(&change).map(|(y, c)| y + field.times.0 * c).collect(),
             moves,
             known: vec![false, false, true],
-            rough: vec![times(&change, field.rough)],
+            rough: vec![times(&change, field.rough), times(&blocks.size(&change), field.rough)],
         };
         let seen = SIZES.map(|tau| model.left_out(&blocks, tau).iter().map(|d| d.seen).collect());
-        let judged = Judged { beside: stacked(&seen).0, alone: seen[0].clone(), ..Judged::default() };
-        alarms += usize::from(judged.missing().nats > 0.0);
+        let judged = Judged {
+            beside: stacked(&seen).0,
+            alone: seen[0].clone(),
+            price: Prior { candidates: 1, readings: cells.len() }.discrepancy(),
+            ..Judged::default()
+        };
+        alarms += usize::from(judged.is_missing());
     }
     let rate = alarms as f64 / RECORDINGS as f64;
     let factor = factors.iter().sum::<f64>() / factors.len() as f64;

@@ -46,7 +46,7 @@ impl Mover {
 }
 
 /// A model's residuals around its fit, in cells.
-pub(super) fn around(cells: &Cells, state: &State) -> Linear {
+pub(super) fn around(cells: &Cells, blocks: &Blocks, state: &State) -> Linear {
     let mut out = Linear { y: state.table.y.clone(), ..Linear::default() };
     for (m, c) in numbers(&state.model, &state.table).into_iter().zip(&state.table.columns) {
         let column = m.apply(&mut out.y, c);
@@ -58,7 +58,7 @@ pub(super) fn around(cells: &Cells, state: &State) -> Linear {
         let column = field(f).apply(&mut out.y, &change);
         out.moves.push(column);
         out.known.push(true);
-        out.rough.extend(rough(f, &change));
+        out.rough.extend(rough(f, &change, blocks));
     }
     out
 }
@@ -74,14 +74,25 @@ pub(super) fn errors(state: &State, own: &Linear, blocks: &Blocks, size: f64) ->
     numbers(&state.model, &state.table).into_iter().enumerate().map(number).collect()
 }
 
-/// What of a field is not known, anew in every block.
-fn rough(f: &Field, change: &[f64]) -> Option<Vec<f64>> {
-    (f.rough > 0.0).then(|| change.iter().map(|c| f.rough * c).collect())
+/// What of a field is not known, anew in every block: how much of it there is, and that an error of its size may be elsewhere in the block,
+/// for one refinement tells of sizes more than of shapes.
+fn rough(f: &Field, change: &[f64], blocks: &Blocks) -> Vec<Vec<f64>> {
+    if f.rough == 0.0 {
+        return Vec::new();
+    }
+    let times = |column: &[f64]| column.iter().map(|c| f.rough * c).collect();
+    vec![times(change), times(&blocks.size(change))]
 }
 
 /// Residuals of a second recording, after the first one `taught` what it knows of the model's numbers and of the errors of grid and step, which
 /// are the same ones there. Numbers that belong to the second recording were fitted to it, and are free.
-pub(super) fn elsewhere(cells: &Cells, readings: &Readings, state: &State, taught: &(Vec<f64>, Mat<f64>)) -> Linear {
+pub(super) fn elsewhere(
+    cells: &Cells,
+    blocks: &Blocks,
+    readings: &Readings,
+    state: &State,
+    taught: &(Vec<f64>, Mat<f64>),
+) -> Linear {
     let table = cells.table(readings, None);
     let mut out = Linear { y: table.y.clone(), ..Linear::default() };
     let first = state.model.values.len();
@@ -104,6 +115,6 @@ pub(super) fn elsewhere(cells: &Cells, readings: &Readings, state: &State, taugh
         out.moves.push(column);
         out.known.push(false);
     }
-    out.rough = state.held_out_finer.iter().filter_map(|f| rough(f, &cells.means(&f.change))).collect();
+    out.rough = state.held_out_finer.iter().flat_map(|f| rough(f, &cells.means(&f.change), blocks)).collect();
     out.taught(&shared, taught)
 }

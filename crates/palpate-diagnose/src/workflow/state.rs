@@ -116,7 +116,7 @@ impl Session<'_> {
     /// How a state predicts what was left out.
     pub(super) fn judge(&self, state: &mut State) {
         state.needed = self.needed(state);
-        let own = linear::around(&self.cells, state);
+        let own = linear::around(&self.cells, &self.blocks, state);
         // The size that readings have on the whole.
         let size = own.discrepancy(&self.blocks);
         state.model.errors = linear::errors(state, &own, &self.blocks, size);
@@ -126,7 +126,7 @@ impl Session<'_> {
             all.push(own.known_left_out(&self.blocks, tau));
             if let Some((readings, (cells, blocks))) = state.held_out.as_ref().zip(self.second.as_ref()) {
                 let taught = own.posterior(&self.blocks, tau);
-                all.extend(linear::elsewhere(cells, readings, state, &taught).left_out(blocks, tau));
+                all.extend(linear::elsewhere(cells, blocks, readings, state, &taught).left_out(blocks, tau));
             }
             all
         };
@@ -137,6 +137,7 @@ impl Session<'_> {
         state.judged = Judged {
             expected: all[0].iter().map(|d| d.expected).sum(),
             beside,
+            price: prior.discrepancy(),
             log_prior: prior.log(&state.needed, &state.strange),
             // Beside that size: numbers that were left to follow the readings contradict nothing.
             conflict: own.conflict(&self.blocks, size),
