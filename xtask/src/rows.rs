@@ -34,14 +34,36 @@ pub fn append(path: &Path, row: &impl Serialize) -> Result<(), String> {
     file.write_all(line.as_bytes()).map_err(fail)
 }
 
-/// Today, and the last commit that changed what is measured: the crates, not the studies of them.
+/// What a study measures, by the files that can move its figures: studies run on the CPU and read no pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measured {
+    /// Fits.
+    Fits,
+    /// Diagnoses, and the fits that they begin with.
+    Diagnoses,
+}
+
+impl Measured {
+    fn paths(self) -> Vec<&'static str> {
+        const NEITHER: [&str; 4] = ["crates", ":!crates/palpate-gpu", ":!crates/palpate/src/report", ":!crates/*/src/tests"];
+        let more: &[&str] = match self {
+            Measured::Fits => &[":!crates/palpate-diagnose", ":!crates/palpate/src/diagnosing"],
+            Measured::Diagnoses => &[],
+        };
+        NEITHER.iter().chain(more).copied().collect()
+    }
+}
+
+/// Today, the last commit that changed what is measured, and a fingerprint of it: commits get other names when they are carried elsewhere, and the
+/// same files do not.
 ///
 /// # Errors
 /// Git does not answer.
-pub fn measured() -> Result<Made, String> {
-    let differs = !table::git(&["status", "--porcelain", "--untracked-files=no", "--", "crates", "shaders"])?.is_empty();
-    let commit = table::git(&["log", "-1", "--format=%h", "--", "crates", "shaders"])?;
-    Ok(Made { date: table::today(), commit: commit + if differs { "+" } else { "" } })
+pub fn measured(of: Measured) -> Result<Made, String> {
+    let git = |first: &[&'static str]| table::git(&[first, &["--"], &of.paths()].concat());
+    let differs = if git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty() { "" } else { "+" };
+    let (commit, files) = (git(&["log", "-1", "--format=%h"])?, git(&["ls-files", "--stage"])?);
+    Ok(Made { date: table::today(), commit: commit + differs, code: format!("{:016x}{differs}", hash(&files)) })
 }
 
 /// A number that spreads names evenly, the order in which slices run: FNV-1a with the finaliser of MurmurHash3, without which names that
@@ -55,6 +77,15 @@ pub fn hash(name: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use super::{Measured, measured};
+
+    #[test]
+    fn the_same_files_have_the_same_fingerprint_and_others_another() {
+        let of = |what| measured(what).unwrap().code;
+        assert_eq!(of(Measured::Fits), of(Measured::Fits));
+        assert_ne!(of(Measured::Fits), of(Measured::Diagnoses));
+    }
+
     #[test]
     fn rows_that_are_appended_are_read_again() {
         let folder = tempfile::tempdir().unwrap();

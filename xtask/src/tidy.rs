@@ -1,8 +1,8 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
 use crate::coverage;
-use crate::real::models;
 use crate::real::report::Report;
+use crate::real::{diagnoses, models};
 use crate::suite::report as suite;
 use crate::table::mark;
 use crate::verify::report::Report as Verification;
@@ -95,14 +95,17 @@ fn tables(root: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// The table of materials and schemes is what `bench/real.json` holds.
+/// Tables of real recordings are what `bench/real.json` holds.
 fn measured(root: &Path, found: &mut Vec<String>) {
-    const MARK: &str = "<!-- models table -->\n";
     let text = fs::read_to_string(root.join("docs/real-data.md")).unwrap_or_default();
-    match Report::load(root) {
-        Ok(report) if text.split(MARK).nth(1) == Some(&models::markdown(&report.models)) => {}
-        Ok(_) => found.push("docs/real-data.md: the table of materials and schemes is not that of bench/real.json".into()),
-        Err(e) => found.push(e),
+    let report = match Report::load(root) {
+        Ok(report) => report,
+        Err(e) => return found.push(e),
+    };
+    for (name, table) in [("models", models::markdown(&report.models)), ("diagnoses", diagnoses::markdown(&report.diagnoses))] {
+        if text.split(&mark(name)).nth(1) != Some(&table) {
+            found.push(format!("docs/real-data.md: the table of {name} is not that of bench/real.json"));
+        }
     }
 }
 
@@ -207,8 +210,8 @@ mod tests {
         fs::write(folder.path().join("README.md"), table(1)).unwrap();
         assert!(!check(folder.path()).join("\n").contains("is not that of docs/real-data.md"));
         // Of materials and schemes nothing was measured, and the page says so until it does not.
-        let models =
-            |rows: &str| format!("{}<!-- models table -->\n{}{rows}<!-- models table -->\n", table(1), models::markdown(&[]));
+        let none = format!("{m}{}{m}", diagnoses::markdown(&[]), m = mark("diagnoses"));
+        let models = |rows: &str| format!("{}{m}{}{rows}{m}{none}", table(1), models::markdown(&[]), m = mark("models"));
         fs::write(folder.path().join("docs/real-data.md"), models("")).unwrap();
         assert!(!check(folder.path()).join("\n").contains("is not that of bench/real.json"));
         fs::write(folder.path().join("docs/real-data.md"), models("| one row |\n")).unwrap();

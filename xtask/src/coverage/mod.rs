@@ -58,9 +58,9 @@ pub fn run(options: &Options) -> Result<(), String> {
     if options.report {
         return report::write(&path);
     }
-    let made = rows::measured()?;
+    let made = rows::measured(rows::Measured::Fits)?;
     let known: Vec<Row> = rows::load(&path)?;
-    let is_open = |t: &Trial| options.fresh || !known.iter().any(|r| r.case == t.name && r.commit == made.commit);
+    let is_open = |t: &Trial| options.fresh || !known.iter().any(|r| r.case == t.name && r.made.is_same(&made));
     let asked = |truth: &Truth, t: &Trial| options.only.as_deref().is_none_or(|w| truth.kind == w || t.set.contains(w));
     let clock = Instant::now();
     let mut done = 0;

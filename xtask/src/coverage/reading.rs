@@ -11,8 +11,7 @@ pub fn rows(made: &Made, truth: &Truth, t: &Trial, outcome: Result<&Fitted, &Err
     let row = |k: usize| {
         let free = &t.free[k];
         let mut row = Row {
-            date: made.date.clone(),
-            commit: made.commit.clone(),
+            made: made.clone(),
             case: t.name.clone(),
             body: truth.kind.into(),
             seed: t.seed,

@@ -1,5 +1,6 @@
 //! How many truths lie inside intervals: `bench/coverage.json` and the table of `docs/coverage.md`.
 
+use crate::real::report::Made;
 use crate::{rows, table};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -10,10 +11,9 @@ const INTERVALS: [(f64, f64); 3] = [(0.5, 0.674_490), (0.8, 1.281_552), (0.95, 1
 /// One fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Day.
-    pub date: String,
-    /// Last commit that changed what is measured, with a + where files differed from it.
-    pub commit: String,
+    /// When, and by what.
+    #[serde(flatten)]
+    pub made: Made,
     /// Name of the trial.
     pub case: String,
     /// Kind of the body.
@@ -119,15 +119,15 @@ fn count(of: &str, commit: &str, all: &[&Row]) -> Line {
 
 /// The table of the last commit that was measured: everything, then by number, by body and by sensors.
 pub fn lines(all: &[Row]) -> Vec<Line> {
-    let Some(commit) = all.last().map(|r| r.commit.clone()) else { return Vec::new() };
+    let Some(made) = all.last().map(|r| r.made.clone()) else { return Vec::new() };
     // The last row of every trial and number.
     let mut of: Vec<&Row> = Vec::new();
-    for r in all.iter().rev().filter(|r| r.commit == commit) {
+    for r in all.iter().rev().filter(|r| r.made.is_same(&made)) {
         if !of.iter().any(|o| (&o.case, &o.parameter) == (&r.case, &r.parameter)) {
             of.push(r);
         }
     }
-    let mut out = vec![count("everything", &commit, &of)];
+    let mut out = vec![count("everything", &made.commit, &of)];
     let by: [fn(&Row) -> &str; 3] = [|r| &r.parameter, |r| &r.body, |r| &r.sensors];
     for key in by {
         let mut names: Vec<&str> = of.iter().map(|r| key(r)).collect();
@@ -135,7 +135,7 @@ pub fn lines(all: &[Row]) -> Vec<Line> {
         names.dedup();
         for name in names {
             let part: Vec<&Row> = of.iter().copied().filter(|r| key(r) == name).collect();
-            out.push(count(name, &commit, &part));
+            out.push(count(name, &made.commit, &part));
         }
     }
     out
@@ -211,8 +211,7 @@ mod tests {
     #[test]
     fn truths_inside_intervals_are_counted_and_failures_apart() {
         let row = |k: u64, value: f64, verdict: &str| Row {
-            date: String::new(),
-            commit: "c".into(),
+            made: Made::default(),
             case: format!("case {k}"),
             body: "ball".into(),
             seed: 100 * k,

@@ -26,15 +26,23 @@ pub enum Slice {
 }
 
 /// When a table was measured, and by what.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Made {
     /// Day.
     pub date: String,
     /// Commit, with a + where tracked files differed from it; of tables older than this entry the commit that stored them.
     pub commit: String,
+    /// Fingerprint of the files that can move the figures; empty where only the commit is known.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub code: String,
 }
 
 impl Made {
+    /// True if both were made by the same code, whatever its commit is called.
+    pub fn is_same(&self, other: &Made) -> bool {
+        if self.code.is_empty() { self.commit == other.commit } else { self.code == other.code }
+    }
+
     /// Today, by the tree as it is.
     ///
     /// # Errors
@@ -42,7 +50,7 @@ impl Made {
     pub fn now() -> Result<Made, String> {
         let differs = !table::git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
         let commit = table::git(&["rev-parse", "--short", "HEAD"])?;
-        Ok(Made { date: table::today(), commit: commit + if differs { "+" } else { "" } })
+        Ok(Made { date: table::today(), commit: commit + if differs { "+" } else { "" }, code: String::new() })
     }
 }
 

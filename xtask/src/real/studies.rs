@@ -3,7 +3,7 @@
 use super::report::{Made, Pair, Report, Row, Slice};
 use super::tracks::{Sighting, rms, track};
 use super::{diagnoses, fit, found, height_at_rest, models, open, scene_path, swings};
-use crate::table;
+use crate::{rows, table};
 use clap::ValueEnum;
 use glam::DVec3;
 use palpate::{Error, Experiment, FitOptions, Fitted};
@@ -280,13 +280,14 @@ pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
                 Slice::Variants => report.variants = variants(&data)?,
                 Slice::Models => report.models = models::measure(&data)?,
                 Slice::Diagnoses => {
-                    let mut rows = std::mem::take(&mut report.diagnoses);
-                    let mut keep = |rows: &[diagnoses::Answer]| {
-                        report.diagnoses = rows.to_vec();
+                    let mut answers = std::mem::take(&mut report.diagnoses);
+                    let mut keep = |answers: &[diagnoses::Answer]| {
+                        report.diagnoses = answers.to_vec();
                         table::save("real", &report).map(|_| ()).map_err(Error::Failed)
                     };
-                    diagnoses::measure(&data, &made, &mut rows, &mut keep)?;
-                    report.diagnoses = rows;
+                    let made = rows::measured(rows::Measured::Diagnoses).map_err(Error::Failed)?;
+                    diagnoses::measure(&data, &made, &mut answers, &mut keep)?;
+                    report.diagnoses = answers;
                 }
             }
             report.made.insert(*slice, made.clone());
@@ -295,5 +296,7 @@ pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
     };
     measure().map_err(|e| e.to_string())?;
     wanted.iter().for_each(|s| report.print(*s));
+    table::replace("docs/real-data.md", "models", &models::markdown(&report.models))?;
+    table::replace("docs/real-data.md", "diagnoses", &diagnoses::markdown(&report.diagnoses))?;
     table::save("real", &report)
 }

@@ -56,11 +56,11 @@ pub fn lines(rows: &[Row]) -> Vec<Line> {
     for (k, a) in ALL.iter().enumerate() {
         let mine = rows.iter().filter(|r| r.method == Method::Ablated(k).name());
         let both: Vec<(&Row, &&Row)> =
-            mine.filter_map(|r| Some((r, plain.iter().rev().find(|p| p.case == r.case && p.commit == r.commit)?))).collect();
+            mine.filter_map(|r| Some((r, plain.iter().rev().find(|p| p.case == r.case && p.made.is_same(&r.made))?))).collect();
         let Some((last, _)) = both.last() else { continue };
-        let both: Vec<_> = both.iter().filter(|(r, _)| r.commit == last.commit).collect();
+        let both: Vec<_> = both.iter().filter(|(r, _)| r.made.is_same(&last.made)).collect();
         let sum = |of: fn(&Row) -> f64| [both.iter().map(|b| of(b.0)).sum(), both.iter().map(|b| of(b.1)).sum()];
-        let (name, commit) = (a.name.into(), last.commit.clone());
+        let (name, commit) = (a.name.into(), last.made.commit.clone());
         out.push(Line { name, commit, cases: both.len(), score: sum(|r| r.score), seconds: sum(|r| r.seconds) });
     }
     out

@@ -124,10 +124,10 @@ pub fn run(options: &Options) -> Result<(), String> {
         let named = options.method.split(',').map(|m| m.trim().parse()).collect::<Result<_, String>>()?;
         (named, rows::path("suite"))
     };
-    let made = rows::measured()?;
+    let made = rows::measured(rows::Measured::Diagnoses)?;
     let known: Vec<Row> = rows::load(&path)?;
     let is_known = |c: &Case, m: Method| {
-        let same = |r: &&Row| r.case == c.name && r.method == m.name() && (options.keep || r.commit == made.commit);
+        let same = |r: &&Row| r.case == c.name && r.method == m.name() && (options.keep || r.made.is_same(&made));
         !options.fresh && known.iter().any(|r| same(&r))
     };
     let wanted = options.wanted(list.cases()?)?;
@@ -235,7 +235,7 @@ fn record(cases: &[Case], folder: &Path) -> Result<(), String> {
 
 /// Scores answers of another method: one JSON object a line.
 fn score_file(cases: &[Case], file: &Path) -> Result<(), String> {
-    let made = rows::measured()?;
+    let made = rows::measured(rows::Measured::Diagnoses)?;
     let method = file.file_stem().map_or_else(|| "other".into(), |s| s.to_string_lossy().into_owned());
     let mut all = Vec::new();
     for a in rows::load::<Answer>(file)? {
@@ -283,7 +283,7 @@ pub fn small(hidden: Option<&str>, seed: u64, folder: &Path) -> Result<Case, pal
 pub fn answered(c: &Case, folder: &Path, budget: Duration) -> Result<Row, palpate::Error> {
     let recorded = c.record(folder)?;
     let answer = Method::Palpate.answer(&c.name, &recorded, budget, &mut |_| ())?;
-    let made = crate::real::report::Made { date: String::new(), commit: String::new() };
+    let made = crate::real::report::Made::default();
     Ok(score::score(&made, Method::Palpate.name(), c, &c.truth()?, &answer))
 }
 

@@ -2,6 +2,7 @@
 
 use super::case::GROUPS;
 use super::score::Row;
+use crate::real::report::Made;
 use crate::{rows, table};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -78,11 +79,11 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!v.is_empty()).then(|| 0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2]))
 }
 
-/// The last row of every case, method and commit.
+/// The last row of every case, method and state of the code.
 fn latest(all: &[Row]) -> Vec<&Row> {
     let mut out: Vec<&Row> = Vec::new();
     for r in all.iter().rev() {
-        if !out.iter().any(|o| (&o.case, &o.method, &o.commit) == (&r.case, &r.method, &r.commit)) {
+        if !out.iter().any(|o| (&o.case, &o.method) == (&r.case, &r.method) && o.made.is_same(&r.made)) {
             out.push(r);
         }
     }
@@ -90,20 +91,20 @@ fn latest(all: &[Row]) -> Vec<&Row> {
     out
 }
 
-/// The table: groups in their order, in each methods and commits in the order in which they were measured first.
+/// The table: groups in their order, in each methods and states of the code in the order in which they were measured first.
 pub fn lines(all: &[Row]) -> Vec<Line> {
     let all = latest(all);
-    let mut columns: Vec<(&str, &str)> = Vec::new();
+    let mut columns: Vec<(&str, &Made)> = Vec::new();
     for r in &all {
-        if !columns.contains(&(&r.method, &r.commit)) {
-            columns.push((&r.method, &r.commit));
+        if !columns.iter().any(|(method, made)| *method == r.method && made.is_same(&r.made)) {
+            columns.push((&r.method, &r.made));
         }
     }
     let mut out = Vec::new();
     for group in GROUPS.into_iter().chain(["faint"]) {
-        for (method, commit) in &columns {
+        for (method, made) in &columns {
             let of: Vec<&&Row> =
-                all.iter().filter(|r| group_of(r) == group && r.method == *method && r.commit == *commit).collect();
+                all.iter().filter(|r| group_of(r) == group && r.method == *method && r.made.is_same(made)).collect();
             if of.is_empty() {
                 continue;
             }
@@ -113,7 +114,7 @@ pub fn lines(all: &[Row]) -> Vec<Line> {
             out.push(Line {
                 group: group.into(),
                 method: method.to_string(),
-                commit: commit.to_string(),
+                commit: made.commit.clone(),
                 cases: of.len(),
                 right: count(&|r| r.score == 1.0),
                 as_good: count(&|r| r.score == 0.5),

@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 /// One method's answer to one case, scored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Day.
-    pub date: String,
-    /// Last commit that changed what is measured, with a + where files differed from it.
-    pub commit: String,
+    /// When, and by what.
+    #[serde(flatten)]
+    pub made: Made,
     /// Name of the method.
     pub method: String,
     /// Name of the case.
@@ -80,8 +79,7 @@ pub fn score(made: &Made, method: &str, case: &Case, truth: &Truth, a: &Answer) 
     let error = |v: Option<f64>| v.map(|v| (v / truth.modulus - 1.0).abs());
     let points_at = a.pull.zip(case.pole()).map(|(pull, to)| glam::DVec3::from(pull).normalize_or_zero().dot(to));
     Row {
-        date: made.date.clone(),
-        commit: made.commit.clone(),
+        made: made.clone(),
         method: method.into(),
         case: case.name.clone(),
         group: case.group.clone(),
@@ -166,7 +164,7 @@ mod tests {
     }
 
     fn scored(c: &Case, a: &Answer) -> Row {
-        score(&Made { date: String::new(), commit: String::new() }, "test", c, &c.truth().unwrap(), a)
+        score(&Made::default(), "test", c, &c.truth().unwrap(), a)
     }
 
     #[test]

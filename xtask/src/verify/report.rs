@@ -160,7 +160,7 @@ impl Report {
             for row in &found.rows {
                 let _ = writeln!(page, "| {} |", row.cells().join(" | "));
             }
-            let Made { date, commit } = &found.made;
+            let Made { date, commit, .. } = &found.made;
             let _ = writeln!(
                 page,
                 "\n`cargo xtask verify --only {}`, {date}, commit {commit}, {:.0} s.",
