@@ -24,6 +24,7 @@ mod strength;
 mod watched;
 
 use crate::rows::{self, hash};
+use crate::table;
 use answer::Answer;
 use case::{Case, GROUPS, Put, Simulator};
 use list::List;
@@ -110,7 +111,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     match &options.instead {
         Instead::Calibrate => return calibrate(list, options),
         Instead::Report => {
-            report::write(&rows::path("suite"))?;
+            report::write(&all_rows(&list.cases()?)?)?;
             return ablation::write(&rows::load(&rows::path("ablation"))?);
         }
         Instead::Record(folder) => return record(&options.wanted(list.cases()?)?, folder),
@@ -233,21 +234,38 @@ fn record(cases: &[Case], folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Scores answers of another method: one JSON object a line.
-fn score_file(cases: &[Case], file: &Path) -> Result<(), String> {
-    let made = rows::measured(rows::Measured::Diagnoses)?;
+/// Answers of another method, one JSON object a line, scored; the method has the name of the file.
+fn scored(cases: &[Case], file: &Path) -> Result<Vec<Row>, String> {
     let method = file.file_stem().map_or_else(|| "other".into(), |s| s.to_string_lossy().into_owned());
-    let mut all = Vec::new();
-    for a in rows::load::<Answer>(file)? {
+    let row = |a: Answer| {
         let c = cases.iter().find(|c| c.name == a.case);
         let c = c.ok_or_else(|| format!("{}: there is no case \"{}\"", file.display(), a.case))?;
         let truth = c.truth().map_err(|e| e.to_string())?;
-        let row = score::score(&made, &method, c, &truth, &a);
-        println!("{}: {}", c.name, report::line(&row));
-        all.push(row);
-    }
+        Ok(score::score(&crate::real::report::Made::default(), &method, c, &truth, &a))
+    };
+    rows::load::<Answer>(file)?.into_iter().map(row).collect()
+}
+
+/// Prints scores of another method.
+fn score_file(cases: &[Case], file: &Path) -> Result<(), String> {
+    let all = scored(cases, file)?;
+    all.iter().for_each(|row| println!("{}: {}", row.case, report::line(row)));
     report::print(&all);
     Ok(())
+}
+
+/// What was measured here, and answers of others that `bench/answers` keeps.
+fn all_rows(cases: &[Case]) -> Result<Vec<Row>, String> {
+    let mut all: Vec<Row> = rows::load(&rows::path("suite"))?;
+    let folder = table::root().join("bench/answers");
+    let fail = |e: std::io::Error| format!("{}: {e}", folder.display());
+    let mut files =
+        std::fs::read_dir(&folder).map_err(fail)?.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>().map_err(fail)?;
+    files.sort();
+    for file in files {
+        all.extend(scored(cases, &file)?);
+    }
+    Ok(all)
 }
 
 /// A case of the tests on the small ball: what is hidden, nothing, or a magnet; calibrated in `folder`.

@@ -3,7 +3,7 @@
 use super::case::GROUPS;
 use super::score::Row;
 use crate::real::report::Made;
-use crate::{rows, table};
+use crate::table;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -153,7 +153,7 @@ fn cells(l: &Line) -> Vec<String> {
     vec![
         l.group.clone(),
         l.method.clone(),
-        l.commit.clone(),
+        if l.commit.is_empty() { "–".into() } else { l.commit.clone() },
         l.cases.to_string(),
         format!("{} ({:.0} %)", l.right, 100.0 * l.right as f64 / l.cases as f64),
         l.as_good.to_string(),
@@ -190,10 +190,9 @@ pub fn markdown(lines: &[Line]) -> String {
 ///
 /// # Errors
 /// A file cannot be read or written.
-pub fn write(from: &Path) -> Result<(), String> {
-    let all: Vec<Row> = rows::load(from)?;
-    print(&all);
-    let lines = lines(&all);
+pub fn write(all: &[Row]) -> Result<(), String> {
+    print(all);
+    let lines = lines(all);
     println!("\nwritten to {}", table::save("suite", &lines)?.display());
     table::replace("docs/suite.md", "suite", &markdown(&lines))
 }

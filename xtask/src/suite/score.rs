@@ -114,7 +114,8 @@ fn size_error(truth: &Truth, a: &Answer) -> Option<f64> {
         let (mut off, mut size) = (0.0, 0.0);
         for (k, n) in &truth.numbers {
             let kind = &truth.names[*k][0];
-            if !a.named.iter().any(|e| e.kind == *kind) {
+            // What is named without numbers states no size.
+            if !a.named.iter().any(|e| e.kind == *kind && !e.numbers.is_empty()) {
                 continue;
             }
             let value = stated(kind, &n.path).map_or(n.absent, |v| sign * v);
