@@ -129,6 +129,9 @@ enum Verb {
         /// Only these tables; the others stay in bench/real.json as they are
         #[arg(long, value_name = "TABLE", num_args = 1..)]
         only: Vec<real::report::Slice>,
+        /// Instead: print the tables of all that was measured, and write those of docs/real-data.md
+        #[arg(long)]
+        report: bool,
     },
     /// Check the equations against theory: orders in space and time, the gradient, and benchmarks with known answers
     ///
@@ -208,7 +211,8 @@ fn run(verb: Verb) -> Result<(), String> {
             suite::run(&suite::Options { only, method, first, slice, budget, fresh, keep, verbose, instead })?;
         }
         Verb::Same { only, backend, why, .. } => same::run(&same::Options { only, backend, why })?,
-        Verb::Real { only } => println!("\nwritten to {}", real::run(&only)?.display()),
+        Verb::Real { only, report: true } => real::tell(&only)?,
+        Verb::Real { only, .. } => println!("\nwritten to {}", real::run(&only)?.display()),
         Verb::Verify { only } => verify::run(&only)?,
         Verb::Test { full, packages, checked, names } => {
             test::run(&table::root(), &test::Options { full, packages, names, checked })?;

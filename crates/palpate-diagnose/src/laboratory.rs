@@ -287,8 +287,9 @@ pub trait Laboratory {
     /// What other measurements would read of each of several rivals, compared with what they would read of the model that is named; those
     /// that there is time to simulate.
     fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation>;
-    /// Numbers of a model that lie outside the world as it is known, or at a bound.
-    fn strange(&self, _model: &Model) -> Vec<Strange> {
+    /// Numbers of a model that lie outside the world as it is known, once they are `corrected` by what errors of grid and step make of them, or that
+    /// a fit left at a bound.
+    fn strange(&self, _model: &Model, _corrected: &[f64]) -> Vec<Strange> {
         Vec::new()
     }
     /// True when the time that was allowed is over.

@@ -2,8 +2,8 @@
 //!
 //! In units of the noise a right model leaves r = Π (ε + Σ s_k d_k), ε noise, d_k the fields by which finer computations differ and the
 //! recording's systematic errors, Π what refitting leaves, drawn with the shapes that noise was seen to have. s_k is one number per field
-//! with prior N(0, 1), fitted along; what finer computations change is itself known only roughly, so a share of it, with a random sign for
-//! every block, counts as noise. The statistics are calibrated by drawing such residuals.
+//! with prior N(0, 1), fitted along. The statistics are calibrated by drawing such residuals. That a refinement is known only roughly in every block
+//! is left to the judgement: a map that took it for noise would be blank where grids are coarse, and is only read once something is known to be missing.
 //!
 //! What is missing must not hide behind the errors that every model has: a field counts up to a few times its size and no further.
 
@@ -36,8 +36,6 @@ pub struct Frame {
     free: Basis,
     /// Errors that every model has, in units of the noise `[fields][m]`.
     pub fields: Vec<Vec<f64>>,
-    /// Share of each that is not known.
-    rough: Vec<f64>,
     /// Root mean square times that each is there, over its standard deviation.
     whole: Vec<f64>,
 }
@@ -60,9 +58,8 @@ pub fn absorbed_by<'a>(columns: impl Iterator<Item = &'a Vec<f64>>, fields: &[Ve
 }
 
 impl Frame {
-    /// A model's table with fields of errors, how many times they are expected (mean and standard deviation), and the shares of them that
-    /// are not known.
-    pub fn new(table: &Table, fields: &[Vec<f64>], times: &[(f64, f64)], rough: &[f64]) -> Frame {
+    /// A model's table with fields of errors, how many times they are expected (mean and standard deviation).
+    pub fn new(table: &Table, fields: &[Vec<f64>], times: &[(f64, f64)]) -> Frame {
         let n = fields.len();
         let free = Basis::new(table.columns.iter());
         let mut y = extended(&table.y, n);
@@ -71,10 +68,9 @@ impl Frame {
         }
         let scaled = |(f, (_, sd)): (&Vec<f64>, &(f64, f64))| f.iter().map(|f| sd * f).collect();
         let fields: Vec<Vec<f64>> = fields.iter().zip(times).map(scaled).collect();
-        let rough = rough.iter().zip(times).map(|(r, (_, sd))| r / sd).collect();
         let absorbed = absorbed_by(table.columns.iter(), &fields);
         let whole = times.iter().map(|(mean, sd)| mean.hypot(*sd) / sd).collect();
-        Frame { y, absorbed, free, fields, rough, whole }
+        Frame { y, absorbed, free, fields, whole }
     }
 
     /// Residuals after the refit `[m + fields]`.
@@ -150,17 +146,12 @@ fn sum(block: &Block, y: &[f64]) -> f64 {
 }
 
 /// One draw of residuals that a right model would leave.
-fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, blocks: &[Block], rng: &mut ChaCha8Rng) -> Vec<f64> {
+fn draw(cells: &Cells, frame: &Frame, noise: &Shapes, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let mut y = noise.draw(cells, rng);
     let mut gauss = || -> f64 { StandardNormal.sample(rng) };
-    for (f, share) in frame.fields.iter().zip(&frame.rough) {
-        let s = gauss();
-        y.iter_mut().zip(f).for_each(|(y, f)| *y += s * f);
-        for b in blocks.iter().filter(|_| *share > 0.0) {
-            let (times, anywhere) = (share * gauss(), share * gauss());
-            let size = (b.cells.iter().map(|i| f[*i].powi(2)).sum::<f64>() / b.cells.len() as f64).sqrt();
-            b.cells.iter().for_each(|i| y[*i] += times * f[*i] + anywhere * size);
-        }
+    for f in &frame.fields {
+        let times = gauss();
+        y.iter_mut().zip(f).for_each(|(y, f)| *y += times * f);
     }
     let mut left = frame.absorbed.without(&extended(&y, frame.fields.len()));
     left.truncate(cells.len());
@@ -173,7 +164,7 @@ pub fn map(cells: &Cells, frame: &Frame, noise: &Shapes, bins: usize, seed: u64)
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let draws: Vec<Vec<f64>> = (0..DRAWS)
         .map(|_| {
-            let y = draw(cells, frame, noise, &blocks, &mut rng);
+            let y = draw(cells, frame, noise, &mut rng);
             blocks.iter().map(|b| sum(b, &y)).collect()
         })
         .collect();

@@ -349,7 +349,7 @@ impl Session<'_> {
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {
         let means: Vec<Vec<f64>> = fields.iter().map(|f| self.cells.means(&f.change)).collect();
         let times: Vec<(f64, f64)> = fields.iter().map(|f| f.times).collect();
-        Frame::new(table, &means, &times, &fields.iter().map(|f| f.rough).collect::<Vec<_>>())
+        Frame::new(table, &means, &times)
     }
 
     fn predict(&self, readings: &Readings, table: &Table, frame: &Frame) -> Vec<Predicted> {

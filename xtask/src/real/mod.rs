@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use swing::Swing;
 use tracks::track;
 
-pub use studies::run;
+pub use studies::{run, tell};
 
 /// A scene file of `assets/scenes`.
 pub fn scene_path(name: &str) -> PathBuf {

@@ -257,7 +257,7 @@ fn told(row: Row) -> Row {
 /// There are no recordings, or a fit fails that is not expected to.
 pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
     let data = crate::bench::data().ok_or("no recordings: set PALPATE_DATA to their folder")?;
-    let wanted: Vec<Slice> = Slice::value_variants().iter().copied().filter(|s| only.is_empty() || only.contains(s)).collect();
+    let wanted = wanted(only);
     let mut report = Report::load(&table::root())?;
     let made = Made::now()?;
     let mut measure = || -> Result<(), Error> {
@@ -295,8 +295,23 @@ pub fn run(only: &[Slice]) -> Result<PathBuf, String> {
         Ok(())
     };
     measure().map_err(|e| e.to_string())?;
-    wanted.iter().for_each(|s| report.print(*s));
+    let path = table::save("real", &report)?;
+    tell(only)?;
+    Ok(path)
+}
+
+/// These tables, or all.
+fn wanted(only: &[Slice]) -> Vec<Slice> {
+    Slice::value_variants().iter().copied().filter(|s| only.is_empty() || only.contains(s)).collect()
+}
+
+/// Prints tables of what was measured, and writes those that a page has from the file.
+///
+/// # Errors
+/// A file cannot be read or written.
+pub fn tell(only: &[Slice]) -> Result<(), String> {
+    let report = Report::load(&table::root())?;
+    wanted(only).iter().for_each(|s| report.print(*s));
     table::replace("docs/real-data.md", "models", &models::markdown(&report.models))?;
-    table::replace("docs/real-data.md", "diagnoses", &diagnoses::markdown(&report.diagnoses))?;
-    table::save("real", &report)
+    table::replace("docs/real-data.md", "diagnoses", &diagnoses::markdown(&report.diagnoses))
 }

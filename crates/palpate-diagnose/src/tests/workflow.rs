@@ -279,7 +279,7 @@ fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
         let readings = bench.linearise(&[(Vec::new(), model.values.clone())]).remove(0).unwrap();
         let field = bench.finer(&[], &model.values).unwrap().remove(0);
         let mut cells = Cells::new(&readings);
-        let frame = Frame::new(&cells.table(&readings, None), &[cells.means(&field.change)], &[field.times], &[field.rough]);
+        let frame = Frame::new(&cells.table(&readings, None), &[cells.means(&field.change)], &[field.times]);
         let (factor, _) = design_effect(&cells, &frame.left(), |i| frame.absorbed.leverage(i));
         factors.push(factor);
         cells.sd.iter_mut().for_each(|s| *s *= factor.sqrt());

@@ -63,15 +63,15 @@ pub(super) fn around(cells: &Cells, blocks: &Blocks, state: &State) -> Linear {
     out
 }
 
-/// Standard errors of a model's numbers by all of it: noise, errors of grid and step and of the sensors, and a discrepancy of this size; `None` where nothing
-/// is read of a number.
-pub(super) fn errors(state: &State, own: &Linear, blocks: &Blocks, size: f64) -> Vec<Option<f64>> {
-    let (_, factor) = own.posterior(blocks, size);
+/// A model's numbers as all of it says: corrected by what errors of grid and step and of the sensors make of them, and standard errors that
+/// hold noise, these errors and a discrepancy of this size; no error where nothing is read of a number.
+pub(super) fn stated(state: &State, own: &Linear, blocks: &Blocks, size: f64) -> (Vec<f64>, Vec<Option<f64>>) {
+    let (mean, factor) = own.posterior(blocks, size);
     let number = |(k, m): (usize, Mover)| {
         let share = (0..factor.ncols()).map(|j| factor[(k, j)].powi(2)).sum::<f64>().sqrt();
-        (m.sd > 0.0).then_some(m.sd * share)
+        (state.model.values[k] + m.mean + m.sd * mean[k], (m.sd > 0.0).then_some(m.sd * share))
     };
-    numbers(&state.model, &state.table).into_iter().enumerate().map(number).collect()
+    numbers(&state.model, &state.table).into_iter().enumerate().map(number).unzip()
 }
 
 /// What of a field is not known, anew in every block: how much of it there is, and that an error of its size may be elsewhere in the block,

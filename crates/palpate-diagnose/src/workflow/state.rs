@@ -119,8 +119,9 @@ impl Session<'_> {
         let own = linear::around(&self.cells, &self.blocks, state);
         // The size that readings have on the whole.
         let size = own.discrepancy(&self.blocks);
-        state.model.errors = linear::errors(state, &own, &self.blocks, size);
-        state.strange = self.lab.strange(&state.model);
+        let corrected;
+        (corrected, state.model.errors) = linear::stated(state, &own, &self.blocks, size);
+        state.strange = self.lab.strange(&state.model, &corrected);
         let density = |tau: f64| {
             let mut all = own.left_out(&self.blocks, tau);
             all.push(own.known_left_out(&self.blocks, tau));

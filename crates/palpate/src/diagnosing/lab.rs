@@ -397,8 +397,8 @@ impl Laboratory for Lab<'_> {
         separations(&self.base, self.backend, &models, &limits.stop())
     }
 
-    fn strange(&self, model: &Model) -> Vec<Strange> {
-        prepare(&self.base, &model.changes).map_or_else(|_| Vec::new(), |ready| strange(&ready, &model.values, &model.errors))
+    fn strange(&self, model: &Model, corrected: &[f64]) -> Vec<Strange> {
+        prepare(&self.base, &model.changes).map_or_else(|_| Vec::new(), |ready| strange(&ready, model, corrected))
     }
 
     fn iterations_left(&self) -> usize {

@@ -1,7 +1,7 @@
 //! The world as it is known: what free numbers may be at all. A fit that needs another one says that its model is wrong.
 
 use super::hypothesis::Prepared;
-use palpate_diagnose::{Strange, stated};
+use palpate_diagnose::{Model, Strange, stated};
 use palpate_fit::{AtBound, Chart};
 use palpate_model::params::{Transform, unit_behind};
 use palpate_model::plan::Physics;
@@ -14,19 +14,19 @@ const EARTHLY: f64 = 0.5;
 const BOUND: f64 = 2.0;
 
 /// What is strange about a model's values.
-pub(super) fn strange(ready: &Prepared, values: &[f64], errors: &[Option<f64>]) -> Vec<Strange> {
+pub(super) fn strange(ready: &Prepared, model: &Model, corrected: &[f64]) -> Vec<Strange> {
     let mut out: Vec<Strange> = Vec::new();
     let freed = |end: &str| ready.names.iter().any(|n| n.path.starts_with(end));
     if freed("world.gravity") {
         let mut sizes: Vec<f64> = Vec::new();
         for (s, e) in ready.experiments.iter().enumerate() {
-            let found = Physics::new(&e.plan.layout, &ready.theta(s, values)).gravity.length();
+            let found = Physics::new(&e.plan.layout, &ready.theta(s, corrected)).gravity.length();
             if (e.scene.gravity.length() - GRAVITY.0).abs() < EARTHLY && !sizes.contains(&found) {
                 sizes.push(found);
             }
         }
         // What the readings leave open of it says nothing against the model.
-        let of = ready.names.iter().zip(errors).filter(|(n, _)| n.path.starts_with("world.gravity"));
+        let of = ready.names.iter().zip(&model.errors).filter(|(n, _)| n.path.starts_with("world.gravity"));
         let open = of.filter_map(|(_, e)| *e).map(|e| e * e).sum::<f64>();
         out.extend(sizes.into_iter().map(|found| {
             let deviations = (found - GRAVITY.0).abs() / (GRAVITY.1.powi(2) + open).sqrt();
@@ -37,7 +37,7 @@ pub(super) fn strange(ready: &Prepared, values: &[f64], errors: &[Option<f64>]) 
             Strange { path: "world.gravity".into(), what, deviations }
         }));
     }
-    for ((n, f), v) in ready.names.iter().zip(&ready.free).zip(values).take(ready.given) {
+    for ((n, f), v) in ready.names.iter().zip(&ready.free).zip(&model.values).take(ready.given) {
         let chart = Chart::new(f.transform, f.typical, f.bounds.0, f.bounds.1).ok();
         let Some(bound) = chart.and_then(|c| c.at_bound(*v)) else { continue };
         // A logarithm that ends at its lowest value says that there is none of it.
