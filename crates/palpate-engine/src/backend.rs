@@ -15,6 +15,8 @@ pub struct BuildError {
     pub message: String,
     /// The way out.
     pub hint: String,
+    /// True where the device broke: nothing is wrong with the plan, and no other plan would be taken.
+    pub broken: bool,
 }
 
 /// Computes simulations of B members that share a [`Plan`] and differ in θ. State stays where the backend keeps it;

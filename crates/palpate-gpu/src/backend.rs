@@ -76,7 +76,11 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        self.world(plan, members).map_err(|e| BuildError { message: e.to_string(), hint: e.hint_for(self.alone) })
+        self.world(plan, members).map_err(|e| BuildError {
+            message: e.to_string(),
+            hint: e.hint_for(self.alone),
+            broken: matches!(e, GpuError::Lost { .. }),
+        })
     }
 
     fn set_params(&self, world: &mut World, theta: &ParamBatch) {

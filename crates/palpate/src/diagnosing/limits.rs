@@ -1,9 +1,11 @@
 //! When a diagnosis ends before its end: one set of limits, which every simulation looks at on its way.
 
+use super::hypothesis::lab_error;
 use crate::error::Error;
 use crate::interrupt::{Clock, Interrupt};
 use palpate_diagnose::LabError;
 use palpate_engine::{FailureKind, Stop};
+use palpate_gpu::GpuError;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
@@ -81,12 +83,14 @@ impl Limits {
         if self.is_over() { LabError::Interrupted } else { LabError::NoTime }
     }
 
-    /// An error of a simulation, which may have been cut short, as the laboratory's.
+    /// An error of a simulation as the laboratory's: it may have been cut short, or its device may have broken, also before it began.
     pub fn error(&self, e: impl Into<Error>) -> LabError {
         match e.into() {
             Error::Simulation(f) if f.kind == FailureKind::Stopped => self.stopped(),
-            Error::Interrupted => LabError::Interrupted,
-            other => LabError::failed(other),
+            Error::Simulation(f) if f.kind == FailureKind::Device => self.break_off(f.to_string()),
+            Error::Build(e) if e.broken => self.break_off(e.to_string()),
+            Error::Device(e @ GpuError::Lost { .. }) => self.break_off(e.to_string()),
+            other => lab_error(other),
         }
     }
 
@@ -105,7 +109,7 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_engine::Failure;
+    use palpate_engine::{BuildError, Failure};
     use std::sync::atomic::{AtomicU64, Ordering};
 
     #[test]
@@ -129,5 +133,22 @@ mod tests {
         time.store(99, Ordering::SeqCst);
         assert!(whole.grace(Duration::from_secs(5)).left() == Some(Duration::from_secs(1)));
         assert!(matches!(whole.break_off("lost".into()), LabError::Interrupted) && less.broken() == Some("lost".into()));
+    }
+
+    #[test]
+    fn a_broken_device_ends_all_whenever_it_is_met_and_a_refused_plan_only_itself() {
+        let none = || Limits::new(&Interrupt::default(), &Clock::default(), None);
+        let build = |broken| BuildError { message: "no".into(), hint: "none".into(), broken };
+        let broken: [Error; 3] = [
+            build(true).into(),
+            Failure::new(FailureKind::Device, 0.0, "no").into(),
+            Error::Device(GpuError::Lost { reason: "no".into() }),
+        ];
+        for e in broken {
+            let limits = none();
+            assert!(matches!(limits.error(e), LabError::Interrupted) && limits.is_over() && limits.broken().is_some());
+        }
+        let limits = none();
+        assert!(matches!(limits.error(build(false)), LabError::Failed(_)) && !limits.is_over());
     }
 }

@@ -125,7 +125,7 @@ pub(super) fn held_out(
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: ready.theta(0, &values),
-            evaluate: backend.evaluator_until(plan, 1, limits.stop()).map_err(lab_error)?,
+            evaluate: backend.evaluator_until(plan, 1, limits.stop()).map_err(|e| limits.error(e))?,
         };
         let free = open.iter().map(|k| {
             let mut f = ready.free[*k].clone();

@@ -54,7 +54,7 @@ pub(super) fn problem(
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: e.plan.theta.clone(),
-            evaluate: backend.evaluator_until(&e.plan, 1, limits.stop()).map_err(lab_error)?,
+            evaluate: backend.evaluator_until(&e.plan, 1, limits.stop()).map_err(|e| limits.error(e))?,
         });
     }
     Ok((Problem::new(scenes, ready.free).map_err(LabError::failed)?, numbers))
