@@ -189,7 +189,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
         }
     };
     s.begin(&baseline, &readings)?;
-    let mut state = s.state(baseline.clone(), readings, Vec::new(), true, None)?;
+    let mut state = s.state(baseline.clone(), readings)?;
     let complete = s.look(&state, 1, !out.cut)?;
     s.no_time |= !complete && !s.lab.interrupted();
     if !out.cut {

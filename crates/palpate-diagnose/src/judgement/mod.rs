@@ -7,8 +7,8 @@
 //! ```
 //!
 //! with ε the noise, N(0, 1) in every cell; c_q its free numbers' columns; d_k the fields of errors that every model has (`Field`: what finer
-//! computations change, s_k ~ N(1, 1), and half of it anew in every block, along the field and in any direction; systematic errors of the recording, s_k ~ N(0, 1)); and g one
-//! discrepancy, N(0, τ²) in every block. Beside one size τ all of it is Gaussian, so that the density of a block under the other folds is a formula
+//! computations change, s_k ~ N(1, 1), and half of it anew in every block, along the field and in any direction; systematic errors of the
+//! recording, s_k ~ N(0, 1)); and g one discrepancy, N(0, τ²) in every block. Beside one size τ all of it is Gaussian, so that the density of a block under the other folds is a formula
 //! ([`density`]). Sizes are mixed as predicts best ([`stack`]).
 //!
 //! ```text

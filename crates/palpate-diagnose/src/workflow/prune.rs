@@ -144,7 +144,7 @@ pub(super) mod tests {
             not_tried: Vec::new(),
             no_time: false,
         };
-        let state = s.state(model, readings, Vec::new(), true, None).unwrap();
+        let state = s.state(model, readings).unwrap();
         let found = |kind: &str| Found {
             kind: kind.into(),
             sentence: String::new(),

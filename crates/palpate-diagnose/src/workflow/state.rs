@@ -43,16 +43,9 @@ impl Session<'_> {
         self.remeasure(state);
     }
 
-    /// Everything known about a model; means of cells that it lost are taken over from another one's. The fields are its `own`, or another's.
-    pub(super) fn state(
-        &mut self,
-        model: Model,
-        readings: Readings,
-        fields: Vec<Field>,
-        own: bool,
-        fallback: Option<&Table>,
-    ) -> Result<State, LabError> {
-        let mut state = self.unjudged(model, readings, fields, own, fallback)?;
+    /// Everything known about a model of which finer computations have shown nothing yet.
+    pub(super) fn state(&mut self, model: Model, readings: Readings) -> Result<State, LabError> {
+        let mut state = self.unjudged(model, readings, Vec::new(), None)?;
         self.judge(&mut state);
         Ok(state)
     }
@@ -64,13 +57,12 @@ impl Session<'_> {
         state
     }
 
-    /// A state before it is judged.
+    /// A state before it is judged; means of cells that it lost are taken over from another model's.
     fn unjudged(
         &mut self,
         model: Model,
         readings: Readings,
         fields: Vec<Field>,
-        own: bool,
         fallback: Option<&Table>,
     ) -> Result<State, LabError> {
         let (held_out, elsewhere) = match self.lab.held_out(&model) {
@@ -79,7 +71,7 @@ impl Session<'_> {
             Err(e) if self.second.is_some() => return Err(e),
             Err(e) => (None, Some(e.to_string())),
         };
-        Ok(State { held_out, elsewhere, own, ..self.unread(model, readings, fields, fallback) })
+        Ok(State { held_out, elsewhere, ..self.unread(model, readings, fields, fallback) })
     }
 
     /// The same before any other recording is read.
@@ -107,7 +99,8 @@ impl Session<'_> {
     /// Everything known about another model of the same recordings, with the errors that finer computations showed of this one.
     pub(super) fn beside(&mut self, state: &State, model: Model, readings: Readings) -> Result<State, LabError> {
         let borrowed = |fields: &[Field]| fields.iter().map(Field::borrowed).collect::<Vec<_>>();
-        let mut new = self.unjudged(model, readings, borrowed(&state.fields), false, Some(&state.table))?;
+        let mut new = self.unjudged(model, readings, borrowed(&state.fields), Some(&state.table))?;
+        new.own = false;
         new.held_out_finer = borrowed(&state.held_out_finer);
         self.judge(&mut new);
         Ok(new)
