@@ -20,7 +20,7 @@ fn beam(cells: usize, nu: f64) -> Scene {
     s.material.youngs_modulus = YOUNG;
     s.material.poisson_ratio = nu;
     s.material.inertia = Inertia::Density(DENSITY);
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.01, -1.0, -1.0), DVec3::new(1e-3 * h, 1.0, 1.0))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.01, -1.0, -1.0), DVec3::new(1e-3 * h, 1.0, 1.0))];
     s
 }
 
@@ -152,7 +152,7 @@ fn a_clamp_acts_where_its_edge_is() {
     let at = |share: f64| {
         let edge = 0.02 + 0.01 * share;
         let mut s = beam(2, 0.3);
-        s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(edge, 1.0, 1.0))];
+        s.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(edge, 1.0, 1.0))];
         sag(s, LENGTH - edge, 0.3)
     };
     let ratio: Vec<f64> = [0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99].into_iter().map(at).collect();

@@ -55,7 +55,7 @@ fn a_body_that_is_clamped_whole_follows_the_clamp() {
         let mut s = body(density, 20);
         s.time.scheme = scheme;
         s.initial.velocity = v;
-        let whole = scenes::clamp(DVec3::splat(-1.0), DVec3::splat(1.0));
+        let whole = Clamp::still(DVec3::splat(-1.0), DVec3::splat(1.0));
         s.clamps = vec![Clamp { motion: motion(&s.time, pose), ..whole }];
         worst(&s, |x, _| x)
     };
@@ -76,7 +76,7 @@ fn a_body_held_at_its_ends_is_turned_as_it_is() {
     // at its other end as well. Hardly any mass: what holds it is all that acts.
     let turn = |t: f64| (DQuat::from_axis_angle(DVec3::new(0.2, 0.1, 1.0).normalize(), 10.0 * t), DVec3::new(0.2, -0.1, 0.3) * t);
     let bend = (DQuat::from_axis_angle(DVec3::new(1.0, 1.0, 0.0).normalize(), 0.3), DVec3::new(-0.002, 0.004, 0.006));
-    let ends = [(-1.0, -0.022), (0.022, 1.0)].map(|(a, b)| scenes::clamp(DVec3::new(a, -1.0, -1.0), DVec3::new(b, 1.0, 1.0)));
+    let ends = [(-1.0, -0.022), (0.022, 1.0)].map(|(a, b)| Clamp::still(DVec3::new(a, -1.0, -1.0), DVec3::new(b, 1.0, 1.0)));
     for held in [1, 2] {
         let mut s = body(MASSLESS, 40);
         s.initial.state = InitialShape::StaticEquilibrium;
@@ -109,7 +109,7 @@ fn what_a_clamp_holds_does_not_depend_on_the_stiffness() {
         s.initial.velocity = DVec3::new(0.02, 0.05, 0.1) * times.sqrt();
         s.initial.state = state;
         // Its edge is in the middle of cells.
-        s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(-0.0165, 1.0, 1.0))];
+        s.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(-0.0165, 1.0, 1.0))];
         let states = run::states(&scenes::plan(&s));
         states.into_iter().map(|s| s.displacement).collect::<Vec<_>>()
     };

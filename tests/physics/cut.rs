@@ -43,7 +43,7 @@ fn block(cut: f64, turn: DMat3, ghost: f64) -> (f64, f64) {
     let top = (2.0 + cut) * H;
     let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(2.0 * H, 2.0 * H, top) }, H);
     s.object.pose = DAffine3::from_mat3(turn);
-    let base = scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5));
+    let base = Clamp::still(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5));
     s.clamps = vec![Clamp { object_frame: true, ..base }];
     let up = turn * DVec3::Z;
     s.gravity = -up;
@@ -111,7 +111,7 @@ fn a_clamp_keeps_the_stiffness_positive_wherever_its_faces_cut_the_lattice() {
         for edge in [0.0, 0.02, 0.05, 0.1, 0.3, 0.5, 0.9, 0.97, 0.99] {
             let mut s = scenes::body(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, -0.002, 0.06) }, 0.022);
             let at = 0.022 * (1.0 + edge);
-            s.clamps = vec![scenes::clamp(DVec3::new(-0.1, at, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+            s.clamps = vec![Clamp::still(DVec3::new(-0.1, at, 0.0), DVec3::new(0.1, 0.1, 0.2))];
             s.initial.state = InitialShape::StaticEquilibrium;
             s.time.steps = 0;
             s.material.youngs_modulus = 1e5;

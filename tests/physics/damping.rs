@@ -34,7 +34,7 @@ fn mass_damping_slows_a_free_body_as_the_scheme_says() {
 fn beam() -> Scene {
     let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.11, 0.023, 0.021) }, 0.01);
     s.material.youngs_modulus = 2.0e5;
-    s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(1e-5, 1.0, 1.0))];
+    s.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(1e-5, 1.0, 1.0))];
     s.gravity = DVec3::new(0.0, 0.0, -0.00981);
     s.solver.tolerance = 1e-11;
     s

@@ -81,7 +81,7 @@ fn mass_at_a_place_bends_a_beam_like_one_that_the_scene_knows() {
         let mut s = scenes::body(shape, 0.01);
         s.material.youngs_modulus = 2e5;
         s.gravity = DVec3::new(0.0, 0.0, -9.81);
-        s.clamps = vec![scenes::clamp(DVec3::splat(-0.1), DVec3::new(0.0101, 0.1, 0.1))];
+        s.clamps = vec![Clamp::still(DVec3::splat(-0.1), DVec3::new(0.0101, 0.1, 0.1))];
         s.masses = if known { vec![PointMass { point: place, mass: 0.02 }] } else { vec![] };
         let at = [("mass", 0, 0.02), ("point", 0, place.x), ("point", 1, place.y), ("point", 2, place.z), ("radius", 0, 4e-3)];
         s.effects = if unknown { vec![effect("point-mass", &at)] } else { vec![] };
@@ -158,7 +158,7 @@ fn absent_effects_change_no_bit() {
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
     s.material.stiffness_damping = 0.002;
     s.planes = vec![scenes::plane(DVec3::new(0.0, 0.0, -0.0102), DVec3::Z)];
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.02, -0.02, -0.02), DVec3::new(-0.0149, 0.02, 0.02))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.02, -0.02, -0.02), DVec3::new(-0.0149, 0.02, 0.02))];
     s.initial.angular_velocity = DVec3::new(0.0, 5.0, 0.0);
     s.time = Time { step: 0.005, steps: 12, start: 0.0, ..Time::weighted(0.6) };
     let plain = run::states(&scenes::plan(&s)).pop().unwrap();

@@ -36,7 +36,7 @@ fn bar(effects: Vec<Effect>) -> Scene {
     s.material.poisson_ratio = 0.0;
     s.material.inertia = Inertia::Density(DENSITY);
     s.gravity = DVec3::new(GRAVITY, 0.0, 0.0);
-    s.clamps = vec![scenes::clamp(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1e-3 * CELL, 1.0, 1.0))];
+    s.clamps = vec![Clamp::still(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1e-3 * CELL, 1.0, 1.0))];
     s.initial.state = InitialShape::StaticEquilibrium;
     s.time.steps = 0;
     s.effects = effects;
@@ -258,7 +258,7 @@ fn an_edge_further_along_is_a_clamp_that_reaches_further() {
         let effects = if shift == 0.0 { Vec::new() } else { vec![effect("clamp-edge", &[("shift", &[shift])])] };
         let mut s = bar(effects);
         s.gravity = DVec3::new(0.0, 0.0, -GRAVITY);
-        s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(held, 1.0, 1.0))];
+        s.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(held, 1.0, 1.0))];
         let plan = scenes::plan(&s);
         let node = run::nearest(&plan, DVec3::new(LENGTH, 0.0, 0.0));
         run::states(&plan).last().expect("there is a start").displacement[node].z

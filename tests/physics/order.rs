@@ -34,7 +34,7 @@ fn beam(time: Time) -> Scene {
     s.material.youngs_modulus = 5e4;
     s.material.mass_damping = 0.5;
     s.gravity = DVec3::new(0.3, -0.5, -4.0);
-    s.clamps = vec![Clamp { motion: Some(motion()), ..scenes::clamp(DVec3::splat(-1.0), DVec3::new(EDGE, 1.0, 1.0)) }];
+    s.clamps = vec![Clamp { motion: Some(motion()), ..Clamp::still(DVec3::splat(-1.0), DVec3::new(EDGE, 1.0, 1.0)) }];
     s.initial.state = InitialShape::StaticEquilibrium;
     s.time = time;
     // Far below the smallest error that is compared.

@@ -26,7 +26,7 @@ fn bar() -> Scene {
     );
     s.material.youngs_modulus = 30e3;
     s.gravity = DVec3::new(0.0, 0.0, -9.81);
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.02, 0.1, 0.1))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.02, 0.1, 0.1))];
     s.initial.state = InitialShape::StaticEquilibrium;
     s.time = Time { step: 1.0, steps: 0, start: 0.0, ..Time::weighted(0.6) };
     s

@@ -47,7 +47,7 @@ pub(super) fn beam(kind: Kind, scheme: &'static Scheme, model: &'static Model) -
             DQuat::from_rotation_z(0.05),
         ],
     };
-    s.clamps = vec![Clamp { motion: Some(motion), ..scenes::clamp(DVec3::splat(-1.0), DVec3::new(0.021, 1.0, 1.0)) }];
+    s.clamps = vec![Clamp { motion: Some(motion), ..Clamp::still(DVec3::splat(-1.0), DVec3::new(0.021, 1.0, 1.0)) }];
     s.initial.velocity = DVec3::new(0.02, -0.03, -0.05);
     s.time = Time { step: 0.01, steps: 3, start: 0.002, theta: 0.5, scheme, open: None };
     s.solver.tolerance = 1e-13;

@@ -8,8 +8,7 @@ use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::{self, ALL, Family};
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::plan::Plan;
-use palpate_model::scene::InitialShape;
-use support::scenes;
+use palpate_model::scene::{Clamp, InitialShape};
 
 /// The ball with one effect, every amplitude at a size that matters.
 pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
@@ -29,7 +28,7 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         // They need a clamp, a start that it does not jerk, and a body that does not hang by half its size from the clamp's edge: where the
         // extension folds, the cost is rough.
         scene.material.youngs_modulus *= 4.0;
-        scene.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+        scene.clamps = vec![Clamp::still(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
         scene.initial.state = InitialShape::StaticEquilibrium;
     }
     scene

@@ -226,7 +226,7 @@ fn static_equilibrium_then_motion() {
         translations: vec![DVec3::ZERO, DVec3::new(0.004, 0.0, 0.002), DVec3::new(0.003, -0.004, 0.0), DVec3::ZERO],
         rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_x(0.1), DQuat::from_rotation_x(0.15), DQuat::from_rotation_y(0.1)],
     };
-    s.clamps = vec![Clamp { motion: Some(motion), ..scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2)) }];
+    s.clamps = vec![Clamp { motion: Some(motion), ..Clamp::still(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2)) }];
     check(&observed(&s, &[0.0, 0.03, 0.055]), "static start");
 }
 
@@ -236,6 +236,6 @@ fn static_problem() {
     s.initial =
         Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::StaticEquilibrium };
     s.time.steps = 0;
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.1, 0.03, 0.0), DVec3::new(0.1, 0.1, 0.2))];
     check(&observed(&s, &[0.0]), "static");
 }

@@ -82,7 +82,7 @@ fn derivatives_of_points_that_belong_to_the_front_agree() {
     s.material.youngs_modulus = 2e4;
     s.initial.velocity = DVec3::new(0.1, -0.2, 0.3);
     s.initial.angular_velocity = DVec3::new(3.0, -5.0, 1.0);
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.05, -0.05, -0.02), DVec3::new(-0.03, 0.05, 0.01))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.05, -0.05, -0.02), DVec3::new(-0.03, 0.05, 0.01))];
     s.time = Time { step: 0.01, steps: 3, start: 0.0, ..Time::weighted(0.6) };
     s.solver.tolerance = 1e-13;
     // A wrong camera moves points and lines of sight.

@@ -10,21 +10,8 @@ use palpate_model::scene::*;
 pub fn body(shape: Analytic, cell_size: f64) -> Scene {
     let object =
         Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell_size) };
-    let material = Material {
-        model: &palpate_model::materials::ALL[0],
-        inertia: Inertia::Density(1000.0),
-        youngs_modulus: 5000.0,
-        poisson_ratio: 0.4,
-        mass_damping: 0.0,
-        stiffness_damping: 0.0,
-    };
     let time = Time { step: 0.005, steps: 10, ..Time::weighted(0.5) };
-    Scene { time, ..Scene::at_rest("in-code.toml", object, material) }
-}
-
-/// A clamp that holds still.
-pub fn clamp(min: DVec3, max: DVec3) -> Clamp {
-    Clamp { min, max, object_frame: false, motion: None, motion_path: None }
+    Scene { time, ..Scene::at_rest("in-code.toml", object, Material::undamped(5000.0, 0.4)) }
 }
 
 /// A contact plane whose stiffness follows the material.

@@ -1,6 +1,8 @@
 //! A scene as plain checked data (format `scene/1`): everything known about an experiment, and what is to be found out.
 //! Reading and writing the TOML is `palpate-io`'s business.
 
+mod in_code;
+
 use crate::effects::Effect;
 use crate::materials::Model;
 use crate::mechanics::motion::RigidMotion;
@@ -49,27 +51,6 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A body at rest in free space, and of everything else what a scene file that says no more gets.
-    pub fn at_rest(path: impl Into<PathBuf>, object: Object, material: Material) -> Scene {
-        Scene {
-            path: path.into(),
-            title: String::new(),
-            object,
-            material,
-            gravity: DVec3::ZERO,
-            clamps: Vec::new(),
-            planes: Vec::new(),
-            masses: Vec::new(),
-            effects: Vec::new(),
-            fields: Vec::new(),
-            initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
-            time: Time::default(),
-            solver: Solver::default(),
-            observation: None,
-            fit: None,
-        }
-    }
-
     /// The parameters of this scene but for the values of fields, of which only a body knows how many there are.
     pub fn layout(&self) -> Layout {
         self.layout_with(&[])

@@ -4,7 +4,7 @@ use super::report::{Requirement, Row};
 use super::scenes;
 use glam::DVec3;
 use palpate_model::materials::ALL;
-use palpate_model::scene::{Analytic, InitialShape, PointMass};
+use palpate_model::scene::{Analytic, Clamp, InitialShape, PointMass};
 
 const LENGTH: f64 = 0.32;
 const THICK: f64 = 0.02;
@@ -49,7 +49,7 @@ fn bend(model: usize, load: f64, h: f64, off: f64) -> Result<[f64; 2], String> {
     s.gravity = DVec3::new(0.0, 0.0, -10.0);
     let tip = DVec3::new(LENGTH, 0.5 * THICK, 0.5 * THICK) + side;
     s.masses = vec![PointMass { point: tip, mass: force / 10.0 }];
-    s.clamps = vec![scenes::clamp(DVec3::splat(-1.0), DVec3::new(0.0, 1.0, 1.0))];
+    s.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(0.0, 1.0, 1.0))];
     s.initial.state = InitialShape::StaticEquilibrium;
     let (plan, state) = scenes::end(&s)?;
     // Mean over the end's face, which the load dents at one point only.

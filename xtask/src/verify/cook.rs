@@ -3,7 +3,7 @@
 use super::report::{Requirement, Row};
 use super::scenes;
 use glam::{DAffine3, DVec3};
-use palpate_model::scene::{BodySource, InitialShape, PointMass};
+use palpate_model::scene::{BodySource, Clamp, InitialShape, PointMass};
 use palpate_model::shape::TriMesh;
 
 /// Thickness, in the panel's own units (48 wide, 44 high at its root and 16 at its end).
@@ -48,7 +48,7 @@ fn deflect(cell: f64) -> Result<f64, String> {
         let z = THICK * (f64::from(j) + 0.5) / f64::from(columns);
         s.masses.push(PointMass { point: DVec3::new(48.0, y, z), mass: weight * THICK / f64::from(rows * columns) });
     }
-    s.clamps = vec![scenes::clamp(DVec3::splat(-99.0), DVec3::new(0.0, 99.0, 99.0))];
+    s.clamps = vec![Clamp::still(DVec3::splat(-99.0), DVec3::new(0.0, 99.0, 99.0))];
     s.initial.state = InitialShape::StaticEquilibrium;
     let (plan, state) = scenes::end(&s)?;
     let middle = DVec3::new(48.0, 52.0, 0.5 * THICK);

@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_cpu::terms::contact::touches;
 use palpate_model::mechanics::plane;
 use palpate_model::plan::Physics;
-use palpate_model::scene::{Analytic, InitialShape, Plane};
+use palpate_model::scene::{Analytic, Clamp, InitialShape, Plane};
 
 const NU: f64 = 0.3;
 const SOURCE: &str = "Legendre series of the elastic sphere";
@@ -30,7 +30,7 @@ fn press(cells: f64, approach: f64, off: DVec3) -> Result<[f64; 2], String> {
     s.material.poisson_ratio = NU;
     // It holds the ball against drifting and turning where nothing moves or is strained much.
     let core = DVec3::splat(0.06);
-    s.clamps = vec![scenes::clamp(c - core, c + core)];
+    s.clamps = vec![Clamp::still(c - core, c + core)];
     let at = |n: DVec3| Plane { point: c - n * (1.0 - approach), ..scenes::plane(n) };
     s.planes = vec![at(DVec3::Z), at(-DVec3::Z)];
     s.initial.state = InitialShape::StaticEquilibrium;

@@ -21,25 +21,12 @@ pub fn body(shape: Analytic, cell: f64) -> Scene {
 /// The same of any source.
 pub fn of(source: BodySource, cell: f64) -> Scene {
     let object = Object { source, pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) };
-    let material = Material {
-        model: &palpate_model::materials::ALL[0],
-        inertia: Inertia::Density(1000.0),
-        youngs_modulus: 1e5,
-        poisson_ratio: 0.3,
-        mass_damping: 0.0,
-        stiffness_damping: 0.0,
-    };
-    Scene::at_rest("verify.toml", object, material)
+    Scene::at_rest("verify.toml", object, Material::undamped(1e5, 0.3))
 }
 
 /// Steps of the scheme that scenes have by default.
 pub fn steps(step: f64, steps: usize) -> Time {
     Time { step, steps, ..Time::default() }
-}
-
-/// A region that is held.
-pub fn clamp(min: DVec3, max: DVec3) -> Clamp {
-    Clamp { min, max, object_frame: false, motion: None, motion_path: None }
 }
 
 /// A plane of the default stiffness through the origin.

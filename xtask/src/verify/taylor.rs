@@ -15,7 +15,7 @@ use palpate_model::params::ParamKey;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
-use palpate_model::scene::{Analytic, PointMass, Scene};
+use palpate_model::scene::{Analytic, Clamp, PointMass, Scene};
 
 /// Sizes of ε over the parameter's own: each a quarter of the last, from a twentieth on.
 const STEPS: usize = 9;
@@ -48,7 +48,7 @@ fn thrown() -> Scene {
 fn held() -> Scene {
     let mut s = thrown();
     (s.initial.velocity, s.initial.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
-    s.clamps = vec![scenes::clamp(DVec3::new(-0.1, 0.021, 0.0), DVec3::new(0.1, 0.1, 0.2))];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.1, 0.021, 0.0), DVec3::new(0.1, 0.1, 0.2))];
     s
 }
 

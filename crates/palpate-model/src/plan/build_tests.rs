@@ -40,10 +40,6 @@ fn scene() -> Scene {
     }
 }
 
-fn clamp(min: DVec3, max: DVec3) -> Clamp {
-    Clamp { min, max, object_frame: false, motion: None, motion_path: None }
-}
-
 fn plan(scene: &Scene) -> Result<Plan, PlanError> {
     build_plan(scene, Observation::default(), &[])
 }
@@ -62,10 +58,10 @@ fn held(site: &ClampSite) -> (f64, f64, DVec3) {
 fn clamps_hold_what_their_box_cuts_out_of_the_body() {
     let mut scene = scene();
     // The end x = 0 only touched; then 0.015 m of the beam, cutting cells in half.
-    scene.clamps.push(clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.0, 0.1, 0.1)));
-    scene.clamps.push(clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.015, 0.1, 0.1)));
+    scene.clamps.push(Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.0, 0.1, 0.1)));
+    scene.clamps.push(Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.015, 0.1, 0.1)));
     // Inside the body: all six faces.
-    scene.clamps.push(clamp(DVec3::splat(0.015), DVec3::splat(0.025)));
+    scene.clamps.push(Clamp::still(DVec3::splat(0.015), DVec3::splat(0.025)));
     let plan = plan(&scene).unwrap();
     let end = 0.05 * 0.04;
     for (site, area, volume, normal) in [
@@ -100,7 +96,7 @@ fn boxes_in_the_object_frame_turn_with_it() {
         DVec3::new(0.013, 0.0, -0.2),
     );
     let motion = RigidMotion { times: vec![0.0], translations: vec![DVec3::ZERO], rotations: vec![DQuat::IDENTITY] };
-    let region = clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.06, 0.1, 0.1));
+    let region = Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.06, 0.1, 0.1));
     scene.clamps = vec![Clamp { object_frame: true, motion: Some(motion), ..region }];
     let plan = plan(&scene).unwrap();
     assert!(plan.clamps[0].motion.is_some());
@@ -114,8 +110,8 @@ fn boxes_in_the_object_frame_turn_with_it() {
 #[test]
 fn clamp_beside_the_body_is_an_error_that_names_it() {
     let mut scene = scene();
-    scene.clamps.push(clamp(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.01, 0.1, 0.1)));
-    scene.clamps.push(clamp(DVec3::splat(1.0), DVec3::splat(2.0)));
+    scene.clamps.push(Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.01, 0.1, 0.1)));
+    scene.clamps.push(Clamp::still(DVec3::splat(1.0), DVec3::splat(2.0)));
     let message = plan(&scene).unwrap_err().to_string();
     assert!(message.starts_with("clamp.1.box: ") && message.contains("0.2, 0.05, 0.04"), "{message}");
 }
@@ -218,7 +214,7 @@ fn a_shifted_edge_holds_what_a_larger_box_would() {
     scene.object.pose = DAffine3::from_rotation_translation(DQuat::from_rotation_z(0.3), DVec3::new(0.003, 0.001, 0.002));
     let boxed = |end: f64| {
         let mut scene = scene.clone();
-        scene.clamps = vec![Clamp { object_frame: true, ..clamp(DVec3::splat(-1.0), DVec3::new(end, 0.0501, 0.0398)) }];
+        scene.clamps = vec![Clamp { object_frame: true, ..Clamp::still(DVec3::splat(-1.0), DVec3::new(end, 0.0501, 0.0398)) }];
         plan(&scene).unwrap()
     };
     let stated = boxed(0.031);
@@ -247,7 +243,7 @@ fn a_shifted_edge_holds_what_a_larger_box_would() {
 #[test]
 fn a_clamp_that_only_touches_the_body_has_an_edge() {
     let mut scene = scene();
-    scene.clamps = vec![clamp(DVec3::splat(-1.0), DVec3::new(0.0, 1.0, 1.0))];
+    scene.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(0.0, 1.0, 1.0))];
     let plan = plan(&scene).unwrap();
     let site = &plan.clamps[0];
     let volume = |held: &[Held]| held.iter().flat_map(|h| h.now.volume_mass.as_flattened()).sum::<f64>();
@@ -256,7 +252,7 @@ fn a_clamp_that_only_touches_the_body_has_an_edge() {
     assert!((grown / (0.005 * 0.05 * 0.04) - 1.0).abs() < 1e-9, "{grown} m³");
     // A box around the whole body has no edge on it.
     let mut whole = scene.clone();
-    whole.clamps = vec![clamp(DVec3::splat(-1.0), DVec3::ONE)];
+    whole.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::ONE)];
     let whole = super::tests::plan(&whole).unwrap();
     let site = &whole.clamps[0];
     assert!(site.edge.cells(&whole.body, &site.cells, -0.05).iter().all(|h| h.near.is_none()));
