@@ -181,10 +181,8 @@ fn peak(command: &mut Command) -> f64 {
 #[cfg(target_os = "linux")]
 #[test]
 fn inspect_foresees_the_memory_of_a_fit_on_the_cpu() {
-    let (folder, scene) = scene();
+    let folder = watched();
     let path = |name: &str| folder.path().join(name);
-    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
-    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
     let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"lbfgs\"\nstarts = 4\niterations = 0\n\
                threads = 2\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
     // What the program takes by itself is the same for both: the difference is the body's.
@@ -263,6 +261,24 @@ fn the_job_for_a_runner_tells_good_from_bad_and_goes_on_where_it_was() {
 struct Running(std::process::Child);
 
 #[cfg(unix)]
+impl Running {
+    /// Sends what Ctrl-C sends, waits for the end, and gives the exit code.
+    fn interrupt(&mut self) -> Option<i32> {
+        assert!(Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().expect("kill is there").success());
+        self.0.wait().expect("it ends").code()
+    }
+}
+
+/// A folder with what a camera sees of the scene, under `seen`.
+#[cfg(unix)]
+fn watched() -> tempfile::TempDir {
+    let (folder, scene) = scene();
+    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
+    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(folder.path().join("seen"))).0, 0);
+    folder
+}
+
+#[cfg(unix)]
 impl Drop for Running {
     fn drop(&mut self) {
         // It has usually ended by itself.
@@ -274,10 +290,8 @@ impl Drop for Running {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
-    let (folder, scene) = scene();
+    let folder = watched();
     let path = |name: &str| folder.path().join(name);
-    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
-    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
     // Short evaluations, but minutes of them.
     let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"rprop\"\nstarts = 2000\niterations = 50\n\
                [[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
@@ -299,10 +313,7 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
             assert!(begun.elapsed() < Duration::from_secs(120), "nothing happens: {}", log());
             std::thread::sleep(Duration::from_millis(20));
         }
-        // What Ctrl-C sends.
-        assert!(Command::new("kill").args(["-INT", &fit.0.id().to_string()]).status().expect("kill is there").success());
-        let code = fit.0.wait().expect("it ends").code();
-        assert_eq!(code, Some(130), "{}", log());
+        assert_eq!(fit.interrupt(), Some(130), "{}", log());
         assert!(log().contains("interrupted: stopping at the next time step"), "{}", log());
         let text = fs::read_to_string(path("out/result.json")).expect("the best so far is written");
         let result: Value = serde_json::from_str(&text).expect("it is JSON");
@@ -324,10 +335,8 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_diagnosis_ends_within_two_seconds_with_what_it_knows() {
-    let (folder, scene) = scene();
+    let folder = watched();
     let path = |name: &str| folder.path().join(name);
-    let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
-    assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
     let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\niterations = 20\n\
                [[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1.0e4\n";
     // Cells so small that the whole diagnosis takes minutes.
@@ -347,10 +356,8 @@ fn an_interrupted_diagnosis_ends_within_two_seconds_with_what_it_knows() {
             std::thread::sleep(Duration::from_millis(5));
         }
         let asked = Instant::now();
-        assert!(Command::new("kill").args(["-INT", &diagnosis.0.id().to_string()]).status().expect("kill is there").success());
-        let code = diagnosis.0.wait().expect("it ends").code();
+        assert_eq!(diagnosis.interrupt(), Some(130));
         let taken = asked.elapsed();
-        assert_eq!(code, Some(130));
         assert!(taken < Duration::from_secs(2), "{begun}: {taken:?}");
         let text = fs::read_to_string(path("out/diagnosis.json")).expect("what is known is written");
         let result: Value = serde_json::from_str(&text).expect("it is JSON");
