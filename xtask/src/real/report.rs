@@ -40,7 +40,7 @@ pub struct Made {
 impl Made {
     /// True if both were made by the same code, whatever its commit is called.
     pub fn is_same(&self, other: &Made) -> bool {
-        if self.code.is_empty() { self.commit == other.commit } else { self.code == other.code }
+        if self.code.is_empty() || other.code.is_empty() { self.commit == other.commit } else { self.code == other.code }
     }
 
     /// Today, by the tree as it is.
