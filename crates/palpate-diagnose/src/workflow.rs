@@ -239,6 +239,10 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
                     }
                     continue;
                 }
+                // Nothing is named where nothing is missing: what helps there follows errors of the grid more closely than their fields do.
+                if out.accepted.is_empty() && !s.lacks(&state) {
+                    break;
+                }
                 let before = (state.clone(), out.accepted.clone());
                 out.accepted.extend(found);
                 state = s.prune(next, &mut out.accepted);
@@ -342,8 +346,12 @@ impl Session<'_> {
     fn is_worth_a_look(&self, state: &State) -> bool {
         let price = Prior { candidates: self.candidates, readings: self.cells.len() };
         let promises = |v: &Variant| 0.5 * v.score.gain + price.log(&[v.score.freedom], &[]) > 0.0;
-        let scored = self.scored.iter().flatten().any(promises);
-        state.judged.is_missing() || state.strange.iter().any(|s| s.deviations > STRANGE) || scored
+        self.lacks(state) || self.scored.iter().flatten().any(promises)
+    }
+
+    /// True when something is missing in a model: a discrepancy beside it predicts better, or its numbers are not of this world.
+    fn lacks(&self, state: &State) -> bool {
+        state.judged.is_missing() || state.strange.iter().any(|s| s.deviations > STRANGE)
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -1,6 +1,6 @@
 //! The verdict: levels before and after, and the gap that is closed.
 
-use super::{Progress, STRANGE, Session, State};
+use super::{Progress, Session, State};
 use crate::crossval::rms;
 use crate::diagnosis::{Diagnosis, Found, Instant, Level, MapEntry, Verdict};
 use crate::laboratory::{Field, LabError, Model, Reading, Readings};
@@ -71,8 +71,7 @@ impl Session<'_> {
         let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
         // The noise may have become known better since.
         self.remeasure(&mut base);
-        let is_missing = |s: &State| s.judged.is_missing() || s.strange.iter().any(|x| x.deviations > STRANGE);
-        let remains = is_missing(&state);
+        let remains = self.lacks(&state);
         let stopped = out.interrupted || self.no_time;
         let verdict = match out.accepted.len() {
             0 if !(remains || out.open || out.cut) => Verdict::Adequate,
