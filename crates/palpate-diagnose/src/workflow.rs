@@ -240,7 +240,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
                     continue;
                 }
                 // Nothing is named where nothing is missing: what helps there follows errors of the grid more closely than their fields do.
-                if out.accepted.is_empty() && !s.lacks(&state) {
+                if out.accepted.is_empty() && !state.lacks() {
                     break;
                 }
                 let before = (state.clone(), out.accepted.clone());
@@ -346,12 +346,7 @@ impl Session<'_> {
     fn is_worth_a_look(&self, state: &State) -> bool {
         let price = Prior { candidates: self.candidates, readings: self.cells.len() };
         let promises = |v: &Variant| 0.5 * v.score.gain + price.log(&[v.score.freedom], &[]) > 0.0;
-        self.lacks(state) || self.scored.iter().flatten().any(promises)
-    }
-
-    /// True when something is missing in a model: a discrepancy beside it predicts better, or its numbers are not of this world.
-    fn lacks(&self, state: &State) -> bool {
-        state.judged.is_missing() || state.strange.iter().any(|s| s.deviations > STRANGE)
+        state.lacks() || self.scored.iter().flatten().any(promises)
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -71,7 +71,7 @@ impl Session<'_> {
         let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
         // The noise may have become known better since.
         self.remeasure(&mut base);
-        let remains = self.lacks(&state);
+        let remains = state.lacks();
         let stopped = out.interrupted || self.no_time;
         let verdict = match out.accepted.len() {
             0 if !(remains || out.open || out.cut) => Verdict::Adequate,

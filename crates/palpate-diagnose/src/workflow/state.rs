@@ -1,12 +1,19 @@
 //! Everything known about one model: its residuals in cells, errors of grid and step, what it says of a second recording, and its score.
 
-use super::{Session, State, linear};
+use super::{STRANGE, Session, State, linear};
 use crate::cells::{Cells, Table};
 use crate::judgement::density::Blocks;
 use crate::judgement::prior::Prior;
 use crate::judgement::rule::Judged;
 use crate::judgement::stack::{SIZES, stacked};
 use crate::laboratory::{Field, LabError, Model, Readings};
+
+impl State {
+    /// True when something is missing in the model: a discrepancy beside it predicts better, or its numbers are not of this world.
+    pub(super) fn lacks(&self) -> bool {
+        self.judged.is_missing() || self.strange.iter().any(|s| s.deviations > STRANGE)
+    }
+}
 
 impl Session<'_> {
     /// What a finer grid and half the step would change, and what the recording's systematic errors may have changed. A scene that is too
