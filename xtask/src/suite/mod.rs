@@ -47,7 +47,7 @@ pub struct Options {
     pub first: Option<usize>,
     /// Stop after so many minutes.
     pub slice: Option<f64>,
-    /// Time for the search of one case [s].
+    /// Time for the search of one case, of all its processors together [s].
     pub budget: f64,
     /// Measure again what this commit has measured already.
     pub fresh: bool,
