@@ -8,7 +8,7 @@ struct Rate { // mirrored
     mass_damping: f32,
     stiffness_damping: f32,
     start: f32,
-    pad: vec2<f32>,
+    viscosity: vec2<f32>,
     gravity: vec4<f32>,
     velocity: vec4<f32>,
     spin: vec4<f32>,

@@ -59,6 +59,8 @@ struct Member { // mirrored
     spin: vec4<f32>,
     // λ/E and μ/E, and their derivatives by ν.
     lame: vec4<f32>,
+    // Viscosity: coefficient and exponent, and the slot of the element matrices at ν = 0.
+    flow: vec4<f32>,
 }
 
 struct Plane { // mirrored

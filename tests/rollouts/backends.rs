@@ -36,9 +36,10 @@ fn every_scheme_and_every_material_agree() {
         return;
     }
     let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
-    let (scheme, model) = (scheme::ALL.last().expect("there is one"), materials::ALL.last().expect("there is one"));
+    let known: Vec<_> = materials::ALL.iter().filter(|m| m.has_twin()).collect();
+    let (scheme, model) = (scheme::ALL.last().expect("there is one"), *known.last().expect("there is one"));
     let schemes = scheme::ALL.iter().map(|s| (s, model));
-    let models = materials::ALL.iter().filter(|m| *m != model).map(|m| (scheme, m));
+    let models = known.iter().filter(|m| **m != model).map(|m| (scheme, *m));
     for (scheme, model) in schemes.chain(models) {
         let mut scene = beam(Kind::CutCells, scheme, model);
         // As accurate as single precision can use.

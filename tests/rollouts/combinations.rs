@@ -3,6 +3,7 @@
 
 use super::gradients::check_some;
 use glam::{DAffine3, DQuat, DVec3};
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::materials::{self, Model};
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::{Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker, ReadingKind};
@@ -83,13 +84,19 @@ pub(super) fn seen(scene: &Scene) -> Plan {
 fn one_of_each(key: ParamKey) -> bool {
     use ParamKey::*;
     matches!(key, YoungsModulus | PoissonRatio | Density | StiffnessDamping | TimeStart | PlaneHeight(0))
+        || matches!(key, Viscosity | ViscosityExponent)
 }
 
 fn check_all(kind: Kind) {
     for scheme in scheme::ALL {
         for model in materials::ALL {
             let name = format!("{kind:?}, {}, {}", scheme.name, model.name);
-            let touched = check_some(&seen(&beam(kind, scheme, model)), &name, one_of_each);
+            let mut scene = beam(kind, scheme, model);
+            // One of the materials flows as well, by a law that a scheme with several past states must see the same way.
+            if *model == materials::ALL[1] {
+                scene.material.viscosity = Some(Viscosity { coefficient: 60.0, exponent: 0.8 });
+            }
+            let touched = check_some(&seen(&scene), &name, one_of_each);
             assert_eq!(touched, 1, "{name}: contact");
         }
     }

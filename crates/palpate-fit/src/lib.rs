@@ -5,6 +5,7 @@
 
 mod chart;
 mod dense;
+mod expected;
 mod fit;
 mod journal;
 mod known;
@@ -15,6 +16,7 @@ mod settings;
 mod uncertainty;
 
 pub use chart::{AtBound, Chart};
+pub use expected::{Expected, expected};
 pub use fit::{FitError, FitResult, FittedField, FittedParameter, Hooks, Lead, Progress, Run, Worth, fit};
 pub use journal::{JournalError, JournalFile};
 pub use known::KnownRow;

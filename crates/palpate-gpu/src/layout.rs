@@ -123,6 +123,8 @@ pub struct Member {
     pub spin: [f32; 4],
     /// λ/E and μ/E, and their derivatives by Poisson's ratio.
     pub lame: [f32; 4],
+    /// Viscosity: coefficient [Pa·s^h] and exponent, and the slot of the element matrices at ν = 0 (the first); one entry fills up.
+    pub flow: [f32; 4],
 }
 
 /// How the coefficients of one member change along a direction; `shared/rates.wgsl`.
@@ -141,8 +143,8 @@ pub struct Rate {
     pub stiffness_damping: f32,
     /// Of the time of the start [s].
     pub start: f32,
-    /// Fills up.
-    pub pad: [f32; 2],
+    /// Of the viscosity's coefficient [Pa·s^h] and exponent.
+    pub viscosity: [f32; 2],
     /// Of gravity [m/s²].
     pub gravity: [f32; 4],
     /// Of the initial velocity [m/s].

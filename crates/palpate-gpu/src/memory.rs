@@ -87,7 +87,8 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     let mut buffers = HashMap::new();
     let geometry = Geometry::new(&counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
     let shape = &geometry.shape;
-    let ratios = load.ratios.clamp(1, members) as u64;
+    // A viscosity needs those at ν = 0 besides.
+    let ratios = load.ratios.clamp(1, members) as u64 + u64::from(plan.layout.is_viscous());
     let matrices = |sets: u64, count: u32| sets * 2 * u64::from(count) * 576 * 4;
     let mut constants: Vec<u64> = buffers.into_values().collect();
     constants.extend([

@@ -61,7 +61,14 @@ pub(crate) const SCENE: Schema = Schema {
         ),
         (
             "material",
-            table(&["model", "density", "mass", "youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]),
+            Schema {
+                keys: &["model", "density", "mass", "youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"],
+                tables: &[
+                    ("viscosity", table(&["coefficient", "exponent"])),
+                    ("stretch_curve", table(&["stretches", "factors"])),
+                    ("volume_curve", table(&["ratios", "factors"])),
+                ],
+            },
         ),
         ("world", table(&["gravity"])),
         ("clamp", Schema { keys: &["frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
@@ -84,6 +91,7 @@ pub(crate) const SCENE: Schema = Schema {
                 tables: &[("frames", table(&["from", "to", "every"])), ("marker", table(&["name", "position", "surface"]))],
             },
         ),
+        ("target", table(&["time", "tolerance", "points", "positions", "file"])),
         (
             "fit",
             Schema {

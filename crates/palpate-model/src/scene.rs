@@ -5,7 +5,10 @@ mod in_code;
 
 use crate::effects::Effect;
 use crate::materials::Model;
+use crate::materials::principal_stretch::PrincipalStretch;
+use crate::materials::viscosity::Viscosity;
 use crate::mechanics::motion::RigidMotion;
+use crate::observation::target::Target;
 use crate::observation::{MarkerRest, ReadingKind};
 use crate::params::Layout;
 use crate::params::fields::FieldSpec;
@@ -26,6 +29,8 @@ pub struct Scene {
     pub object: Object,
     /// Material of the whole body.
     pub material: Material,
+    /// Curves of its stiffness, where its model has some.
+    pub curves: PrincipalStretch,
     /// Gravity [m/s²].
     pub gravity: DVec3,
     /// Regions that are held or moved.
@@ -46,6 +51,8 @@ pub struct Scene {
     pub solver: Solver,
     /// What was measured, if anything.
     pub observation: Option<ObservationSpec>,
+    /// Where points of the body shall be, of a scene that is compared with a wish instead of a recording.
+    pub targets: Vec<Target>,
     /// What is to be found out, if anything.
     pub fit: Option<FitSpec>,
 }
@@ -59,7 +66,7 @@ impl Scene {
     /// The parameters of this scene with fields of so many values.
     pub fn layout_with(&self, fields: &[usize]) -> Layout {
         let laws: Vec<usize> = self.effects.iter().map(|e| e.law).collect();
-        Layout::new(self.planes.len(), self.masses.len(), &laws, fields)
+        Layout::new(self.planes.len(), self.masses.len(), &laws, fields).with_material(self)
     }
 }
 
@@ -153,7 +160,7 @@ pub enum Resolution {
     Open,
 }
 
-/// An isotropic material with Rayleigh damping.
+/// An isotropic material with its damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Its law.
@@ -168,6 +175,8 @@ pub struct Material {
     pub mass_damping: f64,
     /// Rayleigh damping, stiffness-proportional [s].
     pub stiffness_damping: f64,
+    /// Viscosity; `None` = elastic but for Rayleigh damping.
+    pub viscosity: Option<Viscosity>,
 }
 
 /// How heavy the body is.

@@ -124,8 +124,13 @@ fn ray(shape: &dyn Shape, from: DVec3, way: DVec3, size: f64) -> Option<f64> {
     None
 }
 
-/// The step that follows the lowest mode.
-fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, String) {
+/// Estimate of the lowest frequency of a body [Hz].
+pub(crate) fn lowest_frequency(scene: &Scene, shape: &dyn Shape) -> f64 {
+    lowest(scene, shape, thickness(shape))
+}
+
+/// The same for a thickness that is known [m].
+fn lowest(scene: &Scene, shape: &dyn Shape, thickness: f64) -> f64 {
     let (low, high) = shape.bounds();
     let length = (high - low).max_element();
     let density = match scene.material.inertia {
@@ -136,7 +141,14 @@ fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, 
     let speed = (scene.material.youngs_modulus / density).sqrt();
     let root: f64 = if scene.clamps.is_empty() { 4.730 } else { 1.875 };
     let bending = root * root * thickness * speed / (TAU * 12f64.sqrt() * length * length);
-    let frequency = bending.min(0.5 * speed / length);
+    bending.min(0.5 * speed / length)
+}
+
+/// The step that follows the lowest mode.
+fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, String) {
+    let (low, high) = shape.bounds();
+    let length = (high - low).max_element();
+    let frequency = lowest(scene, shape, thickness);
     let wanted = PI * (TAU * length / (15.0 * noise)).sqrt();
     let per_period = if wanted.is_finite() { wanted.clamp(PER_PERIOD[0], PER_PERIOD[1]) } else { PER_PERIOD[1] }.round();
     (

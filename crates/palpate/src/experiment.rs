@@ -111,6 +111,9 @@ impl Experiment {
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(Arc::new(read));
         }
+        if !scene.targets.is_empty() {
+            observation = Observation::of_targets(&scene.targets);
+        }
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
         let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
@@ -309,7 +312,9 @@ impl Experiment {
 /// A fault found while the plan is built, where its key stands: in the scene, or in the recording for what only that states.
 fn plan_fault(scene: &Scene, text: &str, recording: Option<&Recording>, e: PlanError) -> Error {
     let (Some(spec), Some(recording)) = (&scene.observation, recording) else {
-        return scene_error(&scene.path, text, &e.key, e.message).into();
+        // Points of targets are tracked ones.
+        let key = if e.key == "points.rest" { "target.0.points" } else { &e.key };
+        return scene_error(&scene.path, text, key, e.message).into();
     };
     let in_recording = |key: &str| {
         // It was read a moment ago; without it the line is missing and nothing else.

@@ -35,7 +35,9 @@
 mod catalogue;
 mod choose;
 pub mod cli;
+mod coarsen;
 mod commands;
+mod curves;
 mod diagnosing;
 mod embed;
 mod engine;
@@ -45,8 +47,10 @@ mod fields;
 mod fingerprint;
 mod fitting;
 mod grid;
+mod identify;
 mod interrupt;
 mod memory;
+mod motions;
 mod options;
 mod progress;
 pub mod render;
@@ -56,6 +60,7 @@ pub mod results;
 mod scatter;
 pub mod synthetic;
 
+pub use coarsen::{CoarsenOptions, Coarsened, coarsen, usual_numbers};
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
 pub use embed::Embedding;
 pub use engine::Backend;

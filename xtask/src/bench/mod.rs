@@ -172,6 +172,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     Plan {
         fields: Vec::new(),
         model: &ALL[0],
+        curves: Default::default(),
         theta,
         layout,
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],

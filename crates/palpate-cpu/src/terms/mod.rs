@@ -26,6 +26,7 @@ use glam::{DMat3, DVec3};
 use held_nodes::HeldNodes;
 use inertia::Inertia;
 use palpate_model::cutcells::elements::Elements;
+use palpate_model::materials::Solid;
 use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::params::changes;
 use palpate_model::params::coefficients::{Coefficients, Sought};
@@ -135,6 +136,8 @@ pub struct Context<'a> {
     pub places: &'a Places,
     /// Matrices at the member's Poisson ratio.
     pub elements: &'a Elements,
+    /// Matrices for E = 1 Pa and ν = 0, whose energy is ½|ε|²; of materials with a viscosity alone.
+    pub strains: Option<&'a Elements>,
     /// The member's coefficients.
     pub coefficients: &'a Coefficients,
     /// The member's planes.
@@ -157,6 +160,16 @@ impl<'a> Context<'a> {
     /// Numbers of the scene.
     pub fn physics(&self) -> &'a Physics {
         &self.coefficients.physics
+    }
+
+    /// The material's law.
+    pub fn law(&self) -> &'a dyn Solid {
+        self.altered.law.as_ref().map_or(self.plan.model.law, |own| own as &dyn Solid)
+    }
+
+    /// Adds z·∂r/∂(factor) of the material's curves, in their order.
+    pub fn pull_curves(&self, by: &[f64], gradient: &mut Coefficients) {
+        gradient.physics.curves.iter_mut().flatten().zip(by).for_each(|(out, g)| *out += g);
     }
 
     /// Length of the solve [s]; 0 in a static problem.

@@ -70,7 +70,7 @@ impl Term for ElasticPoints {
     }
 
     fn by_coefficients_transposed(&self, s: &mut Passes, pull: &Pull) {
-        if s.has_points() && (pull.material || pull.sought().damping[1]) {
+        if s.has_points() && (pull.material || pull.sought().damping[1] || pull.sought().viscosity) {
             s.run_with(pass::PULL_ELASTIC, ALL, Per::Elastic, 0, &pull.named);
         }
     }

@@ -87,7 +87,7 @@ impl Gathered {
             mass_damping: p.mass_damping as f32,
             stiffness_damping: p.stiffness_damping as f32,
             start: p.start as f32,
-            pad: [0.0; 2],
+            viscosity: p.viscosity.map_or([0.0; 2], |v| [v.coefficient as f32, v.exponent as f32]),
             gravity: vec4(p.gravity),
             velocity: vec4(p.velocity),
             spin: vec4(p.angular_velocity),

@@ -192,6 +192,10 @@ impl Member<'_> {
         p.poisson_ratio += self.cells(0) + self.elastic(0) + self.holds(0) + by[1];
         p.stiffness_damping += self.cells(1) + self.elastic(1) + by[2];
         p.mass_damping += by[3];
+        if let Some(v) = &mut p.viscosity {
+            v.coefficient += self.cells(2) + self.elastic(2);
+            v.exponent += self.cells(3) + self.elastic(3);
+        }
         p.start += self.holds(1) + self.sum("held_sums", 0, shape.nodes.div_ceil(64), 1)[0];
         p.gravity += DVec3::from_slice(&nodes("node_sums", 1));
         p.velocity += DVec3::from_slice(&nodes("velocity_sums", 0));

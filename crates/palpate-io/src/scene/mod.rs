@@ -5,20 +5,23 @@ mod answer_tests;
 mod effects;
 mod fields;
 mod fit;
+mod material;
 mod motion;
 mod object;
+mod rework;
 pub(crate) mod scale;
+mod target;
 #[cfg(test)]
 mod tests;
 mod write;
 
+pub use rework::recast_scene;
 pub use write::{append_effects, name_field_files, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
-use palpate_model::materials::{self, Model};
 use palpate_model::observation::MarkerRest;
 use palpate_model::observation::ReadingKind;
 use palpate_model::plan::scheme::{self, Scheme};
@@ -69,7 +72,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
 
     let mut warnings = Vec::new();
     let object = object::object(&root, &mut warnings)?;
-    let material = material(&root, &mut warnings)?;
+    let (material, curves) = material::material(&root, &mut warnings)?;
     let gravity = match root.optional_table("world")? {
         Some(w) => w.optional_vec3("gravity")?,
         None => None,
@@ -80,6 +83,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         title: root.optional_str("title")?.unwrap_or_default().to_string(),
         object,
         material,
+        curves,
         gravity: gravity.unwrap_or(DVec3::new(0.0, 0.0, -9.81)),
         clamps: clamps(&root)?,
         planes: planes(&root)?,
@@ -90,6 +94,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         initial,
         solver: solver(&root)?,
         observation: observation(&root)?,
+        targets: target::targets(&root)?,
         fit: None,
     };
     if scene.gravity.length() > 100.0 {
@@ -111,45 +116,6 @@ pub(crate) fn check_format(root: &Table, format: &str) -> Result<(), InputError>
         Some(f) => Err(root.error("format", format!("\"{f}\" is not understood; this version reads \"{format}\""))),
         None => Err(root.missing("format", &format!("format = \"{format}\""))),
     }
-}
-
-fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputError> {
-    let t = root.optional_table("material")?.ok_or_else(|| root.missing("material", "a table [material]"))?;
-    let models: Vec<(&str, &'static Model)> = materials::ALL.iter().map(|m| (m.name, m)).collect();
-    let model = t.optional_choice("model", &models)?.unwrap_or(&materials::ALL[0]);
-    let positive = |key: &str| t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0");
-    let zero_up = |key: &str| t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0");
-    let inertia = match (positive("density")?, positive("mass")?) {
-        (Some(d), None) => Inertia::Density(d),
-        (None, Some(m)) => Inertia::Mass(m),
-        (None, None) => return Err(t.missing("density", "density (kg/m³) or mass (kg)")),
-        (Some(_), Some(_)) => return Err(t.error("mass", "density and mass exclude each other; give one")),
-    };
-    let youngs_modulus = positive("youngs_modulus")?.ok_or_else(|| t.missing("youngs_modulus", "a number > 0 (Pa)"))?;
-    let poisson_ratio = t
-        .f64_where("poisson_ratio", |x| x > -1.0 && x < 0.5, "is not allowed: must lie in (-1, 0.5)")?
-        .ok_or_else(|| t.missing("poisson_ratio", "a number in (-1, 0.5)"))?;
-    if !(10.0..=1e12).contains(&youngs_modulus) {
-        let e = t.error(
-            "youngs_modulus",
-            format!("{} Pa is unusual (jelly 1e3, rubber 1e6, steel 2e11); is it in Pa?", number(youngs_modulus)),
-        );
-        warnings.push(e.to_string());
-    }
-    if let Inertia::Density(d) = inertia
-        && !(10.0..=30000.0).contains(&d)
-    {
-        let e = t.error("density", format!("{} kg/m³ is unusual (water 1000); is it in kg/m³? 1 g/cm³ is 1000 kg/m³", number(d)));
-        warnings.push(e.to_string());
-    }
-    Ok(Material {
-        model,
-        inertia,
-        youngs_modulus,
-        poisson_ratio,
-        mass_damping: zero_up("mass_damping")?.unwrap_or(0.0),
-        stiffness_damping: zero_up("stiffness_damping")?.unwrap_or(0.0),
-    })
 }
 
 /// `min` and `max` of a box table, in order.

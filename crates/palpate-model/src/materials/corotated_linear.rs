@@ -12,6 +12,7 @@ pub(super) const MODEL: Model = Model {
     doc: "linear in the stretch, whatever the rotation; exact for small strains, and calm for any",
     law: &CorotatedLinear,
     is_linear: true,
+    has_curves: false,
 };
 
 /// Steps of the iteration for the rotation: it doubles its digits in each, from any F that squeezes to no less than a twentieth.

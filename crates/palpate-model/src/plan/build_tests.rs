@@ -25,6 +25,7 @@ fn scene() -> Scene {
             poisson_ratio: 0.4,
             mass_damping: 0.1,
             stiffness_damping: 0.01,
+            viscosity: None,
         },
         gravity: DVec3::new(0.0, 0.0, -9.81),
         clamps: vec![],
@@ -32,10 +33,12 @@ fn scene() -> Scene {
         masses: vec![],
         effects: Vec::new(),
         fields: Vec::new(),
+        curves: Default::default(),
         initial: Initial { velocity: DVec3::X, angular_velocity: DVec3::Y, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 10, start: 0.5, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
+        targets: Vec::new(),
         fit: None,
     }
 }

@@ -10,6 +10,7 @@ impl Scene {
             title: String::new(),
             object,
             material,
+            curves: PrincipalStretch::default(),
             gravity: DVec3::ZERO,
             clamps: Vec::new(),
             planes: Vec::new(),
@@ -20,6 +21,7 @@ impl Scene {
             time: Time::default(),
             solver: Solver::default(),
             observation: None,
+            targets: Vec::new(),
             fit: None,
         }
     }
@@ -35,6 +37,7 @@ impl Material {
             poisson_ratio,
             mass_damping: 0.0,
             stiffness_damping: 0.0,
+            viscosity: None,
         }
     }
 }

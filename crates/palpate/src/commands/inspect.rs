@@ -6,16 +6,20 @@ use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
+use crate::identify::identify;
 use crate::memory::{Demand, adapter};
+use crate::options::BackendName;
 use crate::results::inspection::{
-    CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
-    SceneInspection, SequenceInspection, Time,
+    CameraInspection, Cells, Constraints, Identification, Images, Inspected, InspectionDocument, Markers, Observed,
+    RecordingInspection, SceneInspection, SequenceInspection, Time,
 };
 use crate::results::{self, finite};
 use clap::Args;
+use palpate_engine::number;
 use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, Sequence, read_recording};
 use palpate_model::observation::{Channel, ReadingKind};
+use palpate_model::params::unit_behind;
 use palpate_model::plan::Physics;
 use palpate_model::scene::BodySource;
 use std::path::{Path, PathBuf};
@@ -25,10 +29,12 @@ Examples:
   palpate inspect beam.toml
   palpate inspect my-recording
   palpate inspect beam.toml --json
+  palpate inspect beam.toml --identify         which of its free numbers the recording would determine
   palpate inspect --devices                    graphics adapters, their limits, what they can run
   palpate inspect --effects                    laws that a scene can add, with parameters and units
 
-A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is simulated.";
+A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is
+simulated but with --identify.";
 
 /// Show what a scene or recording holds, without computing anything
 #[derive(Clone, Debug, Args)]
@@ -40,6 +46,12 @@ pub struct Arguments {
     /// Show the effects that scenes can name, with their parameters, units and defaults
     #[arg(long, conflicts_with = "path")]
     effects: bool,
+    /// Say what the recording would determine before anything is fitted, and which second motion would help most; this simulates
+    #[arg(long, requires = "path")]
+    identify: bool,
+    /// What computes, with --identify
+    #[arg(long, value_enum, default_value = "auto", requires = "identify")]
+    backend: BackendName,
     /// List the graphics adapters of this machine and what they can run
     #[arg(long, conflicts_with_all = ["path", "effects"])]
     devices: bool,
@@ -67,7 +79,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         ("recording", Inspected::Recording(Box::new(content)), lines, r.warnings)
     } else {
         let e = Experiment::open(path)?;
-        let (content, lines) = scene(&e);
+        let (mut content, mut lines) = scene(&e);
+        if a.identify {
+            let (backend, _) = a.backend.choose(e.plan(), 1)?;
+            let found = identify(&e, backend, |what| console.note(&format!("looking at {what}")))?;
+            lines.extend(identified(&found));
+            content.identification = Some(found);
+        }
         ("scene", Inspected::Scene(Box::new(content)), lines, e.warnings().to_vec())
     };
     if console.json() {
@@ -282,6 +300,30 @@ fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
     lines.push(("to be found", text));
     content.free = Some(paths);
+}
+
+/// What the recording would determine, and which second motion would help.
+fn identified(found: &Identification) -> Lines {
+    let unit = |u: &str| unit_behind(u);
+    let mut lines = Lines::new();
+    for n in &found.numbers {
+        let relative = n.relative.map_or(String::new(), |r| format!(" ({:.2} %)", 100.0 * r));
+        let with = if n.with.is_empty() { String::new() } else { format!("; not told apart from {}", n.with.join(", ")) };
+        let (value, error) = (number(n.value), number(n.error));
+        let text = match n.determined {
+            true => format!("{} = {value}{}: expected ± {error}{}{relative}{with}", n.path, unit(&n.unit), unit(&n.unit)),
+            false => format!("{}: undetermined by this recording{with}", n.path),
+        };
+        lines.push(("identify", text));
+    }
+    for m in found.motions.iter().take(3) {
+        let gains = found.numbers.iter().zip(&m.errors).filter(|(n, e)| **e < 0.5 * n.error);
+        let gains: Vec<String> = gains.take(3).map(|(n, e)| format!("{} to ± {}{}", n.path, number(*e), unit(&n.unit))).collect();
+        let gains = if gains.is_empty() { "no number to less than half its error".into() } else { gains.join(", ") };
+        lines.push(("next", format!("{}: {:.1} nats more; brings {gains}", m.motion, m.information)));
+    }
+    lines.extend(found.warnings.iter().map(|w| ("left out", w.clone())));
+    lines
 }
 
 /// Smallest and largest of some numbers; zeros without any.

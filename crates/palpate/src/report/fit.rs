@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
-use crate::results::fit::{Cost, FieldReference, FitDocument, Parameter, Parts, Residual, ResidualBefore, Run};
+use crate::results::fit::{Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
@@ -61,8 +61,13 @@ fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
     }
 }
 
-/// What `result.json` says of a fit of these experiments, whose fields lie beside it.
-pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<FieldReference>) -> FitDocument {
+/// What `result.json` says of a fit of these experiments, whose fields lie beside it, with the curves found.
+pub fn fit_document(
+    fitted: &Fitted,
+    experiments: &[Experiment],
+    fields: Vec<FieldReference>,
+    curves: Vec<FoundCurve>,
+) -> FitDocument {
     let r = &fitted.result;
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
@@ -78,6 +83,7 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<Fie
         error: r.broken.clone(),
         parameters: (0..fitted.free.len()).map(|i| parameter(fitted, i)).collect(),
         fields,
+        curves,
         correlation: r.correlation.iter().map(|row| row.iter().map(|c| finite(*c)).collect()).collect(),
         cost: Cost { initial: finite(r.initial_cost), last: finite(r.cost) },
         reduced_chi_square: finite(r.reduced_chi_square),

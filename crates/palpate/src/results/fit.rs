@@ -30,6 +30,9 @@ pub struct FitDocument {
     /// The fields found; their values lie in array files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fields: Vec<FieldReference>,
+    /// Curves of stiffness of which factors were free.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curves: Vec<FoundCurve>,
     /// Correlation matrix of the numbers' errors `[q][q]`, of the logarithms where these are fitted.
     pub correlation: Vec<Vec<Option<f64>>>,
     /// Cost per scalar residual at the first start and at the best point.
@@ -56,6 +59,23 @@ pub struct FitDocument {
 
 impl Document for FitDocument {
     const FORMAT: &'static str = "fit/2";
+}
+
+/// A curve of stiffness.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundCurve {
+    /// Its path in the scene.
+    pub path: String,
+    /// Number of the scene.
+    pub scene: usize,
+    /// Stretches, or ratios of volumes, of the corners.
+    pub corners: Vec<f64>,
+    /// Factors there, over the stiffness at rest.
+    pub factors: Vec<f64>,
+    /// Their standard errors; `None` where there is none.
+    pub errors: Vec<Option<f64>>,
+    /// Smallest and largest that occurred in the motion: of corners far beyond it says nothing.
+    pub range: [f64; 2],
 }
 
 /// What a fit is worth.
@@ -276,6 +296,14 @@ mod tests {
             optimizer: "gauss-newton".into(),
             parameters: vec![plain, held],
             fields: vec![FieldReference { path: "field.0".into(), min: Some(0.5), max: None, ..FieldReference::default() }],
+            curves: vec![FoundCurve {
+                path: "material.stretch_curve".into(),
+                scene: 1,
+                corners: vec![0.8, 1.25],
+                factors: vec![2.0, 0.5],
+                errors: vec![Some(0.1), None],
+                range: [0.9, 1.1],
+            }],
             correlation: vec![vec![Some(1.0), None], vec![None, Some(1.0)]],
             cost: Cost { initial: None, last: Some(0.5) },
             reduced_chi_square: Some(1.1),
@@ -306,6 +334,7 @@ mod tests {
             "best",
             "correlation",
             "cost",
+            "curves",
             "error",
             "evaluations",
             "fields",

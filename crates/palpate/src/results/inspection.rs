@@ -79,6 +79,53 @@ pub struct SceneInspection {
     /// Paths of the numbers to be found; absent where nothing is fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Vec<String>>,
+    /// What the recording would determine; absent unless asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identification: Option<Identification>,
+}
+
+/// What a recording would determine, before anything is fitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Identification {
+    /// Scalar residuals that it is taken from.
+    pub residuals: usize,
+    /// Every free number, or part of a field.
+    pub numbers: Vec<Expectation>,
+    /// Second motions, the one that would tell most first.
+    pub motions: Vec<Proposal>,
+    /// Motions that could not be looked at.
+    pub warnings: Vec<String>,
+}
+
+/// What is to be expected of one number, at the scene's own values and with residuals as large as the noise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Expectation {
+    /// Its path; of a part of a field, with where it is.
+    pub path: String,
+    /// The scene's value.
+    pub value: f64,
+    /// Expected standard error in its unit.
+    pub error: f64,
+    /// SI unit.
+    pub unit: String,
+    /// The same of its logarithm; absent of numbers that are not fitted by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative: Option<f64>,
+    /// False where the recording says next to nothing of it.
+    pub determined: bool,
+    /// Numbers that it would not be told apart from.
+    pub with: Vec<String>,
+}
+
+/// A second motion, watched by the same sensors.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Proposal {
+    /// What would be done.
+    pub motion: String,
+    /// What it adds, ½ ln det(H₁ + H₂)/det(H₁) [nats].
+    pub information: f64,
+    /// Expected standard error of every number with both recordings, in its unit.
+    pub errors: Vec<f64>,
 }
 
 /// Cells of a body.

@@ -42,6 +42,8 @@ pub(crate) struct Effects {
     grip_rows: Vec<[usize; 2]>,
     /// Those among them that change the clamps' matrices, by their row.
     matrix_rows: Vec<usize>,
+    /// The material has a viscosity.
+    viscous: bool,
     /// Stages: solves of all steps.
     steps: usize,
     stride: u32,
@@ -54,7 +56,11 @@ impl Effects {
     /// # Errors
     /// One of them has no place on the device.
     pub(crate) fn new(plan: &Plan) -> Result<Effects, GpuError> {
-        let mut e = Effects { steps: plan.clock.stages().len(), ..Effects::default() };
+        if !plan.model.has_twin() {
+            let what = format!("the material \"{}\", which the CPU backend has", plan.model.name);
+            return Err(GpuError::Plan { what });
+        }
+        let mut e = Effects { steps: plan.clock.stages().len(), viscous: plan.layout.is_viscous(), ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let mut row = None;
@@ -146,9 +152,9 @@ impl Effects {
         self.cells.len() as u32
     }
 
-    /// True when some effect acts on cells, or the material as one does.
+    /// True when some effect acts on cells, or the material or its viscosity as one does.
     pub(crate) fn on_cells(&self) -> bool {
-        !self.cells.is_empty() || self.bits >> MATERIAL_AT != 0
+        !self.cells.is_empty() || self.bits >> MATERIAL_AT != 0 || self.viscous
     }
 
     /// True when some effect acts on patches.
@@ -266,7 +272,8 @@ fn scalars(plan: &Plan) -> u32 {
         return ENERGY as u32;
     }
     let needs = |law: &Law| if let Site::Cells(cell) = law.site { cell.needs(Part::Energy) } else { 0 };
-    plan.layout.effects().map(|(law, _)| needs(law)).max().unwrap_or(0) as u32
+    let viscous = usize::from(plan.layout.is_viscous());
+    plan.layout.effects().map(|(law, _)| needs(law)).fold(viscous, usize::max) as u32
 }
 
 /// Shares of the nodes in a load that they carry together, with derivatives.

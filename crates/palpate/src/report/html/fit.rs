@@ -7,7 +7,7 @@ use crate::report::fit::{beforehand, field_line, grid_line, number, parts, worth
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::{FieldReference, VerdictWord};
+use crate::results::fit::{FieldReference, FoundCurve, VerdictWord};
 use maud::{Markup, html};
 
 /// What a report is made of.
@@ -18,6 +18,8 @@ pub struct ReportInput<'a> {
     pub experiments: &'a [Experiment],
     /// The fields found.
     pub fields: &'a [FieldReference],
+    /// The curves of stiffness found.
+    pub curves: &'a [FoundCurve],
     /// Pictures scene by scene: at the first start, and with the values found.
     pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
     /// Residual at which colours are saturated [m].
@@ -37,6 +39,7 @@ pub fn fit_html(input: &ReportInput) -> String {
         (distances(fitted))
         (parameters(fitted))
         (fields(input))
+        @for c in input.curves { (curve(c)) }
         (warnings(fitted))
         (correlation(fitted))
         (progress(fitted))
@@ -107,6 +110,23 @@ fn fields(input: &ReportInput) -> Markup {
         }
         @if let Some(why) = &input.fitted.chosen {
             p { (why) "." }
+        }
+    }
+}
+
+/// A curve with its band, and where the motion says nothing of it.
+fn curve(found: &FoundCurve) -> Markup {
+    let labels = ["factor", "+ one standard error", "− one standard error"];
+    let lines: Vec<Curve> =
+        labels.into_iter().zip(found.band()).map(|(label, points)| Curve { label: label.into(), points }).collect();
+    let what = if found.path.ends_with("volume_curve") { "ratio of volumes" } else { "principal stretch" };
+    let unseen: Vec<String> = found.unseen().iter().map(|c| number(*c)).collect();
+    html! {
+        h2 { "Stiffness over that at rest: " code { (found.path) } }
+        @if let Some(drawing) = plot(&lines, what, "factor", false) { (drawing) }
+        p {
+            "In the motion it went from " (number(found.range[0])) " to " (number(found.range[1])) "."
+            @if !unseen.is_empty() { " Of the corners at " (unseen.join(", ")) " the recording says nothing." }
         }
     }
 }

@@ -77,4 +77,13 @@ impl CellLaws<'_> {
         };
         std::array::from_fn(|k| if k == 0 { 0.0 } else { of(k - 1) })
     }
+
+    /// Derivatives of the material's first derivatives by the factors of its curves.
+    pub(super) fn material_by_curves(&self, s: &[f64; ENERGY]) -> Vec<[f64; ENERGY]> {
+        let Some(law) = self.material else { return Vec::new() };
+        let ((lambda, mu), h) = (self.lame[0], strain(s));
+        let of =
+            |by: [f64; 9]| std::array::from_fn(|k| if k == 0 { 0.0 } else { entries(PAIRS[k - 1]).map(|i| by[i]).sum::<f64>() });
+        law.by_curves(&h, lambda, mu).into_iter().map(of).collect()
+    }
 }
