@@ -54,6 +54,7 @@ pub mod report;
 mod residuals;
 pub mod results;
 mod scatter;
+mod suited;
 pub mod synthetic;
 
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
