@@ -3,8 +3,8 @@
 //! *Cells*: h = t/n, with t the thickness below which a tenth of the surface lies, by rays that go inwards against the normal (Shapira, Shamir
 //! & Cohen-Or, Vis. Comput. 24, 2008), and n = 4, or 3 where noise is more than a twentieth of t. At most [`MOST_CELLS`] of them.
 //!
-//! *Tetrahedra* that are made here: edges of t/2, as two quadratic ones through a thickness bend as right as four cells, and at most as many
-//! tetrahedra as there may be cells.
+//! *Tetrahedra* that are made here: edges of t/3. Two through a thickness would do for bending, but leave a round body too few nodes on its
+//! surface. At most as many tetrahedra as there may be cells.
 //!
 //! *Step*: the shortest of
 //! - T/N of the lowest bending mode, f = k² t c/(2π √12 L²) of a beam of length L and thickness t with c = √(E/ρ), k = 1.875 where it is
@@ -28,7 +28,7 @@ const THIN: f64 = 0.1;
 /// Cells through that thickness, and where noise hides what they do.
 const THROUGH: [f64; 2] = [4.0, 3.0];
 /// Edges of tetrahedra through that thickness.
-const EDGES_THROUGH: f64 = 2.0;
+const EDGES_THROUGH: f64 = 3.0;
 /// Tetrahedra in the cube of an edge.
 const IN_CUBE: f64 = 12.0;
 /// Noise over thickness from which on it does.

@@ -94,13 +94,13 @@ mod tests {
 
     #[test]
     fn the_reason_names_thickness_and_nodes() {
-        let text = "format = \"scene/1\"\n[object]\nshape = { box = { min = [0, 0, 0], max = [0.2, 0.2, 0.001] } }\ncell_size = 0.02\n\
+        let text = "format = \"scene/1\"\n[object]\nshape = { box = { min = [0, 0, 0], max = [0.3, 0.3, 0.004] } }\ncell_size = 0.004\n\
             [material]\ndensity = 1000.0\nyoungs_modulus = 1.0e5\npoisson_ratio = 0.4\n[time]\nstep = 0.01\nsteps = 1\n";
         let of = |text: &str| suited(&Experiment::from_toml(text, "sheet.toml").unwrap_or_else(|e| panic!("{e}")));
         let sheet = of(text);
         assert_eq!(sheet.discretisation, "tetrahedra");
         assert!(sheet.reason.contains("m of thickness bend within some 5 %, but take about"), "{sheet:?}");
-        let bar = of(&text.replace("0.001] }", "0.05] }"));
+        let bar = of(&text.replace("0.004] }", "0.05] }").replace("cell_size = 0.004", "cell_size = 0.05"));
         assert!(bar.discretisation == "cells" && bar.reason.ends_with("for the same"), "{bar:?}");
     }
 }

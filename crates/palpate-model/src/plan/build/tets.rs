@@ -21,6 +21,9 @@ use std::sync::Arc;
 /// block-Jacobi takes the difference in size away again.
 pub const HELD: f64 = 1e6;
 
+/// Cells in the box around a shape whose volume is measured.
+const REFERENCE_CELLS: f64 = 1e5;
+
 /// The tetrahedra that a shape is filled with, placed in the world, and how its volume was kept.
 ///
 /// # Errors
@@ -33,8 +36,11 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
     let shape = shape_of(&Object { pose: DAffine3::IDENTITY, ..object.clone() });
     let fault = |e: StuffingError| error("object.edge_length", e.to_string());
     let mut mesh = stuff(shape.as_ref(), edge).map_err(fault)?;
-    // Cut cells know the volume of what is inside, also of a surface that passes through itself.
-    let cells = Body::build(shape.as_ref(), edge, 0.0, SUBDIVISIONS).map_err(|e| error("object.edge_length", e.to_string()))?;
+    // Cut cells know the volume of what is inside, also of a surface that passes through itself; finer ones than the tetrahedra, as far as
+    // that costs little.
+    let (low, high) = shape.bounds();
+    let h = (0.5 * edge).max(((high - low).element_product() / REFERENCE_CELLS).cbrt()).min((high - low).min_element());
+    let cells = Body::build(shape.as_ref(), h, 0.0, SUBDIVISIONS).map_err(|e| error("object.edge_length", e.to_string()))?;
     let kept = mesh.keep_volume(cells.volume);
     Ok((mesh.transformed(&object.pose), kept))
 }
