@@ -12,13 +12,7 @@ fn column(model: &'static materials::Model) -> Scene {
     s.material.model = model;
     s.material.youngs_modulus = 1e5;
     s.material.poisson_ratio = 0.0;
-    s.clamps = vec![Clamp {
-        min: DVec3::new(-0.001, -1.0, -1.0),
-        max: DVec3::new(0.001, 1.0, 1.0),
-        object_frame: false,
-        motion: None,
-        motion_path: None,
-    }];
+    s.clamps = vec![Clamp::still(DVec3::new(-0.001, -1.0, -1.0), DVec3::new(0.001, 1.0, 1.0))];
     s.initial.state = InitialShape::StaticEquilibrium;
     s.time.steps = 0;
     s

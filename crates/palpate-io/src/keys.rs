@@ -44,7 +44,7 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "object",
             Schema {
-                keys: &["mesh", "volume_mesh", "pose", "cell_size", "cells"],
+                keys: &["mesh", "volume_mesh", "pose", "discretisation", "cell_size", "cells", "edge_length"],
                 tables: &[(
                     "shape",
                     Schema {
@@ -71,7 +71,7 @@ pub(crate) const SCENE: Schema = Schema {
             },
         ),
         ("world", table(&["gravity"])),
-        ("clamp", Schema { keys: &["frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
+        ("clamp", Schema { keys: &["group", "frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
         ("plane", table(&["point", "normal", "stiffness"])),
         ("mass", table(&["point", "mass"])),
         (

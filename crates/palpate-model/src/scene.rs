@@ -147,7 +147,7 @@ pub enum Analytic {
     },
 }
 
-/// How fine the grid is.
+/// What the body is made of, and how fine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
     /// That of the file's own elements.
@@ -158,6 +158,10 @@ pub enum Resolution {
     Cells(u32),
     /// Left open: somebody chooses before the body is cut.
     Open,
+    /// Longest edge of the tetrahedra that the inside is filled with [m].
+    Edge(f64),
+    /// Tetrahedra, their edge left open.
+    OpenEdge,
 }
 
 /// An isotropic material with its damping.
@@ -188,19 +192,31 @@ pub enum Inertia {
     Mass(f64),
 }
 
-/// A Dirichlet region: the part of the surface and body inside the box follows `motion`.
+/// A Dirichlet region: what it holds of the body follows `motion`.
 #[derive(Clone, Debug)]
 pub struct Clamp {
-    /// Lowest corner [m].
-    pub min: DVec3,
-    /// Highest corner [m].
-    pub max: DVec3,
-    /// True when the box is given in the mesh's own coordinates (before `pose`).
-    pub object_frame: bool,
+    /// What it holds.
+    pub region: ClampRegion,
     /// Prescribed rigid motion; `None` = held still.
     pub motion: Option<RigidMotion>,
     /// File the motion was read from.
     pub motion_path: Option<PathBuf>,
+}
+
+/// What a clamp holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ClampRegion {
+    /// The part of surface and body inside a box.
+    Box {
+        /// Lowest corner [m].
+        min: DVec3,
+        /// Highest corner [m].
+        max: DVec3,
+        /// True when the box is given in the mesh's own coordinates (before `pose`).
+        object_frame: bool,
+    },
+    /// The nodes of a named group of a volume mesh.
+    Group(String),
 }
 
 /// A contact plane.

@@ -292,9 +292,11 @@ impl Experiment {
         observation: Option<ObservationSpec>,
     ) -> Result<Experiment, Error> {
         let mut scene = Scene { observation, ..self.scene.clone() };
-        if scene.object.resolution != Resolution::Own {
-            scene.object.resolution = Resolution::CellSize(self.plan.body.length / factor);
-        }
+        scene.object.resolution = match scene.object.resolution {
+            Resolution::Own => Resolution::Own,
+            Resolution::Edge(edge) => Resolution::Edge(edge / factor),
+            _ => Resolution::CellSize(self.plan.body.length / factor),
+        };
         let steps = (scene.time.steps as f64 * step).round() as usize;
         if steps > 0 {
             scene.time.step *= scene.time.steps as f64 / steps as f64;

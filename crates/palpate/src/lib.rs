@@ -58,6 +58,7 @@ pub mod report;
 mod residuals;
 pub mod results;
 mod scatter;
+mod suited;
 pub mod synthetic;
 
 pub use coarsen::{CoarsenOptions, Coarsened, coarsen, usual_numbers};

@@ -104,7 +104,7 @@ pub fn held(h: f64) -> Scene {
     let mut scene = ball(h);
     scene.planes[0].point.z = 0.0012;
     let min = DVec3::new(-1.0, -1.0, 0.07);
-    scene.clamps.push(Clamp { min, max: DVec3::ONE, object_frame: false, motion: Some(motion), motion_path: None });
+    scene.clamps.push(Clamp::still(min, DVec3::ONE).moved(Some(motion)));
     scene.initial.state = InitialShape::StaticEquilibrium;
     scene.initial.velocity = DVec3::ZERO;
     scene.initial.angular_velocity = DVec3::ZERO;

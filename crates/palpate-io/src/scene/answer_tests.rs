@@ -127,3 +127,37 @@ fn curves_of_stiffness_are_read_fitted_and_written_back() {
         assert!(refused.contains(message), "{refused}");
     }
 }
+
+#[test]
+fn tetrahedra_may_be_made_and_their_edge_left_open() {
+    use palpate_model::scene::Resolution;
+    let of = |text: &str| parse_scene(&BASE.replace("cell_size = 0.01\n", text), "scene.toml");
+    let made = "discretisation = \"tetrahedra\"\n";
+    let scene = of(made).unwrap().value;
+    assert_eq!(scene.object.resolution, Resolution::OpenEdge);
+    let text = BASE.replace("cell_size = 0.01\n", made);
+    let text = write_scene(&text, &scene, &[("object.edge_length".to_string(), 0.0125)], Path::new(".")).unwrap();
+    assert_eq!(parse_scene(&text, "model.toml").unwrap().value.object.resolution, Resolution::Edge(0.0125));
+    assert_eq!(of("discretisation = \"cells\"\ncells = 9\n").unwrap().value.object.resolution, Resolution::Cells(9));
+    let e = of(&format!("{made}edge_length = 0.2\n")).unwrap_err().to_string();
+    assert_eq!(e, "scene.toml:5: object.edge_length: 0.2 m is larger than the object, whose longest side is 0.1000 m");
+    let e = of("discretisation = \"voxels\"\n").unwrap_err().to_string();
+    assert_eq!(e, "scene.toml:4: object.discretisation: \"voxels\" is not known; allowed: \"cells\", \"tetrahedra\"");
+}
+
+#[test]
+fn a_clamp_has_a_box_or_a_group() {
+    let fault = |text: &str| read(&format!("[[clamp]]\n{text}")).unwrap_err().message;
+    let whole = "box = { min = [0, 0, 0], max = [1, 1, 1] }\n";
+    assert_eq!(fault(&format!("{whole}group = \"base\"\n")), "box and group exclude each other; give one");
+    assert_eq!(
+        fault("frame = \"world\"\n"),
+        "missing; expected box = { min = [x, y, z], max = [x, y, z] }, or group = \"NAME\" of a volume mesh"
+    );
+    assert_eq!(
+        fault("group = \"base\"\nframe = \"object\"\n"),
+        "belongs to a box; a group has its nodes wherever the body is placed"
+    );
+    let scene = read("[[clamp]]\ngroup = \"base\"\n").unwrap().value;
+    assert_eq!(scene.clamps[0].region, ClampRegion::Group("base".into()));
+}

@@ -132,12 +132,25 @@ fn corners(t: &Table) -> Result<(DVec3, DVec3), InputError> {
 fn clamps(root: &Table) -> Result<Vec<Clamp>, InputError> {
     let mut clamps = Vec::new();
     for t in root.tables("clamp")? {
-        let b = t.optional_table("box")?.ok_or_else(|| t.missing("box", "box = { min = [x, y, z], max = [x, y, z] }"))?;
-        let (min, max) = corners(&b)?;
-        let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?.unwrap_or(false);
+        let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?;
+        let region = match (t.optional_table("box")?, t.optional_str("group")?) {
+            (Some(_), Some(_)) => return Err(t.error("group", "box and group exclude each other; give one")),
+            (None, None) => {
+                let wanted = "box = { min = [x, y, z], max = [x, y, z] }, or group = \"NAME\" of a volume mesh";
+                return Err(t.missing("box", wanted));
+            }
+            (None, Some(_)) if object_frame.is_some() => {
+                return Err(t.error("frame", "belongs to a box; a group has its nodes wherever the body is placed"));
+            }
+            (None, Some(name)) => ClampRegion::Group(name.to_string()),
+            (Some(b), None) => {
+                let (min, max) = corners(&b)?;
+                ClampRegion::Box { min, max, object_frame: object_frame.unwrap_or(false) }
+            }
+        };
         let motion_path = t.optional_file("motion")?;
         let motion = motion_path.as_deref().map(motion::read_motion).transpose()?;
-        clamps.push(Clamp { min, max, object_frame, motion, motion_path });
+        clamps.push(Clamp { region, motion, motion_path });
     }
     Ok(clamps)
 }

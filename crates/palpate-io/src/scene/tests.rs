@@ -104,7 +104,7 @@ position = [0, 0, 0.05]
     assert_eq!((s.solver.element, s.solver.linear), (Element::Corner, LinearSolver::ConjugateGradient));
     assert_eq!((s.solver.tolerance, s.solver.newton_iterations, s.solver.ghost), (1e-6, 7, 0.0));
     assert_eq!((s.initial.velocity, s.initial.pivot), (DVec3::new(1.0, 2.0, 3.0), Some(DVec3::Z)));
-    assert!(s.clamps[0].object_frame && s.clamps[0].motion.is_none());
+    assert!(matches!(s.clamps[0].region, ClampRegion::Box { object_frame: true, .. }) && s.clamps[0].motion.is_none());
     let o = s.observation.unwrap();
     assert_eq!((o.from, o.to, o.every, o.file.as_str()), (-0.5, 0.5, 2, "silhouettes.toml"));
     assert_eq!(o.markers[0].position, DVec3::new(0.0, 0.0, 0.05));
@@ -117,7 +117,10 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("radius = 0.05", "radius = 0.05, centre = [0, 0, 0]").contains("did you mean \"center\"?"));
     assert!(error_with("mass = 0.05", "mas = 0.05").starts_with("scene.toml:14: mass.0.mas: unknown key"));
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
-    assert!(error_with("cell_size", "zzz").contains("known: mesh, volume_mesh, pose, cell_size, cells, shape"));
+    assert!(
+        error_with("cell_size", "zzz")
+            .contains("known: mesh, volume_mesh, pose, discretisation, cell_size, cells, edge_length, shape")
+    );
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));
 }

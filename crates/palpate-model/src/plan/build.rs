@@ -4,7 +4,7 @@ mod sites;
 mod tets;
 
 pub use sites::marker_sites;
-pub use tets::HELD;
+pub use tets::{HELD, made};
 
 use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
 use crate::cutcells::clamp_cell::held_cells;
@@ -16,7 +16,7 @@ use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
 use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
-use crate::scene::{BodySource, Clamp, Inertia, Resolution, Scene};
+use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::Body;
 use crate::space::stencil::Stencils;
@@ -50,11 +50,17 @@ fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
         let body = Body::of_tets(&mesh.transformed(&scene.object.pose));
         return Ok((Parts { body, merged: Vec::new() }, shape));
     }
+    if let Resolution::Edge(_) = scene.object.resolution {
+        tets::refuse_what_needs_cells(scene)?;
+        let body = Body::of_tets(&tets::made(&scene.object)?.0);
+        return Ok((Parts { body, merged: Vec::new() }, shape));
+    }
     let (min, max) = shape.bounds();
     let (key, h) = match scene.object.resolution {
         Resolution::CellSize(h) => ("object.cell_size", h),
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
-        Resolution::Own | Resolution::Open => {
+        Resolution::OpenEdge => return Err(error("object.edge_length", "is missing: how fine are the tetrahedra to be?".into())),
+        Resolution::Own | Resolution::Open | Resolution::Edge(_) => {
             return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into()));
         }
     };
@@ -161,19 +167,22 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
     if !body.points.is_empty() {
         return tets::clamp_site(i, clamp, scene, body, shape);
     }
-    let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
-    let region = ClipBox { to_frame, min: clamp.min, max: clamp.max };
+    let ClampRegion::Box { min, max, object_frame } = clamp.region else {
+        let message =
+            "names a group of a volume mesh, and this body is cut out of a lattice: give a box, or a volume_mesh with groups";
+        return Err(error(format!("clamp.{i}.group"), message.into()));
+    };
+    let to_frame = if object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
+    let region = ClipBox { to_frame, min, max };
     let cells = held_cells(&region, parts, shape.as_ref());
     if cells.is_empty() {
         let (lo, hi) = shape.bounds();
         return Err(error(
             format!("clamp.{i}.box"),
             format!(
-                "the box from {} to {} m ({}) holds no part of the body, which lies between {lo} and {hi} m (world); \
+                "the box from {min} to {max} m ({}) holds no part of the body, which lies between {lo} and {hi} m (world); \
                  move or enlarge the box",
-                clamp.min,
-                clamp.max,
-                if clamp.object_frame { "in the object's own frame" } else { "world" }
+                if object_frame { "in the object's own frame" } else { "world" }
             ),
         ));
     }

@@ -100,7 +100,7 @@ fn boxes_in_the_object_frame_turn_with_it() {
     );
     let motion = RigidMotion { times: vec![0.0], translations: vec![DVec3::ZERO], rotations: vec![DQuat::IDENTITY] };
     let region = Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.06, 0.1, 0.1));
-    scene.clamps = vec![Clamp { object_frame: true, motion: Some(motion), ..region }];
+    scene.clamps = vec![region.in_object_frame().moved(Some(motion))];
     let plan = plan(&scene).unwrap();
     assert!(plan.clamps[0].motion.is_some());
     let (area, volume, _) = held(&plan.clamps[0]);
@@ -217,7 +217,7 @@ fn a_shifted_edge_holds_what_a_larger_box_would() {
     scene.object.pose = DAffine3::from_rotation_translation(DQuat::from_rotation_z(0.3), DVec3::new(0.003, 0.001, 0.002));
     let boxed = |end: f64| {
         let mut scene = scene.clone();
-        scene.clamps = vec![Clamp { object_frame: true, ..Clamp::still(DVec3::splat(-1.0), DVec3::new(end, 0.0501, 0.0398)) }];
+        scene.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(end, 0.0501, 0.0398)).in_object_frame()];
         plan(&scene).unwrap()
     };
     let stated = boxed(0.031);

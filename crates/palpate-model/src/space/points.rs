@@ -50,89 +50,30 @@ pub struct TetMesh {
     pub nodes: Vec<DVec3>,
     /// Nodes of every tetrahedron; (b − a) × (c − a) · (d − a) is positive.
     pub tets: Vec<[u32; 4]>,
+    /// Named groups of nodes, each in increasing order.
+    pub groups: BTreeMap<String, Vec<u32>>,
 }
 
 impl TetMesh {
+    /// Faces of a tetrahedron (a, b, c, d) with positive volume, each seen from outside.
+    pub(crate) const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
     /// Six times the volume of a tetrahedron [m³].
-    fn six_volumes(&self, [a, b, c, d]: [u32; 4]) -> f64 {
+    pub(crate) fn six_volumes(&self, [a, b, c, d]: [u32; 4]) -> f64 {
         let x = |n: u32| self.nodes[n as usize];
         (x(b) - x(a)).cross(x(c) - x(a)).dot(x(d) - x(a))
     }
 
-    /// Turns tetrahedra that count their nodes the other way round, drops nodes that none has, and checks the rest.
-    ///
-    /// # Errors
-    /// No tetrahedra, nodes that do not exist, flat ones, or several parts that do not touch; with counts.
-    pub fn checked(mut self) -> Result<TetMesh, String> {
-        if self.tets.is_empty() {
-            return Err("holds no tetrahedra".into());
-        }
-        if let Some(n) = self.tets.iter().flatten().find(|n| **n as usize >= self.nodes.len()) {
-            return Err(format!("names node {n}, but there are {}", self.nodes.len()));
-        }
-        let turned: Vec<bool> = self.tets.iter().map(|t| self.six_volumes(*t) < 0.0).collect();
-        self.tets.iter_mut().zip(turned).filter(|t| t.1).for_each(|(t, _)| t.swap(2, 3));
-        let longest = |t: &[u32; 4]| {
-            let pairs = (0..4).flat_map(|i| (0..i).map(move |j| (i, j)));
-            pairs.map(|(i, j)| (self.nodes[t[i] as usize] - self.nodes[t[j] as usize]).length()).fold(0.0, f64::max)
-        };
-        let flat = self.tets.iter().filter(|t| self.six_volumes(**t) <= 1e-9 * longest(t).powi(3)).count();
-        if flat > 0 {
-            return Err(format!("{flat} of {} tetrahedra are flat; remesh the body", self.tets.len()));
-        }
-        let parts = self.parts();
-        if parts > 1 {
-            return Err(format!("holds {parts} parts that do not touch; a body is one part"));
-        }
-        Ok(self.without_orphans())
-    }
-
-    /// Number of parts that share no node.
-    fn parts(&self) -> usize {
-        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        fn find(root: &mut [u32], mut n: u32) -> u32 {
-            while root[n as usize] != n {
-                root[n as usize] = root[root[n as usize] as usize];
-                n = root[n as usize];
-            }
-            n
-        }
-        for t in &self.tets {
-            let first = find(&mut root, t[0]);
-            for n in &t[1..] {
-                let other = find(&mut root, *n);
-                root[other as usize] = first;
-            }
-        }
-        let mut used: Vec<u32> = self.tets.iter().map(|t| find(&mut root, t[0])).collect();
-        used.sort_unstable();
-        used.dedup();
-        used.len()
-    }
-
-    fn without_orphans(self) -> TetMesh {
-        let mut number = vec![u32::MAX; self.nodes.len()];
-        self.tets.iter().flatten().for_each(|n| number[*n as usize] = 0);
-        let mut nodes = Vec::new();
-        for (n, x) in number.iter_mut().zip(&self.nodes).filter(|(n, _)| **n == 0) {
-            *n = nodes.len() as u32;
-            nodes.push(*x);
-        }
-        TetMesh { nodes, tets: self.tets.iter().map(|t| t.map(|n| number[n as usize])).collect() }
-    }
-
     /// The same, placed.
     pub fn transformed(&self, pose: &DAffine3) -> TetMesh {
-        TetMesh { nodes: self.nodes.iter().map(|x| pose.transform_point3(*x)).collect(), tets: self.tets.clone() }
+        TetMesh { nodes: self.nodes.iter().map(|x| pose.transform_point3(*x)).collect(), ..self.clone() }
     }
 
     /// Faces that only one tetrahedron has, seen from outside, each with its tetrahedron.
     pub fn faces(&self) -> Vec<(u32, [u32; 3])> {
-        // Of (a, b, c, d) with positive volume these look outwards.
-        const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
         let mut seen: BTreeMap<[u32; 3], Option<(u32, [u32; 3])>> = BTreeMap::new();
         for (e, t) in self.tets.iter().enumerate() {
-            for f in FACES.map(|f| f.map(|i| t[i])) {
+            for f in TetMesh::FACES.map(|f| f.map(|i| t[i])) {
                 let mut key = f;
                 key.sort_unstable();
                 seen.entry(key).and_modify(|other| *other = None).or_insert(Some((e as u32, f)));
@@ -178,11 +119,11 @@ impl TetMesh {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A box of 2 × 1 × 1 cubes of six tetrahedra each, and a node that none has.
-    pub(super) fn block() -> TetMesh {
+    pub(in crate::space) fn block() -> TetMesh {
         let at = |i: usize, j: usize, k: usize| (i + 3 * (j + 2 * k)) as u32;
         let mut mesh = TetMesh::default();
         for (k, j, i) in (0..2).flat_map(|k| (0..2).flat_map(move |j| (0..3).map(move |i| (k, j, i)))) {
@@ -225,21 +166,5 @@ mod tests {
             .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
             .sum();
         assert!((solid - 0.002).abs() < 1e-16, "the surface looks outwards: {solid}");
-    }
-
-    #[test]
-    fn meshes_that_are_no_body_are_refused_with_counts() {
-        let mut flat = block();
-        flat.nodes[1] = flat.nodes[0];
-        assert!(flat.checked().unwrap_err().contains("tetrahedra are flat"));
-        let mut apart = block();
-        let n = apart.nodes.len() as u32;
-        apart.nodes.extend([DVec3::X, DVec3::X + DVec3::Y, DVec3::X + DVec3::Z, 2.0 * DVec3::X]);
-        apart.tets.push([n, n + 1, n + 2, n + 3]);
-        assert_eq!(apart.checked().unwrap_err(), "holds 2 parts that do not touch; a body is one part");
-        let mut beyond = block();
-        beyond.tets[0][0] = 99;
-        assert_eq!(beyond.checked().unwrap_err(), "names node 99, but there are 13");
-        assert_eq!(TetMesh::default().checked().unwrap_err(), "holds no tetrahedra");
     }
 }

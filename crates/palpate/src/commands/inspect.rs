@@ -1,5 +1,7 @@
 //! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
 
+mod tets;
+
 use crate::catalogue;
 use crate::cli::Console;
 use crate::commands::devices;
@@ -13,7 +15,8 @@ use crate::results::inspection::{
     CameraInspection, Cells, Constraints, Identification, Images, Inspected, InspectionDocument, Markers, Observed,
     RecordingInspection, SceneInspection, SequenceInspection, Time,
 };
-use crate::results::{self, finite};
+use crate::results::{self, finite, inspection};
+use crate::suited::{Suited, suited};
 use clap::Args;
 use palpate_engine::number;
 use palpate_gpu::AdapterReport;
@@ -204,9 +207,12 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
             ("cells", format!("{all} ({full} full, {cut} cut)")),
             ("band cells", format!("{} of {:.4} m", body.band().cells.len(), plan.band)),
         ]),
-        None => lines.push(("tetrahedra", format!("{all} of about {:.5} m", body.length))),
+        None => tets::tetrahedra(e, content, lines),
     }
     lines.extend([("nodes", nodes.to_string()), ("degrees of freedom", (3 * nodes).to_string())]);
+    let Suited { discretisation, reason } = suited(e);
+    lines.push(("suited", format!("{discretisation}: {reason}")));
+    content.suited = Some(inspection::Suited { discretisation: discretisation.to_string(), reason });
 }
 
 /// Why a number of the scene is what it is, where it was chosen.

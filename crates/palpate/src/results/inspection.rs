@@ -50,6 +50,12 @@ pub struct SceneInspection {
     pub cell_size: f64,
     /// Cells of the body, or its tetrahedra, which count as full.
     pub cells: Cells,
+    /// The mesh of a body of tetrahedra; absent for one of cells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tetrahedra: Option<Tetrahedra>,
+    /// Which discretisation suits the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suited: Option<Suited>,
     /// Its nodes.
     pub nodes: usize,
     /// Three for every node.
@@ -137,6 +143,53 @@ pub struct Cells {
     pub full: usize,
     /// Those that the surface cuts.
     pub cut: usize,
+}
+
+/// The mesh of a body of tetrahedra.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tetrahedra {
+    /// Number of tetrahedra.
+    pub count: usize,
+    /// Number of nodes at their corners.
+    pub corner_nodes: usize,
+    /// Their volume [m³].
+    pub volume: f64,
+    /// Smallest and largest angle between two faces [°].
+    pub dihedral_angles: [f64; 2],
+    /// Named groups of nodes.
+    pub groups: Vec<Group>,
+    /// How they were made; absent where a file has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_here: Option<MadeHere>,
+}
+
+/// A named group of nodes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Number of corner nodes in it.
+    pub nodes: usize,
+}
+
+/// Tetrahedra that a shape was filled with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MadeHere {
+    /// Longest edge of those inside [m].
+    pub edge_length: f64,
+    /// Error of the volume before the surface was moved, relative.
+    pub volume_error: f64,
+    /// How far the surface was moved outwards to make up for it [m].
+    pub moved: f64,
+}
+
+/// Which discretisation suits a body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Suited {
+    /// `cells` or `tetrahedra`.
+    pub discretisation: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// What holds, stops and weighs a body down.
