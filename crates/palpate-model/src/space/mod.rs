@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod carrier;
+pub mod neighbours;
 pub mod pattern;
 pub mod points;
 pub mod stencil;
