@@ -45,6 +45,35 @@ impl Quadratic {
         }
     }
 
+    /// μ `[r]`.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// d along x `[r]`.
+    pub fn d(&self) -> &[f64] {
+        &self.d
+    }
+
+    /// P x of a field `[r][N]`.
+    pub fn against(&self, field: usize) -> &[Vec<f64>] {
+        &self.against[field]
+    }
+
+    /// The part of W `[r, r]` that deviations of one field from its mean leave alone.
+    pub fn rest(&self, reduced: &Reduced, field: usize) -> Vec<f64> {
+        let r = self.values.len();
+        let mut rest = vec![0.0; r * r];
+        let mut add = |w: Vec<f64>| rest.iter_mut().zip(w).for_each(|(o, w)| *o += w);
+        for (k, (_, p)) in reduced.blocks.iter().enumerate() {
+            add(self.mean(k, p));
+            if k != field {
+                add(self.gram(k, p));
+            }
+        }
+        rest
+    }
+
     /// (PX)ᵀ S (PX) of a field's deviations for a precision `[r, r]`, and the field's share of the mean, (PX)ᵀ 1 `[r]`.
     pub fn gram(&self, field: usize, p: &Precision) -> Vec<f64> {
         let px = &self.against[field];
@@ -80,15 +109,7 @@ impl Quadratic {
 /// # Errors
 /// A prior's matrix cannot be factorised.
 pub(super) fn tried(quadratic: &Quadratic, placed: &[Placed], reduced: &Reduced, field: usize) -> Result<Vec<Tried>, String> {
-    let r = quadratic.values.len();
-    let mut rest = vec![0.0; r * r];
-    let mut add = |w: Vec<f64>| rest.iter_mut().zip(w).for_each(|(o, w)| *o += w);
-    for (k, (_, p)) in reduced.blocks.iter().enumerate() {
-        add(quadratic.mean(k, p));
-        if k != field {
-            add(quadratic.gram(k, p));
-        }
-    }
+    let rest = quadratic.rest(reduced, field);
     let own = &placed[field];
     let (lengths, deviations) = super::grid::tried(&own.prior);
     let m = own.logarithms(reduced.point());

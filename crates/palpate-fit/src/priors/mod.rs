@@ -12,6 +12,7 @@ mod evidence;
 mod factor;
 mod grid;
 mod lowrank;
+mod mixture;
 mod posterior;
 mod precision;
 #[cfg(test)]

@@ -2,6 +2,8 @@
 //! update of low rank (Bui-Thanh et al. 2013).
 
 use super::choose::{Choice, Look};
+use super::evidence::{Quadratic, tried};
+use super::mixture::mixture;
 use super::{Hyper, Tried};
 use crate::dense::dot;
 use crate::optimise::{Sample, Stop};
@@ -23,11 +25,11 @@ pub struct FieldPosterior {
     pub hyper: Hyper,
     /// Whether the data chose length and deviation.
     pub chosen: (bool, bool),
-    /// Evidence of all that were tried; empty where the search for them was cut short.
+    /// Evidence of all that were tried, around what was found.
     pub tried: Vec<Tried>,
     /// How many residuals count as one reading of the stated noise.
     pub temper: f64,
-    /// Standard deviation of the logarithm of each value `[N]`.
+    /// Standard deviation of the logarithm of each value `[N]`, over all priors that were tried by the weight of their evidence.
     pub deviation: Vec<f64>,
     /// The same before the recording was looked at, around the field's mean `[N]`.
     pub prior_deviation: Vec<f64>,
@@ -70,17 +72,32 @@ pub(crate) fn assess(
     u.independent = n / design;
     let priors = problem.priors().clone();
     u.tau = priors.temper / n;
+    let mut m = vec![0.0; z.len()];
+    priors.placed.iter().for_each(|p| m[p.range.clone()].copy_from_slice(&p.logarithms(z)));
+    let quadratic = Quadratic::new(reduced, low, &m, &look.gradient, 1.0);
     let mut fields = Vec::new();
     for (k, ((range, p), placed)) in reduced.blocks.iter().zip(&priors.placed).enumerate() {
-        let prior = p.marginal();
-        let mean = p.mean_deviation().powi(2);
-        let taken = |i: usize| low.values.iter().zip(&low.along).map(|(m, x)| m / (1.0 + m) * x[i] * x[i]).sum::<f64>();
-        // What draws estimate may fall below what is exact.
-        let after: Vec<f64> = range.clone().zip(&prior).map(|(i, v)| (v + mean - taken(i)).max(1e-6 * v)).collect();
+        let broken = |e: String| Stop::Broken(e);
+        let mut tried = tried(&quadratic, &priors.placed, reduced, k).map_err(broken)?;
+        let (after, prior) = match tried.len() > 2 {
+            true => {
+                let mixed = mixture(&quadratic, (&priors.placed, reduced), k, &tried, &m[range.clone()]).map_err(broken)?;
+                (mixed.after, mixed.before)
+            }
+            // One prior and one value everywhere: nothing to mix.
+            false => {
+                let (prior, mean) = (p.marginal(), p.mean_deviation().powi(2));
+                let taken = |i: usize| low.values.iter().zip(&low.along).map(|(m, x)| m / (1.0 + m) * x[i] * x[i]).sum::<f64>();
+                // What draws estimate may fall below what is exact.
+                (range.clone().zip(&prior).map(|(i, v)| (v + mean - taken(i)).max(1e-6 * v)).collect(), prior)
+            }
+        };
+        let top = tried.iter().map(|t| t.evidence).fold(f64::NEG_INFINITY, f64::max);
+        tried.iter_mut().for_each(|t| t.evidence -= top);
         let gain: Vec<f64> = after.iter().zip(&prior).map(|(a, b)| (1.0 - a / b).max(0.0)).collect();
         let undetermined: Vec<bool> = gain.iter().map(|g| *g < UNDETERMINED).collect();
         let around = &placed.prior.around;
-        let open: f64 = around.volume.iter().zip(&undetermined).filter(|(_, u)| **u).map(|(v, _)| v).sum();
+        let open: f64 = around.volume.iter().zip(&undetermined).filter(|(_, u)| **u).map(|(v, _)| v).sum::<f64>() + 0.0;
         for (i, v) in range.clone().zip(&after) {
             u.errors_z[i] = Some(v.sqrt());
             u.standard_errors[i] = Some(v.sqrt() * problem.charts()[i].slope(z[i]));
@@ -90,7 +107,7 @@ pub(crate) fn assess(
             kind: placed.prior.kind,
             hyper: placed.hyper,
             chosen: (placed.prior.length.is_none() && placed.prior.kind == PriorKind::Matern, placed.prior.deviation.is_none()),
-            tried: choice.and_then(|c| c.tried.get(k).cloned()).unwrap_or_default(),
+            tried,
             temper: priors.temper,
             deviation: after.iter().map(|v| v.sqrt()).collect(),
             prior_deviation: prior.iter().map(|v| v.sqrt()).collect(),

@@ -348,6 +348,20 @@ fn the_evidence_is_the_marginal_likelihood() {
     let best = |of: &dyn Fn(usize) -> f64| (0..exact.len()).max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap();
     let (a, b) = (best(&|k| found.tried[k].evidence), best(&|k| exact[k]));
     assert!(exact[a] > exact[b] - 0.3 && found.hyper == found.tried[a].hyper, "{a} {b}");
+    // Errors are those of all priors, by weight.
+    let field = &result.fields[0].values;
+    for k in [4, 20, 25, 30, 39] {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (t, e) in found.tried.iter().zip(&exact).filter(|(t, _)| t.hyper.deviation > 0.0) {
+            let p = Precision::new(&auto, t.hyper, &[]).unwrap();
+            let (mean, variance) = posterior(&readings, &p, found.temper);
+            sum += (e - top).exp() * (variance[k] + (mean[k] - field[k].ln()).powi(2));
+            all += (e - top).exp();
+        }
+        let dense = (sum / all).sqrt();
+        println!("{k}: {:.4} {dense:.4}", found.deviation[k]);
+        assert!((found.deviation[k] / dense - 1.0).abs() < 0.1, "{k}: {} {dense}", found.deviation[k]);
+    }
     assert!(found.chosen == (true, true) && found.one_value().is_some_and(|e| e < -20.0));
 }
 
