@@ -78,7 +78,7 @@ pub(crate) const SCENE: Schema = Schema {
             "field",
             Schema {
                 keys: &["path", "basis", "scale", "blend", "file", "array"],
-                tables: &[("regions", table(&["center", "radius", "value"]))],
+                tables: &[("regions", table(&["center", "radius", "value"])), ("prior", table(&["kind", "length", "deviation"]))],
             },
         ),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),

@@ -336,6 +336,23 @@ fn impossible_fields_are_refused_with_what_is_allowed() {
         (&format!("{REGIONS}file = \"a.npy\""), "field.0.file: belongs to basis = \"cells\" or \"nodes\""),
         (&REGIONS.replace("value = 2", "value = 0"), "a factor must be > 0"),
         (&REGIONS.replace("radius = 0.02", "radius = -1"), "field.0.regions.1.radius"),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { length = 1.0 }",
+            "field.0.prior.kind: missing; expected \"matern\" or \"edge-preserving\"",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"matern\", length = -1.0 }",
+            "field.0.prior.length: -1 is not allowed: must be \"auto\" or a number > 0 (m)",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"matern\", deviation = \"some\" }",
+            "field.0.prior.deviation: \"some\" is not allowed: must be \"auto\"",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"edge-preserving\", length = 0.1 }",
+            "field.0.prior.length: belongs to kind = \"matern\"",
+        ),
+        (&format!("{REGIONS}prior = {{ kind = \"matern\" }}"), "field.0.prior: belongs to basis = \"cells\" or \"nodes\""),
         (&REGIONS.replace("0.1", "0").replace("regions = [", "blend = \"axis\"\nregions = ["), "is that of the region before"),
         (&format!("{REGIONS}bases = 1"), "did you mean \"basis\"?"),
     ] {

@@ -3,6 +3,7 @@
 pub mod body;
 pub mod carrier;
 pub mod kept_volume;
+pub mod neighbours;
 pub mod pattern;
 pub mod points;
 pub mod stencil;

@@ -3,7 +3,7 @@
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
-use crate::report::fit::{beforehand, field_line, grid_line, number, parts, worth};
+use crate::report::fit::{beforehand, field_line, grid_line, number, parts, posterior_lines, worth};
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
@@ -107,6 +107,10 @@ fn fields(input: &ReportInput) -> Markup {
     html! {
         @for f in input.fields {
             p { (field_line(f)) "." }
+            @for line in posterior_lines(f) {
+                p { (line) "." }
+            }
+            (evidence(f))
         }
         @if let Some(why) = &input.fitted.chosen {
             p { (why) "." }
@@ -127,6 +131,40 @@ fn curve(found: &FoundCurve) -> Markup {
         p {
             "In the motion it went from " (number(found.range[0])) " to " (number(found.range[1])) "."
             @if !unseen.is_empty() { " Of the corners at " (unseen.join(", ")) " the recording says nothing." }
+        }
+    }
+}
+
+/// Evidence of every prior that was tried, lengths across and deviations down, the darker the better.
+fn evidence(f: &FieldReference) -> Markup {
+    let Some(p) = f.posterior.as_ref().filter(|p| p.tried.len() > 2) else { return Markup::default() };
+    let (mut lengths, mut deviations) = (Vec::new(), Vec::new());
+    for t in p.tried.iter().filter(|t| t.deviation > 0.0) {
+        if !lengths.contains(&t.length) {
+            lengths.push(t.length);
+        }
+        if !deviations.contains(&t.deviation) {
+            deviations.push(t.deviation);
+        }
+    }
+    let of = |length, deviation| p.tried.iter().find(|t| t.length == length && t.deviation == deviation).and_then(|t| t.evidence);
+    let colour = |e: f64| format!("background:rgba(33,102,172,{:.2})", 0.5 * (0.5 * e).exp());
+    html! {
+        p { "Logarithm of the evidence over that of the best, by length [m] across and deviation of the logarithm down." }
+        table {
+            tr {
+                th {}
+                @for l in &lengths { th.n { (l.map_or("–".to_string(), number)) } }
+            }
+            @for d in &deviations {
+                tr {
+                    td { (number(*d)) }
+                    @for l in &lengths {
+                        @let e = of(*l, *d).unwrap_or(f64::NEG_INFINITY);
+                        td.n style=(colour(e)) { (format!("{e:.1}")) }
+                    }
+                }
+            }
         }
     }
 }
