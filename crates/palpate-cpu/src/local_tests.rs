@@ -14,6 +14,7 @@ use palpate_model::materials;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
 use palpate_model::params::ParamKey;
+use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::plan::scheme::{self, Stage};
@@ -38,16 +39,16 @@ fn altering() -> Vec<Effect> {
     (0..ALL.len()).filter(|l| alters(&ALL[*l].site)).map(make).collect()
 }
 
-/// The box of the ball as cubes of six tetrahedra each, three along every edge.
-fn tetrahedra() -> BodySource {
-    let (low, edge) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / 3.0);
-    let at = |i: usize, j: usize, k: usize| (i + 4 * (j + 4 * k)) as u32;
+/// The box of the ball as cubes of six tetrahedra each, so many along every edge.
+fn tetrahedra(count: usize) -> BodySource {
+    let (low, edge, side) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / count as f64, count + 1);
+    let at = |i: usize, j: usize, k: usize| (i + side * (j + side * k)) as u32;
     let mut mesh = TetMesh::default();
-    for n in 0..64 {
-        mesh.nodes.push(low + edge * DVec3::new((n % 4) as f64, (n / 4 % 4) as f64, (n / 16) as f64));
+    for n in 0..side * side * side {
+        mesh.nodes.push(low + edge * DVec3::new((n % side) as f64, (n / side % side) as f64, (n / (side * side)) as f64));
     }
-    for n in 0..27 {
-        let (i, j, k) = (n % 3, n / 3 % 3, n / 9);
+    for n in 0..count * count * count {
+        let (i, j, k) = (n % count, n / count % count, n / (count * count));
         let c = |bits: usize| at(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2));
         for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
             mesh.tets.push([c(0), c(way[0]), c(way[1]), c(7)]);
@@ -59,10 +60,10 @@ fn tetrahedra() -> BodySource {
 
 fn plan(effects: Vec<Effect>) -> Plan {
     let ball = Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.045) };
-    plan_of(BodySource::Analytic(ball), effects)
+    plan_of(BodySource::Analytic(ball), effects, Tetrahedron::default(), Vec::new())
 }
 
-fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
+fn plan_of(source: BodySource, effects: Vec<Effect>, tetrahedron: Tetrahedron, fields: Vec<FieldSpec>) -> Plan {
     let motion = RigidMotion {
         times: vec![-1.0, 0.0, 1.0],
         translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],
@@ -91,7 +92,7 @@ fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
         masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
         effects,
-        fields: Vec::new(),
+        fields,
         initial: Initial {
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
@@ -99,11 +100,17 @@ fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
             state: InitialShape::StaticEquilibrium,
         },
         time: Time { step: 0.01, steps: 3, start: 0.05, ..Time::weighted(0.55) },
-        solver: Solver::default(),
+        solver: Solver { tetrahedron, ..Solver::default() },
         observation: None,
         fit: None,
     };
     build_plan(&scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Stiffness by cells and density by nodes.
+fn fields() -> Vec<FieldSpec> {
+    let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None };
+    vec![of(Varied::Modulus, Basis::Cells), of(Varied::Density, Basis::Nodes)]
 }
 
 /// Random vectors in a cube of half edge `size`, reproducible.
@@ -180,13 +187,27 @@ fn everywhere(check: impl Fn(&At)) {
     for (model, effects) in models.chain([(&materials::ALL[0], altering()), (&materials::ALL[1], altering())]) {
         check_all(Plan { model, ..plan(effects) }, &check);
     }
-    // Bodies of tetrahedra, with a law at points and none.
+    // Bodies of tetrahedra, with a law at points, and fields of the first material.
     for model in materials::ALL {
-        let mut drag = Effect::absent(find("air-drag").unwrap());
-        drag.values[0] = Some(5.0);
-        let mut p = Plan { model, ..plan_of(tetrahedra(), vec![drag]) };
-        // At random displacements springs as stiff as these would drown all other forces in their rounding.
-        p.clamps.iter_mut().flat_map(|c| &mut c.nodes).for_each(|n| n.1 *= 1e-6);
+        for (kind, count) in [(Tetrahedron::Linear, 2), (Tetrahedron::Quadratic, 1)] {
+            let mut drag = Effect::absent(find("air-drag").unwrap());
+            drag.values[0] = Some(5.0);
+            let fields = if model.is_linear { fields() } else { Vec::new() };
+            let mut p = Plan { model, ..plan_of(tetrahedra(count), vec![drag], kind, fields) };
+            // At random displacements springs as stiff as these would drown all other forces in their rounding.
+            p.clamps.iter_mut().flat_map(|c| &mut c.nodes).for_each(|n| n.1 *= 1e-8);
+            let of_field = |k: &ParamKey| matches!(k, ParamKey::Field { .. });
+            let values = p.theta.iter_mut().zip(&p.layout.keys).filter(|(_, k)| of_field(k));
+            values.enumerate().for_each(|(i, (v, _))| *v = 1.0 + 0.3 * (i as f64).sin());
+            check_all(p, &check);
+        }
+    }
+    // Laws of cells, of the clamps and of the body on them.
+    for (model, kind, count) in [(&materials::ALL[0], Tetrahedron::Quadratic, 1), (&materials::ALL[1], Tetrahedron::Linear, 2)] {
+        let on_tets = |e: &Effect| !matches!(e.law().site, Site::Rest(_) | Site::Edges(_));
+        let effects = altering().into_iter().filter(on_tets).collect();
+        let mut p = Plan { model, ..plan_of(tetrahedra(count), effects, kind, Vec::new()) };
+        p.clamps.iter_mut().flat_map(|c| &mut c.nodes).for_each(|n| n.1 *= 1e-8);
         check_all(p, &check);
     }
 }

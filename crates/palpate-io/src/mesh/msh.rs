@@ -85,7 +85,7 @@ mod tests {
     fn tetrahedra_are_read_and_turned_the_right_way_round() {
         let mesh = parse(TWO.as_bytes()).and_then(TetMesh::checked).unwrap();
         assert_eq!((mesh.nodes.len(), mesh.tets.len(), mesh.faces().len()), (5, 2, 6));
-        let volume: f64 = mesh.points().0.volume.iter().sum();
+        let volume = palpate_model::space::body::Body::of_tets(&mesh, Default::default()).volume;
         assert!((volume - (1.0 + 2.0) / 6.0).abs() < 1e-15, "{volume}");
     }
 

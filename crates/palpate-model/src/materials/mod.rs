@@ -13,6 +13,7 @@ mod corotated_linear;
 mod neo_hookean;
 mod neo_hookean_log;
 mod stable_neo_hookean;
+pub mod stretching;
 
 use crate::effects::law::Number;
 use num_dual::HyperDual64;

@@ -5,3 +5,4 @@ pub mod carrier;
 pub mod pattern;
 pub mod points;
 pub mod stencil;
+pub mod tets;

@@ -3,6 +3,8 @@
 //! The potential is `V [θ ψ(F₁) + (1 − θ) P(F₀):F₁ + (β/ℓ) ψ_lin(G₁ − G̃)]` with Green's strain 2G = H + Hᵀ + HᵀH and G̃ = Σ w G(x_past): rigid
 //! motion neither stores nor dissipates.
 //!
+//! Where an element has several points, each has its [`Share`] of the Lamé parameters, in ψ and ψ_lin alike.
+//!
 //! What a point gives is computed side by side and summed by the points around a node in their order, so bits do not depend on threads.
 
 mod blocks;
@@ -15,6 +17,7 @@ use glam::{DMat3, DVec3};
 use palpate_model::materials::Gradient;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::space::points::Share;
 use palpate_model::space::stencil::Stencil;
 use rayon::prelude::*;
 
@@ -26,21 +29,23 @@ const NODES: usize = 256;
 /// The term.
 pub struct ElasticPoints<'a> {
     c: Context<'a>,
-    /// λ and μ over E, and their derivatives by Poisson's ratio.
-    lame: [(f64, f64); 2],
+    /// Of every share, λ and μ over E, and their derivatives by Poisson's ratio.
+    lame: [[(f64, f64); 2]; 3],
     /// Young's modulus [Pa], creep included.
     young: f64,
     /// G̃ of every point; empty without damping.
     past: Vec<DMat3>,
 }
 
-/// A point: number, place and gradient, volume [m³], Lamé parameters [Pa].
+/// A point: number and element, place and gradient, volume [m³], Lamé parameters [Pa], and as [`ElasticPoints::lame`] has them.
 #[derive(Clone, Copy)]
 struct Point<'a> {
     e: usize,
+    element: usize,
     s: Stencil<'a>,
     v: f64,
     moduli: (f64, f64),
+    lame: [(f64, f64); 2],
 }
 
 /// Rows of a matrix, as materials take them.
@@ -82,7 +87,8 @@ impl<'a> ElasticPoints<'a> {
     /// Takes the past's strains.
     pub fn new(c: Context<'a>) -> ElasticPoints<'a> {
         let nu = c.physics().poisson_ratio;
-        let mut term = ElasticPoints { c, lame: [lame(1.0, nu), lame_by_nu(1.0, nu)], young: c.young(), past: Vec::new() };
+        let lame = Share::ALL.map(|s| s.of(lame(1.0, nu), lame_by_nu(1.0, nu)));
+        let mut term = ElasticPoints { c, lame, young: c.young(), past: Vec::new() };
         if c.inertia.is_some() {
             let sum = |p: Point| c.past.each.iter().map(|(w, u)| green(p.s.gradient_of(u)) * *w).sum::<DMat3>();
             term.past = term.each(sum);
@@ -92,8 +98,9 @@ impl<'a> ElasticPoints<'a> {
 
     fn point(&self, e: usize) -> Point<'a> {
         let points = &self.c.plan.body.points;
-        let moduli = scaled(self.lame[0], self.young * self.c.factor(e));
-        Point { e, s: points.stencils.get(e), v: points.volume[e], moduli }
+        let (element, lame) = (points.element_of(e), self.lame[points.share(e) as usize]);
+        let moduli = scaled(lame[0], self.young * self.c.factor(element));
+        Point { e, element, s: points.stencils.get(e), v: points.volume[e], moduli, lame }
     }
 
     /// A value of every point.
@@ -136,7 +143,7 @@ impl<'a> ElasticPoints<'a> {
     }
 
     fn add_force(&self, u1: &[DVec3], out: &mut [DVec3]) {
-        self.gather(|Point { e, s, v, moduli }| self.total(e, s, u1, moduli) * v, out);
+        self.gather(|Point { e, s, v, moduli, .. }| self.total(e, s, u1, moduli) * v, out);
     }
 
     /// ∂P/∂F : δ of the elastic stress at a displacement.
@@ -147,8 +154,8 @@ impl<'a> ElasticPoints<'a> {
     }
 
     /// Derivative of the whole stress by Poisson's ratio, over E.
-    fn by_poisson(&self, e: usize, s: Stencil, u1: &[DVec3]) -> DMat3 {
-        let (w, (lambda, mu), by_nu) = (&self.c.weights, self.lame[0], self.lame[1]);
+    fn by_poisson(&self, Point { e, s, lame: [(lambda, mu), by_nu], .. }: Point, u1: &[DVec3]) -> DMat3 {
+        let w = &self.c.weights;
         let elastic = |u: &[DVec3]| {
             let [by_lambda, by_mu] = self.c.plan.model.law.by_moduli(&rows(s.gradient_of(u)), lambda, mu);
             matrix_of(&std::array::from_fn(|k| by_nu.0 * by_lambda[k] + by_nu.1 * by_mu[k]))
@@ -168,7 +175,7 @@ impl Term for ElasticPoints<'_> {
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
         let w = &self.c.weights;
-        let of = |Point { e, s, v, moduli: (lambda, mu) }: Point| {
+        let of = |Point { e, s, v, moduli: (lambda, mu), .. }: Point| {
             let h = s.gradient_of(u1);
             let mut psi = w.new * self.c.plan.model.law.value(&rows(h), lambda, mu);
             if w.old != 0.0 {
@@ -226,16 +233,17 @@ impl Term for ElasticPoints<'_> {
     fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
         let (ln_young, d) = (self.c.ln_young_along(rates), &rates.physics);
         let damping = d.stiffness_damping * self.c.inertia.map_or(0.0, |t| t.rate);
-        let of = |Point { e, s, v, moduli }: Point| {
-            let ln = ln_young + self.c.ln_factor_along(rates, e);
-            let mut p = if ln == 0.0 { DMat3::ZERO } else { self.total(e, s, u1, moduli) * ln };
+        let of = |p: Point| {
+            let Point { e, element, s, v, moduli, .. } = p;
+            let ln = ln_young + self.c.ln_factor_along(rates, element);
+            let mut stress = if ln == 0.0 { DMat3::ZERO } else { self.total(e, s, u1, moduli) * ln };
             if d.poisson_ratio != 0.0 {
-                p += self.by_poisson(e, s, u1) * (d.poisson_ratio * self.young * self.c.factor(e));
+                stress += self.by_poisson(p, u1) * (d.poisson_ratio * self.young * self.c.factor(element));
             }
             if damping != 0.0 {
-                p += self.viscous(e, s.gradient_of(u1), moduli) * damping;
+                stress += self.viscous(e, s.gradient_of(u1), moduli) * damping;
             }
-            p * v
+            stress * v
         };
         self.gather(of, out);
     }
@@ -243,12 +251,13 @@ impl Term for ElasticPoints<'_> {
     fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
         let rate = self.c.inertia.map_or(0.0, |t| t.rate);
         // By the logarithm of the modulus, Poisson's ratio and damping.
-        let of = |Point { e, s, v, moduli }: Point| {
+        let of = |p: Point| {
+            let Point { e, element, s, v, moduli, .. } = p;
             let dz = s.gradient_of(z) * v;
             let along = |wanted: bool, p: &dyn Fn() -> DMat3| if wanted { contract(dz, p()) } else { 0.0 };
             [
                 along(sought.modulus, &|| self.total(e, s, u1, moduli)),
-                self.young * self.c.factor(e) * along(sought.poisson, &|| self.by_poisson(e, s, u1)),
+                self.young * self.c.factor(element) * along(sought.poisson, &|| self.by_poisson(p, u1)),
                 rate * along(sought.damping[1], &|| self.viscous(e, s.gradient_of(u1), moduli)),
             ]
         };
@@ -258,7 +267,8 @@ impl Term for ElasticPoints<'_> {
             gradient.physics.stiffness_damping += by_damping;
         }
         if sought.modulus {
-            self.c.pull_modulus(all.iter().map(|g| g[0]).enumerate(), gradient);
+            let points = &self.c.plan.body.points;
+            self.c.pull_modulus(all.iter().enumerate().map(|(e, g)| (points.element_of(e), g[0])), gradient);
         }
     }
 
