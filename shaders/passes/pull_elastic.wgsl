@@ -2,7 +2,7 @@
 // use shared/elastic_way
 // use shared/pulls
 
-// [B][points]: by the factor on the point's modulus.
+// [B][points]: by the factor on its element's modulus.
 var<storage, read_write> elastic_pulls: array<f32>;
 // [CELL_ROWS + rows of aging][B][workgroups]: by Poisson's ratio, stiffness damping, the viscosity's coefficient and exponent first.
 var<storage, read_write> elastic_sums: array<f32>;
@@ -19,7 +19,7 @@ fn pull_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let z = gradient_probe(p.member, p.item) * elastic_volumes[p.item];
         let whole = contract(z, way.stress);
         elastic_pulls[p.member * shape.elastic + p.item] -= unvaried(m, p.member) * whole;
-        let young = young_at(m, p.member, p.item);
+        let young = young_at(m, p.member, element_of(p.item));
         by = young * vec4(whole, contract(z, way.by_poisson), 0.0, 0.0);
         if call.mode != 0u {
             by.z = young * contract(z, way.viscous) / shape.dt;

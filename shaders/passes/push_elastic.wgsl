@@ -13,8 +13,8 @@ fn push_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let m = members[p.member];
     let way = elastic_way(p.member, p.item, m, mix_of(m));
-    let young = young_at(m, p.member, p.item);
-    var stress = way.stress * young_rate(m, p.member, p.item);
+    let young = young_at(m, p.member, element_of(p.item));
+    var stress = way.stress * young_rate(m, p.member, element_of(p.item));
     if with_rate(WITH_POISSON) {
         stress += way.by_poisson * (young * rates[p.member].poisson);
     }

@@ -17,10 +17,10 @@ fn tangent_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     }
     let m = members[p.member];
     let mix = mix_of(m);
-    let lame = m.lame.xy;
+    let lame = lame_at(m, p.item).xy;
     let h = gradient_next(p.member, p.item);
     let f = identity3() + h;
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[p.item];
+    let scale = young_at(m, p.member, element_of(p.item)) * elastic_volumes[p.item];
     let convex = newton[p.member].convex != 0u;
     var held = mat3x3<f32>();
     if mix.rate != 0.0 {

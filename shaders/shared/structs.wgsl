@@ -44,6 +44,9 @@ struct Shape { // mirrored
     elastic: u32,
     held: u32,
     element_size: f32,
+    // Elements, cells or tetrahedra, and elastic points of each tetrahedron.
+    elements: u32,
+    per_element: u32,
 }
 
 struct Member { // mirrored

@@ -32,7 +32,7 @@ struct Flow {
 
 fn flow_at(m: Member, member: u32, point: u32, h: mat3x3<f32>) -> Flow {
     var r: Flow;
-    if call.mode == 0u || m.flow.x == 0.0 {
+    if call.mode == 0u || m.flow.x == 0.0 || has_mean(point) {
         return r;
     }
     r.strain = strained(member, point, h);

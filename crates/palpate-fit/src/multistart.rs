@@ -165,7 +165,7 @@ pub fn run(
             ..Begin::given(led.unwrap_or(own), 0, 0)
         })
         .collect();
-    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal.as_deref_mut(), &again)?) {
+    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal, &again)?) {
         let first = &mut runs[begin.number];
         if run.outcome.sample.is_none() {
             // Stopped before it could look again: its first look is what there is.

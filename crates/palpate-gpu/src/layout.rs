@@ -93,8 +93,12 @@ pub struct Shape {
     pub held: u32,
     /// Length of an element [m]: the edge of a cell, or of a cube of six mean tetrahedra. What is not about cells goes by it.
     pub element_size: f32,
+    /// Elements: cells, or tetrahedra.
+    pub elements: u32,
+    /// Elastic points of a tetrahedron; 1 where there are none.
+    pub per_element: u32,
     /// Fills up.
-    pub pad: [u32; 3],
+    pub pad: u32,
 }
 
 /// Parameters of one member.

@@ -15,6 +15,7 @@ use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
 use crate::space::points::TetMesh;
+pub use crate::space::tets::Tetrahedron;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
 
@@ -79,6 +80,14 @@ pub struct Object {
     pub pose: DAffine3,
     /// How fine the grid is.
     pub resolution: Resolution,
+}
+
+impl Object {
+    /// True of a body of tetrahedra, whether a file has them or they are made here.
+    pub fn is_of_tetrahedra(&self) -> bool {
+        let made = matches!(self.resolution, Resolution::Edge(_) | Resolution::OpenEdge);
+        made || matches!(self.source, BodySource::Tetrahedra { .. })
+    }
 }
 
 /// Where the surface comes from.
@@ -295,8 +304,10 @@ impl Time {
 /// Numerical choices; the defaults are what a user wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// Element formulation.
+    /// Element formulation of bodies that are cut out of a lattice.
     pub element: Element,
+    /// Of bodies that are made of tetrahedra.
+    pub tetrahedron: Tetrahedron,
     /// Linear solver.
     pub linear: LinearSolver,
     /// Relative accuracy of the nonlinear solve of a step.
@@ -310,11 +321,18 @@ pub struct Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Solver { element: Element::Enhanced, linear: LinearSolver::Auto, tolerance: 1e-8, newton_iterations: 60, ghost: 0.02 }
+        Solver {
+            element: Element::Enhanced,
+            tetrahedron: Tetrahedron::default(),
+            linear: LinearSolver::Auto,
+            tolerance: 1e-8,
+            newton_iterations: 60,
+            ghost: 0.02,
+        }
     }
 }
 
-/// Element formulation.
+/// Element formulation of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// Trilinear plus nine condensed incompatible modes and linear dilatation: exact in bending, no locking.

@@ -86,7 +86,7 @@ impl Batch {
             geometry.effects.poses(plan, p, &mut poses);
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
-        geometry.effects.upload(gpu, plan, &self.physics, buffers)?;
+        geometry.effects.upload(gpu, plan, &geometry.mass, &self.physics, buffers)?;
         buffers.insert("members", gpu.upload("members", &members)?);
         buffers.insert("planes", gpu.upload("planes", &all_planes)?);
         buffers.insert("poses", gpu.upload("poses", &poses)?);

@@ -72,6 +72,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
 
     let mut warnings = Vec::new();
     let object = object::object(&root, &mut warnings)?;
+    let of_tets = object.is_of_tetrahedra();
     let (material, curves) = material::material(&root, &mut warnings)?;
     let gravity = match root.optional_table("world")? {
         Some(w) => w.optional_vec3("gravity")?,
@@ -92,7 +93,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         fields: fields::fields(&root)?,
         time: time(&root, initial.state)?,
         initial,
-        solver: solver(&root)?,
+        solver: solver(&root, of_tets)?,
         observation: observation(&root)?,
         targets: target::targets(&root)?,
         fit: None,
@@ -244,11 +245,10 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
 /// Shortest time step [s]: the fastest waves need a thousand times as long to cross the smallest cells, and forces overflow long before zero.
 const SHORTEST_STEP: f64 = 1e-9;
 
-fn solver(root: &Table) -> Result<Solver, InputError> {
+fn solver(root: &Table, of_tets: bool) -> Result<Solver, InputError> {
     let mut s = Solver::default();
     let Some(t) = root.optional_table("solver")? else { return Ok(s) };
-    let elements = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
-    s.element = t.optional_choice("element", &elements)?.unwrap_or(s.element);
+    element(&t, of_tets, &mut s)?;
     let linear = [("auto", LinearSolver::Auto), ("cholesky", LinearSolver::Cholesky), ("cg", LinearSolver::ConjugateGradient)];
     s.linear = t.optional_choice("linear", &linear)?.unwrap_or(s.linear);
     let tolerance = t.f64_where("tolerance", |x| x > 0.0 && x < 1.0, "is not allowed: must lie in (0, 1)")?;
@@ -258,6 +258,27 @@ fn solver(root: &Table) -> Result<Solver, InputError> {
     }
     s.ghost = t.f64_where("ghost", |x| x >= 0.0, "is not allowed: must be ≥ 0")?.unwrap_or(s.ghost);
     Ok(s)
+}
+
+/// `element`, which says what cells of a lattice are, or what tetrahedra.
+fn element(t: &Table, of_tets: bool, s: &mut Solver) -> Result<(), InputError> {
+    let cells = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
+    let tets = [("tet10", Tetrahedron::Quadratic), ("tet4", Tetrahedron::Linear)];
+    let all: Vec<(&str, bool)> = cells.iter().map(|c| (c.0, false)).chain(tets.iter().map(|c| (c.0, true))).collect();
+    let Some(is_tet) = t.optional_choice("element", &all)? else { return Ok(()) };
+    match (is_tet, of_tets) {
+        (true, true) => s.tetrahedron = t.optional_choice("element", &tets)?.unwrap_or_default(),
+        (false, false) => s.element = t.optional_choice("element", &cells)?.unwrap_or(s.element),
+        (true, false) => {
+            let message = "belongs to bodies of tetrahedra (object.volume_mesh); cells of a lattice are \"enhanced\", \"trilinear\" or \"corner\"";
+            return Err(t.error("element", message));
+        }
+        (false, true) => {
+            let message = "belongs to bodies that are cut out of a lattice; those of a volume_mesh are \"tet10\" or \"tet4\"";
+            return Err(t.error("element", message));
+        }
+    }
+    Ok(())
 }
 
 fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {

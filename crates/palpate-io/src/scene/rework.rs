@@ -27,17 +27,15 @@ pub fn recast_scene(
     }
     let wrong = |key: &str| InputError { key: key.into(), ..InputError::file(&scene.path, "must be a table") };
     let object = section(&mut doc, "object").ok_or_else(|| wrong("object"))?;
-    match resolution {
-        Resolution::CellSize(h) => {
-            object.remove("cells");
-            set(object, "cell_size", Value::from(h));
-        }
-        Resolution::Cells(n) => {
-            object.remove("cell_size");
-            set(object, "cells", Value::from(i64::from(n)));
-        }
-        Resolution::Own | Resolution::Open => {}
-    }
+    let (cells, tetrahedra) = (&["cell_size", "cells"][..], &["edge_length", "discretisation"][..]);
+    let (without, with): (&[&[&str]], Vec<(&str, Value)>) = match resolution {
+        Resolution::CellSize(h) => (&[cells, tetrahedra], vec![("cell_size", h.into())]),
+        Resolution::Cells(n) => (&[cells, tetrahedra], vec![("cells", i64::from(n).into())]),
+        Resolution::Edge(h) => (&[cells], vec![("discretisation", "tetrahedra".into()), ("edge_length", h.into())]),
+        Resolution::Own | Resolution::Open | Resolution::OpenEdge => (&[], Vec::new()),
+    };
+    without.iter().flat_map(|keys| *keys).for_each(|key| drop(object.remove(key)));
+    with.into_iter().for_each(|(key, value)| set(object, key, value));
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
     let observation = section(&mut doc, "observation").ok_or_else(|| wrong("observation"))?;
     set(observation, "recording", Value::from(recording));

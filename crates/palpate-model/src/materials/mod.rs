@@ -15,6 +15,7 @@ mod neo_hookean;
 mod neo_hookean_log;
 pub mod principal_stretch;
 mod stable_neo_hookean;
+pub mod stretching;
 pub mod viscosity;
 
 use crate::effects::law::Number;

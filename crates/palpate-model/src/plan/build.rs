@@ -10,6 +10,7 @@ use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
 use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
+use crate::cutcells::shadow::shadow;
 use crate::effects::check_choices;
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
@@ -39,20 +40,25 @@ fn error(key: impl Into<String>, message: String) -> PlanError {
 
 /// Cuts a scene's body. The shape is returned with it.
 pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanError> {
-    let (parts, shape) = build_parts(scene)?;
+    let (parts, shape) = build_parts(scene, false)?;
     Ok((Arc::new(parts.body), shape))
 }
 
-fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
+/// `seen`: observed points are to be looked up; bodies of cells are always ready for them.
+fn build_parts(scene: &Scene, seen: bool) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
     let shape = shape_of(&scene.object);
-    if let BodySource::Tetrahedra { mesh, .. } = &scene.object.source {
+    let mesh = match (&scene.object.source, scene.object.resolution) {
+        (BodySource::Tetrahedra { mesh, .. }, _) => Some(mesh.transformed(&scene.object.pose)),
+        (_, Resolution::Edge(_)) => Some(tets::made(&scene.object)?.0),
+        _ => None,
+    };
+    if let Some(mesh) = mesh {
         tets::refuse_what_needs_cells(scene)?;
-        let body = Body::of_tets(&mesh.transformed(&scene.object.pose));
-        return Ok((Parts { body, merged: Vec::new() }, shape));
-    }
-    if let Resolution::Edge(_) = scene.object.resolution {
-        tets::refuse_what_needs_cells(scene)?;
-        let body = Body::of_tets(&tets::made(&scene.object)?.0);
+        let mut body = Body::of_tets(&mesh, scene.solver.tetrahedron);
+        if seen {
+            let (h, width) = (body.length, band_cells(scene) * body.length);
+            body.band = shadow(&body, shape.as_ref(), h, width).map_err(|e| error("observation.band", e.to_string()))?;
+        }
         return Ok((Parts { body, merged: Vec::new() }, shape));
     }
     let (min, max) = shape.bounds();
@@ -83,7 +89,7 @@ fn band_cells(scene: &Scene) -> f64 {
 /// Everything a backend needs for a scene. `observation` comes with frames, cameras and channels; its markers are filled here: one per
 /// entry of `marker_rest` in the same order, then one per rest place of its tracks.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
-    let (parts, shape) = build_parts(scene)?;
+    let (parts, shape) = build_parts(scene, observation.frames.iter().any(|f| !f.points.is_empty()))?;
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);
@@ -100,7 +106,6 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     if !observation.frames.is_empty() {
         check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
     }
-    tets::refuse_depth(&body, &observation)?;
     let planes = scene
         .planes
         .iter()
@@ -187,7 +192,7 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
         ));
     }
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
-    Ok(ClampSite { cells, nodes: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
+    Ok(ClampSite { cells, nodes: Vec::new(), areas: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
 
 pub mod build;
+pub mod locking;
 pub mod scheme;
 
 pub use crate::cutcells::clamp_cell::ClampCell;
@@ -88,6 +89,8 @@ pub struct ClampSite {
     pub cells: Vec<ClampCell>,
     /// Held nodes and the stiffness of each one's spring [N/m], of bodies without cells.
     pub nodes: Vec<(u32, f64)>,
+    /// Area of the held surface that each of them stands for, or a substitute within the body: what a compliant layer acts over [m²].
+    pub areas: Vec<f64>,
     /// Prescribed motion; `None` = held still.
     pub motion: Option<RigidMotion>,
     /// What is held when an effect moves the region's edge.

@@ -9,3 +9,4 @@ pub mod points;
 pub mod stencil;
 pub mod stuffing;
 pub mod tet_checks;
+pub mod tets;

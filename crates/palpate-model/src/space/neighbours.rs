@@ -44,8 +44,7 @@ impl Neighbours {
     /// Nodes that share an element. A pair at distance d gets an equal part of 3 V/d² of every element of volume V that holds it, so that a
     /// constant gradient has the right norm wherever pairs point in all directions alike.
     pub fn of_nodes(body: &Body) -> Neighbours {
-        let volumes =
-            body.cells().iter().map(|c| c.fraction * body.cut().grid.h.powi(3)).chain(body.points.volume.iter().copied());
+        let volumes = body.cells().iter().map(|c| c.fraction * body.cut().grid.h.powi(3)).chain(volumes(body));
         let mut areas: BTreeMap<(u32, u32), (f64, f64)> = BTreeMap::new();
         for (nodes, volume) in body.element_nodes().zip(volumes) {
             let pairs = (nodes.len() * (nodes.len() - 1) / 2).max(1) as f64;
@@ -89,11 +88,11 @@ impl Neighbours {
         }
     }
 
-    /// Elastic points.
+    /// Tetrahedra.
     fn add_points(&mut self, body: &Body) {
         let first = self.volume.len() as u32;
         let mut faces: BTreeMap<[u32; 3], Vec<u32>> = BTreeMap::new();
-        for (e, s) in (first..).zip(body.points.stencils.iter()) {
+        for (e, s) in (first..).zip(body.points.means()) {
             let corners = &s.nodes[..s.nodes.len().min(4)];
             for leave in 0..corners.len() {
                 let mut face: Vec<u32> = (0..corners.len()).filter(|k| *k != leave).map(|k| corners[k]).collect();
@@ -103,8 +102,8 @@ impl Neighbours {
                 }
             }
         }
-        self.volume.extend(&body.points.volume);
-        let middles: Vec<DVec3> = body.points.stencils.iter().map(|s| s.at(&body.nodes)).collect();
+        self.volume.extend(volumes(body));
+        let middles: Vec<DVec3> = body.points.means().map(|s| s.at(&body.nodes)).collect();
         for (face, elements) in faces {
             let [a, b, c] = face.map(|n| body.nodes[n as usize]);
             let area = 0.5 * (b - a).cross(c - a).length();
@@ -131,6 +130,11 @@ impl Neighbours {
     }
 }
 
+/// Volumes of tetrahedra [m³].
+fn volumes(body: &Body) -> impl Iterator<Item = f64> + '_ {
+    (0..body.points.elements()).map(|e| body.points.element_volume(e))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,6 +142,7 @@ mod tests {
     use crate::scene::{Analytic, BodySource, Object, Resolution};
     use crate::shape::shape_of;
     use crate::space::points::TetMesh;
+    use crate::space::tets::Tetrahedron;
 
     /// A bar whose last cells are cut, across and along.
     fn bar() -> Body {
@@ -170,7 +175,7 @@ mod tests {
                 tets.push([tet[0], tet[1], tet[2], tet[3]]);
             }
         }
-        Body::of_tets(&TetMesh { nodes, tets }.checked().unwrap())
+        Body::of_tets(&TetMesh { nodes, tets, ..TetMesh::default() }.checked().unwrap(), Tetrahedron::Quadratic)
     }
 
     /// Σ (A/d)(m_a − m_b)² of the field m = g·x.

@@ -1,21 +1,63 @@
 //! The second kind of elastic domain: points that stand for a volume each, with a stencil for the deformation gradient there. A linear
-//! tetrahedron is one point with four nodes.
+//! tetrahedron is one point with four nodes, a quadratic one five with ten ([`super::tets`]).
 
 use crate::shape::TriMesh;
-use crate::space::stencil::{StencilBuf, Stencils};
-use glam::{DAffine3, DMat3, DVec3};
+use crate::space::stencil::{Stencil, Stencils};
+use glam::{DAffine3, DVec3};
 use std::collections::BTreeMap;
 
-/// Elastic points of a body.
+/// Elastic points of a body, element by element: as many of each.
 #[derive(Clone, Debug, Default)]
 pub struct Points {
     /// Place and deformation gradient of every point, with gradients.
     pub stencils: Stencils,
     /// Volume that every point stands for [m³].
     pub volume: Vec<f64>,
+    /// Points of an element, the last of which has its mean; zero without any.
+    pub per_element: usize,
+}
+
+/// What part of the material acts at a point.
+///
+/// Elements of several points are integrated selectively: at local points the material has the Lamé parameters (λ', μ) with
+/// λ' = λ μ c / (λ + μ c), and at the point that stands for the element's mean (λ − λ', 0). Where the strain is uniform both add up to
+/// (λ, μ). Near ν = ½ only the mean dilatation of an element is stiff, so nothing locks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Share {
+    /// All of it.
+    Whole,
+    /// Shear, and as much of λ as a local point bears.
+    Local,
+    /// The rest of λ.
+    Mean,
+}
+
+/// The most that λ is at local points, over μ: λ' < c μ. Ten is what ν = 0.455 has.
+pub const LOCAL: f64 = 10.0;
+
+impl Share {
+    /// All, as numbers of their own.
+    pub const ALL: [Share; 3] = [Share::Whole, Share::Local, Share::Mean];
+
+    /// Its Lamé parameters and their derivatives by Poisson's ratio, of those of the whole material.
+    pub fn of(self, (lambda, mu): (f64, f64), by_nu: (f64, f64)) -> [(f64, f64); 2] {
+        let (stiff, sum) = (LOCAL * mu, lambda + LOCAL * mu);
+        let local = lambda * stiff / sum;
+        let local_by_nu = (stiff * stiff * by_nu.0 + LOCAL * lambda * lambda * by_nu.1) / (sum * sum);
+        match self {
+            Share::Whole => [(lambda, mu), by_nu],
+            Share::Local => [(local, mu), (local_by_nu, by_nu.1)],
+            Share::Mean => [(lambda * lambda / sum, 0.0), (by_nu.0 - local_by_nu, 0.0)],
+        }
+    }
 }
 
 impl Points {
+    /// None yet, of elements with so many points.
+    pub fn new(per_element: usize) -> Points {
+        Points { per_element, ..Points::default() }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.volume.len()
@@ -26,20 +68,43 @@ impl Points {
         self.volume.is_empty()
     }
 
-    /// The affine field of the element that holds a place, or of the one that it lies outside of by the least, as a stencil; and how far
-    /// outside that is [m], zero inside.
-    pub fn carry(&self, nodes: &[DVec3], place: DVec3) -> (StencilBuf, f64) {
-        let mut best: Option<(f64, StencilBuf)> = None;
-        for (s, volume) in self.stencils.iter().zip(&self.volume) {
-            let away = place - s.at(nodes);
-            let value: Vec<f64> = s.value.iter().zip(s.gradient).map(|(w, g)| w + g.dot(away)).collect();
-            // A weight below zero is the share of the height over the opposite face that the place lies beyond it.
-            let outside = -value.iter().copied().fold(f64::INFINITY, f64::min) * volume.cbrt();
-            if best.as_ref().is_none_or(|b| outside < b.0) {
-                best = Some((outside, StencilBuf { nodes: s.nodes.to_vec(), value, gradient: s.gradient.to_vec() }));
-            }
+    /// Number of elements.
+    pub fn elements(&self) -> usize {
+        self.len() / self.per_element.max(1)
+    }
+
+    /// Element of a point.
+    pub fn element_of(&self, point: usize) -> usize {
+        point / self.per_element
+    }
+
+    /// Number of the point that has an element's mean.
+    pub fn mean_point(&self, element: usize) -> usize {
+        self.per_element * element + self.per_element - 1
+    }
+
+    /// What acts at a point.
+    pub fn share(&self, point: usize) -> Share {
+        match (self.per_element, point % self.per_element) {
+            (1, _) => Share::Whole,
+            (n, k) if k + 1 == n => Share::Mean,
+            _ => Share::Local,
         }
-        best.map_or_else(Default::default, |(outside, s)| (s, outside.max(0.0)))
+    }
+
+    /// Volume of an element [m³].
+    pub fn element_volume(&self, element: usize) -> f64 {
+        self.volume[self.mean_point(element)]
+    }
+
+    /// Place and deformation gradient of an element's mean: of a point of its own, or of its only one.
+    pub fn mean(&self, element: usize) -> Stencil<'_> {
+        self.stencils.get(self.mean_point(element))
+    }
+
+    /// The same of all elements.
+    pub fn means(&self) -> impl Iterator<Item = Stencil<'_>> + Clone {
+        (0..self.elements()).map(|e| self.mean(e))
     }
 }
 
@@ -99,31 +164,14 @@ impl TetMesh {
         }
         mesh
     }
-
-    /// Elastic points and nodal volumes: one point in the middle of each tetrahedron, a quarter of its volume at each node.
-    pub fn points(&self) -> (Points, Vec<f64>) {
-        let (mut points, mut node_volume) = (Points::default(), vec![0.0; self.nodes.len()]);
-        for t in &self.tets {
-            let x = t.map(|n| self.nodes[n as usize]);
-            let edges = DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-            let inverse = edges.inverse().transpose();
-            let others = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
-            let gradient = [-(others[0] + others[1] + others[2]), others[0], others[1], others[2]];
-            let volume = self.six_volumes(*t) / 6.0;
-            points.stencils.push_with_gradient(t, &[0.25; 4], &gradient);
-            points.volume.push(volume);
-            t.iter().for_each(|n| node_volume[*n as usize] += 0.25 * volume);
-        }
-        (points, node_volume)
-    }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// A box of 2 × 1 × 1 cubes of six tetrahedra each, and a node that none has.
-    pub(in crate::space) fn block() -> TetMesh {
+    pub(crate) fn block() -> TetMesh {
         let at = |i: usize, j: usize, k: usize| (i + 3 * (j + 2 * k)) as u32;
         let mut mesh = TetMesh::default();
         for (k, j, i) in (0..2).flat_map(|k| (0..2).flat_map(move |j| (0..3).map(move |i| (k, j, i)))) {
@@ -140,23 +188,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_block_has_its_volume_surface_and_affine_fields() {
+    fn a_block_has_a_surface_that_looks_outwards() {
         let mesh = block().checked().unwrap();
         assert_eq!(mesh.nodes.len(), 12);
-        let (points, node_volume) = mesh.points();
-        assert!((points.volume.iter().sum::<f64>() - 0.002).abs() < 1e-17 && points.volume.iter().all(|v| *v > 0.0));
-        assert!((node_volume.iter().sum::<f64>() - 0.002).abs() < 1e-17);
-        let f = DMat3::from_cols_array(&[1.2, 0.3, -0.1, 0.0, 0.9, 0.2, 0.1, 0.0, 1.1]);
-        let x: Vec<DVec3> = mesh.nodes.iter().map(|x| f * *x + DVec3::Y).collect();
-        for s in points.stencils.iter() {
-            assert!((0..3).all(|c| (s.gradient_of(&x).col(c) - f.col(c)).length() < 1e-13));
-        }
-        let (inside, outside) = (DVec3::new(0.13, 0.04, 0.07), DVec3::new(0.25, 0.05, 0.05));
-        for (place, far) in [(inside, 0.0), (outside, 0.01)] {
-            let (s, away) = points.carry(&mesh.nodes, place);
-            assert!((s.get().at(&x) - (f * place + DVec3::Y)).length() < 1e-13);
-            assert!((away > 0.0) == (far > 0.0) && away < 0.1);
-        }
         let surface = mesh.surface();
         assert_eq!((surface.vertices.len(), surface.triangles.len()), (12, 20));
         let solid: f64 = surface
@@ -165,6 +199,6 @@ pub(super) mod tests {
             .map(|t| t.map(|n| surface.vertices[n as usize]))
             .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
             .sum();
-        assert!((solid - 0.002).abs() < 1e-16, "the surface looks outwards: {solid}");
+        assert!((solid - 0.002).abs() < 1e-16, "{solid}");
     }
 }

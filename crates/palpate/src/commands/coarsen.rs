@@ -16,6 +16,7 @@ const AFTER_HELP: &str = "\
 Examples:
   palpate coarsen bunny.toml --cells 8                   8 cells along the longest side that move like the scene's own
   palpate coarsen bunny.toml --cell-size 0.02 --free material.youngs_modulus,material.stiffness_damping
+  palpate coarsen bunny.toml --edge-length 0.03            tetrahedra with edges of at most 3 cm
   palpate coarsen bunny.toml --cells 8 --out small && palpate simulate small/model.toml
 
 The scene is simulated as it is, points of its surface are followed, and numbers of the coarse body are fitted to their motion. A second
@@ -31,11 +32,14 @@ pub struct Arguments {
     /// Scene file of the fine body
     scene: PathBuf,
     /// Cells of the coarse body along its longest side
-    #[arg(long, value_name = "N", required_unless_present = "cell_size", conflicts_with = "cell_size", value_parser = count(1..=4096))]
+    #[arg(long, value_name = "N", required_unless_present_any = ["cell_size", "edge_length"], value_parser = count(1..=4096))]
     cells: Option<u64>,
     /// Edge of a cell of the coarse body [m]
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", conflicts_with = "cells")]
     cell_size: Option<f64>,
+    /// Longest edge of the coarse body's tetrahedra [m], where it is to be made of these
+    #[arg(long, value_name = "M", conflicts_with_all = ["cells", "cell_size"])]
+    edge_length: Option<f64>,
     /// Numbers that are fitted, separated by commas [default: modulus, Poisson's ratio, and the damping that the scene has]
     #[arg(long, value_name = "PATH", value_delimiter = ',')]
     free: Vec<String>,
@@ -55,10 +59,14 @@ pub struct Arguments {
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let fine = Experiment::open_without_recording(&a.scene)?;
-    let resolution = match (a.cells, a.cell_size) {
-        (Some(n), _) => Resolution::Cells(n as u32),
-        (None, Some(h)) if h > 0.0 && h.is_finite() => Resolution::CellSize(h),
-        (None, h) => return Err(Error::Input(format!("--cell-size: {} is not allowed: must be > 0 (m)", h.unwrap_or(f64::NAN)))),
+    let length = |name: &str, h: f64| match h > 0.0 && h.is_finite() {
+        true => Ok(h),
+        false => Err(Error::Input(format!("--{name}: {h} is not allowed: must be > 0 (m)"))),
+    };
+    let resolution = match (a.cells, a.cell_size, a.edge_length) {
+        (Some(n), ..) => Resolution::Cells(n as u32),
+        (None, Some(h), _) => Resolution::CellSize(length("cell-size", h)?),
+        (None, None, h) => Resolution::Edge(length("edge-length", h.unwrap_or(f64::NAN))?),
     };
     let (backend, note) = a.backend.choose(fine.plan(), 1)?;
     note.iter().for_each(|n| console.note(n));

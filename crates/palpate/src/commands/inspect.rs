@@ -200,12 +200,12 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
         lines.push(("open edges", text));
     }
     (content.cell_size, content.cells) = (body.length, Cells { all, full, cut });
-    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band().cells.len());
+    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band.cells.len());
     match body.cut {
         Some(_) => lines.extend([
             ("cell size", format!("{:.5} m{}", body.length, why(e, "object.cell_size"))),
             ("cells", format!("{all} ({full} full, {cut} cut)")),
-            ("band cells", format!("{} of {:.4} m", body.band().cells.len(), plan.band)),
+            ("band cells", format!("{} of {:.4} m", body.band.cells.len(), plan.band)),
         ]),
         None => tets::tetrahedra(e, content, lines),
     }

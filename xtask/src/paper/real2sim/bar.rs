@@ -33,9 +33,9 @@ const STEP: f64 = 1.0 / 120.0;
 
 /// The bar with its clamps; `material` and what follows is left out.
 fn bar(held: Held) -> String {
-    let mut text = format!(
-        "format = \"scene/1\"\ntitle = \"Bar of two parts\"\n\n[object]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.2, 0.03, 0.03] }} }}\ncell_size = 0.01\n\n\
-         [[clamp]]\nbox = {{ min = [-0.01, -0.01, -0.01], max = [0.01, 0.04, 0.04] }}\nmotion = \"shaken.csv\"\n\n"
+    let mut text = String::from(
+        "format = \"scene/1\"\ntitle = \"Bar of two parts\"\n\n[object]\nshape = { box = { min = [0, 0, 0], max = [0.2, 0.03, 0.03] } }\ncell_size = 0.01\n\n\
+         [[clamp]]\nbox = { min = [-0.01, -0.01, -0.01], max = [0.01, 0.04, 0.04] }\nmotion = \"shaken.csv\"\n\n",
     );
     if held == Held::Both {
         text += "[[clamp]]\nbox = { min = [0.19, -0.01, -0.01], max = [0.21, 0.04, 0.04] }\n\n";
@@ -108,7 +108,9 @@ pub fn run(folder: &Path, held: Held, kind: &str) -> Result<Figures, String> {
     known.sort_by(f64::total_cmp);
     let at_share =
         |s: f64| known.get(((known.len() as f64 * s) as usize).min(known.len().saturating_sub(1))).copied().unwrap_or(f64::NAN);
-    let mut say = |name: &str, x: f64| drop(figures.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        figures.insert(name.into(), x);
+    };
     say("cells with sd < 20 %", known.len() as f64);
     say("their error, median", at_share(0.5));
     say("their error, 95 %", at_share(0.95));

@@ -52,7 +52,9 @@ pub fn alone(data: &Path, made: Made) -> Result<Figures, String> {
         let e = beam(data, scene, &material(made))?;
         let fitted = e.fit(FitOptions::default()).map_err(|e| e.to_string())?;
         let (seen, simulated) = swings(&e, &fitted.result.theta[0], MARKER, guess).map_err(|e| e.to_string())?;
-        let mut say = |name: &str, x: f64| drop(out.insert(format!("{scene}: {name}"), x));
+        let mut say = |name: &str, x: f64| {
+            out.insert(format!("{scene}: {name}"), x);
+        };
         let modulus = found(&fitted, "material.youngs_modulus");
         say("E [kPa]", 1e-3 * modulus);
         say("rms [mm]", 1e3 * fitted.residual().0);
@@ -68,7 +70,8 @@ pub fn alone(data: &Path, made: Made) -> Result<Figures, String> {
 
 /// Both beams at once with one law.
 pub fn together(data: &Path, law: Law) -> Result<Figures, String> {
-    let shared = "per_scene = true      # of this recording alone, also in a joint fit\n\n[[fit.parameter]]\npath   = \"time.start\"";
+    let shared =
+        "per_scene = true      # of this recording alone, also in a joint fit\n\n[[fit.parameter]]\npath   = \"time.start\"";
     let damping = "path   = \"material.stiffness_damping\"\nstart  = 3.0e-3\nbounds = [1.0e-6, 1.0]\n";
     let mut changes = material(Made::Cells);
     // The damping is one for both beams, the start each one's own.
@@ -101,7 +104,8 @@ pub fn together(data: &Path, law: Law) -> Result<Figures, String> {
         out.insert(format!("{scene}: damping ratio over measured"), simulated.damping_ratio() / seen.damping_ratio());
         out.insert(format!("{scene}: frequency off [%]"), 100.0 * (simulated.frequency / seen.frequency - 1.0));
     }
-    let numbers = ["material.viscosity.coefficient", "material.viscosity.exponent", "effect.0.loss", "material.stiffness_damping"];
+    let numbers =
+        ["material.viscosity.coefficient", "material.viscosity.exponent", "effect.0.loss", "material.stiffness_damping"];
     for p in fitted.result.parameters.iter().filter(|p| numbers.contains(&p.path.as_str())) {
         out.insert(p.path.clone(), p.value);
     }

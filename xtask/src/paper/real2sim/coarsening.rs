@@ -52,7 +52,9 @@ pub fn run(data: &Path, folder: &Path, cells: f64) -> Result<Figures, String> {
     };
     let d = coarsen(&fine, &folder.join("coarse"), options).map_err(|e| e.to_string())?.document;
     let mut out = Figures::new();
-    let mut say = |name: &str, x: f64| drop(out.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        out.insert(name.into(), x);
+    };
     say("nodes, fine", d.nodes[0] as f64);
     say("nodes, coarse", d.nodes[1] as f64);
     say("before [mm]", 1e3 * d.before);

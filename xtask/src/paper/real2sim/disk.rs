@@ -91,7 +91,9 @@ pub fn run(folder: &Path, free: Free) -> Result<Figures, String> {
     let run = &fitted.result.runs[fitted.result.best];
     println!("{}", fitted.verdict);
     let mut out = Figures::new();
-    let mut say = |name: &str, x: f64| drop(out.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        out.insert(name.into(), x);
+    };
     say("cells", experiment.plan().body.elements() as f64);
     say("free values", run.end.len() as f64);
     say("miss at the start [mm]", fitted.before[0].as_ref().map_or(f64::NAN, |r| 1e3 * r.rms));

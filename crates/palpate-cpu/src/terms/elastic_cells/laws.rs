@@ -6,7 +6,7 @@
 //! through q: ∇a = Kq/V, ∇ε constant, and q(x) by [`CellPose`].
 
 mod derivatives;
-mod material;
+pub(in crate::terms) mod material;
 mod viscosity;
 
 use super::{Cells, Corners, dot24 as dot, pick};
@@ -15,6 +15,7 @@ use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply}
 use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
 use palpate_model::materials::Solid;
+use palpate_model::materials::stretching::PAIRS;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::plan::{Physics, Plan};
 use viscosity::{Flow, FlowState};
@@ -24,8 +25,8 @@ use viscosity::{Flow, FlowState};
 pub struct CellActing {
     /// Number of the effect in the scene.
     pub effect: usize,
-    law: &'static dyn Cell,
-    p: Vec<f64>,
+    pub(in crate::terms) law: &'static dyn Cell,
+    pub(in crate::terms) p: Vec<f64>,
     /// Its amplitudes are zero: it has no energy, only derivatives by them.
     pub absent: bool,
 }
@@ -128,9 +129,6 @@ fn add(a: &mut V24, factor: f64, b: &V24) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
 }
 
-/// Rows and columns of the strain components xx, yy, zz, yz, zx, xy.
-const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [2, 0], [0, 1]];
-
 /// Gradient of mean strain component c by q.
 fn strain_row(c: usize, gradient: &[DVec3; 8]) -> V24 {
     let [a, b] = PAIRS[c];
@@ -205,7 +203,7 @@ impl Local<'_> {
 }
 
 /// Input of a law: scalars, then parameters.
-fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
+pub(in crate::terms) fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
     let mut z = [0.0; ENERGY + MOST];
     z[..scalars.len()].copy_from_slice(scalars);
     z[scalars.len()..scalars.len() + p.len()].copy_from_slice(p);

@@ -14,6 +14,7 @@ use crate::device::pipelines::shared::structs::{
 };
 use crate::device::{GpuError, Maker};
 use crate::layout::EffectSite;
+use crate::world::mass::MassTable;
 use palpate_model::effects::cell::{ENERGY, Part};
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
@@ -65,6 +66,9 @@ impl Effects {
             let count = places.len() as u32;
             let mut row = None;
             let site = match law.site {
+                Site::Cells(_) | Site::Clamps(_) if plan.body.cut.is_none() => {
+                    return Err(GpuError::Plan { what: format!("\"{}\" on a body of tetrahedra", law.kind) });
+                }
                 Site::Nodes(_) => Some(AT_NODES),
                 Site::Surface(_) => Some(AT_SURFACE),
                 Site::Contact(_) => Some(AT_CONTACT),
@@ -177,14 +181,21 @@ impl Effects {
         self.first_rows[effect].map(|first| first + slot)
     }
 
-    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells` (or elastic points).
-    pub(crate) fn sizes(&self, members: usize, nodes: usize, cells: usize, clamps: usize) -> Vec<(&'static str, usize)> {
+    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells` (or tetrahedra) and so many entries of a mass matrix.
+    pub(crate) fn sizes(
+        &self,
+        members: usize,
+        nodes: usize,
+        cells: usize,
+        masses: usize,
+        clamps: usize,
+    ) -> Vec<(&'static str, usize)> {
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
         let mut all = vec![
             ("effect_values", members * self.stride as usize),
             ("effect_measures", members * self.rows as usize * nodes),
             ("moduli", of(FIELD_MODULUS, cells)),
-            ("densities", of(FIELD_DENSITY, nodes)),
+            ("densities", if masses == 0 { of(FIELD_DENSITY, nodes) } else { members * masses }),
             ("agings", of(FIELD_AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
         ];
         all.extend(self.rest_sizes(members, nodes, cells));
@@ -200,11 +211,12 @@ impl Effects {
         &self,
         gpu: &M,
         plan: &Plan,
+        mass: &MassTable,
         batch: &[Physics],
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<(), GpuError> {
         let body = &plan.body;
-        let sizes = self.sizes(batch.len(), body.nodes.len(), body.elements(), plan.clamps.len());
+        let sizes = self.sizes(batch.len(), body.nodes.len(), body.elements(), mass.entries(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {
@@ -222,7 +234,10 @@ impl Effects {
             }
             let changes = Changes::new(plan, physics);
             changes.modulus.iter().for_each(|m| put(&mut data[2], m));
-            changes.density.iter().for_each(|d| put(&mut data[3], d));
+            match (mass.entries(), changes.density.as_deref()) {
+                (0, density) => density.iter().for_each(|d| put(&mut data[3], d)),
+                (_, density) => put(&mut data[3], &mass.matrix(plan, density)),
+            }
         }
         if self.bits & FIELD_AGING != 0 {
             data[4] = self.agings(plan, batch);

@@ -35,7 +35,8 @@ pub(super) fn entities(file: &mut Bytes, msh: &mut Msh) -> Result<(), Fault> {
 pub(super) fn nodes(file: &mut Bytes, msh: &mut Msh) -> Result<(), Fault> {
     let width = msh.width;
     let (blocks, all) = (file.size(width)?, file.size(width)?);
-    (file.size(width)?, file.size(width)?);
+    file.size(width)?;
+    file.size(width)?;
     file.room(all, 4 * file.width(6), "nodes")?;
     let least = 3 * file.width(4) + file.width(width);
     for _ in 0..file.room(blocks, least, "blocks of nodes")? {
@@ -61,7 +62,8 @@ pub(super) fn nodes(file: &mut Bytes, msh: &mut Msh) -> Result<(), Fault> {
 pub(super) fn elements(file: &mut Bytes, msh: &mut Msh) -> Result<(), Fault> {
     let width = msh.width;
     let (blocks, all) = (file.size(width)?, file.size(width)?);
-    (file.size(width)?, file.size(width)?);
+    file.size(width)?;
+    file.size(width)?;
     file.room(all, 2 * file.width(width), "elements")?;
     let least = 3 * file.width(4) + file.width(width);
     let mut nodes = Vec::new();

@@ -47,8 +47,11 @@ fn numbers<T: std::str::FromStr>((line, text): (usize, &str), least: usize) -> R
     Ok(all)
 }
 
+/// Numbers of a header, and the rows behind it with the lines that they stand in.
+type Rows<'a> = (Vec<u64>, Vec<(usize, &'a str)>);
+
 /// The head of a file, and as many rows as it announces.
-fn table<'a>(rows: &[(usize, &'a str)], things: &str) -> Result<(Vec<u64>, Vec<(usize, &'a str)>), Fault> {
+fn table<'a>(rows: &[(usize, &'a str)], things: &str) -> Result<Rows<'a>, Fault> {
     let (head, rest) = rows.split_first().ok_or_else(|| Fault::from("is empty"))?;
     let head: Vec<u64> = numbers(*head, 1)?;
     match usize::try_from(head[0]).ok().and_then(|n| rest.get(..n)) {

@@ -87,7 +87,7 @@ fn outline(bytes: &[u8]) -> Result<Outline<'_>, Fault> {
         match xml.read_event().map_err(|e| broken(e.to_string()))? {
             Event::Eof => break,
             Event::Start(tag) | Event::Empty(tag) => match tag.name().as_ref() {
-                b"VTKFile" => out.store = Store::new(&Attributes(&tag)).map_err(Fault::from)?,
+                b"VTKFile" => out.store = Store::new(&Attributes(&tag))?,
                 b"UnstructuredGrid" => grid = true,
                 b"Piece" => {
                     let count = |name| Attributes(&tag).number(name);

@@ -6,7 +6,6 @@ use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
 use crate::effects::Site;
 use crate::mechanics::lame::lame;
-use crate::observation::Observation;
 use crate::plan::ClampSite;
 use crate::scene::{BodySource, Clamp, ClampRegion, Object, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
@@ -17,9 +16,9 @@ use crate::space::stuffing::{StuffingError, stuff};
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
-/// Stiffness of a held node's spring over that of its share of the body: it gives way by a millionth of what the body is strained, and
-/// block-Jacobi takes the difference in size away again.
-pub const HELD: f64 = 1e6;
+/// Stiffness of a held node's spring over that of its share of the body: it gives way by a hundred-millionth of what the body is strained, which
+/// leaves clamped nodes of bodies as large as a hand within a nanometre of their path; and block-Jacobi takes the difference in size away again.
+pub const HELD: f64 = 1e8;
 
 /// Cells in the box around a shape whose volume is measured.
 const REFERENCE_CELLS: f64 = 1e5;
@@ -48,20 +47,17 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
 /// Refuses what only cut cells have.
 pub(super) fn refuse_what_needs_cells(scene: &Scene) -> Result<(), PlanError> {
     for (i, effect) in scene.effects.iter().enumerate() {
-        if matches!(effect.law().site, Site::Cells(_) | Site::Rest(_) | Site::Clamps(_) | Site::Edges(_)) {
-            let message = format!("\"{}\" acts on cells of a lattice, and this body is made of tetrahedra", effect.law().kind);
+        let why = match effect.law().site {
+            Site::Edges(_) => {
+                "moves the edge of what is held within cells, and of a body of tetrahedra whole nodes are held: change the clamp's box"
+            }
+            Site::Rest(_) => "acts on cells of a lattice, and this body is made of tetrahedra",
+            _ => continue,
+        };
+        {
+            let message = format!("\"{}\" {why}", effect.law().kind);
             return Err(error(format!("effect.{i}.kind"), message));
         }
-    }
-    Ok(())
-}
-
-/// Depth points are looked up in the lattice around a body, which one of tetrahedra does not have.
-pub(super) fn refuse_depth(body: &Body, observation: &Observation) -> Result<(), PlanError> {
-    let seen = observation.frames.iter().any(|f| !f.points.is_empty());
-    if seen && !body.points.is_empty() {
-        let message = "a body of tetrahedra cannot be compared with depth points yet; use a surface mesh, or markers and tracks";
-        return Err(error("object.volume_mesh", message.into()));
     }
     Ok(())
 }
@@ -90,7 +86,8 @@ pub(super) fn clamp_site(
             (held, region)
         }
         ClampRegion::Group(name) => {
-            let held = group(name, scene).map_err(|message| error(format!("clamp.{i}.group"), message))?;
+            let mut held = group(name, scene).map_err(|message| error(format!("clamp.{i}.group"), message))?;
+            held.sort_unstable();
             let places = || held.iter().map(|n| body.nodes[*n as usize]);
             let (min, max) = (places().fold(DVec3::INFINITY, DVec3::min), places().fold(DVec3::NEG_INFINITY, DVec3::max));
             (held, ClipBox { to_frame: DAffine3::IDENTITY, min, max })
@@ -98,9 +95,28 @@ pub(super) fn clamp_site(
     };
     let (lambda, mu) = lame(scene.material.youngs_modulus, scene.material.poisson_ratio);
     let spring = |volume: f64| HELD * (lambda + 2.0 * mu) * volume / body.length.powi(2);
-    let nodes = held.into_iter().map(|n| (n, spring(body.node_volume[n as usize]))).collect();
+    let nodes: Vec<(u32, f64)> = held.into_iter().map(|n| (n, spring(body.node_volume[n as usize]))).collect();
     let edge = Arc::new(Edge::new(shape.clone(), SUBDIVISIONS, region, Vec::new()));
-    Ok(ClampSite { cells: Vec::new(), nodes, motion: clamp.motion.clone(), edge })
+    let areas = areas(body, &nodes);
+    Ok(ClampSite { cells: Vec::new(), nodes, areas, motion: clamp.motion.clone(), edge })
+}
+
+/// What a compliant layer holds of a node within the body, over its volume and times the length of an element: as of cells, whose held volume gives
+/// way by 20 ℓ/h.
+const WITHIN: f64 = 20.0;
+
+/// Area of the held surface, which are the patches whose nodes are all held, that each node stands for [m²].
+fn areas(body: &Body, held: &[(u32, f64)]) -> Vec<f64> {
+    let place = |n: &u32| held.binary_search_by_key(n, |h| h.0).ok();
+    let mut areas = vec![0.0; held.len()];
+    for (patch, s) in body.pieces() {
+        let Some(places) = s.nodes.iter().map(place).collect::<Option<Vec<usize>>>() else { continue };
+        // Functions of second degree are negative at some corners, and springs must not be.
+        let whole: f64 = s.value.iter().map(|w| w.max(0.0)).sum();
+        places.iter().zip(s.value).for_each(|(k, w)| areas[*k] += patch.area * w.max(0.0) / whole);
+    }
+    let within = |n: u32| WITHIN * body.node_volume[n as usize] / body.length;
+    areas.iter().zip(held).map(|(a, h)| if *a > 0.0 { *a } else { within(h.0) }).collect()
 }
 
 /// The nodes of a body inside a box.
