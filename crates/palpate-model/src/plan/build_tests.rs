@@ -260,3 +260,30 @@ fn a_clamp_that_only_touches_the_body_has_an_edge() {
     let site = &whole.clamps[0];
     assert!(site.edge.cells(&whole.body, &site.cells, -0.05).iter().all(|h| h.near.is_none()));
 }
+
+#[test]
+fn a_shape_that_is_filled_keeps_its_volume_and_turns_with_its_pose() {
+    let mut scene = scene();
+    scene.object.source = BodySource::Analytic(Analytic::Ball { radius: 0.05, center: DVec3::new(0.1, 0.0, 0.0) });
+    for edge in [0.05, 0.03] {
+        scene.object.resolution = Resolution::Edge(edge);
+        scene.object.pose = DAffine3::IDENTITY;
+        let (mesh, kept) = made(&scene.object).unwrap();
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.05f64.powi(3);
+        // Chords of an eighth of the edge are missing in what measures the volume.
+        assert!((mesh.volume() / exact - 1.0).abs() < 0.01, "{edge} m: {kept:?}, {} m³", mesh.volume());
+        assert!(kept.error < -0.01 && kept.moved > 0.0, "{edge} m: {kept:?}");
+        scene.object.pose = DAffine3::from_rotation_translation(DQuat::from_rotation_z(0.7), DVec3::Y);
+        let (turned, _) = made(&scene.object).unwrap();
+        assert_eq!(turned, mesh.transformed(&scene.object.pose), "the mesh does not depend on the pose");
+    }
+    scene.clamps = vec![Clamp::group("base")];
+    let e = build_plan(&scene, Observation::default(), &[]).unwrap_err();
+    assert_eq!(e.key, "clamp.0.group");
+    assert!(e.message.contains("the tetrahedra of this body are made here: give a box"), "{e}");
+    scene.object.resolution = Resolution::CellSize(0.02);
+    let e = build_plan(&scene, Observation::default(), &[]).unwrap_err();
+    assert!(e.key == "clamp.0.group" && e.message.contains("this body is cut out of a lattice: give a box"), "{e}");
+    scene.object.resolution = Resolution::Edge(1e-5);
+    assert_eq!(build_plan(&scene, Observation::default(), &[]).unwrap_err().key, "object.edge_length");
+}
