@@ -226,11 +226,11 @@ impl TetMesh {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// A box of 2 × 1 × 1 cubes of six tetrahedra each, and a node that none has.
-    pub(in crate::space) fn block() -> TetMesh {
+    pub(crate) fn block() -> TetMesh {
         let at = |i: usize, j: usize, k: usize| (i + 3 * (j + 2 * k)) as u32;
         let mut mesh = TetMesh::default();
         for (k, j, i) in (0..2).flat_map(|k| (0..2).flat_map(move |j| (0..3).map(move |i| (k, j, i)))) {
