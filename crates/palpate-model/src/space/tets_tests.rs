@@ -1,3 +1,5 @@
+//! Fields, shares, masses and places of bodies of tetrahedra.
+
 use super::*;
 use crate::space::points::Share;
 use crate::space::points::tests::block;
