@@ -16,6 +16,8 @@ mod mixture;
 mod posterior;
 mod precision;
 #[cfg(test)]
+mod precision_tests;
+#[cfg(test)]
 mod tests;
 
 pub use evidence::Tried;
