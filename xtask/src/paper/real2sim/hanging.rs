@@ -32,7 +32,9 @@ pub fn run(data: &Path, kind: &str) -> Result<Figures, String> {
     let (modulus, volume) = moduli(e.plan(), &fitted);
     let x: Vec<f64> = e.plan().body.middles().map(|m| m.x).collect();
     let ln: Vec<f64> = modulus.iter().map(|m| m.ln()).collect();
-    let mut say = |name: &str, x: f64| drop(figures.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        figures.insert(name.into(), x);
+    };
     say("residual of two parts [mm]", 1e3 * two.residual().0);
     for (k, name) in ["free", "clamped"].iter().enumerate() {
         let part = &two.result.parameters[k];

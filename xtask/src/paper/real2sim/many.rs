@@ -82,7 +82,9 @@ pub fn run(folder: &Path) -> Result<Figures, String> {
     let fitted = e.fit(FitOptions { backend: Backend::Cpu, ..FitOptions::default() }).map_err(|e| fail(&e))?;
     let mut figures = common(&e, &fitted)?;
     let run = &fitted.result.runs[0];
-    let mut say = |name: &str, x: f64| drop(figures.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        figures.insert(name.into(), x);
+    };
     say("iterations", run.iterations as f64);
     say("seconds an iteration, all included", fitted.result.seconds / run.iterations.max(1) as f64);
     // The parts, at the field that was found.

@@ -113,7 +113,9 @@ fn common(experiment: &Experiment, fitted: &Fitted) -> Result<Figures, String> {
     let (rms, noise, points) = fitted.residual();
     let run = &fitted.result.runs[fitted.result.best];
     let mut out = Figures::new();
-    let mut say = |name: &str, x: f64| drop(out.insert(name.into(), x));
+    let mut say = |name: &str, x: f64| {
+        out.insert(name.into(), x);
+    };
     say("cells", experiment.plan().body.elements() as f64);
     say("residual [mm]", 1e3 * rms);
     say("residual of noise [mm]", 1e3 * noise);
