@@ -14,10 +14,11 @@ use rand_chacha::ChaCha8Rng;
 
 /// Most directions.
 const MOST: usize = 96;
-/// The search ends where what is left of A within the directions found is below this, in the product of P: the noise hides the rest.
-const LEFT: f64 = 0.05;
+/// The search ends where what is left of A beside the directions found is below this, in the product of P. The noise hides all below one; priors that are
+/// rougher than P count more of it, and their evidence would be too good without.
+const LEFT: f64 = 1e-3;
 /// Smaller eigenvalues are what is left of the search.
-const FAINT: f64 = 1e-3;
+const FAINT: f64 = 1e-4;
 /// Most numbers beside fields.
 pub(super) const MOST_NUMBERS: usize = 64;
 /// Precision of a number without a prior: a standard deviation of 5 of what an optimiser sees, next to nothing.
