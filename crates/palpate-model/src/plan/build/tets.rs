@@ -12,7 +12,9 @@ use crate::shape::{Shape, shape_of};
 use crate::space::body::Body;
 use crate::space::kept_volume::KeptVolume;
 use crate::space::points::TetMesh;
+use crate::space::stencil::Stencil;
 use crate::space::stuffing::{StuffingError, stuff};
+use crate::space::tets::EDGES;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
@@ -88,6 +90,7 @@ pub(super) fn clamp_site(
         ClampRegion::Group(name) => {
             let mut held = group(name, scene).map_err(|message| error(format!("clamp.{i}.group"), message))?;
             held.sort_unstable();
+            hold_middles(&mut held, body);
             let places = || held.iter().map(|n| body.nodes[*n as usize]);
             let (min, max) = (places().fold(DVec3::INFINITY, DVec3::min), places().fold(DVec3::NEG_INFINITY, DVec3::max));
             (held, ClipBox { to_frame: DAffine3::IDENTITY, min, max })
@@ -130,7 +133,22 @@ fn inside(region: &ClipBox, body: &Body) -> Vec<u32> {
     (0u32..).zip(&body.nodes).filter(|(_, x)| inside(x)).map(|(n, _)| n).collect()
 }
 
-/// The nodes of a named group of the body's volume mesh, or why there are none.
+/// Adds the nodes in the middle of edges that have both ends among the corners held, in order.
+fn hold_middles(held: &mut Vec<u32>, body: &Body) {
+    let has = |n: u32| held.binary_search(&n).is_ok();
+    let middle = |s: Stencil| {
+        let own = s.nodes.to_vec();
+        let of = move |k: usize| own.get(4 + k).map(|m| (own[EDGES[k][0]], own[EDGES[k][1]], *m));
+        (0..EDGES.len()).filter_map(of).collect::<Vec<_>>()
+    };
+    let middles: Vec<u32> =
+        body.points.means().flat_map(middle).filter(|(a, b, _)| has(*a) && has(*b)).map(|(.., m)| m).collect();
+    held.extend(middles);
+    held.sort_unstable();
+    held.dedup();
+}
+
+/// The corners of a named group of the body's volume mesh, or why there are none.
 fn group(name: &str, scene: &Scene) -> Result<Vec<u32>, String> {
     let BodySource::Tetrahedra { path, mesh, .. } = &scene.object.source else {
         return Err("names a group of a volume mesh, and the tetrahedra of this body are made here: give a box".into());
