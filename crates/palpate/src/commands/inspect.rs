@@ -1,5 +1,6 @@
 //! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
 
+mod identify;
 mod tets;
 
 use crate::catalogue;
@@ -8,21 +9,18 @@ use crate::commands::devices;
 use crate::error::Error;
 use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
-use crate::identify::identify;
 use crate::memory::{Demand, adapter};
 use crate::options::BackendName;
 use crate::results::inspection::{
-    CameraInspection, Cells, Constraints, Identification, Images, Inspected, InspectionDocument, Markers, Observed,
-    RecordingInspection, SceneInspection, SequenceInspection, Time,
+    CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
+    SceneInspection, SequenceInspection, Time,
 };
 use crate::results::{self, finite, inspection};
 use crate::suited::{Suited, suited};
 use clap::Args;
-use palpate_engine::number;
 use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, Sequence, read_recording};
 use palpate_model::observation::{Channel, ReadingKind};
-use palpate_model::params::unit_behind;
 use palpate_model::plan::Physics;
 use palpate_model::scene::BodySource;
 use std::path::{Path, PathBuf};
@@ -85,8 +83,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let (mut content, mut lines) = scene(&e);
         if a.identify {
             let (backend, _) = a.backend.choose(e.plan(), 1)?;
-            let found = identify(&e, backend, |what| console.note(&format!("looking at {what}")))?;
-            lines.extend(identified(&found));
+            let found = crate::identify::identify(&e, backend, |what| console.note(&format!("looking at {what}")))?;
+            lines.extend(identify::identified(&found));
             content.identification = Some(found);
         }
         ("scene", Inspected::Scene(Box::new(content)), lines, e.warnings().to_vec())
@@ -306,30 +304,6 @@ fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
     lines.push(("to be found", text));
     content.free = Some(paths);
-}
-
-/// What the recording would determine, and which second motion would help.
-fn identified(found: &Identification) -> Lines {
-    let unit = |u: &str| unit_behind(u);
-    let mut lines = Lines::new();
-    for n in &found.numbers {
-        let relative = n.relative.map_or(String::new(), |r| format!(" ({:.2} %)", 100.0 * r));
-        let with = if n.with.is_empty() { String::new() } else { format!("; not told apart from {}", n.with.join(", ")) };
-        let (value, error) = (number(n.value), number(n.error));
-        let text = match n.determined {
-            true => format!("{} = {value}{}: expected ± {error}{}{relative}{with}", n.path, unit(&n.unit), unit(&n.unit)),
-            false => format!("{}: undetermined by this recording{with}", n.path),
-        };
-        lines.push(("identify", text));
-    }
-    for m in found.motions.iter().take(3) {
-        let gains = found.numbers.iter().zip(&m.errors).filter(|(n, e)| **e < 0.5 * n.error);
-        let gains: Vec<String> = gains.take(3).map(|(n, e)| format!("{} to ± {}{}", n.path, number(*e), unit(&n.unit))).collect();
-        let gains = if gains.is_empty() { "no number to less than half its error".into() } else { gains.join(", ") };
-        lines.push(("next", format!("{}: {:.1} nats more; brings {gains}", m.motion, m.information)));
-    }
-    lines.extend(found.warnings.iter().map(|w| ("left out", w.clone())));
-    lines
 }
 
 /// Smallest and largest of some numbers; zeros without any.
