@@ -10,7 +10,6 @@
 //! The model of the cost is a matrix from forward sensitivities, or products with it ([`super::conjugate`]): the way is the same.
 
 use super::conjugate::{self, Model};
-use super::metric::{self, Metric};
 use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 use crate::settings::Walk;
@@ -31,8 +30,7 @@ enum Curvature {
     /// As the matrix of every sample.
     Matrix,
     /// By products; its size along the first gradient stands for the largest diagonal entry.
-    /// With priors of fields it is measured in their precision, of size one.
-    Products { size: f64, steepest: f64, numbers: Vec<(usize, f64)> },
+    Products { size: f64, steepest: f64 },
 }
 
 /// With the curvature of forward sensitivities.
@@ -43,14 +41,9 @@ pub fn minimise(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, 
 /// With products by tangent and adjoint, for very many parameters.
 pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, Stop> {
     let g = search.projected_gradient(&z, &at.gradient);
-    if search.priors.is_some() {
-        let numbers = metric::numbers(search, &z, &at)?;
-        let steepest = Metric::new(search, &z, &at, &numbers)?.steepness(&g);
-        return walk(search, z, at, &Curvature::Products { size: 1.0, steepest, numbers });
-    }
     let square = dot(&g, &g);
     let size = if square > 0.0 { dot(&g, &search.product(&z, &g)?) / square } else { 0.0 };
-    walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt(), numbers: Vec::new() })
+    walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt() })
 }
 
 fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
@@ -133,9 +126,8 @@ fn step(
     longest: f64,
 ) -> Result<Option<(Vec<f64>, f64)>, Stop> {
     let q = z.len();
-    if let Curvature::Products { steepest, numbers, .. } = curvature {
-        let metric = Metric::new(search, z, at, numbers)?;
-        let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest, metric: &metric };
+    if let Curvature::Products { steepest, .. } = curvature {
+        let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest };
         return conjugate::step(search, &model).map(Some);
     }
     let mut h = at.curvature.clone();

@@ -6,5 +6,5 @@ mod ending;
 mod errors;
 mod fits;
 mod known;
-pub(crate) mod models;
+mod models;
 mod resume;

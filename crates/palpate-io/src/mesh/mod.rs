@@ -1,11 +1,11 @@
-//! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh; and volume meshes to tetrahedra.
+//! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh.
 
+mod msh;
 mod parse;
 #[cfg(test)]
 mod tests;
-mod volume;
 
-pub use volume::read_tets;
+pub use msh::read_tets;
 
 use crate::error::{InputError, Loaded, number};
 use glam::DVec3;

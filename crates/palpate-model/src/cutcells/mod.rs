@@ -19,4 +19,3 @@ pub mod held;
 mod moments;
 pub mod places;
 pub mod pullback;
-pub mod shadow;

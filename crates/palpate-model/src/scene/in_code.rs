@@ -10,7 +10,6 @@ impl Scene {
             title: String::new(),
             object,
             material,
-            curves: PrincipalStretch::default(),
             gravity: DVec3::ZERO,
             clamps: Vec::new(),
             planes: Vec::new(),
@@ -21,7 +20,6 @@ impl Scene {
             time: Time::default(),
             solver: Solver::default(),
             observation: None,
-            targets: Vec::new(),
             fit: None,
         }
     }
@@ -37,7 +35,6 @@ impl Material {
             poisson_ratio,
             mass_damping: 0.0,
             stiffness_damping: 0.0,
-            viscosity: None,
         }
     }
 }
@@ -45,32 +42,6 @@ impl Material {
 impl Clamp {
     /// A box of the world that is held still.
     pub fn still(min: DVec3, max: DVec3) -> Clamp {
-        Clamp { region: ClampRegion::Box { min, max, object_frame: false }, motion: None, motion_path: None }
-    }
-
-    /// A named group of nodes of a volume mesh that is held still.
-    pub fn group(name: &str) -> Clamp {
-        Clamp { region: ClampRegion::Group(name.into()), motion: None, motion_path: None }
-    }
-
-    /// Lowest and highest corner of its box [m], where it has one.
-    pub fn corners(&self) -> Option<(DVec3, DVec3)> {
-        match self.region {
-            ClampRegion::Box { min, max, .. } => Some((min, max)),
-            ClampRegion::Group(_) => None,
-        }
-    }
-
-    /// The same with its box in the mesh's own coordinates.
-    pub fn in_object_frame(mut self) -> Clamp {
-        if let ClampRegion::Box { object_frame, .. } = &mut self.region {
-            *object_frame = true;
-        }
-        self
-    }
-
-    /// The same, moved.
-    pub fn moved(self, motion: Option<RigidMotion>) -> Clamp {
-        Clamp { motion, ..self }
+        Clamp { min, max, object_frame: false, motion: None, motion_path: None }
     }
 }

@@ -8,7 +8,6 @@
 
 pub mod batch;
 pub mod checkpoint;
-pub mod coarsening;
 pub mod devices;
 pub mod diagnosis;
 pub mod effects;
