@@ -198,7 +198,7 @@ fn include_cells(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out
 fn include_materials(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
     include(shaders, "shared/materials", variant, done, out);
     let mut cases = String::new();
-    for (number, model) in materials::ALL.iter().enumerate().filter(|(_, model)| !model.is_linear) {
+    for (number, model) in materials::ALL.iter().enumerate().filter(|(_, model)| !model.is_linear && model.has_twin()) {
         let name = model.name.replace('-', "_");
         include(shaders, &format!("materials/{name}"), variant, done, out);
         writeln!(cases, "        case {number}u: {{ return {name}(h, lambda, mu); }}").expect("a String takes all");

@@ -1,6 +1,5 @@
-//! Adds mass damping, and the springs of nodes that are held, to the diagonal of the matrix of a body without cells.
-// use shared/mix
-// use shared/inertia
+//! Adds the springs of nodes that are held to the diagonal of the matrix of a body without cells.
+// use shared/grid
 // use shared/held
 
 var<storage, read> diagonals: array<u32>;
@@ -13,8 +12,7 @@ fn brace_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !p.live {
         return;
     }
-    let m = members[p.member];
-    let added = mix_of(m).drag * node_mass(m, p.member, p.item) + spring_of(p.item);
+    let added = spring_of(p.item);
     let at = (p.member * shape.blocks + diagonals[p.item]) * 9u;
     for (var axis = 0u; axis < 3u; axis++) {
         values[at + 4u * axis] += added;

@@ -17,16 +17,18 @@ fn couple_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let matrix = stiffness_of(c);
     let by_d = loss_of(c, w, old, vec2(1.0, 0.0));
     let by_old = loss_of(c, w, old, vec2(0.0, 1.0)).z;
+    let flow = flow_way(c, fresh, old);
     var f = vec3(0.0);
     if call.extra == ALONG {
         let dq = strain_rate(old.pose, d, c.sign);
         let along = by_old * mean(c, old.kq, dq) - by_d.z * mean(c, w.kd, dq);
-        f = force(fresh.pose, c.young * (along * w.kd - by_d.y * stiff(matrix, c.number, dq)), c.sign);
+        let y = c.young * (along * w.kd - by_d.y * stiff(matrix, c.number, dq));
+        f = force(fresh.pose, y + flow_by_old(c, flow, dq), c.sign);
     } else {
         let dq = strain_rate(fresh.pose, d, c.sign);
         let along = mean(c, w.kd, dq);
         let y = along * (by_old * old.kq - by_d.z * w.kd) - by_d.y * stiff(matrix, c.number, dq);
-        f = force(old.pose, c.young * y, c.sign);
+        f = force(old.pose, c.young * y + flow_by_old(c, flow, dq), c.sign);
     }
     // The old state's own force, whose derivative is symmetric.
     let body = centred(transpose(old.pose.r) * d);

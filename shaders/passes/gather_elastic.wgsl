@@ -1,6 +1,6 @@
-//! Adds what elastic points and patches give to every 3 × 3 block of the matrix of a body without cells, in a fixed order.
-// use shared/grid
-// use shared/stencil
+//! Adds what elastic points and patches give to every 3 × 3 block of the matrix of a body without cells, in a fixed order, and mass damping.
+// use shared/mix
+// use shared/inertia
 // use shared/elastic_asks
 
 struct Pair { // mirrored
@@ -54,10 +54,12 @@ fn gather_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             sum += mat3x3(vec3(d.x, o.x, o.y), vec3(o.x, d.y, o.z), vec3(o.y, o.z, d.z));
         }
     }
+    let m = members[p.member];
+    let damped = mix_of(m).drag * block_mass(m, p.member, p.item);
     let at = (p.member * shape.blocks + p.item) * 9u;
     for (var row = 0u; row < 3u; row++) {
         for (var column = 0u; column < 3u; column++) {
-            values[at + 3u * row + column] += sum[column][row];
+            values[at + 3u * row + column] += sum[column][row] + select(0.0, damped, row == column);
         }
     }
 }

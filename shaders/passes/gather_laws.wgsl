@@ -16,6 +16,16 @@ fn outer(a: vec3<f32>, b: vec3<f32>) -> mat3x3<f32> {
     return mat3x3(a * b.x, a * b.y, a * b.z);
 }
 
+// A block of a class's matrix.
+fn element_block(slot: u32, kind: u32, within: u32) -> mat3x3<f32> {
+    let a = (slot * 2u * shape.classes + kind) * 576u + within;
+    return mat3x3(
+        vec3(elements[a], elements[a + 1u], elements[a + 2u]),
+        vec3(elements[a + 24u], elements[a + 25u], elements[a + 26u]),
+        vec3(elements[a + 48u], elements[a + 49u], elements[a + 50u]),
+    );
+}
+
 @compute @workgroup_size(64)
 fn gather_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) local: u32) {
@@ -25,6 +35,7 @@ fn gather_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     let n = (shape.fields >> 8u) & 15u;
     let slot = members[p.member].slot;
+    let flow_slot = u32(members[p.member].flow.z);
     var sum = mat3x3<f32>();
     for (var k = place_rows[p.item]; k < place_rows[p.item + 1u]; k++) {
         let e = places[k] / 64u;
@@ -32,18 +43,17 @@ fn gather_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let j = places[k] % 8u;
         let turn = (p.member * shape.cells + e) * TANGENT_VECTORS;
         let r = mat3x3(tangents[turn].xyz, tangents[turn + 1u].xyz, tangents[turn + 2u].xyz);
-        let a = (slot * 2u * shape.classes + cells[e].kind) * 576u + 72u * j + 3u * i;
-        let block = mat3x3(
-            vec3(elements[a], elements[a + 1u], elements[a + 2u]),
-            vec3(elements[a + 24u], elements[a + 25u], elements[a + 26u]),
-            vec3(elements[a + 48u], elements[a + 49u], elements[a + 50u]),
-        );
         let at = mode_at(p.member, e, n);
         let head = law_modes[at];
-        sum += (r * block * transpose(r)) * head.x;
+        let within = 72u * j + 3u * i;
+        sum += (r * element_block(slot, cells[e].kind, within) * transpose(r)) * head.x;
+        if head.y != 0.0 {
+            sum += (r * element_block(flow_slot, cells[e].kind, within) * transpose(r)) * head.y;
+        }
         let here = corner_mode(at, n, i);
         let there = corner_mode(at, n, j);
         sum += outer(law_modes[here + n].xyz, head.z * law_modes[there + n].xyz);
+        sum += outer(law_modes[here + n + 1u].xyz, head.w * law_modes[there + n + 1u].xyz);
         for (var row = 0u; row < 7u; row++) {
             if row >= n {
                 break;

@@ -28,6 +28,11 @@ fn trial_at(member: u32, stencil: u32) -> vec3<f32> {
     return sum;
 }
 
+// Way of free flight.
+fn flight_of(a: u32, m: Member) -> vec3<f32> {
+    return shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * m.gravity.xyz;
+}
+
 @compute @workgroup_size(64)
 fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                    @builtin(local_invocation_index) local: u32) {
@@ -51,11 +56,26 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     if call.mode != 0u {
         let before = old_force[a].xyz;
         elastic += vec4(before, dot(before, w));
-        let flight = shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * m.gravity.xyz;
+        let flight = flight_of(a, m);
         body = mass * vec4(mix.inertia * w + mix.drag * (flight + w),
                            0.5 * (mix.inertia + mix.drag) * dot(w, w) + mix.drag * dot(flight, w));
     } else {
         body = -mass * vec4(m.gravity.xyz, dot(m.gravity.xyz, w));
+    }
+    if has_mass_matrix() {
+        body = vec4(0.0);
+        for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
+            let b = at_node(p.member, columns[k]);
+            var pull = -m.gravity.xyz;
+            var potential = -m.gravity.xyz;
+            if call.mode != 0u {
+                let there = trial[b].xyz;
+                let flight = flight_of(b, m);
+                pull = mix.inertia * there + mix.drag * (flight + there);
+                potential = 0.5 * (mix.inertia + mix.drag) * there + mix.drag * flight;
+            }
+            body += block_mass(m, p.member, k) * vec4(pull, dot(potential, w));
+        }
     }
     var carried = mass;
     for (var s = 0u; s < shape.masses; s++) {

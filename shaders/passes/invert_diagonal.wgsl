@@ -17,6 +17,9 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let m = members[p.member];
     let mix = mix_of(m);
     var mass = node_mass(m, p.member, p.item);
+    if has_mass_matrix() {
+        mass = block_mass(m, p.member, diagonals[p.item]);
+    }
     for (var s = 0u; s < shape.masses; s++) {
         let entry = entry_of(mass_stencil(s), p.item);
         if entry != NONE {

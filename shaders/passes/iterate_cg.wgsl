@@ -35,7 +35,10 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         storageBarrier();
         var curvature = vec4(0.0);
         for (var i = local; i < shape.nodes; i += 256u) {
-            var q = (mix.inertia * node_mass(m, p.home, i)) * cg_along[at_node(p.member, i)].xyz;
+            var q = vec3(0.0);
+            if !has_mass_matrix() {
+                q = (mix.inertia * node_mass(m, p.home, i)) * cg_along[at_node(p.member, i)].xyz;
+            }
             for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
                 let x = cg_along[at_node(p.member, columns[k])].xyz;
                 let v = (p.home * shape.blocks + k) * 9u;
@@ -44,6 +47,9 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
                     values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
                     values[v + 6u] * x.x + values[v + 7u] * x.y + values[v + 8u] * x.z,
                 );
+                if has_mass_matrix() {
+                    q += (mix.inertia * block_mass(m, p.home, k)) * x;
+                }
             }
             q = with_masses(q, mix.inertia, p.member, p.home, i);
             let a = at_node(p.member, i);

@@ -18,6 +18,7 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         return;
     }
     let m = members[p.home];
+    let inertia = mix_of(m).inertia;
     var q = vec3(0.0);
     if p.live {
         let end = block_rows[p.item + 1u];
@@ -29,13 +30,16 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
                 values[v + 6u] * x.x + values[v + 7u] * x.y + values[v + 8u] * x.z,
             );
+            if has_mass_matrix() {
+                q += (inertia * block_mass(m, p.home, k)) * x;
+            }
         }
     }
     shares[local] = vec4(q, 0.0);
     workgroupBarrier();
     var curvature = vec4(0.0);
     if p.live && local % 8u == 0u {
-        q = heavy_row(m, mix_of(m).inertia, p);
+        q = heavy_row(m, inertia, p);
         for (var i = 0u; i < 8u; i++) {
             q += shares[local + i].xyz;
         }

@@ -15,25 +15,31 @@ fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let m = members[p.member];
     let mix = mix_of(m);
+    let lame = lame_at(m, p.item).xy;
     var stress = mat3x3<f32>();
     var energy = 0.0;
+    // What no modulus scales.
+    var flow: Flow;
+    var flowing = mat3x3<f32>();
     if call.extra == STRESS_OLD {
         if mix.old != 0.0 {
-            stress = stress_at(gradient_now(p.member, p.item), m.lame.xy).stress * mix.old;
+            stress = stress_at(gradient_now(p.member, p.item), lame).stress * mix.old;
         }
     } else {
         let h = gradient_next(p.member, p.item);
-        let r = stress_at(h, m.lame.xy);
-        stress = r.stress * mix.fresh + viscous(p.member, p.item, h, m.lame.xy) * mix.rate;
+        let r = stress_at(h, lame);
+        stress = r.stress * mix.fresh + viscous(p.member, p.item, h, lame) * mix.rate;
         energy = mix.fresh * r.energy;
         if mix.rate != 0.0 {
             let g = strained(p.member, p.item, h);
-            energy += 0.5 * mix.rate * contract(g, linear_stress(g, m.lame.xy));
+            energy += 0.5 * mix.rate * contract(g, linear_stress(g, lame));
         }
+        flow = flow_at(m, p.member, p.item, h);
+        flowing = (identity3() + h) * flow.stress * elastic_volumes[p.item];
     }
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[p.item];
+    let scale = young_at(m, p.member, element_of(p.item)) * elastic_volumes[p.item];
     let at = stress_place(p.member, p.item);
-    elastic_stress[at] = vec4(scale * stress[0], scale * energy);
-    elastic_stress[at + 1u] = vec4(scale * stress[1], 0.0);
-    elastic_stress[at + 2u] = vec4(scale * stress[2], 0.0);
+    elastic_stress[at] = vec4(scale * stress[0] + flowing[0], scale * energy + elastic_volumes[p.item] * flow.energy);
+    elastic_stress[at + 1u] = vec4(scale * stress[1] + flowing[1], 0.0);
+    elastic_stress[at + 2u] = vec4(scale * stress[2] + flowing[2], 0.0);
 }

@@ -13,16 +13,19 @@ fn press_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     var w: Way;
     var loss = vec3(0.0);
     var weight = c.mix.old;
+    var flow: FlowWay;
     if call.extra == 0u {
         side = new_side(c);
         w = way_of(c, side, old);
         loss = loss_of(c, w, old, vec2(0.0));
         weight = c.mix.fresh;
+        flow = flow_way(c, side, old);
     }
     let r = ask_energy(c, side.s, nowhere());
-    let f = force(side.pose, c.young * (weight * stress(c, side, r.first) + loss.y * w.kd), c.sign);
+    let f = force(side.pose, c.young * (weight * stress(c, side, r.first) + loss.y * w.kd) + flow.by.y * flow.kd, c.sign);
     // Of the old state's force the potential is linear; gather_residual knows it.
-    var energy = select(0.0, c.young * volume_of(c) * (weight * r.value + loss.x) * 0.125, call.extra == 0u);
+    let density = c.young * (weight * r.value + loss.x) + flow.by.x;
+    var energy = select(0.0, volume_of(c) * density * 0.125, call.extra == 0u);
     if r.value >= NOWHERE_FROM {
         // The material does not exist there: judge_trial sees it.
         energy = NOWHERE;

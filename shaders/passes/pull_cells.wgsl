@@ -9,7 +9,7 @@ var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 // [B][cells]: by the factor on the cell's modulus.
 var<storage, read_write> cell_pulls: array<f32>;
-// [CELL_ROWS + rows of aging …][B][workgroups]: by Poisson's ratio and stiffness damping first.
+// [CELL_ROWS + rows of aging …][B][workgroups]: by Poisson's ratio and stiffness damping first; two of the viscosity follow.
 var<storage, read_write> cell_sums: array<f32>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 

@@ -1,4 +1,4 @@
-//! The same of the laws of cells, added to what pull_cells left: by the modulus, Poisson's ratio, changes in time, the stress-free shape, and
+//! The same of the laws of cells, added to what pull_cells left: by the modulus, Poisson's ratio, the viscosity, changes in time, the stress-free shape, and
 //! the laws' own numbers, one a lane.
 // use effects/cells
 // use shared/pulls
@@ -78,13 +78,20 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     if seeks(SEEK_POISSON) && material() != 0u {
         poisson += c.mix.fresh * material_by_poisson(c, fresh.s, ds1) + c.mix.old * material_by_poisson(c, old.s, ds0);
     }
+    var by_flow = vec2(0.0);
+    if seeks(SEEK_VISCOSITY) {
+        let flow = flow_way(c, fresh, old);
+        by_flow = (2.0 * volume_of(c) * mean(c, flow.kd, dq1)) * flow_by_numbers(c.m, flow.squared);
+    }
     let first = c.live && c.number == 0u;
-    let total = sum64(local, select(vec4(0.0), unit * vec4(own, poisson, 0.0, 0.0), first));
+    let total = sum64(local, select(vec4(0.0), vec4(unit * vec2(own, poisson), by_flow), first));
     if first {
         cell_pulls[c.member * shape.cells + c.cell] -= unvaried(c.m, c.member) * volume_of(c) * own;
     }
     if local == 0u && c.live {
         cell_sums[row_at(0u, c.member, c.cell, shape.cells, 8u)] -= total.y;
+        cell_sums[row_at(2u, c.member, c.cell, shape.cells, 8u)] -= total.z;
+        cell_sums[row_at(3u, c.member, c.cell, shape.cells, 8u)] -= total.w;
         for (var row = 0u; row < shape.aging_rows; row++) {
             let slope = aging_at(c.member, 1u + row) / aging_at(c.member, 0u);
             cell_sums[row_at(CELL_ROWS + row, c.member, c.cell, shape.cells, 8u)] -= slope * total.x;

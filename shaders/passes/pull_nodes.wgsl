@@ -9,7 +9,7 @@ var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> block_rows: array<u32>;
 var<storage, read> columns: array<u32>;
 var<storage, read> ghosts: array<f32>;
-// [B][N]: by the density at the node.
+// [B][N]: by the density at the node, or a node's part of that by the density of the whole.
 var<storage, read_write> node_pulls: array<f32>;
 // [2][B][workgroups]: by Young's modulus, Poisson's ratio and stiffness damping through the ghost penalty, by mass damping; by gravity.
 var<storage, read_write> node_sums: array<vec4<f32>>;
@@ -47,16 +47,33 @@ fn pull_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let mix = mix_of(m);
         let a = at_node(p.member, p.item);
         let z = probe[a].xyz;
-        let volume = rest[p.item].w;
-        let mass = node_mass(m, p.member, p.item);
-        var by = dot(z, acceleration(p.member, p.item, m));
-        if call.mode != 0u {
-            let speed = dot(z, speed(p.member, p.item));
-            by += m.mass_damping * speed;
-            stiffness.w = mass * speed;
+        var carried = 0.0;
+        if has_mass_matrix() {
+            // Derivatives by the density of the whole body: pull_densities has those by places.
+            var by = 0.0;
+            for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
+                let mass = block_mass(m, p.member, k);
+                carried += mass;
+                by += mass * dot(z, acceleration(p.member, columns[k], m));
+                if call.mode != 0u {
+                    let speed = mass * dot(z, speed(p.member, columns[k]));
+                    by += m.mass_damping * speed;
+                    stiffness.w += speed;
+                }
+            }
+            node_pulls[a] -= by / m.density;
+        } else {
+            let volume = rest[p.item].w;
+            let mass = node_mass(m, p.member, p.item);
+            var by = dot(z, acceleration(p.member, p.item, m));
+            if call.mode != 0u {
+                let speed = dot(z, speed(p.member, p.item));
+                by += m.mass_damping * speed;
+                stiffness.w = mass * speed;
+            }
+            node_pulls[a] -= volume * by;
+            carried = mass;
         }
-        node_pulls[a] -= volume * by;
-        var carried = mass;
         for (var s = 0u; s < shape.masses; s++) {
             let entry = entry_of(mass_stencil(s), p.item);
             if entry != NONE {

@@ -1,4 +1,4 @@
-//! Change of the stress of elastic points along a direction: by the modulus of each, Poisson's ratio and stiffness damping.
+//! Change of the stress of elastic points along a direction: by the modulus of each, Poisson's ratio, stiffness damping and viscosity.
 // use shared/elastic_way
 // use shared/rates
 
@@ -13,14 +13,16 @@ fn push_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let m = members[p.member];
     let way = elastic_way(p.member, p.item, m, mix_of(m));
-    let young = young_at(m, p.member, p.item);
-    var stress = way.stress * young_rate(m, p.member, p.item);
+    let young = young_at(m, p.member, element_of(p.item));
+    var stress = way.stress * young_rate(m, p.member, element_of(p.item));
     if with_rate(WITH_POISSON) {
         stress += way.by_poisson * (young * rates[p.member].poisson);
     }
     if call.mode != 0u {
         stress += way.viscous * (young * rates[p.member].stiffness_damping / shape.dt);
     }
+    let flow = rates[p.member].viscosity;
+    stress += way.by_coefficient * flow.x + way.by_exponent * flow.y;
     let at = stress_place(p.member, p.item);
     for (var c = 0u; c < 3u; c++) {
         elastic_stress[at + c] = vec4(elastic_volumes[p.item] * stress[c], 0.0);

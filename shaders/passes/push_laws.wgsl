@@ -86,9 +86,11 @@ fn push_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         let l = ask_along(c, LOSS_PART, s, change);
         loss = vec2(l.first[0], l.bend[0]);
     }
+    let flow = flow_way(c, fresh, old);
     // Body-frame forces of the two poses; they are proportional to the modulus.
     let y1 = c.young * (c.mix.fresh * (stress(c, fresh, r.bend) + r.first[0] * kq) + loss.x * kd + loss.y * w.kd)
-        + young * (c.mix.fresh * stress(c, fresh, r.first) + loss.x * w.kd);
+        + young * (c.mix.fresh * stress(c, fresh, r.first) + loss.x * w.kd)
+        + 2.0 * dot(flow_by_numbers(c.m, flow.squared), rates[c.member].viscosity) * flow.kd;
     let y0 = c.young * (stress(c, old, before.bend) + before.first[0] * kq_old) + young * stress(c, old, before.first);
     let f = force(fresh.pose, y1, c.sign) + force(old.pose, c.mix.old * y0, c.sign);
     if c.live {

@@ -12,7 +12,7 @@ var<storage, read> node_list: array<u32>;
 var<storage, read> block_rows: array<u32>;
 var<storage, read> columns: array<u32>;
 var<storage, read> ghosts: array<f32>;
-// [B][N]: of the factors on the nodes' densities, and of the stress-free shape.
+// Of the factors on densities, as shared/inertia has them; and [B][N] of the stress-free shape.
 var<storage, read> rate_densities: array<f32>;
 var<storage, read> rate_rests: array<vec4<f32>>;
 var<storage, read_write> column: array<vec4<f32>>;
@@ -48,6 +48,15 @@ fn by_ghosts(member: u32, node: u32, m: Member, mix: Mix) -> vec3<f32> {
     return f;
 }
 
+// What a mass at a node changes along the direction, its own change `heavier` included.
+fn by_mass(member: u32, node: u32, m: Member, r: Rate, mass: f32, heavier: f32) -> vec3<f32> {
+    var f = heavier * acceleration(member, node, m);
+    if call.mode != 0u {
+        f += (heavier * m.mass_damping + mass * r.mass_damping) * speed(member, node);
+    }
+    return f - mass * r.gravity.xyz;
+}
+
 @compute @workgroup_size(64)
 fn push_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) local: u32) {
@@ -68,16 +77,23 @@ fn push_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if shape.ghosts != 0u {
         f += by_ghosts(p.member, p.item, m, mix);
     }
-    let mass = node_mass(m, p.member, p.item);
-    var heavier = r.density * mass / m.density;
-    if with_rate(WITH_DENSITIES) {
-        heavier += m.density * rest[p.item].w * rate_densities[a];
+    if has_mass_matrix() {
+        for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
+            let mass = block_mass(m, p.member, k);
+            var heavier = r.density * mass / m.density;
+            if with_rate(WITH_DENSITIES) {
+                heavier += m.density * rate_densities[p.member * shape.blocks + k];
+            }
+            f += by_mass(p.member, columns[k], m, r, mass, heavier);
+        }
+    } else {
+        let mass = node_mass(m, p.member, p.item);
+        var heavier = r.density * mass / m.density;
+        if with_rate(WITH_DENSITIES) {
+            heavier += m.density * rest[p.item].w * rate_densities[a];
+        }
+        f += by_mass(p.member, p.item, m, r, mass, heavier);
     }
-    f += heavier * acceleration(p.member, p.item, m);
-    if call.mode != 0u {
-        f += (heavier * m.mass_damping + mass * r.mass_damping) * speed(p.member, p.item);
-    }
-    f -= mass * r.gravity.xyz;
     for (var s = 0u; s < shape.masses; s++) {
         let entry = entry_of(mass_stencil(s), p.item);
         if entry != NONE {

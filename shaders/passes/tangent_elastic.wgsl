@@ -17,26 +17,30 @@ fn tangent_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     }
     let m = members[p.member];
     let mix = mix_of(m);
-    let lame = m.lame.xy;
+    let lame = lame_at(m, p.item).xy;
     let h = gradient_next(p.member, p.item);
     let f = identity3() + h;
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[p.item];
+    let scale = young_at(m, p.member, element_of(p.item)) * elastic_volumes[p.item];
     let convex = newton[p.member].convex != 0u;
     var held = mat3x3<f32>();
     if mix.rate != 0.0 {
         held = linear_stress(strained(p.member, p.item, h), lame);
     }
+    let flow = flow_at(m, p.member, p.item, h);
     for (var column = 0u; column < 9u; column++) {
         var dh = mat3x3<f32>();
         dh[column % 3u][column / 3u] = 1.0;
-        let along = f * linear_stress(green_rate(f, dh), lame);
+        let dg = green_rate(f, dh);
+        let along = f * linear_stress(dg, lame);
+        var flowing = f * flow_rate(flow, dg);
         var change = along * (mix.fresh + mix.rate);
         if !convex {
             change = respond_at(h, dh, lame, vec2(0.0)).change * mix.fresh + (dh * held + along) * mix.rate;
+            flowing += dh * flow.stress;
         }
         let at = (p.member * shape.elastic + p.item) * TANGENT_NUMBERS + 9u * column;
         for (var row = 0u; row < 9u; row++) {
-            elastic_tangents[at + row] = scale * component(change, row);
+            elastic_tangents[at + row] = scale * component(change, row) + elastic_volumes[p.item] * component(flowing, row);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Adds the laws of cells to what tangent_cells left, and lists what else the tangent is made of: Σ ψ_kl r_k r_lᵀ + φ_dd r_d r_dᵀ with r the
-//! world-frame gradients of V s and V d. `law_modes` holds per cell: (factor of K, 0, E φ_dd/V, 0); r_k and r_d per corner; the matrix
-//! E θ ψ_kl/V, two vectors a row.
+//! world-frame gradients of V s and V d; and the same for the viscosity. `law_modes` holds per cell: factors of K and K₀, E φ_dd/V, the
+//! viscosity's φ_dd/V; r_k, r_d and the viscosity's r_d per corner; the matrix E θ ψ_kl/V, two vectors a row.
 // use effects/cells
 // use shared/rank_six
 // use shared/modes
@@ -43,18 +43,22 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let scale = c.young * (c.mix.fresh * r.first[0] + loss.y);
     let y = c.young * (c.mix.fresh * stress(c, fresh, r.first) + loss.y * w.kd);
     let half = rank_six(fresh.pose, stiffness_of(c), c.number, c.sign, scale, centred(y), convex);
-    let turned = fresh.pose.r * half;
+    let flow = flow_way(c, fresh, old);
+    let flowing = rank_six(fresh.pose, flow_matrix(c), c.number, c.sign, flow.by.y, centred(flow.by.y * flow.kd), convex);
+    let turned = fresh.pose.r * (half + flowing);
     let unit = c.young / volume_of(c);
     let at = mode_at(c.member, c.cell, n);
     let own = corner_mode(at, n, c.number);
     let by_way = force(fresh.pose, w.kd, c.sign);
+    let by_flow = force(fresh.pose, flow.kd, c.sign);
     if c.live {
         for (var k = 0u; k < 3u; k++) {
             tangents[(c.member * shape.cells + c.cell) * TANGENT_VECTORS + 6u + 3u * c.number + k] += vec4(turned[k], 0.0);
         }
         law_modes[own + n] = vec4(by_way, 0.0);
+        law_modes[own + n + 1u] = vec4(by_flow, 0.0);
         if c.number == 0u {
-            law_modes[at] = vec4(scale, 0.0, unit * loss.z, 0.0);
+            law_modes[at] = vec4(scale, flow.by.y, unit * loss.z, flow.by.z / volume_of(c));
         }
         if c.number < n {
             let b = r.bend;

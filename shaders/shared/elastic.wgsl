@@ -12,6 +12,34 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 
+// What λ' of a local point stays below, over μ.
+override local_share: f32;
+
+fn element_of(point: u32) -> u32 {
+    return point / shape.per_element;
+}
+
+// True of the point that has the mean of an element of several points.
+fn has_mean(point: u32) -> bool {
+    return shape.per_element > 1u && point % shape.per_element == shape.per_element - 1u;
+}
+
+// λ/E and μ/E that act at a point, and their derivatives by Poisson's ratio. Twin of `Share` in palpate-model/src/space/points.rs: of an element
+// of several points the last has the mean, and what of λ is more than local points bear.
+fn lame_at(m: Member, point: u32) -> vec4<f32> {
+    if shape.per_element == 1u {
+        return m.lame;
+    }
+    let stiff = local_share * m.lame.y;
+    let sum = m.lame.x + stiff;
+    let part = m.lame.x / sum;
+    if has_mean(point) {
+        return vec4(m.lame.x * part, 0.0, part * ((2.0 - part) * m.lame.z - part * local_share * m.lame.w), 0.0);
+    }
+    let kept = stiff / sum;
+    return vec4(m.lame.x * kept, m.lame.y, kept * kept * m.lame.z + local_share * part * part * m.lame.w, m.lame.w);
+}
+
 fn contract(a: mat3x3<f32>, b: mat3x3<f32>) -> f32 {
     return dot(a[0], b[0]) + dot(a[1], b[1]) + dot(a[2], b[2]);
 }
@@ -122,7 +150,7 @@ fn stress_at(h: mat3x3<f32>, lame: vec2<f32>) -> Response {
     return respond_at(h, mat3x3<f32>(), lame, vec2(0.0));
 }
 
-// Numbers of a point's stress in `elastic_stress`, and of its row of any array of one number a point.
+// Where a point's stress begins in `elastic_stress`.
 fn stress_place(member: u32, point: u32) -> u32 {
     return 3u * (member * shape.elastic + point);
 }

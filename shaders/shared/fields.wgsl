@@ -1,6 +1,6 @@
 //! Stiffness of a cell where effects vary it over the body or in time; without such effects the factors are not read.
 
-// [B][cells], or [B][elastic points], times Young's modulus.
+// [B][elements], times Young's modulus.
 var<storage, read> moduli: array<f32>;
 // [1 + rows][B][steps + 1]: factor on the whole body's modulus at the start and in every step, then its derivatives.
 var<storage, read> agings: array<f32>;
@@ -25,10 +25,10 @@ fn unvaried(m: Member, member: u32) -> f32 {
     return young;
 }
 
-fn young_at(m: Member, member: u32, cell: u32) -> f32 {
+fn young_at(m: Member, member: u32, element: u32) -> f32 {
     var young = m.young;
     if (shape.fields & FIELD_MODULUS) != 0u {
-        young *= moduli[member * (shape.cells + shape.elastic) + cell];
+        young *= moduli[member * shape.elements + element];
     }
     if (shape.fields & FIELD_AGING) != 0u {
         young *= aging_at(member, 0u);

@@ -1,15 +1,27 @@
-//! Lumped mass of the nodes, and point masses, each a stencil.
+//! Mass of the body, and point masses, each a stencil. Cells have a lumped mass on each node; tetrahedra have the whole matrix, entry by entry of
+//! the pattern of blocks.
 // use shared/stencil
 
 var<storage, read> rest: array<vec4<f32>>;
 // [B][masses] in kg.
 var<storage, read> mass_values: array<f32>;
-// [B][N], times the density; read only where effects vary it over the body.
+// Of cells [B][N], times the density; read only where effects vary it over the body. Of tetrahedra [B][blocks]: entries of the mass matrix over
+// the density.
 var<storage, read> densities: array<f32>;
 
-// Mass of the body's own node [kg]; the fourth component of a rest position is ∫ N.
+fn has_mass_matrix() -> bool {
+    return shape.elastic != 0u;
+}
+
+// Entry of the mass matrix [kg] at a block of the pattern.
+fn block_mass(m: Member, member: u32, block: u32) -> f32 {
+    return m.density * densities[member * shape.blocks + block];
+}
+
+// Mass of the body's own node [kg]; the fourth component of a rest position is its volume. Where there is a mass matrix, a measure of how heavy
+// it is and no more.
 fn node_mass(m: Member, member: u32, node: u32) -> f32 {
-    if (shape.fields & FIELD_DENSITY) != 0u {
+    if (shape.fields & FIELD_DENSITY) != 0u && !has_mass_matrix() {
         return m.density * rest[node].w * densities[at_node(member, node)];
     }
     return m.density * rest[node].w;

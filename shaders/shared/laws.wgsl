@@ -1,10 +1,11 @@
 //! Laws of cells: scalars of a cell's deformation, what laws say of them, and the body-frame forces that follow. Twin of
 //! palpate-cpu/src/terms/elastic_cells/laws.rs and palpate-model/src/effects/cell.rs. Laws are the files of `effects/`; the build script links
 //! them with `cell_law`, which calls the one of a number, and with the sizes of the input. All laws of a plan act at once, and the material
-//! where it is not linear, as one more.
+//! where it is not linear, as one more; and its viscosity.
 // use shared/past
 // use materials/all
 // use shared/effect_site
+// use shared/flow
 
 // The two functions of a law: ψ of (a, ε), and φ of (d, a₀).
 const ENERGY_PART = 0u;
@@ -280,4 +281,30 @@ fn loss_of(c: Corner, w: Way, old: Side, change: vec2<f32>) -> vec3<f32> {
 
 fn nowhere() -> array<f32, SCALARS> {
     return array<f32, SCALARS>();
+}
+
+// The way of a cell from the past as the material's viscosity sees it: K₀ (q₁ − q̃) at this corner, with K₀ the matrix for E = 1 and ν = 0, whose
+// energy is ½|ε|²; φ with its first and second derivative by d = ½ (q₁ − q̃)·K₀ (q₁ − q̃)/V; and |ΔE|² = 2d.
+struct FlowWay {
+    kd: vec3<f32>,
+    by: vec3<f32>,
+    squared: f32,
+}
+
+fn flow_matrix(c: Corner) -> u32 {
+    return matrix_at(u32(c.m.flow.z), 0u, cells[c.cell].kind);
+}
+
+fn flow_way(c: Corner, fresh: Side, old: Side) -> FlowWay {
+    var w: FlowWay;
+    let dq = fresh.q - old.q;
+    w.kd = stiff(flow_matrix(c), c.number, dq);
+    w.squared = max(mean(c, dq, w.kd), 0.0);
+    w.by = flow_loss(c.m, w.squared) * vec3(1.0, 2.0, 4.0);
+    return w;
+}
+
+// Change of its body-frame force with a change of the past's deformation; symmetric.
+fn flow_by_old(c: Corner, w: FlowWay, dq: vec3<f32>) -> vec3<f32> {
+    return -w.by.y * stiff(flow_matrix(c), c.number, dq) - (w.by.z * mean(c, w.kd, dq)) * w.kd;
 }

@@ -21,5 +21,11 @@ fn old_row(member: u32, node: u32, m: Member, mix: Mix) -> vec3<f32> {
             f += (scale * ghosts[k]) * (probe[at_node(member, columns[k])].xyz - z);
         }
     }
+    if has_mass_matrix() {
+        for (var k = block_rows[node]; k < block_rows[node + 1u]; k++) {
+            f -= (mix.drag * block_mass(m, member, k)) * probe[at_node(member, columns[k])].xyz;
+        }
+        return f;
+    }
     return f - (mix.drag * node_mass(m, member, node)) * z;
 }

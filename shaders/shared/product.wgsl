@@ -23,6 +23,10 @@ fn with_masses(row: vec3<f32>, inertia: f32, member: u32, home: u32, node: u32) 
 }
 
 fn heavy_row(m: Member, inertia: f32, p: Place) -> vec3<f32> {
-    let own = (inertia * node_mass(m, p.home, p.item)) * cg_along[at_node(p.member, p.item)].xyz;
+    var own = vec3(0.0);
+    // Of a mass matrix, what multiplies blocks has added it.
+    if !has_mass_matrix() {
+        own = (inertia * node_mass(m, p.home, p.item)) * cg_along[at_node(p.member, p.item)].xyz;
+    }
     return with_masses(own, inertia, p.member, p.home, p.item);
 }

@@ -7,6 +7,7 @@ const SEEK_POISSON = 2u;
 const SEEK_DAMPING = 4u;
 const SEEK_REST = 8u;
 const SEEK_START = 16u;
+const SEEK_VISCOSITY = 32u;
 // Of clamps, from these bits on: numbers of effects that move their poses, and of those that change their matrices.
 const POSES_AT = 8u;
 const MATRICES_AT = 20u;
@@ -19,7 +20,7 @@ const SEEK_TIME = 8u;
 const SEEK_PLANES = 16u;
 const ROW_AT = 13u;
 // Rows of the sums over cells and over clamp cells before those of effects' numbers, and numbers of a law of cells.
-const CELL_ROWS = 2u;
+const CELL_ROWS = 4u;
 const HOLD_ROWS = 2u;
 const CELL_SLOTS = 8u;
 // Rows of a law of points beside its own numbers: gravity, stiffness, time; and of each plane: height and angles, stiffness.

@@ -8,7 +8,7 @@ struct Rate { // mirrored
     mass_damping: f32,
     stiffness_damping: f32,
     start: f32,
-    pad: vec2<f32>,
+    viscosity: vec2<f32>,
     gravity: vec4<f32>,
     velocity: vec4<f32>,
     spin: vec4<f32>,
@@ -27,7 +27,7 @@ const PLANE_NUMBERS = 4u;
 var<storage, read> rates: array<Rate>;
 // [B]: of planes, point masses, changes in time, clamps (poses, then matrices), effects.
 var<storage, read> rate_numbers: array<f32>;
-// [B][cells or elastic points]: of the factors on the cells' moduli.
+// [B][elements]: of the factors on their moduli.
 var<storage, read> rate_moduli: array<f32>;
 
 fn with_rate(what: u32) -> bool {
@@ -47,15 +47,15 @@ fn aging_numbers(member: u32) -> u32 {
     return numbers_at(member) + PLANE_NUMBERS * shape.planes + shape.masses;
 }
 
-// Of Young's modulus of a cell.
-fn young_rate(m: Member, member: u32, cell: u32) -> f32 {
+// Of Young's modulus of an element.
+fn young_rate(m: Member, member: u32, element: u32) -> f32 {
     var factor = 1.0;
     if (shape.fields & FIELD_MODULUS) != 0u {
-        factor = moduli[member * (shape.cells + shape.elastic) + cell];
+        factor = moduli[member * shape.elements + element];
     }
     var rate = rates[member].young * factor;
     if with_rate(WITH_MODULI) {
-        rate += m.young * rate_moduli[member * (shape.cells + shape.elastic) + cell];
+        rate += m.young * rate_moduli[member * shape.elements + element];
     }
     if (shape.fields & FIELD_AGING) != 0u {
         rate *= aging_at(member, 0u);

@@ -44,6 +44,9 @@ struct Shape { // mirrored
     elastic: u32,
     held: u32,
     element_size: f32,
+    // Elements, cells or tetrahedra, and elastic points of each tetrahedron.
+    elements: u32,
+    per_element: u32,
 }
 
 struct Member { // mirrored
@@ -59,6 +62,8 @@ struct Member { // mirrored
     spin: vec4<f32>,
     // λ/E and μ/E, and their derivatives by ν.
     lame: vec4<f32>,
+    // Viscosity: coefficient and exponent, and the slot of the element matrices at ν = 0.
+    flow: vec4<f32>,
 }
 
 struct Plane { // mirrored

@@ -148,3 +148,44 @@ fn a_field_that_does_not_fit_its_body_is_refused_with_its_line() {
     let e = refused(&parts(1.0, 1.0).replace("\"axis\"", "\"harmonic\"").replace("[0.12,", "[0.32,"));
     assert!(e.contains("field.0.regions: region 1 around ") && e.contains("holds no node"), "{e}");
 }
+
+#[test]
+fn a_field_with_a_prior_says_what_the_recording_does_not_know() {
+    let cells = |prior: &str| format!("\n[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"cells\"\nprior = {prior}\n");
+    let folder = recorded(0.0135, &cells("{ kind = \"matern\" }"));
+    let (r, text) = found(folder.path(), &[]);
+    println!("{text}");
+    assert_eq!((&r["optimizer"], &r["verdict"]["word"]), (&"gauss-newton-cg".into(), &"converged".into()));
+    let (field, out) = (&r["fields"][0], folder.path().join("found"));
+    let p = &field["posterior"];
+    assert_eq!((&p["prior"], &p["chosen"]), (&"matern".into(), &serde_json::json!(["length", "deviation"])));
+    assert!(p["tried"].as_array().unwrap().iter().any(|t| t["evidence"] == 0.0 && t["length"] == p["length"]), "{p}");
+    // Two parts that differ threefold are no single value, and a bar that stands out of a wall is not bent at its tip.
+    let one = p["tried"].as_array().unwrap().iter().find(|t| t["deviation"] == 0.0).unwrap();
+    assert!(one["evidence"].as_f64().unwrap() < -10.0, "{one}");
+    let grid = out.join(field["grid"].as_str().unwrap());
+    let read = |name: &str| palpate_io::vtk::read_vtu_array(&grid, Some(name), true).unwrap();
+    let (open, gain, e, sd) = (read("undetermined"), read("gain"), read("E"), read("E_sd"));
+    assert_eq!(open.iter().filter(|u| **u == 1.0).count() as u64, p["undetermined"].as_u64().unwrap());
+    let body = &palpate::Experiment::open(out.join("model.toml")).unwrap().plan().body.clone();
+    let (mut near, mut off) = (Vec::new(), Vec::new());
+    for (k, x) in body.middles().enumerate() {
+        assert!((open[k] == 1.0) == (gain[k] < 0.1));
+        let truth = 3e4 * if x.x < 0.04 { 0.7 } else { 2.0 };
+        if (0.02..0.04).contains(&x.x) {
+            near.push(gain[k]);
+        }
+        if x.x < 0.04 || x.x > 0.12 {
+            off.push((e[k] / truth).ln().abs() / (sd[k] / e[k]));
+        }
+    }
+    assert!(near.iter().all(|g| *g > 0.3), "{near:?}");
+    let inside = off.iter().filter(|o| **o < 2.0).count() as f64 / off.len() as f64;
+    assert!(inside > 0.8, "{inside}");
+    let npz = out.join(field["file"].as_str().unwrap());
+    for name in ["ln_sd", "ln_prior_sd", "gain", "undetermined", "standard_error"] {
+        assert_eq!(palpate_io::npy::read_array(&npz, Some(name)).unwrap().values.len() as u64, field["count"].as_u64().unwrap());
+    }
+    assert!(text.contains("prior of field.0: matern, length ") && text.contains("residuals count as one"), "{text}");
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("Logarithm of the evidence"));
+}

@@ -44,7 +44,7 @@ fn block(cut: f64, turn: DMat3, ghost: f64) -> (f64, f64) {
     let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(2.0 * H, 2.0 * H, top) }, H);
     s.object.pose = DAffine3::from_mat3(turn);
     let base = Clamp::still(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1e-5));
-    s.clamps = vec![Clamp { object_frame: true, ..base }];
+    s.clamps = vec![base.in_object_frame()];
     let up = turn * DVec3::Z;
     s.gravity = -up;
     s.material.poisson_ratio = 0.3;

@@ -4,6 +4,7 @@
 
 use glam::{DQuat, DVec3};
 use palpate_model::effects::{self, Effect};
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::scene::*;
 use studies::real::swing::Swing;
 use support::{run, scenes};
@@ -150,6 +151,30 @@ fn linear_power_law_is_stiffness_damping() {
     // Both are solved to 1e-8 of the forces in each of 40 steps. Ghost lines, which only Rayleigh's damping sees, a full bar has none.
     assert!((a - b).abs() < 1e-5 * b.abs(), "{a:e} {b:e}");
     assert!((a - free).abs() > 0.01 * b.abs(), "damping must matter: {a:e} {free:e}");
+}
+
+/// Where ν = 0 the modulus C of stiffness damping is 2μ I, and βC ε̇ is a Newtonian fluid's 2η ε̇ with η = βμ.
+#[test]
+fn newtonian_viscosity_without_poisson_effect_is_stiffness_damping() {
+    let swing = |viscosity: Option<Viscosity>, damping: f64, tets: bool| {
+        let mut s = bar(Vec::new());
+        if tets {
+            let source = support::tets::bar(DVec3::ZERO, CELL, [10, 1, 1]);
+            s.object = Object { source, pose: glam::DAffine3::IDENTITY, resolution: Resolution::Own };
+        }
+        s.initial.state = InitialShape::Rest;
+        s.gravity = DVec3::new(3.0, 1.0, 0.0);
+        s.material.viscosity = viscosity;
+        s.material.stiffness_damping = damping;
+        s.time = Time { step: 0.002, steps: 40, start: 0.0, ..Time::weighted(0.5) };
+        tip(&s)
+    };
+    for tets in [false, true] {
+        let flow = Viscosity { coefficient: 0.003 * 0.5 * YOUNG, exponent: 1.0 };
+        let (a, b, free) = (swing(Some(flow), 0.0, tets), swing(None, 0.003, tets), swing(None, 0.0, tets));
+        assert!((a - b).abs() < 1e-5 * b.abs(), "{a:e} {b:e}");
+        assert!((a - free).abs() > 0.01 * b.abs(), "damping must matter: {a:e} {free:e}");
+    }
 }
 
 #[test]

@@ -29,11 +29,11 @@ fn plan(linear: LinearSolver, radius: f64) -> Plan {
     build_plan(&s, Observation { frames: frames.to_vec(), ..noise }, &[]).unwrap()
 }
 
-/// The same of a brick of 2646 tetrahedra that flies and spins.
+/// The same of a brick of 360 quadratic tetrahedra that flies and spins.
 fn plan_of_tets() -> Plan {
     let mut s = scenes::body(Analytic::Ball { radius: 0.01, center: DVec3::ZERO }, 0.01);
     s.object = Object {
-        source: support::tets::bar(DVec3::ZERO, 0.01, [9, 7, 7]),
+        source: support::tets::bar(DVec3::ZERO, 0.01, [5, 4, 3]),
         pose: DAffine3::from_rotation_x(0.3),
         resolution: Resolution::Own,
     };

@@ -11,7 +11,7 @@ use support::scenes;
 fn with_field(varied: Varied, basis: Basis, scale: Scale) -> Plan {
     let mut scene = ball();
     let body = scenes::plan(&scene).body;
-    let mut spec = FieldSpec { varied, basis, scale, values: None };
+    let mut spec = FieldSpec { varied, basis, scale, values: None, prior: None };
     if !matches!(spec.basis, Basis::Regions(..)) {
         spec.values = Some((0..spec.count(&body)).map(|k| 1.0 + 0.4 * (1.7 * k as f64).sin()).collect());
     }

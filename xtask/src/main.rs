@@ -24,7 +24,8 @@ enum Verb {
         /// Coarser cells, fewer starts and cases
         #[arg(long)]
         quick: bool,
-        /// One table alone: torus, finer, ball, gravity, cameras, image, band, optimiser or gradient
+        /// One table alone: torus, finer, ball, gravity, cameras, image, band, optimiser or gradient; or real2sim, fields
+        /// of stiffness with priors, of which one case alone is real2sim-NAME and what this commit has measured is not run again
         #[arg(long, value_name = "TABLE")]
         only: Option<String>,
     },
@@ -168,6 +169,7 @@ enum Verb {
 
 fn run(verb: Verb) -> Result<(), String> {
     match verb {
+        Verb::Paper { only: Some(only), .. } if paper::real2sim::is_asked(&only) => paper::real2sim::run(&only)?,
         Verb::Paper { quick, only } => {
             let suffix = only.as_ref().map_or_else(String::new, |t| format!("-{t}"));
             let report = paper::tables::all(quick, only).map_err(|e| e.to_string())?;

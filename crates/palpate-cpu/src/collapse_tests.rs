@@ -40,6 +40,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
             poisson_ratio: 0.45,
             mass_damping: 0.1,
             stiffness_damping: 0.002,
+            viscosity: None,
         },
         gravity: DVec3::new(0.0, 0.0, -9.81),
         clamps: Vec::new(),
@@ -47,10 +48,12 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
         masses: Vec::new(),
         effects: Vec::new(),
         fields: Vec::new(),
+        curves: Default::default(),
         initial: Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest },
         time: Time { step: 0.01, steps: 40, start: 0.0, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
+        targets: Vec::new(),
         fit: None,
     }
 }

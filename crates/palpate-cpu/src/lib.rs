@@ -8,6 +8,8 @@ mod collapse_tests;
 pub mod costs;
 pub mod linear;
 #[cfg(test)]
+mod local_bodies;
+#[cfg(test)]
 mod local_tests;
 mod memory;
 mod newton;

@@ -2,109 +2,21 @@
 //! products.
 
 use crate::linear::matrix::{Operator, Packed};
+use crate::local_bodies::{Made, altering, ball, curved, fields, flowing, plan, tetrahedra};
 use crate::simulate::{self, Start};
 use crate::terms::elastic_cells::corners;
 use crate::terms::{Curvature, PastChange, zeros};
 use crate::world::{Gradient, MemberState, World};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use palpate_engine::{Direction, ParamBatch};
 use palpate_model::cutcells::corotation::CellPose;
-use palpate_model::effects::{ALL, Effect, Site, find};
+use palpate_model::effects::{Effect, Site, find};
 use palpate_model::materials;
-use palpate_model::mechanics::motion::RigidMotion;
-use palpate_model::observation::Observation;
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::plan::build::build_plan;
 use palpate_model::plan::scheme::{self, Stage};
 use palpate_model::scene::*;
-use palpate_model::space::points::TetMesh;
-
-/// Every effect that changes the body, its material or its clamps, at a size that matters.
-fn altering() -> Vec<Effect> {
-    let alters = |site: &Site| {
-        let of_body = matches!(site, Site::Modulus(_) | Site::Density(_) | Site::Aging(_) | Site::Rest(_) | Site::Cells(_));
-        of_body || matches!(site, Site::Clamps(_) | Site::Edges(_))
-    };
-    let make = |law: usize| {
-        let mut effect = Effect::absent(law);
-        for (value, p) in effect.values.iter_mut().zip(ALL[law].params) {
-            // Cell laws three times stronger, to show beside the linear material at these strains.
-            let size = if matches!(ALL[law].site, Site::Cells(_)) { 3.0 } else { 0.3 };
-            *value = value.map(|v| (v + size * p.typical).clamp(p.lower, p.upper));
-        }
-        effect
-    };
-    (0..ALL.len()).filter(|l| alters(&ALL[*l].site)).map(make).collect()
-}
-
-/// The box of the ball as cubes of six tetrahedra each, three along every edge.
-fn tetrahedra() -> BodySource {
-    let (low, edge) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / 3.0);
-    let at = |i: usize, j: usize, k: usize| (i + 4 * (j + 4 * k)) as u32;
-    let mut mesh = TetMesh::default();
-    for n in 0..64 {
-        mesh.nodes.push(low + edge * DVec3::new((n % 4) as f64, (n / 4 % 4) as f64, (n / 16) as f64));
-    }
-    for n in 0..27 {
-        let (i, j, k) = (n % 3, n / 3 % 3, n / 9);
-        let c = |bits: usize| at(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2));
-        for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
-            mesh.tets.push([c(0), c(way[0]), c(way[1]), c(7)]);
-        }
-    }
-    let mesh = mesh.checked().unwrap();
-    BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
-}
-
-fn plan(effects: Vec<Effect>) -> Plan {
-    let ball = Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.045) };
-    plan_of(BodySource::Analytic(ball), effects)
-}
-
-fn plan_of(source: BodySource, effects: Vec<Effect>) -> Plan {
-    let motion = RigidMotion {
-        times: vec![-1.0, 0.0, 1.0],
-        translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],
-        rotations: vec![glam::DQuat::IDENTITY, glam::DQuat::from_rotation_z(0.1), glam::DQuat::from_rotation_y(0.4)],
-    };
-    let scene = Scene {
-        path: "in-code.toml".into(),
-        title: String::new(),
-        object: Object { source, pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(0.03) },
-        material: Material {
-            model: &palpate_model::materials::ALL[0],
-            inertia: Inertia::Density(1000.0),
-            youngs_modulus: 5000.0,
-            poisson_ratio: 0.4,
-            mass_damping: 0.3,
-            stiffness_damping: 0.004,
-        },
-        gravity: DVec3::new(0.4, -0.3, -9.0),
-        clamps: vec![Clamp {
-            min: DVec3::new(-1.0, -1.0, 0.07),
-            max: DVec3::ONE,
-            object_frame: false,
-            motion: Some(motion),
-            motion_path: None,
-        }],
-        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::new(0.1, 0.05, 1.0).normalize(), stiffness: None }],
-        masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
-        effects,
-        fields: Vec::new(),
-        initial: Initial {
-            velocity: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-            pivot: None,
-            state: InitialShape::StaticEquilibrium,
-        },
-        time: Time { step: 0.01, steps: 3, start: 0.05, ..Time::weighted(0.55) },
-        solver: Solver::default(),
-        observation: None,
-        fit: None,
-    };
-    build_plan(&scene, Observation::default(), &[]).unwrap_or_else(|e| panic!("{e}"))
-}
 
 /// Random vectors in a cube of half edge `size`, reproducible.
 fn random(n: usize, size: f64, seed: u64) -> Vec<DVec3> {
@@ -180,14 +92,34 @@ fn everywhere(check: impl Fn(&At)) {
     for (model, effects) in models.chain([(&materials::ALL[0], altering()), (&materials::ALL[1], altering())]) {
         check_all(Plan { model, ..plan(effects) }, &check);
     }
-    // Bodies of tetrahedra, with a law at points and none.
-    for model in materials::ALL {
-        let mut drag = Effect::absent(find("air-drag").unwrap());
-        drag.values[0] = Some(5.0);
-        let mut p = Plan { model, ..plan_of(tetrahedra(), vec![drag]) };
-        // At random displacements springs as stiff as these would drown all other forces in their rounding.
-        p.clamps.iter_mut().flat_map(|c| &mut c.nodes).for_each(|n| n.1 *= 1e-6);
-        check_all(p, &check);
+    // A material of curves, and a viscosity, each beside a law of cells that dissipates and a stress-free shape of its own.
+    let few = || -> Vec<Effect> {
+        altering().into_iter().filter(|e| ["structural-damping", "rest-shape"].contains(&e.law().kind)).collect()
+    };
+    check_all(curved(ball(), few()), &check);
+    check_all(curved(tetrahedra(1), Vec::new()), &check);
+    check_all(flowing(ball(), 0.6, few()), &check);
+    // Bodies of tetrahedra, with a law at points, and fields of the first material; half of them flow.
+    for (model, exponent) in materials::ALL.iter().zip([None, Some(0.6)].into_iter().cycle()) {
+        for (kind, count) in [(Tetrahedron::Linear, 2), (Tetrahedron::Quadratic, 1)] {
+            let mut drag = Effect::absent(find("air-drag").unwrap());
+            drag.values[0] = Some(5.0);
+            let fields = if model.is_linear { fields() } else { Vec::new() };
+            let viscosity = exponent.map(|exponent| Viscosity { coefficient: 40.0, exponent });
+            let made = Made { tetrahedron: kind, fields, viscosity, ..Made::of(tetrahedra(count), vec![drag]) };
+            let mut p = Plan { model, ..made.plan() };
+            let of_field = |k: &ParamKey| matches!(k, ParamKey::Field { .. });
+            let values = p.theta.iter_mut().zip(&p.layout.keys).filter(|(_, k)| of_field(k));
+            values.enumerate().for_each(|(i, (v, _))| *v = 1.0 + 0.3 * (i as f64).sin());
+            check_all(p, &check);
+        }
+    }
+    // Laws of cells, of the clamps and of the body on them.
+    for (model, kind, count) in [(&materials::ALL[0], Tetrahedron::Quadratic, 1), (&materials::ALL[1], Tetrahedron::Linear, 2)] {
+        let on_tets = |e: &Effect| !matches!(e.law().site, Site::Rest(_) | Site::Edges(_));
+        let effects = altering().into_iter().filter(on_tets).collect();
+        let made = Made { tetrahedron: kind, ..Made::of(tetrahedra(count), effects) };
+        check_all(Plan { model, ..made.plan() }, &check);
     }
 }
 
@@ -200,12 +132,45 @@ fn check_all(p: Plan, check: &impl Fn(&At)) {
             // Strains of some 10 % or cells turned inside out, contact active, the old states elsewhere, fast.
             let states = [(1, random(n, 0.003, 1)), (2, random(n, 0.003, 2)), (3, inverted(&p))];
             // Materials with a barrier do not exist inside out.
-            let few = model.name.starts_with("neo-hookean") || !p.body.points.is_empty();
+            let few = model.name.starts_with("neo-hookean") || model.has_curves || !p.body.points.is_empty();
             let exist = if few { 2 } else { 3 };
             for (seed, u) in states.into_iter().take(exist) {
                 let state = |s| MemberState { u: random(n, 0.003, seed + s), v: random(n, 0.3, seed + s + 10) };
                 let past = stage.map_or(Vec::new(), |s| (0..s.from.len() as u64).map(|i| state(10 + 40 * i)).collect());
                 check(&At { seed, plan: &p, stage, u1: &u, past });
+            }
+        }
+    }
+}
+
+/// A5 of Real2Sim's acceptance: whatever the scheme, a body that turns and moves rigidly meets no viscosity.
+#[test]
+fn rigid_motion_meets_no_viscosity() {
+    for source in [ball(), tetrahedra(2)] {
+        let p = flowing(source, 0.8, Vec::new());
+        let n = p.body.nodes.len();
+        // A fifth of a turn a step.
+        let at = |time: f64| -> Vec<DVec3> {
+            let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 120.0 * time);
+            p.body.nodes.iter().map(|x| turn * *x + DVec3::new(2.0, 0.1, -0.4) * time - *x).collect()
+        };
+        for scheme in scheme::ALL {
+            for stage in scheme.stages(p.clock.step, 4, 0.55) {
+                // Numbers of states are those of the times they stand for, up to the stage itself.
+                let count = stage.from.len() as f64;
+                let past =
+                    (0..stage.from.len()).map(|i| MemberState { u: at(stage.time - 0.01 * (count - i as f64)), v: zeros(n) });
+                let (past, u1) = (past.collect::<Vec<_>>(), at(stage.time));
+                let place = p.layout.index(ParamKey::Viscosity);
+                let force = |coefficient: f64| {
+                    let mut theta = p.theta.clone();
+                    theta[place] = coefficient;
+                    let at = At { seed: 0, plan: &p, stage: Some(&stage), u1: &u1, past: past.clone() };
+                    at.with(&theta, &past, |mut e| e.residual(&u1))
+                };
+                let elastic = 5000.0 * p.body.length.powi(2);
+                let viscous = force(40.0).iter().zip(force(0.0)).map(|(a, b)| (*a - b).length()).fold(0.0, f64::max);
+                assert!(viscous < 1e-12 * elastic, "{}: {viscous:e} N of {elastic:e}", scheme.name);
             }
         }
     }

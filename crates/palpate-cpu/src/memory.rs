@@ -55,7 +55,7 @@ pub struct Sizes<'a> {
 impl<'a> Sizes<'a> {
     /// Of a plan.
     pub fn new(plan: &'a Plan) -> Sizes<'a> {
-        let (body, band) = (&plan.body, plan.body.band());
+        let (body, band) = (&plan.body, &plan.body.band);
         let pattern = Pattern::new(body);
         let blocks = pattern.blocks.columns.len();
         let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
@@ -64,7 +64,7 @@ impl<'a> Sizes<'a> {
             + band.cells.len() * size_of::<BandCell>()
             + band.nodes.len() * size_of::<DVec3>()
             + band.columns.len() * (size_of::<u32>() + size_of::<f64>())
-            + 4 * body.cut.as_ref().map_or(0, |c| c.grid.len())
+            + 4 * band.grid.len()
             + 8 * pattern.cell_list.len()
             + 4 * blocks
             + points * (size_of::<ObservedPoint>() + 8);

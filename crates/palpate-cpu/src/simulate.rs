@@ -74,6 +74,7 @@ pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option
         pattern: &shared.pattern,
         places: &shared.places,
         elements: &member.elements,
+        strains: shared.strains.as_ref(),
         coefficients: &member.coefficients,
         planes: &member.planes,
         effects: &member.effects,

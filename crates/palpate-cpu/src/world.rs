@@ -31,6 +31,8 @@ pub struct Shared {
     pub(crate) pattern: Pattern,
     pub(crate) places: Places,
     pub(crate) classes: Classes,
+    /// Element matrices at ν = 0, where the material has a viscosity.
+    pub(crate) strains: Option<Elements>,
     pub(crate) solvers: Solvers,
     pub(crate) costs: Costs,
     /// 1/n: one over the number of scalar residuals of the whole recording.
@@ -75,11 +77,12 @@ impl World {
         let pattern = Pattern::new(&plan.body);
         let places = Places::new(&plan, &pattern);
         let classes = Classes::new(&plan);
+        let strains = plan.layout.is_viscous().then(|| Elements::new(&plan, &classes, 0.0));
         let costs = Costs::new(&plan);
         let residuals = plan.observation.residuals();
         let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
         let solvers = Solvers::new(plan.solver.linear);
-        World { shared: Shared { plan, pattern, places, classes, solvers, costs, scale }, members: Vec::new() }
+        World { shared: Shared { plan, pattern, places, classes, strains, solvers, costs, scale }, members: Vec::new() }
     }
 
     pub(crate) fn set_params(&mut self, theta: &ParamBatch) {

@@ -3,8 +3,10 @@
 use crate::chart::AtBound;
 use crate::dense::{box_step, dot};
 use crate::journal::{Journal, JournalError, JournalFile};
-use crate::multistart;
-use crate::optimise::{Sample, Status};
+use crate::multistart::{self, Begin};
+use crate::optimise::{Sample, Status, Stop as Ending};
+use crate::priors::choose::{Choice, Ended, choose};
+use crate::priors::{self, FieldPosterior};
 use crate::problem::{Problem, Want};
 use crate::settings::{ErrorModel, Settings, Walk};
 use crate::uncertainty::{self, Uncertainty};
@@ -134,6 +136,8 @@ pub struct FittedField {
     pub values: Vec<f64>,
     /// Standard error of each; `None` at a bound or where it was not computed.
     pub standard_errors: Vec<Option<f64>>,
+    /// What a prior and the recording say of it together.
+    pub posterior: Option<FieldPosterior>,
     /// SI unit, `1` for none.
     pub unit: String,
 }
@@ -188,8 +192,21 @@ fn reason(status: &Status) -> &str {
 /// result, with the reason in [`FitResult::broken`].
 pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Result<FitResult, FitError> {
     let clock = Instant::now();
-    let journal = hooks.journal.as_ref().map(|place| Journal::open(place, problem, settings)).transpose()?;
-    let starts = multistart::run(problem, settings, &mut hooks, journal)?;
+    let mut journal = hooks.journal.as_ref().map(|place| Journal::open(place, problem, settings)).transpose()?;
+    let mut choice = None;
+    let starts = match problem.priors().is_empty() {
+        true => multistart::run(problem, settings, &mut hooks, journal.as_mut(), None)?,
+        false => match choose(problem, settings, &mut hooks, journal.as_mut())? {
+            Ended::Cut(run) => vec![*run],
+            Ended::Found(found) => {
+                let first = Begin::given(found.values.clone(), found.evaluations, found.iterations);
+                let mut starts = multistart::run(problem, settings, &mut hooks, journal.as_mut(), Some(first))?;
+                found.add_to(problem, &mut starts[0]);
+                choice = Some(found);
+                starts
+            }
+        },
+    };
     let runs: Vec<Run> = starts
         .iter()
         .map(|s| Run {
@@ -225,7 +242,14 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     // Data whose errors go together say less; never more.
     let design_effect = hooks.design_effect.as_mut().map_or(1.0, |ask| ask(&theta)).max(1.0);
     let settings = &Settings { errors: ErrorModel { design_effect, ..settings.errors.clone() }, ..settings.clone() };
-    let (u, distance, extra) = curvature(problem, &z, starts[best].outcome.sample.as_ref(), settings, cut, &mut broken);
+    let sample = starts[best].outcome.sample.as_ref();
+    let (u, distance, extra, posteriors) = match problem.priors().is_empty() {
+        true => {
+            let (u, distance, extra) = curvature(problem, &z, sample, settings, cut, &mut broken);
+            (u, distance, extra, Vec::new())
+        }
+        false => with_priors(problem, &z, (sample, choice.as_ref(), design_effect), cut, &hooks, &mut broken),
+    };
     let mut warnings = u.warnings.clone();
     warnings.extend(uncertainty::compare_starts(problem, &starts, best, &u));
     let failed: Vec<usize> = (0..runs.len()).filter(|&s| runs[s].cost.is_infinite()).collect();
@@ -241,7 +265,7 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
     if cut.is_none() && runs[best].status == Status::IterationLimit {
         warnings.push(format!("the best start used up its {} iterations; more may lower the cost", settings.iterations));
     }
-    let (parameters, fields) = found(problem, &values, &u);
+    let (parameters, fields) = found(problem, &values, &u, posteriors);
     let correlation = match u.correlation.is_empty() {
         true => uncertainty::identity(parameters.len()),
         false => parameters.iter().map(|a| parameters.iter().map(|b| u.correlation[a.index][b.index]).collect()).collect(),
@@ -266,8 +290,14 @@ pub fn fit(problem: &mut Problem, settings: &Settings, mut hooks: Hooks) -> Resu
 }
 
 /// The free numbers and fields at the best point.
-fn found(problem: &Problem, values: &[f64], u: &Uncertainty) -> (Vec<FittedParameter>, Vec<FittedField>) {
+fn found(
+    problem: &Problem,
+    values: &[f64],
+    u: &Uncertainty,
+    posteriors: Vec<FieldPosterior>,
+) -> (Vec<FittedParameter>, Vec<FittedField>) {
     let (mut parameters, mut fields) = (Vec::new(), Vec::new());
+    let mut posteriors = posteriors.into_iter();
     for (f, range) in problem.blocks() {
         let (path, unit, first) = (f.path.clone(), f.unit.clone(), range.start);
         if f.count == 1 {
@@ -284,10 +314,38 @@ fn found(problem: &Problem, values: &[f64], u: &Uncertainty) -> (Vec<FittedParam
             });
         } else {
             let standard_errors = u.standard_errors[range.clone()].to_vec();
-            fields.push(FittedField { path, first, values: values[range].to_vec(), standard_errors, unit });
+            let posterior = f.prior.as_ref().and_then(|_| posteriors.next());
+            fields.push(FittedField { path, first, values: values[range].to_vec(), standard_errors, posterior, unit });
         }
     }
     (parameters, fields)
+}
+
+/// Errors of a fit with priors of fields; see [`curvature`].
+fn with_priors(
+    problem: &mut Problem,
+    z: &[f64],
+    (sample, choice, design): (Option<&Sample>, Option<&Choice>, f64),
+    cut: Option<&str>,
+    hooks: &Hooks,
+    broken: &mut Option<String>,
+) -> (Uncertainty, f64, usize, Vec<FieldPosterior>) {
+    let without = |problem: &Problem, why: &str| {
+        let mut u = uncertainty::assess(problem, z, &Sample::default(), &ErrorModel::default());
+        u.warnings.push(format!("no standard errors: {why}"));
+        (u, f64::NAN, 0, Vec::new())
+    };
+    let (Some(sample), None) = (sample, cut) else { return without(problem, cut.unwrap_or("nothing was evaluated")) };
+    let stop = hooks.interrupt.clone();
+    let over = || stop.is_over();
+    match priors::assess(problem, z, sample, choice, design, &over) {
+        Ok(a) => (a.uncertainty, a.distance, 0, a.fields),
+        Err(Ending::Interrupted) => without(problem, "the fit was interrupted"),
+        Err(Ending::Broken(why)) => {
+            *broken = Some(why.clone());
+            without(problem, &why)
+        }
+    }
 }
 
 /// How far the optimum is, in standard errors, by a free step in the box.

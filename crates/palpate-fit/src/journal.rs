@@ -5,6 +5,8 @@
 //! digits of their bits, so that they come back exactly). A last line without its end is what a crash leaves, and is ignored.
 
 use crate::optimise::Sample;
+use crate::priors::choose::Choice;
+use crate::priors::{FieldPrior, Hyper, Tried};
 use crate::problem::{FitScene, FreeParameter, Problem};
 use crate::settings::Settings;
 use serde::{Deserialize, Serialize};
@@ -45,6 +47,9 @@ struct HeadParameter {
     /// Value and standard deviation known beforehand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     known: Option<[f64; 2]>,
+    /// Prior of a field in a text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    prior: Option<String>,
     /// Number of values, of a field.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     count: usize,
@@ -71,6 +76,75 @@ struct HeadScene {
 #[derive(Serialize, Deserialize)]
 struct Round {
     round: Vec<Entry>,
+}
+
+/// The line that ends the search for hyperparameters of priors; see [`Choice`].
+#[derive(Serialize, Deserialize)]
+struct Chosen {
+    chosen: ChosenEntry,
+}
+
+/// Its content; numbers are hexadecimal digits of pairs, triples and vectors.
+#[derive(Serialize, Deserialize)]
+struct ChosenEntry {
+    /// Length and deviation of every prior.
+    hypers: String,
+    temper: String,
+    /// Length, deviation and evidence of all that were tried, by prior.
+    tried: Vec<String>,
+    start: String,
+    values: String,
+    start_cost: String,
+    /// Fits, iterations, evaluations, products.
+    effort: [usize; 4],
+    settled: bool,
+}
+
+impl ChosenEntry {
+    fn new(c: &Choice) -> ChosenEntry {
+        let hyper = |h: &Hyper| [h.length, h.deviation];
+        let tried = |t: &Vec<Tried>| {
+            let all: Vec<f64> = t.iter().flat_map(|t| [t.hyper.length, t.hyper.deviation, t.evidence]).collect();
+            to_hex(&all)
+        };
+        ChosenEntry {
+            hypers: to_hex(&c.hypers.iter().flat_map(hyper).collect::<Vec<f64>>()),
+            temper: to_hex(&[c.temper]),
+            tried: c.tried.iter().map(tried).collect(),
+            start: to_hex(&c.start),
+            values: to_hex(&c.values),
+            start_cost: to_hex(&[c.start_cost]),
+            effort: [c.fits, c.iterations, c.evaluations, c.products],
+            settled: c.settled,
+        }
+    }
+
+    /// `None` where it is damaged, or not one of q values.
+    fn choice(&self, q: usize) -> Option<Choice> {
+        let one = |text: &str| from_hex(text).and_then(|v| v.first().copied());
+        let tried = |text: &String| {
+            let rows = from_hex(text)?;
+            let row = |r: &[f64]| Tried { hyper: Hyper { length: r[0], deviation: r[1] }, evidence: r[2] };
+            rows.len().is_multiple_of(3).then(|| rows.chunks(3).map(row).collect::<Vec<Tried>>())
+        };
+        let hypers = from_hex(&self.hypers).filter(|h| h.len() == 2 * self.tried.len())?;
+        let (start, values) = (from_hex(&self.start)?, from_hex(&self.values)?);
+        let [fits, iterations, evaluations, products] = self.effort;
+        (start.len() == q && values.len() == q).then_some(())?;
+        Some(Choice {
+            hypers: hypers.chunks(2).map(|h| Hyper { length: h[0], deviation: h[1] }).collect(),
+            temper: one(&self.temper)?,
+            tried: self.tried.iter().map(tried).collect::<Option<_>>()?,
+            start,
+            values,
+            start_cost: one(&self.start_cost)?,
+            fits,
+            iterations,
+            evaluations,
+            products,
+            settled: self.settled,
+        })
+    }
 }
 
 /// Where a fit keeps its journal.
@@ -140,6 +214,7 @@ pub struct Journal {
     path: PathBuf,
     file: File,
     entries: Entries,
+    chosen: Option<Choice>,
 }
 
 impl Journal {
@@ -148,16 +223,16 @@ impl Journal {
         let path = place.path.clone();
         let io = |error: io::Error| JournalError::Io { path: path.clone(), error };
         let head = Head::new(problem, settings);
-        let mut entries = BTreeMap::new();
+        let (mut entries, mut chosen) = (BTreeMap::new(), None);
         let mut keep = 0;
         if place.resume && path.exists() {
             let text = std::fs::read(&path).map_err(io)?;
             keep = text.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
-            entries = read(&path, &String::from_utf8_lossy(&text[..keep]), &head, problem.values_count())?;
+            (entries, chosen) = read(&path, &String::from_utf8_lossy(&text[..keep]), &head, problem.values_count())?;
         }
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(io)?;
         file.set_len(keep as u64).map_err(io)?;
-        let mut journal = Journal { path: path.clone(), file, entries };
+        let mut journal = Journal { path: path.clone(), file, entries, chosen };
         io::Seek::seek(&mut journal.file, io::SeekFrom::End(0)).map_err(io)?;
         if keep == 0 {
             writeln!(journal.file, "{}", text(&head).map_err(io)?).map_err(io)?;
@@ -176,6 +251,18 @@ impl Journal {
             return Err(JournalError::Content { path: self.path.clone(), line, message });
         }
         Ok(Some(sample))
+    }
+
+    /// The hyperparameters that an earlier run has found.
+    pub(crate) fn chosen(&mut self) -> Option<Choice> {
+        self.chosen.take()
+    }
+
+    /// Appends hyperparameters that were found.
+    pub(crate) fn choose(&mut self, choice: &Choice) -> Result<(), JournalError> {
+        let io = |error| JournalError::Io { path: self.path.clone(), error };
+        let line = text(&Chosen { chosen: ChosenEntry::new(choice) }).map_err(io)? + "\n";
+        self.file.write_all(line.as_bytes()).map_err(io)
     }
 
     /// Appends a round of evaluations (start, number, z, result) as one line. None of them may be [broken](Sample::broken): a resumed
@@ -214,6 +301,7 @@ impl Head {
             bounds: [f.bounds.0.to_string(), f.bounds.1.to_string()],
             start: [f.start.0, f.start.1],
             known: f.known.map(|(value, sd)| [value, sd]),
+            prior: f.prior.as_ref().map(FieldPrior::text),
             count: f.count,
             slots: f.slots.iter().map(|s| (s.scene, s.place, to_hex(&[s.factor]))).collect(),
         };
@@ -263,9 +351,9 @@ impl Entry {
 }
 
 /// Reads the whole lines of a journal of a problem with this head and q free parameters.
-fn read(path: &Path, text: &str, own: &Head, q: usize) -> Result<Entries, JournalError> {
+fn read(path: &Path, text: &str, own: &Head, q: usize) -> Result<(Entries, Option<Choice>), JournalError> {
     let wrong = |line: usize, message: String| JournalError::Content { path: path.to_path_buf(), line, message };
-    let mut entries = BTreeMap::new();
+    let (mut entries, mut chosen) = (BTreeMap::new(), None);
     for (k, text) in text.lines().enumerate() {
         let line = k + 1;
         let not = |what: &str, e: serde_json::Error| wrong(line, format!("not a {what} ({e})"));
@@ -284,6 +372,12 @@ fn read(path: &Path, text: &str, own: &Head, q: usize) -> Result<Entries, Journa
             }
             continue;
         }
+        if text.starts_with("{\"chosen\"") {
+            let line_of: Chosen = serde_json::from_str(text).map_err(|e| not("line of chosen priors", e))?;
+            let damaged = || wrong(line, "the chosen numbers of priors are damaged".into());
+            chosen = Some(line_of.chosen.choice(q).ok_or_else(damaged)?);
+            continue;
+        }
         let Round { round } = serde_json::from_str(text).map_err(|e| not("round of evaluations", e))?;
         for e in round {
             let (start, evaluation) = (e.start, e.evaluation);
@@ -292,5 +386,5 @@ fn read(path: &Path, text: &str, own: &Head, q: usize) -> Result<Entries, Journa
             entries.insert((start, evaluation), (z, sample, line));
         }
     }
-    Ok(entries)
+    Ok((entries, chosen))
 }

@@ -1,7 +1,8 @@
 //! What is known of a number before the recording is looked at: a Gaussian prior (x − value)/sd, one more residual of unit noise.
 //!
 //! A problem of scenes with n_s residuals and costs J_s has the cost `[Σ n_s J_s + Σ ½ ((x − value)/sd)²] / Σ n_s`: for residuals that are
-//! independent and as noisy as stated, n times it is the negative logarithm of the posterior density.
+//! independent and as noisy as stated, n times it is the negative logarithm of the posterior density. Beside priors of fields, t residuals count
+//! as one ([`crate::priors`]), and what is known beforehand weighs t times as much.
 
 use crate::optimise::Sample;
 use crate::problem::Problem;
@@ -44,10 +45,11 @@ impl Problem<'_> {
     /// Adds the priors to a sum over scenes of n_s times cost and derivatives by values, as far as it has them.
     pub(crate) fn add_known(&self, sum: &mut Sample, values: &[f64]) {
         let q = values.len();
+        let temper = self.priors().temper;
         for KnownRow { index: i, residual, slope } in self.known_rows(values) {
-            sum.cost += 0.5 * residual * residual;
-            sum.gradient.iter_mut().skip(i).take(1).for_each(|g| *g += residual * slope);
-            sum.curvature.iter_mut().skip(i * q + i).take(1).for_each(|h| *h += slope * slope);
+            sum.cost += temper * 0.5 * residual * residual;
+            sum.gradient.iter_mut().skip(i).take(1).for_each(|g| *g += temper * residual * slope);
+            sum.curvature.iter_mut().skip(i * q + i).take(1).for_each(|h| *h += temper * slope * slope);
         }
     }
 
@@ -55,7 +57,7 @@ impl Problem<'_> {
     pub(crate) fn known_curvature(&self, z: &[f64], n: f64) -> Vec<f64> {
         let mut out = vec![0.0; z.len()];
         for row in self.known_rows(&self.values(z)) {
-            out[row.index] = (row.slope * self.charts()[row.index].slope(z[row.index])).powi(2) / n;
+            out[row.index] = self.priors().temper * (row.slope * self.charts()[row.index].slope(z[row.index])).powi(2) / n;
         }
         out
     }

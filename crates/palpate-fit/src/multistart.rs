@@ -7,6 +7,7 @@ use crate::chart::Chart;
 use crate::fit::{FitError, Hooks, Progress};
 use crate::journal::Journal;
 use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
+use crate::priors::Priors;
 use crate::problem::{FreeParameter, Problem};
 use crate::settings::{Settings, Walk};
 use palpate_engine::FailureKind;
@@ -77,6 +78,7 @@ struct Runner<'a> {
     line: usize,
     free: &'a [FreeParameter],
     charts: &'a [Chart],
+    priors: &'a Priors,
     own: &'a [f64],
     lower: &'a [f64],
     upper: &'a [f64],
@@ -121,7 +123,8 @@ impl Runner<'_> {
                 let _ = tell.send((self.line, Message::Iteration(n, cost, z.to_vec())));
             };
             let search = Search::new(&mut evaluate, &mut progress, self.lower, self.upper, self.settings);
-            let search = search.with_products(&mut product).with_sight(self.sight && self.given.is_none());
+            let search =
+                search.with_products(&mut product).with_priors(self.priors).with_sight(self.sight && self.given.is_none());
             let mut outcome = search.run(self.settings.optimizer, &start);
             spent += outcome.evaluations;
             attempt += 1;
@@ -135,17 +138,20 @@ impl Runner<'_> {
     }
 }
 
-/// Runs all starts; the result is ordered by start. Starts that see nothing are led to where they do, where the hooks have who leads.
+/// Runs all starts, the first from `first` where that is given; the result is ordered by start. Starts that see nothing are led to where they do,
+/// where the hooks have who leads.
 pub fn run(
     problem: &mut Problem,
     settings: &Settings,
     hooks: &mut Hooks,
-    mut journal: Option<Journal>,
+    mut journal: Option<&mut Journal>,
+    first: Option<Begin>,
 ) -> Result<Vec<StartRun>, FitError> {
     // Fixed starts are all the same.
     let fixed = problem.free().iter().all(|f| f.start.0 == f.start.1);
-    let all: Vec<Begin> = (0..if fixed { 1 } else { settings.starts.max(1) }).map(Begin::drawn).collect();
-    let mut runs = run_some(problem, settings, hooks, journal.as_mut(), &all)?;
+    let mut all: Vec<Begin> = (0..if fixed { 1 } else { settings.starts.max(1) }).map(Begin::drawn).collect();
+    all.iter_mut().zip(first).for_each(|(begin, first)| *begin = first);
+    let mut runs = run_some(problem, settings, hooks, journal.as_deref_mut(), &all)?;
     let blind: Vec<usize> = (0..runs.len()).filter(|s| runs[*s].outcome.status == Status::Blind).collect();
     let Some(lead) = hooks.lead.as_mut().filter(|_| !blind.is_empty()) else { return Ok(runs) };
     let values: Vec<Vec<f64>> = blind.iter().map(|s| problem.values(&runs[*s].start)).collect();
@@ -153,9 +159,13 @@ pub fn run(
     let again: Vec<Begin> = blind
         .iter()
         .zip(values.into_iter().zip(led))
-        .map(|(&s, (own, led))| Begin { number: s, served: runs[s].outcome.evaluations, given: Some(led.unwrap_or(own)) })
+        .map(|(&s, (own, led))| Begin {
+            number: s,
+            served: runs[s].outcome.evaluations,
+            ..Begin::given(led.unwrap_or(own), 0, 0)
+        })
         .collect();
-    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal.as_mut(), &again)?) {
+    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal, &again)?) {
         let first = &mut runs[begin.number];
         if run.outcome.sample.is_none() {
             // Stopped before it could look again: its first look is what there is.
@@ -174,17 +184,23 @@ pub fn run(
 }
 
 /// How a start begins.
-struct Begin {
+pub struct Begin {
     number: usize,
-    /// Evaluations that it has had.
+    /// Evaluations and iterations that it has had.
     served: usize,
+    iterations: usize,
     /// Values `[q]`, where they are not drawn.
     given: Option<Vec<f64>>,
 }
 
 impl Begin {
     fn drawn(number: usize) -> Begin {
-        Begin { number, served: 0, given: None }
+        Begin { number, served: 0, iterations: 0, given: None }
+    }
+
+    /// The first start from given values `[q]`, after so many evaluations and iterations.
+    pub fn given(values: Vec<f64>, served: usize, iterations: usize) -> Begin {
+        Begin { number: 0, served, iterations, given: Some(values) }
     }
 }
 
@@ -198,6 +214,7 @@ fn run_some(
 ) -> Result<Vec<StartRun>, FitError> {
     let free = problem.free().to_vec();
     let charts = problem.charts().to_vec();
+    let priors = problem.priors().clone();
     let own = problem.own_values();
     let (lower, upper): (Vec<f64>, Vec<f64>) = charts.iter().map(Chart::range).unzip();
     let sight = hooks.lead.is_some();
@@ -213,6 +230,7 @@ fn run_some(
                 number,
                 free: &free,
                 charts: &charts,
+                priors: &priors,
                 own: &own,
                 lower: &lower,
                 upper: &upper,
@@ -288,7 +306,9 @@ fn broker(
         heard.sort_by_key(|h| h.0);
         for (start, iteration, cost, z) in heard {
             if let Some(f) = &mut hooks.on_iteration {
-                f(&Progress { start: begins[start].number, iteration, cost, values: problem.values(&z) });
+                let begin = &begins[start];
+                let iteration = begin.iterations + iteration;
+                f(&Progress { start: begin.number, iteration, cost, values: problem.values(&z) });
             }
         }
         if asked.iter().all(Option::is_none) {

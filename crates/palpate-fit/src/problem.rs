@@ -3,6 +3,7 @@
 use crate::chart::Chart;
 use crate::known;
 use crate::optimise::{Sample, is_blind, want};
+use crate::priors::{FieldPrior, Priors};
 use palpate_engine::{Evaluate, Failure, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
 use palpate_model::scene::Optimizer;
@@ -35,6 +36,8 @@ pub struct FreeParameter {
     pub start: (f64, f64),
     /// Value and standard deviation that are known beforehand, in its own unit: a Gaussian prior, of every value of a field.
     pub known: Option<(f64, f64)>,
+    /// What is expected of a field's values together.
+    pub prior: Option<FieldPrior>,
     /// Places that follow it; at least one.
     pub slots: Vec<Slot>,
     /// How many values follow each other from every slot's place on: 1 for a number.
@@ -67,7 +70,8 @@ pub enum Want {
 }
 
 /// A joint fit of one or more scenes. Its cost is `Σ n_s J_s / Σ n_s` with n_s the residual count of scene s, so that every
-/// residual counts once; what is known of values beforehand adds to it ([`crate::KnownRow`]). The free values of all parameters, one after the other, are the vector `[q]` that optimisers see.
+/// residual counts once; what is known of values beforehand ([`crate::KnownRow`]) and priors of fields ([`crate::FieldPrior`]) add to it. The free
+/// values of all parameters, one after the other, are the vector `[q]` that optimisers see.
 pub struct Problem<'a> {
     scenes: Vec<FitScene<'a>>,
     free: Vec<FreeParameter>,
@@ -77,6 +81,9 @@ pub struct Problem<'a> {
     charts: Vec<Chart>,
     /// Residuals n_s of every scene when it was last evaluated.
     residuals: Vec<f64>,
+    /// True once they were counted.
+    counted: bool,
+    priors: Priors,
 }
 
 impl<'a> Problem<'a> {
@@ -116,7 +123,22 @@ impl<'a> Problem<'a> {
             }
         }
         let residuals = vec![1.0; scenes.len()];
-        Ok(Problem { scenes, free, firsts, charts, residuals })
+        let priors = Priors::new(free.iter().zip(firsts.windows(2).map(|w| w[0]..w[1])))?;
+        Ok(Problem { scenes, free, firsts, charts, residuals, counted: false, priors })
+    }
+
+    /// Priors of fields as they stand.
+    pub(crate) fn priors(&self) -> &Priors {
+        &self.priors
+    }
+
+    pub(crate) fn priors_mut(&mut self) -> &mut Priors {
+        &mut self.priors
+    }
+
+    /// Residuals of all scenes when they were last evaluated; a scene that counts none weighs as one.
+    pub(crate) fn residual_count(&self) -> f64 {
+        self.residuals.iter().sum()
     }
 
     /// Free parameters; each stands for as many values as it counts.
@@ -196,6 +218,21 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// Why it could not be computed.
     pub fn product(&mut self, z: &[f64], direction: &[f64]) -> Result<Vec<f64>, Failure> {
+        // Evaluations that a journal served have not counted residuals.
+        if !self.counted && (self.scenes.len() > 1 || !self.priors.is_empty()) {
+            let values = self.values(z);
+            self.evaluate_values(&[values], Want::Cost);
+        }
+        let mut out = self.data_product(z, direction)?;
+        if !self.priors.is_empty() {
+            let weight = self.priors.temper / self.residual_count();
+            out.iter_mut().zip(self.priors.product(z, direction)).for_each(|(o, p)| *o += weight * p);
+        }
+        Ok(out)
+    }
+
+    /// The same without priors of fields.
+    pub(crate) fn data_product(&mut self, z: &[f64], direction: &[f64]) -> Result<Vec<f64>, Failure> {
         let slopes: Vec<f64> = self.charts.iter().zip(z).map(|(c, &z)| c.slope(z)).collect();
         let values = self.values(z);
         let mut out = vec![0.0; z.len()];
@@ -259,6 +296,7 @@ impl<'a> Problem<'a> {
                 let n = e.residuals.max(1) as f64;
                 weights[b] += n;
                 self.residuals[s] = n;
+                self.counted = s + 1 == self.residuals.len();
                 sum.residuals += e.residuals;
                 sum.unmatched += e.residuals.saturating_sub(e.matched);
                 sum.cost += n * e.cost;
@@ -303,8 +341,24 @@ impl<'a> Problem<'a> {
         for (sample, z) in samples.iter_mut().zip(z) {
             let slopes: Vec<f64> = self.charts.iter().zip(z).map(|(c, &z)| c.slope(z)).collect();
             sample.scale_axes(&slopes);
+            if !self.priors.is_empty() && sample.failure.is_none() {
+                self.add_priors(sample, z);
+            }
         }
         samples
+    }
+
+    /// Adds the priors of fields at z `[q]`.
+    fn add_priors(&self, sample: &mut Sample, z: &[f64]) {
+        let (q, weight) = (z.len(), self.priors.temper / self.residual_count());
+        let (energy, gradient) = self.priors.energy(z);
+        sample.cost += weight * energy;
+        sample.gradient.iter_mut().zip(gradient).for_each(|(g, p)| *g += weight * p);
+        for row in 0..sample.curvature.len() / q.max(1) {
+            let unit: Vec<f64> = (0..q).map(|i| if i == row { 1.0 } else { 0.0 }).collect();
+            let along = self.priors.product(z, &unit);
+            sample.curvature[row * q..(row + 1) * q].iter_mut().zip(along).for_each(|(h, p)| *h += weight * p);
+        }
     }
 }
 

@@ -93,8 +93,12 @@ pub struct Shape {
     pub held: u32,
     /// Length of an element [m]: the edge of a cell, or of a cube of six mean tetrahedra. What is not about cells goes by it.
     pub element_size: f32,
+    /// Elements: cells, or tetrahedra.
+    pub elements: u32,
+    /// Elastic points of a tetrahedron; 1 where there are none.
+    pub per_element: u32,
     /// Fills up.
-    pub pad: [u32; 3],
+    pub pad: u32,
 }
 
 /// Parameters of one member.
@@ -123,6 +127,8 @@ pub struct Member {
     pub spin: [f32; 4],
     /// λ/E and μ/E, and their derivatives by Poisson's ratio.
     pub lame: [f32; 4],
+    /// Viscosity: coefficient [Pa·s^h] and exponent, and the slot of the element matrices at ν = 0 (the first); one entry fills up.
+    pub flow: [f32; 4],
 }
 
 /// How the coefficients of one member change along a direction; `shared/rates.wgsl`.
@@ -141,8 +147,8 @@ pub struct Rate {
     pub stiffness_damping: f32,
     /// Of the time of the start [s].
     pub start: f32,
-    /// Fills up.
-    pub pad: [f32; 2],
+    /// Of the viscosity's coefficient [Pa·s^h] and exponent.
+    pub viscosity: [f32; 2],
     /// Of gravity [m/s²].
     pub gravity: [f32; 4],
     /// Of the initial velocity [m/s].

@@ -87,7 +87,8 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     let mut buffers = HashMap::new();
     let geometry = Geometry::new(&counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
     let shape = &geometry.shape;
-    let ratios = load.ratios.clamp(1, members) as u64;
+    // A viscosity needs those at ν = 0 besides.
+    let ratios = load.ratios.clamp(1, members) as u64 + u64::from(plan.layout.is_viscous());
     let matrices = |sets: u64, count: u32| sets * 2 * u64::from(count) * 576 * 4;
     let mut constants: Vec<u64> = buffers.into_values().collect();
     constants.extend([
@@ -100,8 +101,8 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
         matrices(if geometry.effects.on_clamps() { b } else { ratios }, shape.holds),
         b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64,
     ]);
-    let effects =
-        geometry.effects.sizes(members, shape.nodes as usize, (shape.cells + shape.elastic) as usize, shape.clamps as usize);
+    let [nodes, elements, clamps] = [shape.nodes, shape.elements, shape.clamps].map(|n| n as usize);
+    let effects = geometry.effects.sizes(members, nodes, elements, geometry.mass.entries(), clamps);
     constants.extend(effects.iter().map(|s| 4 * s.1 as u64));
     constants.extend(costs::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();

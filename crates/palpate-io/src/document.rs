@@ -248,6 +248,13 @@ impl<'a> Table<'a> {
         array.iter().map(|v| self.value_f64(key, v)).collect::<Result<_, _>>().map(Some)
     }
 
+    /// An array of finite numbers.
+    pub fn optional_list(&self, key: &str) -> Result<Option<Vec<f64>>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let array = item.as_array().ok_or_else(|| self.wrong(key, "an array of numbers", item))?;
+        self.optional_numbers(key, array.len())
+    }
+
     /// A vector `[x, y, z]`.
     pub fn optional_vec3(&self, key: &str) -> Result<Option<DVec3>, InputError> {
         Ok(self.optional_numbers(key, 3)?.map(|v| DVec3::new(v[0], v[1], v[2])))
@@ -256,6 +263,18 @@ impl<'a> Table<'a> {
     /// A vector that must be there.
     pub fn vec3(&self, key: &str) -> Result<DVec3, InputError> {
         self.optional_vec3(key)?.ok_or_else(|| self.missing(key, "[x, y, z]"))
+    }
+
+    /// An array of vectors `[[x, y, z], …]`.
+    pub fn optional_points(&self, key: &str) -> Result<Option<Vec<DVec3>>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let wrong = || self.wrong(key, "an array of [x, y, z], three numbers each", item);
+        let point = |v: &Value| {
+            let v = v.as_array().filter(|a| a.len() == 3).ok_or_else(wrong)?;
+            let numbers: Vec<f64> = v.iter().map(|x| self.value_f64(key, x)).collect::<Result<_, _>>()?;
+            Ok(DVec3::from_slice(&numbers))
+        };
+        item.as_array().ok_or_else(wrong)?.iter().map(point).collect::<Result<_, _>>().map(Some)
     }
 
     /// A 4 × 4 matrix, row by row.

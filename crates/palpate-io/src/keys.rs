@@ -44,7 +44,7 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "object",
             Schema {
-                keys: &["mesh", "volume_mesh", "pose", "cell_size", "cells"],
+                keys: &["mesh", "volume_mesh", "pose", "discretisation", "cell_size", "cells", "edge_length"],
                 tables: &[(
                     "shape",
                     Schema {
@@ -61,17 +61,24 @@ pub(crate) const SCENE: Schema = Schema {
         ),
         (
             "material",
-            table(&["model", "density", "mass", "youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"]),
+            Schema {
+                keys: &["model", "density", "mass", "youngs_modulus", "poisson_ratio", "mass_damping", "stiffness_damping"],
+                tables: &[
+                    ("viscosity", table(&["coefficient", "exponent"])),
+                    ("stretch_curve", table(&["stretches", "factors"])),
+                    ("volume_curve", table(&["ratios", "factors"])),
+                ],
+            },
         ),
         ("world", table(&["gravity"])),
-        ("clamp", Schema { keys: &["frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
+        ("clamp", Schema { keys: &["group", "frame", "motion"], tables: &[("box", table(&["min", "max"]))] }),
         ("plane", table(&["point", "normal", "stiffness"])),
         ("mass", table(&["point", "mass"])),
         (
             "field",
             Schema {
                 keys: &["path", "basis", "scale", "blend", "file", "array"],
-                tables: &[("regions", table(&["center", "radius", "value"]))],
+                tables: &[("regions", table(&["center", "radius", "value"])), ("prior", table(&["kind", "length", "deviation"]))],
             },
         ),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
@@ -84,6 +91,7 @@ pub(crate) const SCENE: Schema = Schema {
                 tables: &[("frames", table(&["from", "to", "every"])), ("marker", table(&["name", "position", "surface"]))],
             },
         ),
+        ("target", table(&["time", "tolerance", "points", "positions", "file"])),
         (
             "fit",
             Schema {

@@ -26,12 +26,17 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// The elements of a body: its cells as hexahedra (VTK's type 12), or its tetrahedra (type 10), in the body's order.
+    /// The elements of a body: its cells as hexahedra (VTK's type 12), or its tetrahedra (type 10, or 24 where they are quadratic), in
+    /// the body's order.
     pub fn of(body: &Body) -> Elements {
         let mut all = Elements::default();
         body.cells().iter().for_each(|c| all.push(CellType::Hexahedron, VTK_ORDER.map(|i| c.nodes[i])));
-        // Linear tetrahedra count their corners as VTK does: the fourth lies on the side that the first three turn around.
-        body.points.stencils.iter().for_each(|s| all.push(CellType::Tetra, s.nodes.iter().copied()));
+        // Tetrahedra count their nodes as VTK does: the fourth corner lies on the side that the first three turn around, and nodes of edges
+        // follow as `palpate_model::space::tets::EDGES` has them.
+        for s in body.points.means() {
+            let kind = if s.nodes.len() == 4 { CellType::Tetra } else { CellType::QuadraticTetra };
+            all.push(kind, s.nodes.iter().copied());
+        }
         all
     }
 

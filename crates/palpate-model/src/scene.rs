@@ -1,17 +1,24 @@
 //! A scene as plain checked data (format `scene/1`): everything known about an experiment, and what is to be found out.
 //! Reading and writing the TOML is `palpate-io`'s business.
 
+mod fit;
 mod in_code;
+
+pub use fit::{FitParameter, FitSpec, Optimizer};
 
 use crate::effects::Effect;
 use crate::materials::Model;
+use crate::materials::principal_stretch::PrincipalStretch;
+use crate::materials::viscosity::Viscosity;
 use crate::mechanics::motion::RigidMotion;
+use crate::observation::target::Target;
 use crate::observation::{MarkerRest, ReadingKind};
 use crate::params::Layout;
 use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
 use crate::space::points::TetMesh;
+pub use crate::space::tets::Tetrahedron;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
 
@@ -26,6 +33,8 @@ pub struct Scene {
     pub object: Object,
     /// Material of the whole body.
     pub material: Material,
+    /// Curves of its stiffness, where its model has some.
+    pub curves: PrincipalStretch,
     /// Gravity [m/s²].
     pub gravity: DVec3,
     /// Regions that are held or moved.
@@ -46,6 +55,8 @@ pub struct Scene {
     pub solver: Solver,
     /// What was measured, if anything.
     pub observation: Option<ObservationSpec>,
+    /// Where points of the body shall be, of a scene that is compared with a wish instead of a recording.
+    pub targets: Vec<Target>,
     /// What is to be found out, if anything.
     pub fit: Option<FitSpec>,
 }
@@ -59,7 +70,7 @@ impl Scene {
     /// The parameters of this scene with fields of so many values.
     pub fn layout_with(&self, fields: &[usize]) -> Layout {
         let laws: Vec<usize> = self.effects.iter().map(|e| e.law).collect();
-        Layout::new(self.planes.len(), self.masses.len(), &laws, fields)
+        Layout::new(self.planes.len(), self.masses.len(), &laws, fields).with_material(self)
     }
 }
 
@@ -72,6 +83,14 @@ pub struct Object {
     pub pose: DAffine3,
     /// How fine the grid is.
     pub resolution: Resolution,
+}
+
+impl Object {
+    /// True of a body of tetrahedra, whether a file has them or they are made here.
+    pub fn is_of_tetrahedra(&self) -> bool {
+        let made = matches!(self.resolution, Resolution::Edge(_) | Resolution::OpenEdge);
+        made || matches!(self.source, BodySource::Tetrahedra { .. })
+    }
 }
 
 /// Where the surface comes from.
@@ -140,7 +159,7 @@ pub enum Analytic {
     },
 }
 
-/// How fine the grid is.
+/// What the body is made of, and how fine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
     /// That of the file's own elements.
@@ -151,9 +170,13 @@ pub enum Resolution {
     Cells(u32),
     /// Left open: somebody chooses before the body is cut.
     Open,
+    /// Longest edge of the tetrahedra that the inside is filled with [m].
+    Edge(f64),
+    /// Tetrahedra, their edge left open.
+    OpenEdge,
 }
 
-/// An isotropic material with Rayleigh damping.
+/// An isotropic material with its damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Its law.
@@ -168,6 +191,8 @@ pub struct Material {
     pub mass_damping: f64,
     /// Rayleigh damping, stiffness-proportional [s].
     pub stiffness_damping: f64,
+    /// Viscosity; `None` = elastic but for Rayleigh damping.
+    pub viscosity: Option<Viscosity>,
 }
 
 /// How heavy the body is.
@@ -179,19 +204,31 @@ pub enum Inertia {
     Mass(f64),
 }
 
-/// A Dirichlet region: the part of the surface and body inside the box follows `motion`.
+/// A Dirichlet region: what it holds of the body follows `motion`.
 #[derive(Clone, Debug)]
 pub struct Clamp {
-    /// Lowest corner [m].
-    pub min: DVec3,
-    /// Highest corner [m].
-    pub max: DVec3,
-    /// True when the box is given in the mesh's own coordinates (before `pose`).
-    pub object_frame: bool,
+    /// What it holds.
+    pub region: ClampRegion,
     /// Prescribed rigid motion; `None` = held still.
     pub motion: Option<RigidMotion>,
     /// File the motion was read from.
     pub motion_path: Option<PathBuf>,
+}
+
+/// What a clamp holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ClampRegion {
+    /// The part of surface and body inside a box.
+    Box {
+        /// Lowest corner [m].
+        min: DVec3,
+        /// Highest corner [m].
+        max: DVec3,
+        /// True when the box is given in the mesh's own coordinates (before `pose`).
+        object_frame: bool,
+    },
+    /// The nodes of a named group of a volume mesh.
+    Group(String),
 }
 
 /// A contact plane.
@@ -270,8 +307,10 @@ impl Time {
 /// Numerical choices; the defaults are what a user wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// Element formulation.
+    /// Element formulation of bodies that are cut out of a lattice.
     pub element: Element,
+    /// Of bodies that are made of tetrahedra.
+    pub tetrahedron: Tetrahedron,
     /// Linear solver.
     pub linear: LinearSolver,
     /// Relative accuracy of the nonlinear solve of a step.
@@ -285,11 +324,18 @@ pub struct Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Solver { element: Element::Enhanced, linear: LinearSolver::Auto, tolerance: 1e-8, newton_iterations: 60, ghost: 0.02 }
+        Solver {
+            element: Element::Enhanced,
+            tetrahedron: Tetrahedron::default(),
+            linear: LinearSolver::Auto,
+            tolerance: 1e-8,
+            newton_iterations: 60,
+            ghost: 0.02,
+        }
     }
 }
 
-/// Element formulation.
+/// Element formulation of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// Trilinear plus nine condensed incompatible modes and linear dilatation: exact in bending, no locking.
@@ -349,71 +395,4 @@ impl ObservationSpec {
             markers: Vec::new(),
         }
     }
-}
-
-/// What is to be found out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitSpec {
-    /// The optimiser; `None` where the scene leaves the choice.
-    pub optimizer: Option<Optimizer>,
-    /// Most iterations per start.
-    pub iterations: usize,
-    /// Number of starts.
-    pub starts: usize,
-    /// Seed of the starts.
-    pub seed: u64,
-    /// Threads; 0 = all.
-    pub threads: usize,
-    /// Free parameters.
-    pub parameters: Vec<FitParameter>,
-}
-
-/// Optimisers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Optimizer {
-    /// Resilient propagation: signs of the gradient only (the paper).
-    Rprop,
-    /// Gradient descent with adaptive (Barzilai–Borwein) steps.
-    GradientDescent,
-    /// Limited-memory quasi-Newton.
-    Lbfgs,
-    /// Gauss–Newton with Levenberg–Marquardt damping.
-    GaussNewton,
-    /// The same without a matrix: products by a tangent and an adjoint, for fields.
-    GaussNewtonCg,
-    /// Simplex search without gradients.
-    NelderMead,
-}
-
-impl Optimizer {
-    /// All by their names in files and on the command line.
-    pub const ALL: [(&'static str, Optimizer); 6] = [
-        ("rprop", Optimizer::Rprop),
-        ("gradient-descent", Optimizer::GradientDescent),
-        ("lbfgs", Optimizer::Lbfgs),
-        ("gauss-newton", Optimizer::GaussNewton),
-        ("gauss-newton-cg", Optimizer::GaussNewtonCg),
-        ("nelder-mead", Optimizer::NelderMead),
-    ];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        Optimizer::ALL.iter().find(|o| o.1 == self).map_or("", |o| o.0)
-    }
-}
-
-/// One free number.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitParameter {
-    /// Path in the scene file: a component of a vector and a region of a field have their own entry, a field by cells or nodes has one for
-    /// all its values; `material.mass` stays as written.
-    pub path: String,
-    /// Where starts are drawn from (equal ends: a fixed start).
-    pub start: (f64, f64),
-    /// Allowed range.
-    pub bounds: (f64, f64),
-    /// Value and standard deviation that are known beforehand: a Gaussian prior in the number's own unit.
-    pub known: Option<(f64, f64)>,
-    /// With several scenes: not shared between them.
-    pub per_scene: bool,
 }

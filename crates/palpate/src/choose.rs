@@ -3,6 +3,9 @@
 //! *Cells*: h = t/n, with t the thickness below which a tenth of the surface lies, by rays that go inwards against the normal (Shapira, Shamir
 //! & Cohen-Or, Vis. Comput. 24, 2008), and n = 4, or 3 where noise is more than a twentieth of t. At most [`MOST_CELLS`] of them.
 //!
+//! *Tetrahedra* that are made here: edges of t/3. Two through a thickness would do for bending, but leave a round body too few nodes on its
+//! surface. At most as many tetrahedra as there may be cells.
+//!
 //! *Step*: the shortest of
 //! - T/N of the lowest bending mode, f = k² t c/(2π √12 L²) of a beam of length L and thickness t with c = √(E/ρ), k = 1.875 where it is
 //!   clamped and 4.730 where it is free, never above c/2L. A second-order scheme lags by (2π/N)²/12 of its phase, which over a period
@@ -24,10 +27,14 @@ const RAYS: usize = 400;
 const THIN: f64 = 0.1;
 /// Cells through that thickness, and where noise hides what they do.
 const THROUGH: [f64; 2] = [4.0, 3.0];
+/// Edges of tetrahedra through that thickness.
+const EDGES_THROUGH: f64 = 3.0;
+/// Tetrahedra in the cube of an edge.
+const IN_CUBE: f64 = 12.0;
 /// Noise over thickness from which on it does.
 const NOISY: f64 = 0.05;
 /// Most cells that are chosen: beyond, somebody should know why.
-const MOST_CELLS: f64 = 20_000.0;
+pub(crate) const MOST_CELLS: f64 = 20_000.0;
 /// Fewest and most steps in a period of the lowest mode.
 const PER_PERIOD: [f64; 2] = [16.0, 64.0];
 /// Share of a cell that a step may cross.
@@ -39,33 +46,40 @@ pub type Choice = (&'static str, f64, String);
 /// Fills in what a scene leaves open, and says what it is and why.
 pub(crate) fn choose(scene: &mut Scene, shape: &dyn Shape, observation: &Observation) -> Vec<Choice> {
     let mut chosen = Vec::new();
-    if scene.object.resolution != Resolution::Open && scene.time.open.is_none() {
+    let open = matches!(scene.object.resolution, Resolution::Open | Resolution::OpenEdge);
+    if !open && scene.time.open.is_none() {
         return chosen;
     }
     let seen = ReadingKind::ALL.into_iter().filter(|k| observation.readings(*k) > 0).map(|k| observation.noise(k));
     let noise = seen.fold(f64::NAN, f64::min);
     let (low, high) = shape.bounds();
     let thickness = thickness(shape);
-    if scene.object.resolution == Resolution::Open {
+    if open {
+        let made = scene.object.resolution == Resolution::OpenEdge;
         let [fine, coarse] = THROUGH;
-        let through = if noise > NOISY * thickness { coarse } else { fine };
-        // Three quarters of a box are full where a body fills it well; of others there are fewer cells.
-        let least = ((high - low).element_product() / MOST_CELLS).cbrt();
-        let (h, limited) = (rounded(thickness / through), rounded(least));
-        let why = match h < limited {
-            true => {
-                format!("about {MOST_CELLS} cells; {through} through {} m of thickness would be more", number(two(thickness)))
-            }
-            false => format!("{through} cells through {} m of thickness", number(two(thickness))),
+        let cells = if noise > NOISY * thickness { coarse } else { fine };
+        let (key, through, of, things) = match made {
+            true => ("object.edge_length", EDGES_THROUGH, "edges", "tetrahedra"),
+            false => ("object.cell_size", cells, "cells", "cells"),
         };
-        scene.object.resolution = Resolution::CellSize(h.max(limited));
-        chosen.push(("object.cell_size", h.max(limited), why));
+        // Three quarters of a box are full where a body fills it well; of others there are fewer cells.
+        let in_cube = if made { IN_CUBE } else { 1.0 };
+        let least = ((high - low).element_product() * in_cube / MOST_CELLS).cbrt();
+        let (h, limited) = (rounded(thickness / through), rounded(least));
+        let thick = number(two(thickness));
+        let why = match h < limited {
+            true => format!("about {MOST_CELLS} {things}; {through} through {thick} m of thickness would be more"),
+            false => format!("{through} {of} through {thick} m of thickness"),
+        };
+        let h = h.max(limited);
+        scene.object.resolution = if made { Resolution::Edge(h) } else { Resolution::CellSize(h) };
+        chosen.push((key, h, why));
     }
     if let Some(duration) = scene.time.open.take() {
         let h = match scene.object.resolution {
-            Resolution::CellSize(h) => h,
+            Resolution::CellSize(h) | Resolution::Edge(h) => h,
             Resolution::Cells(n) => (high - low).max_element() / f64::from(n),
-            Resolution::Own | Resolution::Open => thickness,
+            Resolution::Own | Resolution::Open | Resolution::OpenEdge => thickness,
         };
         let mut limits = vec![swing(scene, shape, thickness, noise)];
         limits.extend(frames(observation));
@@ -79,7 +93,7 @@ pub(crate) fn choose(scene: &mut Scene, shape: &dyn Shape, observation: &Observa
 }
 
 /// A number with its first two digits.
-fn two(x: f64) -> f64 {
+pub(crate) fn two(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
 
@@ -90,7 +104,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 /// How thick the thin parts of a body are [m].
-fn thickness(shape: &dyn Shape) -> f64 {
+pub(crate) fn thickness(shape: &dyn Shape) -> f64 {
     let (low, high) = shape.bounds();
     let size = (high - low).max_element();
     let mesh = shape.surface(size / 24.0);
@@ -124,8 +138,13 @@ fn ray(shape: &dyn Shape, from: DVec3, way: DVec3, size: f64) -> Option<f64> {
     None
 }
 
-/// The step that follows the lowest mode.
-fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, String) {
+/// Estimate of the lowest frequency of a body [Hz].
+pub(crate) fn lowest_frequency(scene: &Scene, shape: &dyn Shape) -> f64 {
+    lowest(scene, shape, thickness(shape))
+}
+
+/// The same for a thickness that is known [m].
+fn lowest(scene: &Scene, shape: &dyn Shape, thickness: f64) -> f64 {
     let (low, high) = shape.bounds();
     let length = (high - low).max_element();
     let density = match scene.material.inertia {
@@ -136,7 +155,14 @@ fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, 
     let speed = (scene.material.youngs_modulus / density).sqrt();
     let root: f64 = if scene.clamps.is_empty() { 4.730 } else { 1.875 };
     let bending = root * root * thickness * speed / (TAU * 12f64.sqrt() * length * length);
-    let frequency = bending.min(0.5 * speed / length);
+    bending.min(0.5 * speed / length)
+}
+
+/// The step that follows the lowest mode.
+fn swing(scene: &Scene, shape: &dyn Shape, thickness: f64, noise: f64) -> (f64, String) {
+    let (low, high) = shape.bounds();
+    let length = (high - low).max_element();
+    let frequency = lowest(scene, shape, thickness);
     let wanted = PI * (TAU * length / (15.0 * noise)).sqrt();
     let per_period = if wanted.is_finite() { wanted.clamp(PER_PERIOD[0], PER_PERIOD[1]) } else { PER_PERIOD[1] }.round();
     (

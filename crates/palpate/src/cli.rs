@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, diagnose, fit, inspect, observe, simulate};
+use crate::commands::{batch, coarsen, diagnose, fit, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -38,6 +38,7 @@ enum Command {
     Observe(observe::Arguments),
     Fit(fit::Arguments),
     Batch(batch::Arguments),
+    Coarsen(coarsen::Arguments),
     Diagnose(diagnose::Arguments),
     Inspect(inspect::Arguments),
 }
@@ -127,6 +128,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),
         Command::Batch(a) => batch::run(a, &mut console),
+        Command::Coarsen(a) => coarsen::run(a, &mut console),
         Command::Diagnose(a) => diagnose::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };

@@ -45,7 +45,7 @@ impl Embedding {
 mod tests {
     use super::*;
     use glam::DMat3;
-    use palpate_model::cutcells::domain::{Band, Cell, CutCells};
+    use palpate_model::cutcells::domain::{Cell, CutCells};
     use palpate_model::cutcells::grid::{CORNERS, Grid};
 
     /// Two cells in a row, side 0.1.
@@ -69,7 +69,8 @@ mod tests {
             node_volume: vec![0.0; nodes.len()],
             length: grid.h,
             nodes,
-            cut: Some(CutCells { grid, cells, ghosts: vec![], band: Band::default() }),
+            cut: Some(CutCells { grid, cells, ghosts: vec![] }),
+            band: Default::default(),
             patches: vec![],
             surface: Default::default(),
             points: Default::default(),

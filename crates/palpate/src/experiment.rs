@@ -14,6 +14,7 @@ use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
+use palpate_model::plan::locking::locking;
 use palpate_model::scene::{InitialShape, ObservationSpec, Resolution, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
@@ -26,6 +27,9 @@ pub(crate) fn short(t: f64) -> String {
 
 /// Depth, in cells, from which on a plane that reaches into the body at rest deserves a word.
 const CUT: f64 = 0.25;
+
+/// Part of the sag of a bar that may be missing on linear tetrahedra before a word is said: what a modulus is known to, at best.
+const LOCKS: f64 = 0.05;
 
 /// One scene, its recording where it names one, and the plan made of both.
 #[derive(Clone, Debug)]
@@ -111,11 +115,15 @@ impl Experiment {
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(Arc::new(read));
         }
+        if !scene.targets.is_empty() {
+            observation = Observation::of_targets(&scene.targets);
+        }
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
         let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
         experiment.check_times()?;
         experiment.check_planes();
+        experiment.check_elements();
         Ok(experiment)
     }
 
@@ -172,6 +180,22 @@ impl Experiment {
                     number(depth)
                 ));
             }
+        }
+    }
+
+    /// Linear tetrahedra make a body stiffer than its material, and what is fitted on them belongs to the mesh.
+    fn check_elements(&mut self) {
+        let nu = self.scene.material.poisson_ratio;
+        let Some(l) = locking(&self.plan.body, self.scene.solver.tetrahedron, nu) else { return };
+        if l.missing > LOCKS {
+            self.warnings.push(format!(
+                "{}: tet4 locks: at ν = {} a bar that is {} elements thick, as this body is about, sags some {:.0} % too little, and a modulus \
+                 that is fitted is that of the mesh; use [solver] element = \"tet10\"",
+                self.scene.path.display(),
+                number(nu),
+                number((10.0 * l.across).round() / 10.0),
+                100.0 * l.missing
+            ));
         }
     }
 
@@ -289,9 +313,11 @@ impl Experiment {
         observation: Option<ObservationSpec>,
     ) -> Result<Experiment, Error> {
         let mut scene = Scene { observation, ..self.scene.clone() };
-        if scene.object.resolution != Resolution::Own {
-            scene.object.resolution = Resolution::CellSize(self.plan.body.length / factor);
-        }
+        scene.object.resolution = match scene.object.resolution {
+            Resolution::Own => Resolution::Own,
+            Resolution::Edge(edge) => Resolution::Edge(edge / factor),
+            _ => Resolution::CellSize(self.plan.body.length / factor),
+        };
         let steps = (scene.time.steps as f64 * step).round() as usize;
         if steps > 0 {
             scene.time.step *= scene.time.steps as f64 / steps as f64;
@@ -309,7 +335,9 @@ impl Experiment {
 /// A fault found while the plan is built, where its key stands: in the scene, or in the recording for what only that states.
 fn plan_fault(scene: &Scene, text: &str, recording: Option<&Recording>, e: PlanError) -> Error {
     let (Some(spec), Some(recording)) = (&scene.observation, recording) else {
-        return scene_error(&scene.path, text, &e.key, e.message).into();
+        // Points of targets are tracked ones.
+        let key = if e.key == "points.rest" { "target.0.points" } else { &e.key };
+        return scene_error(&scene.path, text, key, e.message).into();
     };
     let in_recording = |key: &str| {
         // It was read a moment ago; without it the line is missing and nothing else.

@@ -4,7 +4,8 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::Fitted;
 use crate::results::finite;
-use crate::results::fit::FieldReference;
+use crate::results::fit::{FieldReference, Posterior, Tried};
+use palpate_fit::FieldPosterior;
 use palpate_io::npy::{Array, write_npz};
 use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::params::fields::{Basis, Varied};
@@ -28,6 +29,8 @@ struct Found<'a> {
     factors: Vec<f64>,
     /// Standard errors `[count]`, NaN where there is none; `None` where there are none at all.
     errors: Option<Vec<f64>>,
+    /// What prior and recording say of it.
+    posterior: Option<&'a FieldPosterior>,
 }
 
 /// Standard errors of the free values of a scene, by the path of its fields: `field.0.3`, or the first of `field.0`.
@@ -39,7 +42,7 @@ fn errors_of(fitted: &Fitted, scene: usize) -> BTreeMap<&str, Vec<Option<f64>>> 
 }
 
 /// Every field of a scene of which something was free.
-fn found<'a>(experiment: &'a Experiment, fitted: &Fitted, scene: usize) -> Vec<Found<'a>> {
+fn found<'a>(experiment: &'a Experiment, fitted: &'a Fitted, scene: usize) -> Vec<Found<'a>> {
     let (plan, theta) = (experiment.plan(), &fitted.result.theta[scene]);
     let free = errors_of(fitted, scene);
     let named = |path: &str| experiment.scene().fit.iter().flat_map(|f| &f.parameters).any(|p| p.path == path);
@@ -51,12 +54,16 @@ fn found<'a>(experiment: &'a Experiment, fitted: &Fitted, scene: usize) -> Vec<F
         fields[usize::from(field)] = true;
         places.zip(known).for_each(|(p, e)| errors[p] = e.unwrap_or(f64::NAN));
     }
+    let posterior = |field: usize| {
+        let own = |n: &crate::FreeNumber| n.path == format!("field.{field}") && n.scene.is_none_or(|s| s == scene);
+        fitted.fields.iter().zip(&fitted.result.fields).find(|(n, _)| own(n)).and_then(|(_, f)| f.posterior.as_ref())
+    };
     let all = plan.layout.fields().zip(&plan.fields).enumerate().filter(|(field, _)| fields[*field]);
     all.map(|(field, (places, f))| {
         let values = theta[places.clone()].to_vec();
         let own = errors[places].to_vec();
         let errors = own.iter().any(|e| e.is_finite()).then_some(own);
-        Found { experiment, scene, field, factors: f.factors(&values), values, errors }
+        Found { experiment, scene, field, factors: f.factors(&values), values, errors, posterior: posterior(field) }
     })
     .collect()
 }
@@ -110,7 +117,21 @@ impl Found<'_> {
         let errors = self.errors.as_ref().map(|e| one(e));
         let mut arrays = vec![(ARRAY, &values), ("factor", &factors), ("place", &place)];
         arrays.extend(errors.iter().map(|e| ("standard_error", e)));
+        let known: Vec<(&str, Array)> = self.posterior_arrays().into_iter().map(|(name, values)| (name, one(&values))).collect();
+        arrays.extend(known.iter().map(|(name, values)| (*name, values)));
         Ok(write_npz(path, &arrays)?)
+    }
+
+    /// What is known of every value `[count]`, of a field with a prior.
+    fn posterior_arrays(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let Some(p) = self.posterior else { return Vec::new() };
+        let open = p.undetermined.iter().map(|u| f64::from(u8::from(*u))).collect();
+        vec![
+            ("ln_sd", p.deviation.clone()),
+            ("ln_prior_sd", p.prior_deviation.clone()),
+            ("gain", p.gain.clone()),
+            ("undetermined", open),
+        ]
     }
 
     fn varied(&self) -> Varied {
@@ -142,8 +163,33 @@ impl Found<'_> {
             min: at(0).and_then(finite),
             median: median.and_then(finite),
             max: sorted.last().copied().and_then(finite),
+            posterior: self.posterior.map(posterior),
             scene: self.scene,
         }
+    }
+}
+
+/// What `result.json` says of a field with a prior.
+fn posterior(p: &FieldPosterior) -> Posterior {
+    let mut sorted = p.deviation.clone();
+    sorted.sort_by(f64::total_cmp);
+    let length = |h: palpate_fit::Hyper| (h.length > 0.0).then_some(h.length);
+    let chosen = [(p.chosen.0, "length"), (p.chosen.1, "deviation")];
+    Posterior {
+        prior: p.kind.name().into(),
+        length: length(p.hyper),
+        deviation: finite(p.hyper.deviation),
+        chosen: chosen.iter().filter(|c| c.0).map(|c| c.1.to_string()).collect(),
+        residuals_as_one: finite(p.temper),
+        effective: finite(p.effective),
+        sd: [0, sorted.len() / 2, sorted.len().saturating_sub(1)].map(|k| sorted.get(k).copied().and_then(finite)),
+        undetermined: p.undetermined.iter().filter(|u| **u).count(),
+        undetermined_share: finite(p.undetermined_share),
+        tried: p
+            .tried
+            .iter()
+            .map(|t| Tried { length: length(t.hyper), deviation: t.hyper.deviation, evidence: finite(t.evidence) })
+            .collect(),
     }
 }
 
@@ -160,6 +206,16 @@ fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Re
         let number = arrays.iter().find(|a| a.0 == name).map(|a| a.1.clone()).unwrap_or_default();
         let sd = number.iter().zip(errors.iter().zip(&f.factors)).map(|(n, (e, factor))| n * e / factor);
         arrays.push((format!("{name}_sd"), sd.collect()));
+    }
+    // One field's names stand alone.
+    let several = found.iter().filter(|f| f.posterior.is_some()).count() > 1;
+    for f in found {
+        let name = |name: &str| if several { format!("{name}_{}", f.field) } else { name.to_string() };
+        let arrays = match e.scene().fields[f.field].basis {
+            Basis::Nodes => &mut grid.nodes,
+            _ => &mut grid.elements,
+        };
+        arrays.extend(f.posterior_arrays().into_iter().map(|(n, values)| (name(n), values)));
     }
     let body = &plan.body;
     Ok(write_vtu(path, &body.nodes, &Elements::of(body), &named(&grid.nodes), &named(&grid.elements))?)

@@ -244,7 +244,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         let mut worth = |theta: &[Vec<f64>]| {
             let at = |(e, theta): (&Experiment, &Vec<f64>)| residuals_at(e, backend, theta, &stop, &mut notes);
             match experiments.iter().zip(theta).map(at).collect() {
-                Ok(all) => after = all,
+                // Only where it ends counts: a search for priors asks on its way as well.
+                Ok(all) => (after, fault) = (all, None),
                 Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => {}
                 Err(e) => fault = Some(e),
             }
@@ -345,9 +346,11 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-/// The optimiser where nobody names one: with more values than sensitivities are computed of, one that does without them.
+/// The optimiser where nobody names one: with more values than sensitivities are computed of, one that does without them; the same for fields with
+/// priors, whose precision makes products few.
 pub(crate) fn usual(free: &[FreeParameter]) -> Optimizer {
-    if values(free) > MOST_SENSITIVITIES { Optimizer::GaussNewtonCg } else { Optimizer::GaussNewton }
+    let many = values(free) > MOST_SENSITIVITIES || free.iter().any(|f| f.prior.is_some());
+    if many { Optimizer::GaussNewtonCg } else { Optimizer::GaussNewton }
 }
 
 fn values(free: &[FreeParameter]) -> usize {
@@ -364,11 +367,12 @@ fn optimizer(asked: Option<Optimizer>, free: &[FreeParameter]) -> Result<(Optimi
         Some(asked) => Ok((asked, None)),
         None => {
             let usual = usual(free);
-            let why = || {
-                format!(
+            let why = || match count > MOST_SENSITIVITIES {
+                false => format!("optimizer {}: a field has a prior", usual.name()),
+                true => format!(
                     "optimizer {}: {count} values are free, sensitivities are computed of {MOST_SENSITIVITIES} at most",
                     usual.name()
-                )
+                ),
             };
             Ok((usual, (usual != Optimizer::GaussNewton).then(why)))
         }

@@ -147,7 +147,10 @@ pub fn grid_check(
     }
     let cells = experiments.iter().any(|e| e.scene().object.resolution != Resolution::Own);
     let step = experiments.iter().any(|e| e.plan().clock.steps > 0);
+    let made = experiments.iter().all(|e| matches!(e.scene().object.resolution, Resolution::Edge(_)));
     let what = match (cells, step) {
+        (true, true) if made => "tetrahedra and step",
+        (true, false) if made => "tetrahedra",
         (true, true) => "cells and step",
         (true, false) => "cells",
         (false, true) => "step",

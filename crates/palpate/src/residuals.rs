@@ -221,9 +221,9 @@ fn incidence(experiment: &Experiment, frame: usize, vertices: &[DVec3], triangle
 
 /// Root mean square of the interpolated signed distance at the rest surface [m].
 fn grid_error(plan: &Plan, surface: &Embedding) -> f64 {
-    let lookup = BandLookup::new(&plan.body);
+    let lookup = BandLookup::of(&plan.body.band);
     let (mut sum, mut n) = (0.0, 0usize);
-    for (distance, _) in surface.rest.iter().filter_map(|p| lookup.distance(&plan.body, *p)) {
+    for (distance, _) in surface.rest.iter().filter_map(|p| lookup.distance(&plan.body.band, *p)) {
         sum += distance.powi(2);
         n += 1;
     }

@@ -50,7 +50,7 @@ fn block() -> Result<Plan, String> {
     let h = 0.2 / ACROSS;
     let body = Body::build(&shape, h, BAND * h, SUBDIVISIONS).map_err(|e| e.to_string())?;
     let mut plan = plan(body, &[]);
-    let spec = FieldSpec { varied: Varied::Modulus, basis: Basis::Cells, scale: Scale::Log, values: None };
+    let spec = FieldSpec { varied: Varied::Modulus, basis: Basis::Cells, scale: Scale::Log, values: None, prior: None };
     plan.fields = vec![Field::new(&spec, &plan.body)?];
     let count = plan.fields[0].count;
     plan.layout = Layout::new(1, 0, &[], &[count]);

@@ -172,6 +172,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     Plan {
         fields: Vec::new(),
         model: &ALL[0],
+        curves: Default::default(),
         theta,
         layout,
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
@@ -219,7 +220,7 @@ pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, case: &Case) -> Result<
         name: name.into(),
         nodes: body.nodes.len(),
         cells: body.cells().len(),
-        band_nodes: body.band().nodes.len(),
+        band_nodes: body.band.nodes.len(),
         build,
         forward: Times::of(taken.forward),
         cost: Times::of(taken.cost),

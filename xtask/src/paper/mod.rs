@@ -3,6 +3,7 @@
 
 pub mod finer;
 pub mod gradient;
+pub mod real2sim;
 pub mod scenes;
 pub mod several;
 pub mod study;

@@ -22,6 +22,7 @@ fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
         poisson_ratio: 0.4,
         mass_damping: 0.1,
         stiffness_damping: 0.01,
+        viscosity: None,
     };
     let time = Time { step: 0.01, steps: 20, ..Time::weighted(0.6) };
     Scene { gravity: DVec3::new(0.0, 0.0, -9.81), time, ..Scene::at_rest("study.toml", object, material) }

@@ -117,6 +117,7 @@ pub fn search_on(backend: Backend, plan: &Plan, unknowns: &[Unknown], how: &Sear
                 bounds: (spec.lower, spec.upper),
                 start: u.start,
                 known: None,
+                prior: None,
                 count: 1,
                 direction: u.key.direction(),
                 slots: vec![Slot { scene: 0, place: place(u), factor: 1.0 }],

@@ -107,7 +107,7 @@ pub fn measure(case: &Case, backend: Backend) -> Result<Measured, String> {
         let experiment = case.experiment()?;
         let fitted = experiment.fit(FitOptions { backend, ..FitOptions::default() }).map_err(wrong)?;
         let mut numbers = BTreeMap::new();
-        let document = serde_json::to_value(report::fit_document(&fitted, &[experiment], Vec::new()))
+        let document = serde_json::to_value(report::fit_document(&fitted, &[experiment], Vec::new(), Vec::new()))
             .map_err(|e| format!("{}: {e}", case.name))?;
         leaves(&document, "", &mut numbers);
         numbers.remove("seconds");

@@ -6,7 +6,7 @@ use super::loads::{Loads, Plane};
 use super::material::Material;
 use super::mesh::Mesh;
 use glam::DVec3;
-use palpate_model::scene::{Analytic, BodySource, Inertia, Scene};
+use palpate_model::scene::{Analytic, BodySource, Clamp, Inertia, Scene};
 
 /// Density of the air [kg/m³].
 const AIR: f64 = 1.2;
@@ -34,7 +34,7 @@ pub fn mesh(scene: &Scene, fine: usize) -> Result<Mesh, String> {
             let second = size.x.min(size.y).max(size.x.max(size.y).min(size.z));
             let across = if second > PLATE * thin { 1 } else { THIN };
             let along = |a: usize| {
-                let edges = scene.clamps.iter().flat_map(|c| [c.min[a], c.max[a]]);
+                let edges = scene.clamps.iter().filter_map(Clamp::corners).flat_map(|(min, max)| [min[a], max[a]]);
                 let inside = edges.filter(|e| *e > min[a] + 1e-9 && *e < max[a] - 1e-9);
                 planes(min[a], max[a], inside.collect(), thin, across, fine as f64)
             };
@@ -82,14 +82,15 @@ fn planes(low: f64, high: f64, mut edges: Vec<f64>, thin: f64, across: usize, fi
 pub fn body(scene: &Scene, change: &Change, fine: usize) -> Result<Body, String> {
     let mut mesh = mesh(scene, fine)?;
     let m = &scene.material;
-    let held = |x: &DVec3| scene.clamps.iter().any(|c| x.cmpge(c.min - 1e-9).all() && x.cmple(c.max + 1e-9).all());
+    let boxes: Vec<(DVec3, DVec3)> = scene.clamps.iter().filter_map(Clamp::corners).collect();
+    let held = |x: &DVec3| boxes.iter().any(|(min, max)| x.cmpge(*min - 1e-9).all() && x.cmple(*max + 1e-9).all());
     let held = mesh.nodes.iter().map(held).collect();
     // Of the shape that the scene states: it says which part is which, also where the true one is bent.
     let centers: Vec<DVec3> = mesh.tets.iter().map(|t| t.iter().take(4).map(|n| mesh.nodes[*n]).sum::<DVec3>() / 4.0).collect();
     let low = mesh.nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = mesh.nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     if change.bend != 0.0 {
-        let middle = scene.clamps.first().map_or(0.5 * (low.x + high.x), |c| 0.5 * (c.min.x.max(low.x) + c.max.x.min(high.x)));
+        let middle = boxes.first().map_or(0.5 * (low.x + high.x), |(min, max)| 0.5 * (min.x.max(low.x) + max.x.min(high.x)));
         let anchor = DVec3::new(middle, 0.5 * (low.y + high.y), 0.5 * (low.z + high.z));
         mesh.nodes.iter_mut().for_each(|x| *x = bent(*x, anchor, change.bend));
     }

@@ -57,7 +57,7 @@ fn varied() -> Scene {
     let mut s = thrown();
     let region = |z: f64, value: f64| Region { center: DVec3::new(0.0, 0.0, z), radius: 0.01, value };
     let regions = Basis::Regions(vec![region(0.03, 1.3), region(0.08, 0.8)], Blend::Harmonic);
-    let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None };
+    let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None, prior: None };
     s.fields = vec![of(Varied::Modulus, regions), of(Varied::Density, Basis::Nodes), of(Varied::Modulus, Basis::Cells)];
     s
 }

@@ -22,7 +22,10 @@ impl Depth {
     /// Hashes the points of every frame.
     pub fn new(plan: &Plan) -> Depth {
         let hash = |points: &[ObservedPoint]| PointHash::new(points, plan.body.length);
-        Depth { lookup: BandLookup::new(&plan.body), hashes: plan.observation.frames.iter().map(|f| hash(&f.points)).collect() }
+        Depth {
+            lookup: BandLookup::of(&plan.body.band),
+            hashes: plan.observation.frames.iter().map(|f| hash(&f.points)).collect(),
+        }
     }
 
     /// Places of a frame's points on the body at displacement `u` `[N]`, by rising point; of those that met it.
@@ -122,7 +125,7 @@ impl Residuals for Distances {
             return;
         }
         let body = &*look.plan.body;
-        let mut extended = vec![DVec3::ZERO; out.len() + body.band().nodes.len()];
+        let mut extended = vec![DVec3::ZERO; out.len() + body.band.nodes.len()];
         for m in &self.matches {
             let (nodes, weights) = m.stencil(body);
             let g = -factors[m.point as usize] * m.place.gradient;
@@ -164,13 +167,13 @@ fn bare(look: Look, point: u32) -> ResidualRow {
 }
 
 fn row(look: Look, m: &Match) -> ResidualRow {
-    let (grid, band) = (&look.plan.body.cut().grid, look.plan.body.band());
+    let band = &look.plan.body.band;
     let seen = &look.seen().points[m.point as usize];
     let sight = DVec3::from_array(look.sensors.truth(camera(look, seen), seen).ray()).normalize_or_zero();
     ResidualRow {
         value: Some(m.place.phi),
         weight: kernel::weight(m.place.phi, look.plan.band),
-        rest: grid.position(band.cells[m.cell as usize].lattice) + grid.h * m.place.xi,
+        rest: band.grid.position(band.cells[m.cell as usize].lattice) + band.grid.h * m.place.xi,
         along_sight: m.place.gradient.dot(sight),
         by_place: m.place.gradient,
         ..bare(look, m.point)

@@ -81,13 +81,13 @@ pub struct Match {
 impl Match {
     /// Extended nodes and shape functions of the place.
     pub fn stencil<'a>(&self, body: &'a Body) -> (&'a [u32; 8], [f64; 8]) {
-        (&body.band().cells[self.cell as usize].nodes, shape_functions(self.place.xi))
+        (&body.band.cells[self.cell as usize].nodes, shape_functions(self.place.xi))
     }
 }
 
 /// Displacements of all extended nodes `[N + M]`: those of the body, then those extended to the band.
 pub fn extend(body: &Body, u: &[DVec3]) -> Vec<DVec3> {
-    let band = body.band();
+    let band = &body.band;
     let mut all = Vec::with_capacity(u.len() + band.nodes.len());
     all.extend_from_slice(u);
     all.par_extend((0..band.nodes.len()).into_par_iter().with_min_len(1024).map(|p| {
@@ -104,7 +104,7 @@ pub fn extend(body: &Body, u: &[DVec3]) -> Vec<DVec3> {
 /// Transpose of [`extend`]: folds a gradient on the extended nodes back onto the body.
 pub fn extend_transposed(body: &Body, extended: &[DVec3]) -> Vec<DVec3> {
     let n = body.nodes.len();
-    let band = body.band();
+    let band = &body.band;
     let mut out = extended[..n].to_vec();
     for p in 0..band.nodes.len() {
         let g = extended[n + p];
@@ -140,7 +140,7 @@ pub fn match_points(
     (band, noise): (f64, f64),
 ) -> Vec<Match> {
     let n = body.nodes.len();
-    let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band().nodes[a as usize - n] };
+    let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
     let corners = |nodes: &[u32; 8]| -> Corners { nodes.map(|a| rest(a) + u[a as usize]) };
     let line = |(points, cameras): (&[ObservedPoint], &[Camera]), p: u32| {
         let seen = &points[p as usize];
@@ -148,7 +148,7 @@ pub fn match_points(
     };
     let moved = (seen.points, seen.cameras);
     let candidates: Vec<Vec<(bool, Match)>> = body
-        .band()
+        .band
         .cells
         .par_iter()
         .with_min_len(256)
@@ -183,12 +183,13 @@ pub fn match_points(
         if faces {
             return Some(m);
         }
-        let cell = &body.band().cells[m.cell as usize];
-        let (x, lowest) = (corners(&cell.nodes), body.cut().grid.position(cell.lattice));
-        let distance = |xi: DVec3| lookup.distance(body, lowest + body.cut().grid.h * xi);
+        let cell = &body.band.cells[m.cell as usize];
+        let grid = &body.band.grid;
+        let (x, lowest) = (corners(&cell.nodes), grid.position(cell.lattice));
+        let distance = |xi: DVec3| lookup.distance(&body.band, lowest + grid.h * xi);
         let way = 1.5 * m.place.phi.abs() + NOISE_REACH * noise;
         let sight = Sight { x: &x, point: seen.points[m.point as usize].position, direction: line(seen.recorded, m.point) };
-        let place = sight.side(m.place, way, (body.cut().grid.h, band), distance)?;
+        let place = sight.side(m.place, way, (grid.h, band), distance)?;
         Some(Match { place, ..m })
     };
     best.into_par_iter().with_min_len(1024).filter_map(side).collect()
@@ -214,9 +215,9 @@ mod tests {
         let points: Vec<ObservedPoint> = (0..2000).map(|k| ObservedPoint { position: place(k), camera: 0 }).collect();
         let hash = PointHash::new(&points, h);
         let n = body.nodes.len();
-        let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band().nodes[a as usize - n] };
+        let rest = |a: u32| if (a as usize) < n { body.nodes[a as usize] } else { body.band.nodes[a as usize - n] };
         let (mut handed, mut held) = (0usize, 0usize);
-        for cell in &body.band().cells {
+        for cell in &body.band.cells {
             let x = cell.nodes.map(rest);
             let (min, max) = (x.into_iter().fold(x[0], DVec3::min), x.into_iter().fold(x[0], DVec3::max));
             hash.visit(min, max, |p| {
@@ -225,7 +226,7 @@ mod tests {
                 held += usize::from(at.cmpge(min).all() && at.cmple(max).all());
             });
         }
-        (body.band().cells.len(), handed as f64 / 2000.0, held as f64 / 2000.0)
+        (body.band.cells.len(), handed as f64 / 2000.0, held as f64 / 2000.0)
     }
 
     #[test]

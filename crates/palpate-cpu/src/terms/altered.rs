@@ -3,6 +3,7 @@
 use super::elastic_cells::laws::{CellActing, cell_laws};
 use palpate_model::cutcells::corotation::CellPose;
 use palpate_model::cutcells::elements::Elements;
+use palpate_model::materials::principal_stretch::PrincipalStretch;
 use palpate_model::params::coefficients::Coefficients;
 use palpate_model::params::grips::Grip;
 use palpate_model::plan::Plan;
@@ -16,6 +17,8 @@ pub struct Altered {
     pub grips: Option<Vec<Grip>>,
     /// Laws of cells.
     pub laws: Vec<CellActing>,
+    /// The material, where its curves are the member's own.
+    pub law: Option<PrincipalStretch>,
 }
 
 impl Altered {
@@ -26,6 +29,6 @@ impl Altered {
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
             body.cells().iter().map(|c| CellPose::new(&c.nodes.map(at), body.length)).collect()
         });
-        Altered { rest, grips: Grip::all(plan, physics, elements), laws: cell_laws(plan, physics) }
+        Altered { rest, grips: Grip::all(plan, physics, elements), laws: cell_laws(plan, physics), law: plan.own_law(physics) }
     }
 }

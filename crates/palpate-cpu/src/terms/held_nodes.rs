@@ -1,10 +1,14 @@
 //! Nodes that clamps hold, of bodies without cells: a stiff spring draws each to where its clamp wants it, A X + b. The stiffness is the
-//! plan's and no parameter.
+//! plan's and no parameter, but for a layer of thickness ℓ that gives way ([`palpate_model::effects`], "compliant-clamp"): the layer is in series with
+//! the spring, S/ℓ with S = (λ + 2μ) times the area that the node stands for. Effects move what is wanted as they move the clamps of cells.
 
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal};
 use crate::linear::matrix::Matrix;
 use glam::DVec3;
+use palpate_model::mechanics::lame::{lame, lame_by_nu};
+use palpate_model::params::changes::{hold, hold_slope};
 use palpate_model::params::coefficients::{Coefficients, Sought};
+use palpate_model::params::grips::{Grips, Pose, acted};
 use palpate_model::plan::clamp_pose;
 
 /// The prescribed motion is a smooth curve: central differences over a microsecond leave about 1e-10 of its derivative by time.
@@ -12,49 +16,129 @@ const MOMENT: f64 = 1e-6;
 
 /// The term.
 pub struct HeldNodes<'a> {
-    /// What it reads.
-    pub c: Context<'a>,
+    c: Context<'a>,
+    /// The clamps where effects act on them.
+    grips: Option<Grips<'a>>,
+    /// Thickness of the layer [m].
+    layer: f64,
+    /// (λ + 2μ) [Pa], and its derivative by Poisson's ratio over itself.
+    firm: (f64, f64),
 }
 
-impl HeldNodes<'_> {
-    /// Hands every held node to `visit`: number, stiffness, and where it is wanted at a time on the recording's clock [m].
-    fn each(&self, time: f64, mut visit: impl FnMut(usize, f64, DVec3)) {
-        for clamp in &self.c.plan.clamps {
-            let (a, b) = clamp_pose(clamp.motion.as_ref(), time);
-            for (n, stiffness) in &clamp.nodes {
-                let n = *n as usize;
-                visit(n, *stiffness, a * self.c.plan.body.nodes[n] + b);
+/// A held node.
+#[derive(Clone, Copy)]
+struct Held {
+    clamp: usize,
+    node: usize,
+    /// Rest position [m].
+    rest: DVec3,
+    /// Of the spring with its layer [N/m], and its derivatives by the layer's thickness and by the logarithm of S.
+    stiffness: f64,
+    by_layer: f64,
+    by_firm: f64,
+}
+
+impl<'a> HeldNodes<'a> {
+    /// The clamps at the new state.
+    pub fn new(c: Context<'a>) -> HeldNodes<'a> {
+        let (plan, physics) = (c.plan, c.physics());
+        let grips = acted(plan).then(|| Grips::new(plan, physics, c.time - physics.start));
+        let layer = grips.map_or(0.0, |g| hold(plan, physics, &g.spot)[1]);
+        let [(lambda, mu), (lambda_nu, mu_nu)] = [lame(1.0, physics.poisson_ratio), lame_by_nu(1.0, physics.poisson_ratio)];
+        let whole = lambda + 2.0 * mu;
+        HeldNodes { c, grips, layer, firm: (c.young() * whole, (lambda_nu + 2.0 * mu_nu) / whole) }
+    }
+
+    /// Every held node, clamp by clamp.
+    fn held(&self) -> impl Iterator<Item = Held> + '_ {
+        let of = move |(i, clamp): (usize, &'a palpate_model::plan::ClampSite)| {
+            clamp.nodes.iter().zip(&clamp.areas).map(move |((n, k), area)| (i, *n as usize, *k, *area))
+        };
+        self.c.plan.clamps.iter().enumerate().flat_map(of).map(|(clamp, node, k, area)| {
+            let rest = self.c.plan.body.nodes[node];
+            if self.grips.is_none() {
+                return Held { clamp, node, rest, stiffness: k, by_layer: 0.0, by_firm: 0.0 };
+            }
+            // k S/(S + k ℓ).
+            let s = self.firm.0 * area;
+            let sum = s + k * self.layer;
+            Held {
+                clamp,
+                node,
+                rest,
+                stiffness: k * s / sum,
+                by_layer: -k * k * s / (sum * sum),
+                by_firm: k * k * self.layer * s / (sum * sum),
+            }
+        })
+    }
+
+    /// Where clamps want what they hold at a time on the recording's clock, A and b.
+    fn poses(&self, time: f64) -> Vec<Pose> {
+        let pose = |i: usize| match &self.grips {
+            Some(grips) => grips.pose(i, time),
+            None => clamp_pose(self.c.plan.clamps[i].motion.as_ref(), time),
+        };
+        (0..self.c.plan.clamps.len()).map(pose).collect()
+    }
+
+    /// Every held node with its way to where it is wanted, backwards [m].
+    fn away<'b>(&'b self, u1: &'b [DVec3]) -> impl Iterator<Item = (Held, DVec3)> + 'b {
+        let poses = self.poses(self.c.time);
+        self.held().map(move |h| {
+            let (a, b) = poses[h.clamp];
+            (h, h.rest + u1[h.node] - (a * h.rest + b))
+        })
+    }
+
+    /// Minus the force's derivative by time at every held node: the velocity of what is wanted, times the stiffness.
+    fn moves(&self, mut visit: impl FnMut(usize, DVec3)) {
+        for sign in [1.0, -1.0] {
+            let poses = self.poses(self.c.time + sign * MOMENT);
+            for h in self.held() {
+                let (a, b) = poses[h.clamp];
+                visit(h.node, sign * h.stiffness / (2.0 * MOMENT) * (a * h.rest + b));
             }
         }
     }
 
-    /// Adds the springs' forces at the new state.
-    fn force(&self, u1: &[DVec3], out: &mut [DVec3]) {
-        self.each(self.c.time, |n, k, wanted| out[n] += k * (self.c.plan.body.nodes[n] + u1[n] - wanted));
+    /// Change of the force at every held node with number `slot` of an effect; nothing for effects that leave clamps alone.
+    fn by_number(&self, u1: &[DVec3], effect: usize, slot: usize, mut visit: impl FnMut(usize, DVec3)) {
+        let Some(grips) = &self.grips else { return };
+        let Some(slope) = hold_slope(self.c.plan, self.c.physics(), &grips.spot, effect, slot) else { return };
+        let poses: Vec<Option<Pose>> =
+            (0..self.c.plan.clamps.len()).map(|i| grips.pose_slope(i, self.c.time, effect, slot)).collect();
+        for (h, away) in self.away(u1) {
+            let moved = poses[h.clamp].map_or(DVec3::ZERO, |(a, b)| a * h.rest + b);
+            visit(h.node, slope[1] * h.by_layer * away - h.stiffness * moved);
+        }
     }
 
-    /// Velocity of the place where a node is wanted, times its stiffness: minus the force's derivative by time.
-    fn moves(&self, mut visit: impl FnMut(usize, DVec3)) {
-        for sign in [1.0, -1.0] {
-            self.each(self.c.time + sign * MOMENT, |n, k, wanted| visit(n, sign * k / (2.0 * MOMENT) * wanted));
+    /// Change of the force at every held node with the logarithm of S.
+    fn by_firm(&self, u1: &[DVec3], mut visit: impl FnMut(usize, DVec3)) {
+        if self.layer != 0.0 {
+            self.away(u1).for_each(|(h, away)| visit(h.node, h.by_firm * away));
         }
+    }
+
+    /// Numbers of all effects: effect and slot.
+    fn numbers(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.c.physics().effects.iter().enumerate().flat_map(|(e, p)| (0..p.len()).map(move |slot| (e, slot)))
     }
 }
 
 impl Term for HeldNodes<'_> {
     fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
-        self.force(u1, out);
+        self.away(u1).for_each(|(h, away)| out[h.node] += h.stiffness * away);
     }
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
-        let mut w = 0.0;
-        self.each(self.c.time, |n, k, wanted| w += 0.5 * k * (self.c.plan.body.nodes[n] + u1[n] - wanted).length_squared());
-        w
+        self.away(u1).map(|(h, away)| 0.5 * h.stiffness * away.length_squared()).sum()
     }
 
     fn tangent(&self, _u1: &[DVec3], _curvature: Curvature, matrix: &mut Matrix) {
         let diagonal = &self.c.pattern.blocks.diagonal;
-        self.each(self.c.time, |n, k, _| add_to_diagonal(&mut matrix.values[diagonal[n]], k));
+        self.held().for_each(|h| add_to_diagonal(&mut matrix.values[diagonal[h.node]], h.stiffness));
     }
 
     fn by_past(&self, _u1: &[DVec3], _change: &PastChange, _out: &mut [DVec3]) {
@@ -63,15 +147,32 @@ impl Term for HeldNodes<'_> {
 
     fn by_past_transposed(&self, _u1: &[DVec3], _z: &[DVec3], _out: &mut PastGradient) {}
 
-    fn by_coefficients(&self, _u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
-        if rates.physics.start != 0.0 {
-            self.moves(|n, v| out[n] -= rates.physics.start * v);
+    fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
+        let d = &rates.physics;
+        if d.start != 0.0 {
+            self.moves(|n, v| out[n] -= d.start * v);
+        }
+        for (effect, slot) in self.numbers().filter(|(e, slot)| d.effects[*e][*slot] != 0.0) {
+            self.by_number(u1, effect, slot, |n, f| out[n] += d.effects[effect][slot] * f);
+        }
+        let firmer = self.c.ln_young_along(rates) + self.firm.1 * d.poisson_ratio;
+        if firmer != 0.0 {
+            self.by_firm(u1, |n, f| out[n] += firmer * f);
         }
     }
 
-    fn by_coefficients_transposed(&self, _u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
+    fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
         if sought.start {
             self.moves(|n, v| gradient.physics.start -= z[n].dot(v));
+        }
+        for (effect, slot) in self.numbers().filter(|(e, _)| sought.effects[*e]) {
+            self.by_number(u1, effect, slot, |n, f| gradient.physics.effects[effect][slot] += z[n].dot(f));
+        }
+        if sought.modulus || sought.poisson {
+            let mut firmer = 0.0;
+            self.by_firm(u1, |n, f| firmer += z[n].dot(f));
+            gradient.physics.poisson_ratio += self.firm.1 * firmer;
+            self.c.pull_young(firmer, gradient);
         }
     }
 

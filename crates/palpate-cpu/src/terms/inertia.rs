@@ -1,5 +1,7 @@
-//! Inertia of nodes and point masses, damping in proportion to mass, and weight.
+//! Inertia of nodes and point masses, damping in proportion to mass, and weight. Cells have lumped masses; tetrahedra have the whole matrix
+//! ([`Consistent`]).
 
+use super::consistent::Consistent;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;
@@ -23,11 +25,29 @@ fn density(c: &Context, node: usize) -> f64 {
     c.physics().density * c.coefficients.changes.density.as_ref().map_or(1.0, |d| d[node])
 }
 
-impl Inertia<'_> {
+/// Sum of the diagonal of the mass matrix [kg], point masses left out.
+pub(crate) fn diagonal(c: &Context) -> f64 {
+    match c.plan.body.cut {
+        Some(_) => masses(c).sum(),
+        None => Consistent::new(c).diagonal(),
+    }
+}
+
+impl<'a> Inertia<'a> {
+    /// The mass matrix where it is none of numbers on nodes.
+    fn consistent(&self) -> Option<Consistent<'a>> {
+        self.c.plan.body.cut.is_none().then(|| Consistent::new(&self.c))
+    }
+
     /// Adds M a for accelerations a(node) of the body and of the point masses.
     fn add(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
-        for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
-            out[i] += density(&self.c, i) * v * body(i);
+        match self.consistent() {
+            Some(m) => m.add(body, out),
+            None => {
+                for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+                    out[i] += density(&self.c, i) * v * body(i);
+                }
+            }
         }
         self.add_points(&self.c.physics().masses, points, out);
     }
@@ -77,8 +97,13 @@ impl Term for Inertia<'_> {
     fn tangent(&self, _u1: &[DVec3], _curvature: Curvature, matrix: &mut Matrix) {
         let Some(t) = self.c.inertia else { return };
         let factor = t.displacement + self.c.physics().mass_damping * t.rate;
-        for (i, m) in masses(&self.c).enumerate() {
-            add_to_diagonal(&mut matrix.values[self.c.pattern.blocks.diagonal[i]], m * factor);
+        match self.consistent() {
+            Some(m) => m.each_block(|place, m| add_to_diagonal(&mut matrix.values[place], m * factor)),
+            None => {
+                for (i, m) in masses(&self.c).enumerate() {
+                    add_to_diagonal(&mut matrix.values[self.c.pattern.blocks.diagonal[i]], m * factor);
+                }
+            }
         }
         for (k, (site, m)) in self.c.plan.masses.iter().zip(&self.c.physics().masses).enumerate() {
             let w = site.value;
@@ -110,8 +135,14 @@ impl Term for Inertia<'_> {
             d.density * factor + rates.changes.density.as_ref().map_or(0.0, |f| p.density * f[i])
         };
         if d.density != 0.0 || rates.changes.density.is_some() {
-            for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
-                out[i] += density_rate(i) * v * (self.pull(u1, i) + p.mass_damping * self.speed(u1, i));
+            let whole = |i: usize| self.pull(u1, i) + p.mass_damping * self.speed(u1, i);
+            match self.consistent() {
+                Some(m) => m.along(rates).add(whole, out),
+                None => {
+                    for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+                        out[i] += density_rate(i) * v * whole(i);
+                    }
+                }
             }
         }
         if d.mass_damping != 0.0 {
@@ -127,7 +158,19 @@ impl Term for Inertia<'_> {
 
     fn by_coefficients_transposed(&self, u1: &[DVec3], z: &[DVec3], sought: &Sought, gradient: &mut Coefficients) {
         let p = self.c.physics();
-        for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
+        if let Some(m) = self.consistent() {
+            if sought.density {
+                m.pull_density(z, |i| self.pull(u1, i) + p.mass_damping * self.speed(u1, i), gradient);
+            }
+            let mut momentum = zeros(z.len());
+            m.add(|i| z[i], &mut momentum);
+            if sought.damping[0] {
+                gradient.physics.mass_damping += momentum.iter().enumerate().map(|(i, z)| z.dot(self.speed(u1, i))).sum::<f64>();
+            }
+            gradient.physics.gravity -= momentum.iter().sum::<DVec3>();
+        }
+        let lumped = if self.c.plan.body.cut.is_some() { &self.c.plan.body.node_volume[..] } else { &[] };
+        for (i, v) in lumped.iter().enumerate() {
             if sought.density {
                 let g = v * z[i].dot(self.pull(u1, i) + p.mass_damping * self.speed(u1, i));
                 gradient.physics.density += self.c.coefficients.changes.density.as_ref().map_or(1.0, |f| f[i]) * g;

@@ -7,6 +7,7 @@
 
 mod assembly;
 pub mod clamps;
+mod consistent;
 pub mod contact;
 pub mod elastic_cells;
 pub mod elastic_points;
@@ -14,6 +15,7 @@ pub mod ghost;
 pub mod held_nodes;
 pub mod inertia;
 pub mod point_laws;
+pub mod tet_laws;
 
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
@@ -26,12 +28,14 @@ use glam::{DMat3, DVec3};
 use held_nodes::HeldNodes;
 use inertia::Inertia;
 use palpate_model::cutcells::elements::Elements;
+use palpate_model::materials::Solid;
 use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::params::changes;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::space::pattern::{Pattern, Places};
 use point_laws::PointLaws;
+use tet_laws::TetLaws;
 
 pub use elastic_cells::laws::{CellActing, cell_laws};
 pub use point_laws::{Acting, acting};
@@ -135,6 +139,8 @@ pub struct Context<'a> {
     pub places: &'a Places,
     /// Matrices at the member's Poisson ratio.
     pub elements: &'a Elements,
+    /// Matrices for E = 1 Pa and ν = 0, whose energy is ½|ε|²; of materials with a viscosity alone.
+    pub strains: Option<&'a Elements>,
     /// The member's coefficients.
     pub coefficients: &'a Coefficients,
     /// The member's planes.
@@ -157,6 +163,16 @@ impl<'a> Context<'a> {
     /// Numbers of the scene.
     pub fn physics(&self) -> &'a Physics {
         &self.coefficients.physics
+    }
+
+    /// The material's law.
+    pub fn law(&self) -> &'a dyn Solid {
+        self.altered.law.as_ref().map_or(self.plan.model.law, |own| own as &dyn Solid)
+    }
+
+    /// Adds z·∂r/∂(factor) of the material's curves, in their order.
+    pub fn pull_curves(&self, by: &[f64], gradient: &mut Coefficients) {
+        gradient.physics.curves.iter_mut().flatten().zip(by).for_each(|(out, g)| *out += g);
     }
 
     /// Length of the solve [s]; 0 in a static problem.
@@ -207,9 +223,14 @@ impl<'a> Context<'a> {
                 m[cell] += g / self.factor(cell);
             }
         }
-        gradient.physics.youngs_modulus += sum / self.physics().youngs_modulus;
+        self.pull_young(sum, gradient);
+    }
+
+    /// The same of the whole body's.
+    pub fn pull_young(&self, by_ln: f64, gradient: &mut Coefficients) {
+        gradient.physics.youngs_modulus += by_ln / self.physics().youngs_modulus;
         if !self.effects.is_empty() {
-            changes::pull_aging(self.plan, self.physics(), self.elapsed(), sum / self.aging(), &mut gradient.physics);
+            changes::pull_aging(self.plan, self.physics(), self.elapsed(), by_ln / self.aging(), &mut gradient.physics);
         }
     }
 }
@@ -260,8 +281,11 @@ impl<'a> Equation<'a> {
         // The elements come first: their tangent overwrites the matrix.
         let mut terms: Vec<Box<dyn Term + 'a>> = match context.plan.body.cut {
             Some(_) => vec![Box::new(ElasticCells::new(context))],
-            None => vec![Box::new(ElasticPoints::new(context)), Box::new(HeldNodes { c: context })],
+            None => vec![Box::new(ElasticPoints::new(context)), Box::new(HeldNodes::new(context))],
         };
+        if context.plan.body.cut.is_none() && !context.altered.laws.is_empty() {
+            terms.push(Box::new(TetLaws::new(context)));
+        }
         if !context.plan.body.ghosts().is_empty() {
             terms.push(Box::new(Ghost { c: context }));
         }
@@ -332,7 +356,7 @@ impl<'a> Equation<'a> {
     /// Share of inertia in the diagonal of the matrix; 0 in a static problem.
     pub fn share_of_inertia(&self, matrix: &Matrix) -> f64 {
         let Some(t) = self.context.inertia else { return 0.0 };
-        let mass: f64 = inertia::masses(&self.context).sum();
+        let mass = inertia::diagonal(&self.context);
         let diagonal = &self.context.pattern.blocks.diagonal;
         t.displacement * mass / diagonal.iter().map(|k| matrix.mean_diagonal(*k)).sum::<f64>()
     }
@@ -341,6 +365,19 @@ impl<'a> Equation<'a> {
 /// A zero vector for `n` nodes.
 pub fn zeros(n: usize) -> Nodes {
     vec![DVec3::ZERO; n]
+}
+
+/// Adds the blocks of a tangent ∂P/∂F [N m], row by row of both, to the nodes whose gradients these are; `places` are those of its pairs.
+pub(crate) fn add_blocks(gradient: &[DVec3], places: &[u32], tangent: &[[f64; 9]; 9], matrix: &mut Matrix) {
+    let n = gradient.len();
+    for (j, b) in gradient.iter().enumerate() {
+        let half: [DVec3; 9] =
+            tangent.map(|t| DVec3::from_array([0, 3, 6].map(|c| t[c] * b.x + t[c + 1] * b.y + t[c + 2] * b.z)));
+        for (i, a) in gradient.iter().enumerate() {
+            let row = |r: usize| half[3 * r] * a.x + half[3 * r + 1] * a.y + half[3 * r + 2] * a.z;
+            matrix.values[places[n * i + j] as usize] += DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        }
+    }
 }
 
 /// block += s I.

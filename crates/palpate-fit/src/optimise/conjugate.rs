@@ -4,6 +4,7 @@
 //! the step to count (forcing terms of Eisenstat & Walker 1996 grow tighter as the gradient falls). A bound that is met holds its
 //! parameter for the rest of the step, and the iteration starts anew on the others.
 
+use super::metric::Metric;
 use super::{Search, Stop};
 use crate::dense::dot;
 
@@ -24,28 +25,39 @@ pub(super) struct Model<'a> {
     pub longest: f64,
     /// Length of the gradient at the start of the search.
     pub steepest: f64,
+    /// How steps are measured.
+    pub metric: &'a Metric,
 }
 
 /// A step `[q]` that lowers the model within the box and the longest step, and the decrease that the undamped model promises.
 pub(super) fn step(search: &mut Search, model: &Model) -> Result<(Vec<f64>, f64), Stop> {
     let (z, g, q) = (model.z, model.gradient, model.z.len());
-    let mut free: Vec<bool> = search.projected_gradient(z, g).iter().map(|g| *g != 0.0).collect();
+    // With a prior what the data do not see moves along with its neighbours.
+    let moves = |g: f64| g == 0.0 && !matches!(model.metric, Metric::Plain);
+    let mut free: Vec<bool> = search.projected_gradient(z, g).iter().zip(g).map(|(p, g)| *p != 0.0 || moves(*g)).collect();
     let (mut p, mut hp) = (vec![0.0; q], vec![0.0; q]);
     let mut r = g.to_vec();
     let mut direction: Option<(Vec<f64>, f64)> = None;
-    let length = inner(&r, &r, &free).sqrt();
+    // M⁻¹ r among those that no bound holds.
+    let conditioned = |r: &[f64], free: &[bool]| match model.metric {
+        Metric::Plain => r.to_vec(),
+        metric => metric.solve(&r.iter().zip(free).map(|(r, f)| if *f { *r } else { 0.0 }).collect::<Vec<_>>()),
+    };
+    let length = inner(&r, &conditioned(&r, &free), &free).sqrt();
     let small = length * LOOSEST.min((length / model.steepest.max(f64::MIN_POSITIVE)).sqrt());
     for _ in 0..MOST_PRODUCTS {
-        let rr = inner(&r, &r, &free);
+        let s = conditioned(&r, &free);
+        let rr = inner(&r, &s, &free);
         if rr.sqrt() <= small {
             break;
         }
-        let mut d: Vec<f64> = (0..q).map(|i| if free[i] { -r[i] } else { 0.0 }).collect();
+        let mut d: Vec<f64> = (0..q).map(|i| if free[i] { -s[i] } else { 0.0 }).collect();
         if let Some((last, before)) = &direction {
             d.iter_mut().zip(last).for_each(|(d, l)| *d += rr / before * l);
         }
         let hd = search.product(z, &d)?;
-        let curvature = dot(&d, &hd) + model.damping * dot(&d, &d);
+        let md = model.metric.times(&d);
+        let curvature = dot(&d, &hd) + model.damping * dot(&d, &md);
         let wanted = if curvature > 0.0 { -inner(&r, &d, &free) / curvature } else { f64::INFINITY };
         let (room, end) = room(search, model, &p, &d);
         let t = wanted.min(room);
@@ -55,7 +67,7 @@ pub(super) fn step(search: &mut Search, model: &Model) -> Result<(Vec<f64>, f64)
         for i in 0..q {
             p[i] += t * d[i];
             hp[i] += t * hd[i];
-            r[i] += t * (hd[i] + model.damping * d[i]);
+            r[i] += t * (hd[i] + model.damping * md[i]);
         }
         direction = Some((d, rr));
         match end {

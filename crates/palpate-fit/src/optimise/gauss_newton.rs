@@ -10,6 +10,7 @@
 //! The model of the cost is a matrix from forward sensitivities, or products with it ([`super::conjugate`]): the way is the same.
 
 use super::conjugate::{self, Model};
+use super::metric::{self, Metric};
 use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 use crate::settings::Walk;
@@ -30,7 +31,8 @@ enum Curvature {
     /// As the matrix of every sample.
     Matrix,
     /// By products; its size along the first gradient stands for the largest diagonal entry.
-    Products { size: f64, steepest: f64 },
+    /// With priors of fields it is measured in their precision, of size one.
+    Products { size: f64, steepest: f64, numbers: Vec<(usize, f64)> },
 }
 
 /// With the curvature of forward sensitivities.
@@ -41,9 +43,14 @@ pub fn minimise(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, 
 /// With products by tangent and adjoint, for very many parameters.
 pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Result<Status, Stop> {
     let g = search.projected_gradient(&z, &at.gradient);
+    if search.priors.is_some() {
+        let numbers = metric::numbers(search, &z, &at)?;
+        let steepest = Metric::new(search, &z, &at, &numbers)?.steepness(&g);
+        return walk(search, z, at, &Curvature::Products { size: 1.0, steepest, numbers });
+    }
     let square = dot(&g, &g);
     let size = if square > 0.0 { dot(&g, &search.product(&z, &g)?) / square } else { 0.0 };
-    walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt() })
+    walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt(), numbers: Vec::new() })
 }
 
 fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
@@ -126,8 +133,9 @@ fn step(
     longest: f64,
 ) -> Result<Option<(Vec<f64>, f64)>, Stop> {
     let q = z.len();
-    if let Curvature::Products { steepest, .. } = curvature {
-        let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest };
+    if let Curvature::Products { steepest, numbers, .. } = curvature {
+        let metric = Metric::new(search, z, at, numbers)?;
+        let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest, metric: &metric };
         return conjugate::step(search, &model).map(Some);
     }
     let mut h = at.curvature.clone();

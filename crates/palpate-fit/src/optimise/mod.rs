@@ -5,10 +5,12 @@ mod descent;
 mod gauss_newton;
 mod lbfgs;
 mod line;
+mod metric;
 mod rprop;
 mod simplex;
 
 use crate::dense::max_abs;
+use crate::priors::Priors;
 use crate::problem::Want;
 use crate::settings::{Settings, Walk};
 use palpate_model::scene::Optimizer;
@@ -163,6 +165,8 @@ pub struct Search<'a> {
     evaluate: &'a mut dyn FnMut(&[f64]) -> Result<Sample, Stop>,
     progress: &'a mut dyn FnMut(usize, f64, &[f64]),
     product: Option<&'a mut Product<'a>>,
+    /// Priors of fields, whose precision conditions products.
+    priors: Option<&'a Priors>,
     /// Whether a start from which nothing can be seen ends it.
     sight: bool,
     /// Smallest z `[q]`; may be −∞.
@@ -224,6 +228,7 @@ impl<'a> Search<'a> {
             evaluate,
             progress,
             product: None,
+            priors: None,
             sight: false,
             lower,
             upper,
@@ -241,6 +246,12 @@ impl<'a> Search<'a> {
     #[must_use]
     pub fn with_products(self, product: &'a mut Product<'a>) -> Search<'a> {
         Search { product: Some(product), ..self }
+    }
+
+    /// The same search, for a problem with these priors of fields.
+    #[must_use]
+    pub(crate) fn with_priors(self, priors: &'a Priors) -> Search<'a> {
+        Search { priors: Some(priors).filter(|p| !p.is_empty()), ..self }
     }
 
     /// The same search, which ends as [`Status::Blind`] at a start from which nothing can be seen.
@@ -324,6 +335,9 @@ impl<'a> Search<'a> {
 
     /// Distance to the optimum in standard errors, for a decrease of the cost that the curvature promises.
     fn decrement(&self, at: &Sample, promised: f64) -> f64 {
+        if let Some(priors) = self.priors {
+            return (2.0 * at.residuals as f64 * promised.max(0.0) / priors.temper).sqrt();
+        }
         at.decrement(self.lower.len(), promised)
     }
 

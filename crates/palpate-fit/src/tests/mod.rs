@@ -6,5 +6,5 @@ mod ending;
 mod errors;
 mod fits;
 mod known;
-mod models;
+pub(crate) mod models;
 mod resume;

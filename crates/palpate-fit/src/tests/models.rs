@@ -99,6 +99,7 @@ pub fn parameter(place: usize, transform: Transform, bounds: (f64, f64), start: 
         bounds,
         start,
         known: None,
+        prior: None,
         slots: vec![Slot { scene: 0, place, factor: 1.0 }],
         count: 1,
         direction: None,

@@ -79,7 +79,7 @@ fn order(d: &Downloaded) -> Vec<usize> {
 }
 
 fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
-    let (obs, grid) = (&d.plan.observation, &d.plan.body.cut().grid);
+    let (obs, grid) = (&d.plan.observation, &d.plan.body.band.grid);
     let (seen, found) = (&d.seen().points[point], &d.found[place]);
     let bare = ResidualRow {
         frame: d.frame,
@@ -91,7 +91,7 @@ fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
         along_sight: 0.0,
         by_place: DVec3::ZERO,
     };
-    let Some(cell) = d.plan.body.band().cells.get(found.cell as usize) else { return bare };
+    let Some(cell) = d.plan.body.band.cells.get(found.cell as usize) else { return bare };
     let truth = d.sensors.truth(&obs.cameras[seen.camera as usize], seen);
     let sight = DVec3::from_array(truth.ray()).normalize_or_zero();
     let gradient = DVec3::from_array(found.gradient.map(f64::from));

@@ -18,7 +18,7 @@ use palpate_model::scene::Analytic;
 use std::sync::Arc;
 
 fn band(plan: &mut Plan) -> &mut Band {
-    &mut Arc::make_mut(&mut plan.body).cut.as_mut().expect("the ball is made of cells").band
+    &mut Arc::make_mut(&mut plan.body).band
 }
 
 fn seen(plan: &mut Plan) -> &mut Observation {

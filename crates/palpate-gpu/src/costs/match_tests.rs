@@ -97,13 +97,13 @@ fn off(a: &[DVec3], b: &[DVec3]) -> f64 {
 /// All holders of a point, in their order.
 fn holders(plan: &Plan, u: &[DVec3], point: &ObservedPoint) -> Vec<Holder> {
     let (body, all) = (&*plan.body, extend(&plan.body, u));
-    let rest = |a: usize| if a < body.nodes.len() { body.nodes[a] } else { body.band().nodes[a - body.nodes.len()] };
+    let rest = |a: usize| if a < body.nodes.len() { body.nodes[a] } else { body.band.nodes[a - body.nodes.len()] };
     let line = (point.position - plan.observation.cameras[0].center).normalize();
     let hold = |(c, cell): (usize, &palpate_model::cutcells::domain::BandCell)| {
         let place = pull_back(&cell.nodes.map(|a| rest(a as usize) + all[a as usize]), &cell.sdf, point.position)?;
         Some((c as u32, place.phi.abs(), place.gradient.dot(line) <= TURNED_AWAY * place.gradient.length()))
     };
-    body.band().cells.iter().enumerate().filter_map(hold).collect()
+    body.band.cells.iter().enumerate().filter_map(hold).collect()
 }
 
 /// The right part of a bar of 6 × 4 × 2 cells, pushed into the left one: the cells between are inside out and hold nothing.

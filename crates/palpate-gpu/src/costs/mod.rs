@@ -353,7 +353,7 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
     let points = most(&|f| f.points.len());
     let mut sight = Sight {
         nodes: body.nodes.len() as u32,
-        extended: (body.nodes.len() + body.band().nodes.len()) as u32,
+        extended: (body.nodes.len() + body.band.nodes.len()) as u32,
         cells: band.cells.len() as u32,
         points: points as u32,
         rows: most(&|f| row_count(plan, f)) as u32,
@@ -364,7 +364,7 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         offsets: readings::offset_places(plan).len() as u32,
         readings: readings::places(plan).len() as u32,
         frames: obs.frames.len() as u32,
-        lattice: body.cut.as_ref().map_or([0; 3], |c| c.grid.size.map(|n| n as u32)),
+        lattice: body.band.grid.size.map(|n| n as u32),
         h: body.length as f32,
         band: plan.band as f32,
         reach: (NOISE_REACH * obs.channel(ReadingKind::Depth).map_or(0.0, |c| c.noise)) as f32,

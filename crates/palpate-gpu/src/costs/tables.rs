@@ -52,14 +52,14 @@ pub(crate) struct BandTables {
 
 impl BandTables {
     pub(crate) fn new(plan: &Plan) -> BandTables {
-        let (body, band) = (&*plan.body, plan.body.band());
+        let (body, band) = (&*plan.body, &plan.body.band);
         let n = body.nodes.len();
-        let mut lookup = vec![NONE; body.cut.as_ref().map_or(0, |c| c.grid.len())];
+        let mut lookup = vec![NONE; band.grid.len()];
         let mut cells = Vec::with_capacity(band.cells.len());
         let mut corners = Vec::with_capacity(8 * band.cells.len());
         for (c, cell) in band.cells.iter().enumerate() {
-            lookup[body.cut().grid.index(cell.lattice)] = c as u32;
-            let corner = split(body.cut().grid.position(cell.lattice) - body.center)[0];
+            lookup[band.grid.index(cell.lattice)] = c as u32;
+            let corner = split(band.grid.position(cell.lattice) - body.center)[0];
             cells.push(BandCell { nodes: cell.nodes, lattice: cell.lattice.map(|x| x as u32), pad: 0, corner });
             corners.extend((0..8).map(|i| (cell.nodes[i], (8 * c + i) as u32, ())));
         }

@@ -71,6 +71,7 @@ pub(crate) fn constant(name: &str) -> Option<f64> {
         "sdf_pieces" => palpate_model::cutcells::distances::PIECES as f64,
         "smallest_pair" => palpate_model::mechanics::rotation::SMALLEST_PAIR,
         "newton_determinant" => palpate_model::mechanics::rotation::NEWTON_DETERMINANT,
+        "local_share" => palpate_model::space::points::LOCAL,
         "held_stiffness" => palpate_model::plan::build::HELD,
         "guard_start" => palpate_model::cutcells::corotation::inversion::START,
         "guard_strength" => palpate_model::cutcells::corotation::inversion::STRENGTH,

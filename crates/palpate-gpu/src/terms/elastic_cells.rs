@@ -34,7 +34,7 @@ impl Term for ElasticCells {
         if along.gathered {
             s.run_with(pass::PUSH_CELLS, ALL, Per::Cell, along.flags, &along.named);
         }
-        if along.body || along.laws {
+        if along.body || along.laws || along.moved.viscosity {
             s.all_laws(pass::PUSH_LAWS, along.flags, &along.named);
         }
     }
@@ -43,7 +43,7 @@ impl Term for ElasticCells {
         if pull.material || pull.sought().damping[1] {
             s.run_with(pass::PULL_CELLS, ALL, Per::Cell, pull.asked(), &pull.named);
         }
-        if pull.material || seeks_effect(s.world, pull.sought(), |s| matches!(s, Site::Cells(_))) {
+        if pull.material || pull.sought().viscosity || seeks_effect(s.world, pull.sought(), |s| matches!(s, Site::Cells(_))) {
             s.all_laws(pass::PULL_LAWS, pull.asked(), &pull.named);
         }
     }

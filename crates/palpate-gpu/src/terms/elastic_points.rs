@@ -8,7 +8,7 @@ use crate::passes::{ALL, Passes, Per};
 pub(super) struct ElasticPoints;
 
 impl Passes<'_, '_> {
-    fn has_points(&self) -> bool {
+    pub(super) fn has_points(&self) -> bool {
         self.world.geometry.shape.elastic != 0
     }
 
@@ -44,7 +44,7 @@ impl Term for ElasticPoints {
         }
     }
 
-    /// Points, patches, springs and mass damping.
+    /// Points, patches, mass damping and springs.
     fn tangent(&self, s: &mut Passes, section: u32) {
         if s.has_points() {
             s.run(pass::TANGENT_ELASTIC, section, Per::Elastic, 0);
@@ -70,7 +70,7 @@ impl Term for ElasticPoints {
     }
 
     fn by_coefficients_transposed(&self, s: &mut Passes, pull: &Pull) {
-        if s.has_points() && (pull.material || pull.sought().damping[1]) {
+        if s.has_points() && (pull.material || pull.sought().damping[1] || pull.sought().viscosity) {
             s.run_with(pass::PULL_ELASTIC, ALL, Per::Elastic, 0, &pull.named);
         }
     }

@@ -15,7 +15,7 @@ mod start;
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::points::{BACK, BY_OLD};
-use crate::device::pipelines::shared::pulls::{SEEK_DAMPING, SEEK_MODULUS, SEEK_POISSON, SEEK_REST, SEEK_START};
+use crate::device::pipelines::shared::pulls::{SEEK_DAMPING, SEEK_MODULUS, SEEK_POISSON, SEEK_REST, SEEK_START, SEEK_VISCOSITY};
 use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{Rates, Sums, Tally, World};
@@ -123,7 +123,7 @@ impl<'a> Along<'a> {
         let laws = on(|s| matches!(s, Site::Cells(_)));
         let points = point_laws::change(world, moved);
         let patches = moved.planes || moved.modulus || (points && effects.on_patches());
-        let gathered = body || moved.damping[1] || clamps || patches || laws;
+        let gathered = body || moved.damping[1] || moved.viscosity || clamps || patches || laws;
         Along { moved, flags: rates.flags, named: rates.named(), body, grips, clamps, laws, points, patches, gathered }
     }
 }
@@ -164,6 +164,7 @@ fn asked(s: &Sought) -> u32 {
         | bit(s.damping[1], SEEK_DAMPING)
         | bit(s.rest, SEEK_REST)
         | bit(s.start, SEEK_START)
+        | bit(s.viscosity, SEEK_VISCOSITY)
 }
 
 /// Whether numbers of some effect on such a site are sought.

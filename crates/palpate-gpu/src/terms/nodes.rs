@@ -4,6 +4,7 @@
 use super::{Along, Past, Pull, Term, Way};
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::rates::WITH_CELLS;
+use crate::device::pipelines::shared::structs::FIELD_DENSITY;
 use crate::passes::{ALL, Passes, Per};
 
 pub(super) struct Nodes;
@@ -45,6 +46,9 @@ impl Term for Nodes {
         }
         if pull.material || sought.density || sought.gravity || sought.damping.contains(&true) {
             s.run_with(pass::PULL_NODES, ALL, Per::Node, pull.asked(), &pull.named);
+        }
+        if sought.density && s.has_points() && s.world.geometry.shape.fields & FIELD_DENSITY != 0 {
+            s.run_with(pass::PULL_DENSITIES, ALL, Per::Elastic, 0, &pull.named);
         }
         if sought.masses {
             s.run_with(pass::PULL_MASSES, ALL, Per::Member, 0, &pull.named);

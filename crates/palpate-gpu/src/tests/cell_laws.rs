@@ -9,6 +9,7 @@ use crate::device::pipelines::pass;
 use crate::device::recorder::{Args, Recorder, Size};
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
 use palpate_model::effects::{ALL, Law, Site};
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::scene::Scene;
 use std::collections::HashMap;
 
@@ -128,7 +129,7 @@ fn evaluations_with_laws_of_cells_agree() {
 }
 
 #[test]
-fn evaluations_of_a_held_body_with_laws_of_cells_and_uneven_stiffness_agree() {
+fn evaluations_of_a_held_body_with_laws_of_cells_a_viscosity_and_uneven_stiffness_agree() {
     let mut s = held(0.03);
     s.initial.velocity.z = -1.0;
     s.time.steps = 2;
@@ -138,5 +139,6 @@ fn evaluations_of_a_held_body_with_laws_of_cells_and_uneven_stiffness_agree() {
     with(&mut s, "rest-shape", &[("stretch", &[0.04, -0.02, 0.03]), ("bend_x_to_z", &[1.5])]);
     with(&mut s, "stiffness-gradient", &[("slope", &[12.0, 2.0, -4.0])]);
     with(&mut s, "creep", &[("fraction", &[0.6]), ("time", &[0.005])]);
+    s.material.viscosity = Some(Viscosity { coefficient: 40.0, exponent: 0.7 });
     compare(&seen(&s));
 }

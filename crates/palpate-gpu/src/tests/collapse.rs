@@ -89,7 +89,7 @@ fn pressed() -> Scene {
     };
     let clamp = |low: f64, high: f64, motion| {
         let (min, max) = (DVec3::new(-1.0, -1.0, low), DVec3::new(1.0, 1.0, high));
-        Clamp { min, max, object_frame: false, motion, motion_path: None }
+        Clamp::still(min, max).moved(motion)
     };
     s.clamps = vec![clamp(-1.0, 0.03, None), clamp(0.058, 1.0, Some(motion))];
     s.observation = watched();

@@ -172,7 +172,7 @@ fn every_parameter_of_a_falling_ball() {
 fn varied(mut scene: Scene) -> Plan {
     let field = |varied, basis, scale, count: usize| {
         let values = Some((0..count).map(|k| 1.0 + 0.3 * (2.0 * k as f64).sin()).collect());
-        FieldSpec { varied, basis, scale, values }
+        FieldSpec { varied, basis, scale, values, prior: None }
     };
     let body = plan(&scene).body;
     scene.fields = vec![

@@ -182,6 +182,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
         pattern: &pattern,
         places: &places,
         elements: &elements,
+        strains: None,
         coefficients: &coefficients,
         planes: &planes,
         effects: &effects,

@@ -67,6 +67,7 @@ pub fn ball(h: f64) -> Scene {
             poisson_ratio: 0.4,
             mass_damping: 0.3,
             stiffness_damping: 0.004,
+            viscosity: None,
         },
         gravity: DVec3::new(0.4, -0.3, -9.0),
         clamps: Vec::new(),
@@ -74,6 +75,7 @@ pub fn ball(h: f64) -> Scene {
         masses: vec![PointMass { point: DVec3::new(0.0, 0.02, 0.07), mass: 0.02 }],
         effects: Vec::new(),
         fields: Vec::new(),
+        curves: Default::default(),
         initial: Initial {
             velocity: DVec3::new(0.2, 0.0, -0.5),
             angular_velocity: DVec3::new(0.0, 3.0, 1.0),
@@ -83,6 +85,7 @@ pub fn ball(h: f64) -> Scene {
         time: Time { step: 0.01, steps: 6, start: 0.05, ..Time::weighted(0.6) },
         solver: Solver::default(),
         observation: None,
+        targets: Vec::new(),
         fit: None,
     }
 }
@@ -101,7 +104,7 @@ pub fn held(h: f64) -> Scene {
     let mut scene = ball(h);
     scene.planes[0].point.z = 0.0012;
     let min = DVec3::new(-1.0, -1.0, 0.07);
-    scene.clamps.push(Clamp { min, max: DVec3::ONE, object_frame: false, motion: Some(motion), motion_path: None });
+    scene.clamps.push(Clamp::still(min, DVec3::ONE).moved(Some(motion)));
     scene.initial.state = InitialShape::StaticEquilibrium;
     scene.initial.velocity = DVec3::ZERO;
     scene.initial.angular_velocity = DVec3::ZERO;

@@ -3,6 +3,7 @@
 use super::effects::Effects;
 use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
+use super::mass::MassTable;
 use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
 use crate::device::{GpuError, Maker};
 use crate::layout::{Cell, Shape};
@@ -29,6 +30,7 @@ pub(crate) struct Geometry {
     /// (clamp, cell of the body) of every clamp cell in the device's order: all that a member may hold.
     pub(crate) holds: Vec<(usize, u32)>,
     pub(crate) effects: Effects,
+    pub(crate) mass: MassTable,
 }
 
 fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
@@ -91,6 +93,7 @@ impl Geometry {
         let first_mass = stencils.len() as u32;
         stencils.extend(plan.masses.iter());
         let acting = if touched { first_mass } else { first_patch };
+        let mass = MassTable::new(plan, &places, blocks);
         let elastic = ElasticTables::new(plan, &pattern, &stencils, acting as usize);
 
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
@@ -171,7 +174,9 @@ impl Geometry {
             elastic: body.points.len() as u32,
             held: u32::from(elastic.holds()),
             element_size: body.length as f32,
-            pad: [0; 3],
+            elements: body.elements() as u32,
+            per_element: body.points.per_element.max(1) as u32,
+            pad: 0,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         buffers.insert("cells", gpu.upload("cells", &cells)?);
@@ -181,6 +186,7 @@ impl Geometry {
         buffers.insert("rest", gpu.upload("rest", &rest)?);
         stencils.upload(gpu, buffers)?;
         elastic.upload(gpu, buffers)?;
+        mass.upload(gpu, buffers)?;
         buffers.insert("node_rows", gpu.upload("node_rows", &node_rows)?);
         buffers.insert("node_list", gpu.upload("node_list", &node_list)?);
         buffers.insert("block_rows", gpu.upload("block_rows", &to_u32(&pattern.blocks.rows))?);
@@ -192,6 +198,6 @@ impl Geometry {
         buffers.insert("effects", gpu.upload("effects", &effects.sites())?);
         buffers.insert("cell_effects", gpu.upload("cell_effects", &effects.cell_sites())?);
         buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
-        Ok(Geometry { shape, classes, holds, effects })
+        Ok(Geometry { shape, classes, holds, effects, mass })
     }
 }

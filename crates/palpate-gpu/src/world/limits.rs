@@ -57,12 +57,12 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 19] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 20] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
             ("begin_solve", 4 * self.share() + 300),
-            ("step_back", 2 * self.row + 20),
+            ("step_back", 3 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),
             ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 2 * self.stencil + 4),
@@ -79,7 +79,8 @@ impl Most {
             ("tangent_elastic", 9 * 800 + 20 * self.stencil),
             ("place_held", self.holders * (1 + self.holders)),
             ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
-            ("push_nodes", 60 + self.row + (4 + 2 * self.stencil) * self.masses),
+            ("pull_densities", self.stencil * (self.stencil + 1)),
+            ("push_nodes", 60 + 2 * self.row + (4 + 2 * self.stencil) * self.masses),
             ("push_cells", 2600 + 2 * self.supports + self.aging),
             ("push_holds", 2 * (2 * self.grips + 10 * self.grips + 60) + self.aging + 60),
         ]

@@ -48,6 +48,10 @@ impl Batch {
         let mut poses: Vec<ClampPose> = Vec::new();
         let mut masses: Vec<f32> = Vec::new();
         let unit = plan.solver.ghost * plan.body.length;
+        // What viscosity needs comes first, where it need not be looked for.
+        if plan.layout.is_viscous() {
+            slots.push(0.0);
+        }
         for p in &self.physics {
             let slot = slots.iter().position(|nu| *nu == p.poisson_ratio).unwrap_or_else(|| {
                 slots.push(p.poisson_ratio);
@@ -69,6 +73,7 @@ impl Batch {
                 velocity: vec4(p.velocity, 0.0),
                 spin: vec4(p.angular_velocity, 0.0),
                 lame: [lambda, mu, lambda_by_nu, mu_by_nu].map(|v| v as f32),
+                flow: p.viscosity.map_or([0.0; 4], |v| [v.coefficient as f32, v.exponent as f32, 0.0, 0.0]),
             });
             all_planes.extend(planes(plan, p).iter().map(|q| Plane {
                 normal: vec4(q.normal[0], q.height),
@@ -81,7 +86,7 @@ impl Batch {
             geometry.effects.poses(plan, p, &mut poses);
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
-        geometry.effects.upload(gpu, plan, &self.physics, buffers)?;
+        geometry.effects.upload(gpu, plan, &geometry.mass, &self.physics, buffers)?;
         buffers.insert("members", gpu.upload("members", &members)?);
         buffers.insert("planes", gpu.upload("planes", &all_planes)?);
         buffers.insert("poses", gpu.upload("poses", &poses)?);

@@ -5,6 +5,7 @@ mod effort;
 mod elastic;
 mod geometry;
 mod limits;
+mod mass;
 mod members;
 pub(crate) mod rates;
 mod room;

@@ -57,12 +57,13 @@ pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64
         _ => false,
     };
     let sought = Sought::new(plan, &(0..plan.layout.len()).map(|p| p == place).collect::<Vec<_>>());
+    let densities = if geometry.mass.entries() == 0 { shape.nodes } else { shape.blocks };
     let of = |moves: bool, bytes: u32| if moves { u64::from(bytes) * members } else { 0 };
     vec![
         size_of::<Rate>() as u64 * members,
         4 * u64::from(shape.rate_numbers) * members,
-        of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * (shape.cells + shape.elastic)),
-        of(varies(|s| matches!(s, Site::Density(_)), sought.density), 4 * shape.nodes),
+        of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * shape.elements),
+        of(varies(|s| matches!(s, Site::Density(_)), sought.density), 4 * densities),
         of(sought.rest, 16 * shape.nodes),
     ]
 }
@@ -87,7 +88,7 @@ impl Gathered {
             mass_damping: p.mass_damping as f32,
             stiffness_damping: p.stiffness_damping as f32,
             start: p.start as f32,
-            pad: [0.0; 2],
+            viscosity: p.viscosity.map_or([0.0; 2], |v| [v.coefficient as f32, v.exponent as f32]),
             gravity: vec4(p.gravity),
             velocity: vec4(p.velocity),
             spin: vec4(p.angular_velocity),
@@ -95,7 +96,11 @@ impl Gathered {
         numbers(&world.geometry, &world.plan, p, &mut self.numbers);
         // Which arrays there are depends on the direction alone, not on the member.
         self.moduli.extend(rate.changes.modulus.iter().flatten().map(|v| *v as f32));
-        self.densities.extend(rate.changes.density.iter().flatten().map(|v| *v as f32));
+        let (mass, density) = (&world.geometry.mass, rate.changes.density.as_deref());
+        match (mass.entries(), density) {
+            (0, _) | (_, None) => self.densities.extend(density.unwrap_or_default().iter().map(|v| *v as f32)),
+            (_, factors) => self.densities.extend(mass.matrix(&world.plan, factors).iter().map(|v| *v as f32)),
+        }
         self.rests.extend(rate.changes.rest.iter().flatten().map(|v| vec4(*v)));
     }
 

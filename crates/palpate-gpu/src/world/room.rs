@@ -53,7 +53,7 @@ pub(crate) const COLUMN_VECTORS: [&str; 4] = ["direction", "cg_rest", "cg_along"
 fn modes(fields: u32) -> u32 {
     match (fields >> structs::SCALARS_AT) & structs::MOST_SCALARS {
         0 => 0,
-        n => 1 + 8 * (n + 1) + 2 * n,
+        n => 1 + 8 * (n + 2) + 2 * n,
     }
 }
 

@@ -10,6 +10,7 @@ use palpate_engine::Wanted;
 use palpate_model::effects::Site;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
+use palpate_model::space::tets::lumped;
 use std::collections::HashMap;
 
 /// Derivatives that are wanted, and where their sums lie.
@@ -55,6 +56,7 @@ impl Sums {
             ("cell_sums", cell_rows * each(shape.cells, 8)),
             ("elastic_pulls", shape.elastic.into()),
             ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * each(shape.elastic, 64)),
+            ("density_pulls", shape.elastic.into()),
             ("held_sums", each(shape.nodes, 64)),
             ("hold_pulls", holds),
             ("hold_sums", hold_rows * each(shape.holds, 8)),
@@ -74,7 +76,7 @@ impl Sums {
         let own = Coefficients::new(plan, theta);
         let at = Member { shape: &geometry.shape, member, found };
         let mut g = Coefficients::zero_gradient(plan, &self.sought);
-        at.add_material(&own, geometry, &mut g);
+        at.add_material(plan, &own, geometry, &mut g);
         at.add_numbers(&mut g);
         self.add_effects(plan, &geometry.effects, &at, &mut g);
         let mut out = vec![0.0; plan.layout.len()];
@@ -158,10 +160,11 @@ impl Member<'_> {
     }
 
     /// What lies on cells and nodes, and the numbers of the material that it makes.
-    fn add_material(&self, own: &Coefficients, geometry: &Geometry, g: &mut Coefficients) {
+    fn add_material(&self, plan: &Plan, own: &Coefficients, geometry: &Geometry, g: &mut Coefficients) {
         let shape = self.shape;
         let mut modulus = self.items("cell_pulls", shape.cells, 1);
-        modulus.extend(self.items("elastic_pulls", shape.elastic, 1));
+        let points = self.items("elastic_pulls", shape.elastic, 1);
+        modulus.extend(points.chunks(shape.per_element as usize).map(|p| p.iter().sum::<f64>()));
         let holds = self.items("hold_pulls", shape.holds, 1);
         geometry.holds.iter().zip(&holds).for_each(|((_, cell), h)| modulus[*cell as usize] += h);
         let density = self.items("node_pulls", shape.nodes, 1);
@@ -170,17 +173,33 @@ impl Member<'_> {
             None => by.iter().sum(),
         };
         g.physics.youngs_modulus += whole(&modulus, &own.changes.modulus) / own.physics.youngs_modulus;
-        g.physics.density += whole(&density, &own.changes.density);
+        // Of tetrahedra the factors are in the matrix already.
+        let factors = if geometry.mass.entries() == 0 { &own.changes.density } else { &None };
+        g.physics.density += whole(&density, factors);
         if let Some(out) = &mut g.changes.modulus {
             *out = modulus;
         }
         if let Some(out) = &mut g.changes.density {
             *out = density.iter().map(|d| own.physics.density * d).collect();
+            if geometry.mass.entries() != 0 {
+                *out = self.densities_of_nodes(plan, own.physics.density);
+            }
         }
         if let Some(out) = &mut g.changes.rest {
             let rest = self.items("rest_pulls", shape.nodes, 4);
             *out = rest.chunks_exact(4).map(DVec3::from_slice).collect();
         }
+    }
+
+    /// Derivatives by the factors on the densities of nodes, each of which has its share of its elements'.
+    fn densities_of_nodes(&self, plan: &Plan, density: f64) -> Vec<f64> {
+        let (points, mut out) = (&plan.body.points, vec![0.0; plan.body.nodes.len()]);
+        let pulls = self.items("density_pulls", self.shape.elastic, 1);
+        for (e, s) in points.means().enumerate() {
+            let by = density * pulls[points.mean_point(e)];
+            s.nodes.iter().zip(lumped(s.nodes.len())).for_each(|(n, w)| out[*n as usize] += w * by);
+        }
+        out
     }
 
     /// The numbers of the scene that act through sums.
@@ -192,6 +211,10 @@ impl Member<'_> {
         p.poisson_ratio += self.cells(0) + self.elastic(0) + self.holds(0) + by[1];
         p.stiffness_damping += self.cells(1) + self.elastic(1) + by[2];
         p.mass_damping += by[3];
+        if let Some(v) = &mut p.viscosity {
+            v.coefficient += self.cells(2) + self.elastic(2);
+            v.exponent += self.cells(3) + self.elastic(3);
+        }
         p.start += self.holds(1) + self.sum("held_sums", 0, shape.nodes.div_ceil(64), 1)[0];
         p.gravity += DVec3::from_slice(&nodes("node_sums", 1));
         p.velocity += DVec3::from_slice(&nodes("velocity_sums", 0));

@@ -1,11 +1,11 @@
-//! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh.
+//! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh; and volume meshes to tetrahedra.
 
-mod msh;
 mod parse;
 #[cfg(test)]
 mod tests;
+mod volume;
 
-pub use msh::read_tets;
+pub use volume::read_tets;
 
 use crate::error::{InputError, Loaded, number};
 use glam::DVec3;

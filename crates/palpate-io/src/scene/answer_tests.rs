@@ -2,6 +2,7 @@
 
 use super::tests::{BASE, parameters, read};
 use super::*;
+use palpate_model::materials::viscosity::Viscosity;
 
 #[test]
 fn what_is_known_beforehand_is_a_pair_for_each_component_or_one_for_all() {
@@ -58,4 +59,105 @@ fn the_next_fit_starts_where_this_one_ended() {
     // Measured from another axis as soon as the normal turns: what is written is the normal.
     assert!(!text.contains("1.6"), "{text}");
     assert_eq!(again[0].known, Some((1e5, 2e4)));
+}
+
+#[test]
+fn a_viscosity_is_read_fitted_and_written_back() {
+    let with = |inner: &str| BASE.replace("density = 1000\n", &format!("density = 1000\nviscosity = {{ {inner} }}\n"));
+    assert_ne!(with(""), BASE);
+    let fit = "[fit]\n[[fit.parameter]]\npath = \"material.viscosity.coefficient\"\nstart = [1, 100]\n\
+               [[fit.parameter]]\npath = \"material.viscosity.exponent\"\n";
+    let text = format!("{}{fit}", with("coefficient = 8.0, exponent = 0.8"));
+    let scene = parse_scene(&text, "scene.toml").unwrap().value;
+    assert_eq!(scene.material.viscosity, Some(Viscosity { coefficient: 8.0, exponent: 0.8 }));
+    let parameters = &scene.fit.as_ref().unwrap().parameters;
+    assert_eq!((parameters[0].start, parameters[1].start), ((1.0, 100.0), (0.8, 0.8)));
+    assert_eq!((parameters[0].bounds, parameters[1].bounds), ((1e-9, 1e9), (0.1, 3.0)));
+    let values = [("material.viscosity.coefficient".to_string(), 12.5), ("material.viscosity.exponent".to_string(), 0.95)];
+    let again = parse_scene(&write_scene(&text, &scene, &values, Path::new(".")).unwrap(), "model.toml").unwrap().value;
+    assert_eq!(again.material.viscosity, Some(Viscosity { coefficient: 12.5, exponent: 0.95 }));
+    // Newtonian where no more is said.
+    let plain = parse_scene(&with("coefficient = 2"), "scene.toml").unwrap().value;
+    assert_eq!(plain.material.viscosity, Some(Viscosity { coefficient: 2.0, exponent: 1.0 }));
+    for (inner, message) in [
+        ("exponent = 1", "material.viscosity.coefficient"),
+        ("coefficient = -1", "must be ≥ 0"),
+        ("coefficient = 1, exponent = 5", "must lie in [0.1, 3]"),
+        ("coefficient = 1, power = 1", "known: coefficient, exponent"),
+    ] {
+        let refused = parse_scene(&with(inner), "scene.toml").expect_err(inner).to_string();
+        assert!(refused.contains(message), "{refused}");
+    }
+    let none = format!("{BASE}{fit}");
+    let refused = parse_scene(&none, "scene.toml").expect_err("there is none").to_string();
+    assert!(refused.contains("material.viscosity.coefficient"), "{refused}");
+}
+
+#[test]
+fn curves_of_stiffness_are_read_fitted_and_written_back() {
+    let with = |inner: &str| BASE.replace("density = 1000\n", &format!("density = 1000\n{inner}\n"));
+    let model = "model = \"principal-stretch\"";
+    let curves = "stretch_curve = { stretches = [0.7, 1.3], factors = [1.5, 2.0] }\nvolume_curve = { ratios = [0.8] }";
+    let fit = "[fit]\n[[fit.parameter]]\npath = \"material.stretch_curve.factors\"\nbounds = [0.1, 10]\n\
+               [[fit.parameter]]\npath = \"material.volume_curve.factors.0\"\n";
+    let text = format!("{}{fit}", with(&format!("{model}\n{curves}")));
+    let scene = parse_scene(&text, "scene.toml").unwrap().value;
+    assert_eq!((scene.curves.stretch.stretches.clone(), scene.curves.volume.factors.clone()), (vec![0.7, 1.3], vec![1.0]));
+    let parameters = &scene.fit.as_ref().unwrap().parameters;
+    let found: Vec<_> = parameters.iter().map(|p| (p.path.as_str(), p.start.0, p.bounds)).collect();
+    assert_eq!(
+        found,
+        [
+            ("material.stretch_curve.factors.0", 1.5, (0.1, 10.0)),
+            ("material.stretch_curve.factors.1", 2.0, (0.1, 10.0)),
+            ("material.volume_curve.factors.0", 1.0, (1e-3, 1e3)),
+        ]
+    );
+    let values = [("material.stretch_curve.factors.1".to_string(), 3.25)];
+    let again = parse_scene(&write_scene(&text, &scene, &values, Path::new(".")).unwrap(), "model.toml").unwrap().value;
+    assert_eq!(again.curves.stretch.factors, [1.5, 3.25]);
+    for (inner, message) in [
+        (curves, "corotated-linear has no curves; set model = \"principal-stretch\""),
+        (&format!("{model}\nstretch_curve = {{ factors = [1] }}"), "material.stretch_curve.stretches"),
+        (&format!("{model}\nstretch_curve = {{ stretches = [1.2, 0.9] }}"), "must have increasing corners"),
+        (&format!("{model}\nstretch_curve = {{ stretches = [0.9, 1] }}"), "has a corner at 1"),
+        (&format!("{model}\nvolume_curve = {{ ratios = [0.9], factors = [1, 2] }}"), "1 corners and 2 factors"),
+    ] {
+        let refused = parse_scene(&with(inner), "scene.toml").expect_err(inner).to_string();
+        assert!(refused.contains(message), "{refused}");
+    }
+}
+
+#[test]
+fn tetrahedra_may_be_made_and_their_edge_left_open() {
+    use palpate_model::scene::Resolution;
+    let of = |text: &str| parse_scene(&BASE.replace("cell_size = 0.01\n", text), "scene.toml");
+    let made = "discretisation = \"tetrahedra\"\n";
+    let scene = of(made).unwrap().value;
+    assert_eq!(scene.object.resolution, Resolution::OpenEdge);
+    let text = BASE.replace("cell_size = 0.01\n", made);
+    let text = write_scene(&text, &scene, &[("object.edge_length".to_string(), 0.0125)], Path::new(".")).unwrap();
+    assert_eq!(parse_scene(&text, "model.toml").unwrap().value.object.resolution, Resolution::Edge(0.0125));
+    assert_eq!(of("discretisation = \"cells\"\ncells = 9\n").unwrap().value.object.resolution, Resolution::Cells(9));
+    let e = of(&format!("{made}edge_length = 0.2\n")).unwrap_err().to_string();
+    assert_eq!(e, "scene.toml:5: object.edge_length: 0.2 m is larger than the object, whose longest side is 0.1000 m");
+    let e = of("discretisation = \"voxels\"\n").unwrap_err().to_string();
+    assert_eq!(e, "scene.toml:4: object.discretisation: \"voxels\" is not known; allowed: \"cells\", \"tetrahedra\"");
+}
+
+#[test]
+fn a_clamp_has_a_box_or_a_group() {
+    let fault = |text: &str| read(&format!("[[clamp]]\n{text}")).unwrap_err().message;
+    let whole = "box = { min = [0, 0, 0], max = [1, 1, 1] }\n";
+    assert_eq!(fault(&format!("{whole}group = \"base\"\n")), "box and group exclude each other; give one");
+    assert_eq!(
+        fault("frame = \"world\"\n"),
+        "missing; expected box = { min = [x, y, z], max = [x, y, z] }, or group = \"NAME\" of a volume mesh"
+    );
+    assert_eq!(
+        fault("group = \"base\"\nframe = \"object\"\n"),
+        "belongs to a box; a group has its nodes wherever the body is placed"
+    );
+    let scene = read("[[clamp]]\ngroup = \"base\"\n").unwrap().value;
+    assert_eq!(scene.clamps[0].region, ClampRegion::Group("base".into()));
 }

@@ -4,7 +4,7 @@ use crate::document::Table;
 use crate::error::{InputError, number};
 use crate::npy::read_array;
 use crate::vtk::read_vtu_array;
-use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
+use palpate_model::params::fields::{Basis, Blend, FieldSpec, Prior, PriorKind, Region, Scale, Varied};
 use std::path::Path;
 
 /// Every field of a scene, in the order of the file.
@@ -46,7 +46,31 @@ fn field(t: &Table) -> Result<FieldSpec, InputError> {
         }
     };
     let values = values(t, kind)?;
-    Ok(FieldSpec { varied, basis, scale, values })
+    let prior = prior(t, kind)?;
+    Ok(FieldSpec { varied, basis, scale, values, prior })
+}
+
+/// What is expected of the values, if anything.
+fn prior(t: &Table, kind: Kind) -> Result<Option<Prior>, InputError> {
+    let Some(p) = t.optional_table("prior")? else { return Ok(None) };
+    if kind == Kind::Regions {
+        let message = "belongs to basis = \"cells\" or \"nodes\"; what is known of a region is said by known = [value, sd] in its [[fit.parameter]]";
+        return Err(t.error("prior", message));
+    }
+    let names = PriorKind::ALL.map(|(name, _)| format!("\"{name}\"")).join(" or ");
+    let kind = p.optional_choice("kind", &PriorKind::ALL)?.ok_or_else(|| p.missing("kind", &names))?;
+    if kind == PriorKind::EdgePreserving && p.has("length") {
+        return Err(p.error("length", "belongs to kind = \"matern\"; an edge-preserving prior knows steps, not lengths"));
+    }
+    let auto_or = |key: &str, unit: &str| {
+        let allowed = format!("is not allowed: must be \"auto\" or a number > 0{unit}");
+        match p.optional_str(key) {
+            Ok(None | Some("auto")) => Ok(None),
+            Ok(Some(other)) => Err(p.error(key, format!("\"{other}\" {allowed}"))),
+            Err(_) => p.f64_where(key, |x| x > 0.0, &allowed),
+        }
+    };
+    Ok(Some(Prior { kind, length: auto_or("length", " (m)")?, deviation: auto_or("deviation", " (of the logarithm)")? }))
 }
 
 fn regions(t: &Table, blend: Blend) -> Result<Vec<Region>, InputError> {

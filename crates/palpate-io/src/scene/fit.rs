@@ -5,7 +5,7 @@ use crate::error::{InputError, number};
 use crate::keys::suggest;
 use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
-use palpate_model::params::{ParamKey, Transform};
+use palpate_model::params::{ParamKey, Transform, is_component};
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene};
 
@@ -79,6 +79,10 @@ fn value(scene: &Scene, key: ParamKey) -> f64 {
         },
         ParamKey::MassDamping => scene.material.mass_damping,
         ParamKey::StiffnessDamping => scene.material.stiffness_damping,
+        ParamKey::Viscosity => scene.material.viscosity.map_or(0.0, |v| v.coefficient),
+        ParamKey::ViscosityExponent => scene.material.viscosity.map_or(1.0, |v| v.exponent),
+        ParamKey::StretchFactor(k) => scene.curves.stretch.factors[usize::from(k)],
+        ParamKey::VolumeFactor(k) => scene.curves.volume.factors[usize::from(k)],
         ParamKey::Gravity(a) => scene.gravity[usize::from(a)],
         ParamKey::Velocity(a) => scene.initial.velocity[usize::from(a)],
         ParamKey::AngularVelocity(a) => scene.initial.angular_velocity[usize::from(a)],
@@ -124,20 +128,22 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
 /// One `[[fit.parameter]]`: a number, the three components of a vector, or a field, whose values share one start and one pair of bounds.
 fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParameter>, InputError> {
     let path = t.optional_str("path")?.ok_or_else(|| t.missing("path", "the dotted path of a number in this file"))?;
-    let component = |k: &Target| k.path.strip_prefix(path).is_some_and(|r| matches!(r, "" | ".x" | ".y" | ".z"));
+    let component = |k: &Target| k.path.strip_prefix(path).is_some_and(is_component);
     let of_field = field_targets(path, scene);
     let chosen: Vec<&Target> =
         of_field.as_ref().map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
     if chosen.is_empty() {
         return Err(t.error("path", unknown_path(path, scene, known)));
     }
-    let ranges = |key| match of_field {
-        Some(_) => t.optional_ranges(key, 1).map(|r| r.map(|r| vec![r[0]; chosen.len()])),
-        None => t.optional_ranges(key, chosen.len()),
+    // Values of a field and factors of a curve share one range.
+    let shared = of_field.is_some() || path.ends_with("_curve.factors");
+    let ranges = |key| match shared {
+        true => t.optional_ranges(key, 1).map(|r| r.map(|r| vec![r[0]; chosen.len()])),
+        false => t.optional_ranges(key, chosen.len()),
     };
     let starts = ranges("start")?;
     let bounds = ranges("bounds")?;
-    let known_values = known_values(t, chosen.len(), of_field.is_some())?;
+    let known_values = known_values(t, chosen.len(), shared)?;
     let per_scene = t.optional_bool("per_scene")?.unwrap_or(false);
     let mut out = Vec::new();
     for (i, k) in chosen.iter().enumerate() {

@@ -5,20 +5,23 @@ mod answer_tests;
 mod effects;
 mod fields;
 mod fit;
+mod material;
 mod motion;
 mod object;
+mod rework;
 pub(crate) mod scale;
+mod target;
 #[cfg(test)]
 mod tests;
 mod write;
 
+pub use rework::recast_scene;
 pub use write::{append_effects, name_field_files, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
 use glam::DVec3;
-use palpate_model::materials::{self, Model};
 use palpate_model::observation::MarkerRest;
 use palpate_model::observation::ReadingKind;
 use palpate_model::plan::scheme::{self, Scheme};
@@ -69,7 +72,8 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
 
     let mut warnings = Vec::new();
     let object = object::object(&root, &mut warnings)?;
-    let material = material(&root, &mut warnings)?;
+    let of_tets = object.is_of_tetrahedra();
+    let (material, curves) = material::material(&root, &mut warnings)?;
     let gravity = match root.optional_table("world")? {
         Some(w) => w.optional_vec3("gravity")?,
         None => None,
@@ -80,6 +84,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         title: root.optional_str("title")?.unwrap_or_default().to_string(),
         object,
         material,
+        curves,
         gravity: gravity.unwrap_or(DVec3::new(0.0, 0.0, -9.81)),
         clamps: clamps(&root)?,
         planes: planes(&root)?,
@@ -88,8 +93,9 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         fields: fields::fields(&root)?,
         time: time(&root, initial.state)?,
         initial,
-        solver: solver(&root)?,
+        solver: solver(&root, of_tets)?,
         observation: observation(&root)?,
+        targets: target::targets(&root)?,
         fit: None,
     };
     if scene.gravity.length() > 100.0 {
@@ -113,45 +119,6 @@ pub(crate) fn check_format(root: &Table, format: &str) -> Result<(), InputError>
     }
 }
 
-fn material(root: &Table, warnings: &mut Vec<String>) -> Result<Material, InputError> {
-    let t = root.optional_table("material")?.ok_or_else(|| root.missing("material", "a table [material]"))?;
-    let models: Vec<(&str, &'static Model)> = materials::ALL.iter().map(|m| (m.name, m)).collect();
-    let model = t.optional_choice("model", &models)?.unwrap_or(&materials::ALL[0]);
-    let positive = |key: &str| t.f64_where(key, |x| x > 0.0, "is not allowed: must be > 0");
-    let zero_up = |key: &str| t.f64_where(key, |x| x >= 0.0, "is not allowed: must be ≥ 0");
-    let inertia = match (positive("density")?, positive("mass")?) {
-        (Some(d), None) => Inertia::Density(d),
-        (None, Some(m)) => Inertia::Mass(m),
-        (None, None) => return Err(t.missing("density", "density (kg/m³) or mass (kg)")),
-        (Some(_), Some(_)) => return Err(t.error("mass", "density and mass exclude each other; give one")),
-    };
-    let youngs_modulus = positive("youngs_modulus")?.ok_or_else(|| t.missing("youngs_modulus", "a number > 0 (Pa)"))?;
-    let poisson_ratio = t
-        .f64_where("poisson_ratio", |x| x > -1.0 && x < 0.5, "is not allowed: must lie in (-1, 0.5)")?
-        .ok_or_else(|| t.missing("poisson_ratio", "a number in (-1, 0.5)"))?;
-    if !(10.0..=1e12).contains(&youngs_modulus) {
-        let e = t.error(
-            "youngs_modulus",
-            format!("{} Pa is unusual (jelly 1e3, rubber 1e6, steel 2e11); is it in Pa?", number(youngs_modulus)),
-        );
-        warnings.push(e.to_string());
-    }
-    if let Inertia::Density(d) = inertia
-        && !(10.0..=30000.0).contains(&d)
-    {
-        let e = t.error("density", format!("{} kg/m³ is unusual (water 1000); is it in kg/m³? 1 g/cm³ is 1000 kg/m³", number(d)));
-        warnings.push(e.to_string());
-    }
-    Ok(Material {
-        model,
-        inertia,
-        youngs_modulus,
-        poisson_ratio,
-        mass_damping: zero_up("mass_damping")?.unwrap_or(0.0),
-        stiffness_damping: zero_up("stiffness_damping")?.unwrap_or(0.0),
-    })
-}
-
 /// `min` and `max` of a box table, in order.
 fn corners(t: &Table) -> Result<(DVec3, DVec3), InputError> {
     let (min, max) = (t.vec3("min")?, t.vec3("max")?);
@@ -166,12 +133,25 @@ fn corners(t: &Table) -> Result<(DVec3, DVec3), InputError> {
 fn clamps(root: &Table) -> Result<Vec<Clamp>, InputError> {
     let mut clamps = Vec::new();
     for t in root.tables("clamp")? {
-        let b = t.optional_table("box")?.ok_or_else(|| t.missing("box", "box = { min = [x, y, z], max = [x, y, z] }"))?;
-        let (min, max) = corners(&b)?;
-        let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?.unwrap_or(false);
+        let object_frame = t.optional_choice("frame", &[("world", false), ("object", true)])?;
+        let region = match (t.optional_table("box")?, t.optional_str("group")?) {
+            (Some(_), Some(_)) => return Err(t.error("group", "box and group exclude each other; give one")),
+            (None, None) => {
+                let wanted = "box = { min = [x, y, z], max = [x, y, z] }, or group = \"NAME\" of a volume mesh";
+                return Err(t.missing("box", wanted));
+            }
+            (None, Some(_)) if object_frame.is_some() => {
+                return Err(t.error("frame", "belongs to a box; a group has its nodes wherever the body is placed"));
+            }
+            (None, Some(name)) => ClampRegion::Group(name.to_string()),
+            (Some(b), None) => {
+                let (min, max) = corners(&b)?;
+                ClampRegion::Box { min, max, object_frame: object_frame.unwrap_or(false) }
+            }
+        };
         let motion_path = t.optional_file("motion")?;
         let motion = motion_path.as_deref().map(motion::read_motion).transpose()?;
-        clamps.push(Clamp { min, max, object_frame, motion, motion_path });
+        clamps.push(Clamp { region, motion, motion_path });
     }
     Ok(clamps)
 }
@@ -265,11 +245,10 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
 /// Shortest time step [s]: the fastest waves need a thousand times as long to cross the smallest cells, and forces overflow long before zero.
 const SHORTEST_STEP: f64 = 1e-9;
 
-fn solver(root: &Table) -> Result<Solver, InputError> {
+fn solver(root: &Table, of_tets: bool) -> Result<Solver, InputError> {
     let mut s = Solver::default();
     let Some(t) = root.optional_table("solver")? else { return Ok(s) };
-    let elements = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
-    s.element = t.optional_choice("element", &elements)?.unwrap_or(s.element);
+    element(&t, of_tets, &mut s)?;
     let linear = [("auto", LinearSolver::Auto), ("cholesky", LinearSolver::Cholesky), ("cg", LinearSolver::ConjugateGradient)];
     s.linear = t.optional_choice("linear", &linear)?.unwrap_or(s.linear);
     let tolerance = t.f64_where("tolerance", |x| x > 0.0 && x < 1.0, "is not allowed: must lie in (0, 1)")?;
@@ -279,6 +258,27 @@ fn solver(root: &Table) -> Result<Solver, InputError> {
     }
     s.ghost = t.f64_where("ghost", |x| x >= 0.0, "is not allowed: must be ≥ 0")?.unwrap_or(s.ghost);
     Ok(s)
+}
+
+/// `element`, which says what cells of a lattice are, or what tetrahedra.
+fn element(t: &Table, of_tets: bool, s: &mut Solver) -> Result<(), InputError> {
+    let cells = [("enhanced", Element::Enhanced), ("trilinear", Element::Trilinear), ("corner", Element::Corner)];
+    let tets = [("tet10", Tetrahedron::Quadratic), ("tet4", Tetrahedron::Linear)];
+    let all: Vec<(&str, bool)> = cells.iter().map(|c| (c.0, false)).chain(tets.iter().map(|c| (c.0, true))).collect();
+    let Some(is_tet) = t.optional_choice("element", &all)? else { return Ok(()) };
+    match (is_tet, of_tets) {
+        (true, true) => s.tetrahedron = t.optional_choice("element", &tets)?.unwrap_or_default(),
+        (false, false) => s.element = t.optional_choice("element", &cells)?.unwrap_or(s.element),
+        (true, false) => {
+            let message = "belongs to bodies of tetrahedra (object.volume_mesh); cells of a lattice are \"enhanced\", \"trilinear\" or \"corner\"";
+            return Err(t.error("element", message));
+        }
+        (false, true) => {
+            let message = "belongs to bodies that are cut out of a lattice; those of a volume_mesh are \"tet10\" or \"tet4\"";
+            return Err(t.error("element", message));
+        }
+    }
+    Ok(())
 }
 
 fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {

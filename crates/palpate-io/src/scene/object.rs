@@ -18,7 +18,7 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
         return Err(t.error(second, format!("{first} and {second} exclude each other; give one")));
     }
     if let Some(path) = t.optional_file("volume_mesh")? {
-        return tetrahedra(&t, path);
+        return tetrahedra(&t, path, warnings);
     }
     let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
         (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
@@ -48,48 +48,59 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
         None => DAffine3::IDENTITY,
         Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
     };
-    let longest = extent.max_element();
-    let resolution =
-        match (t.f64_where("cell_size", |x| x > 0.0, "is not allowed: must be > 0 (m)")?, t.optional_count("cells", 1..=4096)?) {
-            (Some(_), Some(_)) => return Err(t.error("cells", "cell_size and cells exclude each other; give one")),
-            (None, None) => Resolution::Open,
-            (None, Some(n)) => Resolution::Cells(n as u32),
-            (Some(h), None) if h > longest => {
-                return Err(t.error(
-                    "cell_size",
-                    format!("{} m is larger than the object, whose longest side is {longest:.4} m", number(h)),
-                ));
-            }
-            (Some(h), None) if longest / h > 4096.0 => {
-                return Err(t.error(
-                    "cell_size",
-                    format!(
-                        "{} m makes {} cells along the longest side of {} m, at most 4096 are allowed{}",
-                        number(h),
-                        number((longest / h).round()),
-                        number(longest),
-                        unit_hint(longest)
-                    ),
-                ));
-            }
-            (Some(h), None) => Resolution::CellSize(h),
-        };
-    Ok(Object { source: body, pose, resolution })
+    Ok(Object { source: body, pose, resolution: resolution(&t, extent.max_element())? })
+}
+
+/// Cells or tetrahedra, and how fine.
+fn resolution(t: &Table, longest: f64) -> Result<Resolution, InputError> {
+    let made = t.optional_choice("discretisation", &[("cells", false), ("tetrahedra", true)])?.unwrap_or(false);
+    let (length, others) = if made { ("edge_length", &["cell_size", "cells"][..]) } else { ("cell_size", &["edge_length"][..]) };
+    if let Some(key) = others.iter().find(|k| t.has(k)) {
+        let (of, say) = if made { ("cells", "edge_length") } else { ("tetrahedra", "cell_size or cells") };
+        let message = format!("belongs to discretisation = \"{of}\"; give {say}, or leave it to be chosen");
+        return Err(t.error(key, message));
+    }
+    let h = t.f64_where(length, |x| x > 0.0, "is not allowed: must be > 0 (m)")?;
+    match (h, t.optional_count("cells", 1..=4096)?) {
+        (Some(_), Some(_)) => Err(t.error("cells", "cell_size and cells exclude each other; give one")),
+        (None, None) if made => Ok(Resolution::OpenEdge),
+        (None, None) => Ok(Resolution::Open),
+        (None, Some(n)) => Ok(Resolution::Cells(n as u32)),
+        (Some(h), None) if h > longest => {
+            Err(t.error(length, format!("{} m is larger than the object, whose longest side is {longest:.4} m", number(h))))
+        }
+        (Some(h), None) if longest / h > 4096.0 => Err(t.error(
+            length,
+            format!(
+                "{} m makes {} {} along the longest side of {} m, at most 4096 are allowed{}",
+                number(h),
+                number((longest / h).round()),
+                if made { "edges" } else { "cells" },
+                number(longest),
+                unit_hint(longest)
+            ),
+        )),
+        (Some(h), None) if made => Ok(Resolution::Edge(h)),
+        (Some(h), None) => Ok(Resolution::CellSize(h)),
+    }
 }
 
 /// A body of a volume mesh's own tetrahedra.
-fn tetrahedra(t: &Table, path: PathBuf) -> Result<Object, InputError> {
-    if let Some(key) = ["cell_size", "cells"].into_iter().find(|k| t.has(k)) {
-        return Err(t.error(key, "belongs to bodies that are cut out of a lattice; a volume mesh has its own elements"));
+fn tetrahedra(t: &Table, path: PathBuf, warnings: &mut Vec<String>) -> Result<Object, InputError> {
+    for (key, of) in [
+        ("cell_size", "bodies that are cut out of a lattice"),
+        ("cells", "bodies that are cut out of a lattice"),
+        ("discretisation", "bodies of a mesh or shape"),
+        ("edge_length", "bodies whose tetrahedra are made here"),
+    ] {
+        if t.has(key) {
+            return Err(t.error(key, format!("belongs to {of}; a volume mesh has its own elements")));
+        }
     }
-    let mesh = read_tets(&path)?;
+    let loaded = read_tets(&path)?;
+    warnings.extend(loaded.warnings);
+    let mesh = loaded.value;
     let surface = mesh.surface();
-    let (min, max) = crate::mesh::bounds(&mesh.nodes);
-    let longest = (max - min).max_element();
-    if longest > LARGEST_SIDE {
-        let message = format!("its longest side is {} m; in millimetres? lengths are in metres: scale by 0.001", number(longest));
-        return Err(InputError::file(&path, message));
-    }
     let pose = match t.optional_matrix4("pose")? {
         None => DAffine3::IDENTITY,
         Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,

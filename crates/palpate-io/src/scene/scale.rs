@@ -5,7 +5,7 @@ use crate::document::Source;
 use crate::error::InputError;
 use crate::mesh::bounds;
 use glam::DVec3;
-use palpate_model::scene::{BodySource, Clamp, Inertia, Plane, Scene};
+use palpate_model::scene::{BodySource, ClampRegion, Inertia, Plane, Scene};
 use palpate_model::shape::LARGE;
 use palpate_model::shape::{Shape, shape_of};
 
@@ -41,7 +41,9 @@ pub(super) fn check(source: &Source, scene: &Scene, warnings: &mut Vec<String>) 
     let advice = "is the object in millimetres? convert it to metres (scale by 0.001)";
     let width = (volume / longest).sqrt();
     for (i, c) in scene.clamps.iter().enumerate() {
-        let size = diagonal(c);
+        // A group lies on the body, in its unit.
+        let ClampRegion::Box { min, max, .. } = c.region else { continue };
+        let size = (max - min).length();
         if size < FAR_SMALLER * width {
             return Err(source.fault(&format!("clamp.{i}.box"), format!("its diagonal is {size:.4} m, {object}; {advice}")));
         }
@@ -57,10 +59,6 @@ pub(super) fn check(source: &Source, scene: &Scene, warnings: &mut Vec<String>) 
     let text = format!("its longest side is {longest:.4} m and its mass {mass} kg; in millimetres? lengths are in metres");
     warnings.push(source.fault(key, text).to_string());
     Ok(())
-}
-
-fn diagonal(clamp: &Clamp) -> f64 {
-    (clamp.max - clamp.min).length()
 }
 
 /// True for a plane that has more than a tenth of the body on its forbidden side and stands, measured by the body, next to the origin,

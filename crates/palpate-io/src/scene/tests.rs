@@ -104,7 +104,7 @@ position = [0, 0, 0.05]
     assert_eq!((s.solver.element, s.solver.linear), (Element::Corner, LinearSolver::ConjugateGradient));
     assert_eq!((s.solver.tolerance, s.solver.newton_iterations, s.solver.ghost), (1e-6, 7, 0.0));
     assert_eq!((s.initial.velocity, s.initial.pivot), (DVec3::new(1.0, 2.0, 3.0), Some(DVec3::Z)));
-    assert!(s.clamps[0].object_frame && s.clamps[0].motion.is_none());
+    assert!(matches!(s.clamps[0].region, ClampRegion::Box { object_frame: true, .. }) && s.clamps[0].motion.is_none());
     let o = s.observation.unwrap();
     assert_eq!((o.from, o.to, o.every, o.file.as_str()), (-0.5, 0.5, 2, "silhouettes.toml"));
     assert_eq!(o.markers[0].position, DVec3::new(0.0, 0.0, 0.05));
@@ -117,7 +117,10 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("radius = 0.05", "radius = 0.05, centre = [0, 0, 0]").contains("did you mean \"center\"?"));
     assert!(error_with("mass = 0.05", "mas = 0.05").starts_with("scene.toml:14: mass.0.mas: unknown key"));
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
-    assert!(error_with("cell_size", "zzz").contains("known: mesh, volume_mesh, pose, cell_size, cells, shape"));
+    assert!(
+        error_with("cell_size", "zzz")
+            .contains("known: mesh, volume_mesh, pose, discretisation, cell_size, cells, edge_length, shape")
+    );
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));
 }
@@ -333,6 +336,23 @@ fn impossible_fields_are_refused_with_what_is_allowed() {
         (&format!("{REGIONS}file = \"a.npy\""), "field.0.file: belongs to basis = \"cells\" or \"nodes\""),
         (&REGIONS.replace("value = 2", "value = 0"), "a factor must be > 0"),
         (&REGIONS.replace("radius = 0.02", "radius = -1"), "field.0.regions.1.radius"),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { length = 1.0 }",
+            "field.0.prior.kind: missing; expected \"matern\" or \"edge-preserving\"",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"matern\", length = -1.0 }",
+            "field.0.prior.length: -1 is not allowed: must be \"auto\" or a number > 0 (m)",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"matern\", deviation = \"some\" }",
+            "field.0.prior.deviation: \"some\" is not allowed: must be \"auto\"",
+        ),
+        (
+            "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"edge-preserving\", length = 0.1 }",
+            "field.0.prior.length: belongs to kind = \"matern\"",
+        ),
+        (&format!("{REGIONS}prior = {{ kind = \"matern\" }}"), "field.0.prior: belongs to basis = \"cells\" or \"nodes\""),
         (&REGIONS.replace("0.1", "0").replace("regions = [", "blend = \"axis\"\nregions = ["), "is that of the region before"),
         (&format!("{REGIONS}bases = 1"), "did you mean \"basis\"?"),
     ] {

@@ -83,6 +83,21 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 let array = table.get_mut(name).and_then(Item::as_array_mut).ok_or_else(unknown)?;
                 replace(array.get_mut(a).ok_or_else(unknown)?, Value::from(*value));
             }
+            ["material", inner @ "viscosity", name] => {
+                let table = section(&mut doc, "material").and_then(|t| t.get_mut(inner)?.as_table_like_mut());
+                set(table.ok_or_else(unknown)?, name, Value::from(*value));
+            }
+            ["material", curve @ ("stretch_curve" | "volume_curve"), "factors", k] => {
+                let table = section(&mut doc, "material").and_then(|t| t.get_mut(curve)?.as_table_like_mut());
+                let table = table.ok_or_else(unknown)?;
+                if !table.contains_key("factors") {
+                    let known = if curve == "stretch_curve" { &scene.curves.stretch } else { &scene.curves.volume };
+                    set(table, "factors", Value::from(known.factors.iter().copied().collect::<Array>()));
+                }
+                let array = table.get_mut("factors").and_then(Item::as_array_mut).ok_or_else(unknown)?;
+                let k: usize = k.parse().map_err(|_| unknown())?;
+                replace(array.get_mut(k).ok_or_else(unknown)?, Value::from(*value));
+            }
             [group @ ("material" | "time" | "object"), name] => {
                 let table = section(&mut doc, group).ok_or_else(unknown)?;
                 match name {
@@ -204,7 +219,7 @@ fn vector(v: DVec3) -> Value {
 }
 
 /// A table under a top-level key, made when absent.
-fn section<'a>(doc: &'a mut DocumentMut, key: &str) -> Option<&'a mut dyn TableLike> {
+pub(super) fn section<'a>(doc: &'a mut DocumentMut, key: &str) -> Option<&'a mut dyn TableLike> {
     doc.as_table_mut().entry(key).or_insert_with(|| Item::Table(Table::new())).as_table_like_mut()
 }
 
@@ -229,7 +244,7 @@ fn replace(old: &mut Value, new: Value) {
     *old.decor_mut() = decor;
 }
 
-fn set(table: &mut dyn TableLike, key: &str, new: Value) {
+pub(super) fn set(table: &mut dyn TableLike, key: &str, new: Value) {
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => replace(old, new),
         None => drop(table.insert(key, Item::Value(new))),
@@ -271,7 +286,7 @@ fn note_change(new: &mut Value, old: &Value) {
 }
 
 /// Rewrites the paths in a scene that lies in `from` so that they hold from `to`.
-fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
+pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     let fix = |table: &mut dyn TableLike, key: &str| {
         if let Some(Value::String(s)) = table.get_mut(key).and_then(Item::as_value_mut)
             && Path::new(s.value()).is_relative()
@@ -282,11 +297,12 @@ fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     };
     if let Some(t) = doc.get_mut("object").and_then(Item::as_table_like_mut) {
         fix(t, "mesh");
+        fix(t, "volume_mesh");
     }
     if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
         fix(t, "recording");
     }
-    for (rows, key) in [("clamp", "motion"), ("field", "file")] {
+    for (rows, key) in [("clamp", "motion"), ("field", "file"), ("target", "file")] {
         let mut i = 0;
         while let Some(t) = row(doc, rows, i) {
             fix(t, key);

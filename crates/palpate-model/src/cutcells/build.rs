@@ -1,7 +1,7 @@
 //! Builds a body from its shape: cuts every cell, numbers nodes, collects surface, ghost penalty and band.
 
 use crate::cutcells::cut::{CellCut, Lattice, POINTS27, cut_cell};
-use crate::cutcells::domain::{Band, Cell, CutCells, GhostLine};
+use crate::cutcells::domain::{Cell, CutCells, GhostLine};
 use crate::cutcells::extension;
 use crate::cutcells::grid::{CORNERS, Grid, shape_functions};
 use crate::shape::{Shape, unit_hint};
@@ -220,11 +220,11 @@ pub(crate) fn build_parts(shape: &dyn Shape, h: f64, band_width: f64, subdivisio
         node_volume,
         patches,
         surface,
-        cut: Some(CutCells { grid, cells: active, ghosts, band: Band::default() }),
+        cut: Some(CutCells { grid, cells: active, ghosts }),
         points: Default::default(),
+        band: Default::default(),
     };
-    let band = extension::band(&body, shape, band_width);
-    body.cut = body.cut.map(|cut| CutCells { band, ..cut });
+    body.band = extension::band(&body, shape, band_width);
     Ok(Parts { body, merged: slivers })
 }
 
@@ -233,7 +233,7 @@ fn corner(c: [usize; 3], o: [i32; 3]) -> [usize; 3] {
 }
 
 /// The lattice around a shape, and how many cells at its rim cannot hold any of it.
-fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<(Grid, usize), BodyError> {
+pub(super) fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<(Grid, usize), BodyError> {
     if !(h > 0.0 && h.is_finite()) {
         return Err(BodyError::BadCellSize { h });
     }

@@ -1,4 +1,4 @@
-//! The cells of a body that is cut out of a lattice, and what else it has of that lattice.
+//! The cells of a body that is cut out of a lattice, and what it has of that lattice; and the band, which any body may have.
 
 use crate::cutcells::distances::Distances;
 use crate::cutcells::grid::Grid;
@@ -13,8 +13,6 @@ pub struct CutCells {
     pub cells: Vec<Cell>,
     /// Ghost penalty lines: squared second differences of u on cut cells' faces.
     pub ghosts: Vec<GhostLine>,
-    /// The body and the cells around it, where observed points are looked up.
-    pub band: Band,
 }
 
 impl CutCells {
@@ -55,9 +53,12 @@ pub struct GhostLine {
     pub weight: f64,
 }
 
-/// The body and a band of cells around it. Extended nodes are numbered: first the N simulation nodes, then band nodes.
+/// The body and a band of cells around it, where observed points are looked up. Extended nodes are numbered: first the N simulation nodes, then
+/// band nodes. On a body of tetrahedra no corner of a cell is a simulation node.
 #[derive(Clone, Debug, Default)]
 pub struct Band {
+    /// The lattice that covers body and band.
+    pub grid: Grid,
     /// Half width of the band [m]: every point closer to the surface than this lies in a band cell.
     pub width: f64,
     /// Rest positions of the band nodes only [m], shape `[M]` (extended number = N + row).
@@ -68,7 +69,7 @@ pub struct Band {
     pub columns: Vec<u32>,
     /// Extension weights; every row sums to one and reproduces affine fields exactly.
     pub values: Vec<f64>,
-    /// Cells of the band, active cells included.
+    /// Cells of the band, those that hold the body included.
     pub cells: Vec<BandCell>,
 }
 

@@ -41,9 +41,51 @@ impl NodeLookup {
     }
 }
 
+/// The nodes that a fit may use.
+pub(super) trait Nearby: Sync {
+    /// Distance of neighbouring nodes [m].
+    fn spacing(&self) -> f64;
+    /// A radius that holds all nodes from anywhere near the body [m].
+    fn reach(&self) -> f64;
+    /// Hands nodes to `visit` with the volume that each stands for over that of a cube of the spacing: all within the radius and maybe others.
+    fn visit(&self, center: DVec3, radius: f64, visit: &mut dyn FnMut(u32, f64));
+}
+
+/// Nodes of a lattice.
+struct OnLattice<'a> {
+    body: &'a Body,
+    lookup: &'a NodeLookup,
+}
+
+impl Nearby for OnLattice<'_> {
+    fn spacing(&self) -> f64 {
+        self.body.cut().grid.h
+    }
+
+    fn reach(&self) -> f64 {
+        (self.body.cut().grid.size.iter().max().copied().unwrap_or(1)) as f64 * 2.0 * self.spacing()
+    }
+
+    fn visit(&self, center: DVec3, radius: f64, visit: &mut dyn FnMut(u32, f64)) {
+        let grid = &self.body.cut().grid;
+        let h = grid.h;
+        let bound = |s: f64, a: usize| ((s / h).round() as i64 - i64::from(grid.offset[a])).clamp(0, grid.size[a] as i64 - 1);
+        let lo: [usize; 3] = std::array::from_fn(|a| bound(center[a] - radius, a) as usize);
+        let hi: [usize; 3] = std::array::from_fn(|a| bound(center[a] + radius, a) as usize);
+        for k in lo[2]..=hi[2] {
+            for j in lo[1]..=hi[1] {
+                for i in lo[0]..=hi[0] {
+                    let Some(n) = self.lookup.node(grid, [i, j, k]) else { continue };
+                    visit(n, self.body.node_volume[n as usize] / h.powi(3));
+                }
+            }
+        }
+    }
+}
+
 /// A weighted least-squares fit of affine fields: value and gradient anywhere are linear in the nodes' values.
-struct AffineFit {
-    nodes: Vec<u32>,
+pub(super) struct AffineFit {
+    pub(super) nodes: Vec<u32>,
     offsets: Vec<DVec3>,
     kernel: Vec<f64>,
     total: f64,
@@ -53,44 +95,34 @@ struct AffineFit {
 
 impl AffineFit {
     /// Fits around `center` [m] with a kernel of the given radius [m], grown until the nodes span all directions.
-    fn new(body: &Body, lookup: &NodeLookup, center: DVec3, radius: f64) -> AffineFit {
-        let h = body.cut().grid.h;
-        let reach = (body.cut().grid.size.iter().max().copied().unwrap_or(1)) as f64 * 2.0 * h + radius;
+    pub(super) fn new(body: &Body, near: &dyn Nearby, center: DVec3, radius: f64) -> AffineFit {
+        let h = near.spacing();
+        let reach = near.reach() + radius;
         let mut r = radius.max(h);
         while r < reach {
-            if let Some(fit) = AffineFit::within(body, lookup, center, r, true) {
+            if let Some(fit) = AffineFit::within(body, near, center, r, true) {
                 return fit;
             }
             r *= 1.4;
         }
         // Reached only if nearly all volume sits on one plane of nodes. Without volume as weight the nodes of any cell span space.
-        AffineFit::within(body, lookup, center, 4.0 * reach, false)
-            .expect("a body has at least one cell, and its nodes span space")
+        AffineFit::within(body, near, center, 4.0 * reach, false).expect("a body has at least one cell, and its nodes span space")
     }
 
-    fn within(body: &Body, lookup: &NodeLookup, center: DVec3, radius: f64, by_volume: bool) -> Option<AffineFit> {
-        let grid = &body.cut().grid;
-        let h = grid.h;
-        let bound = |s: f64, a: usize| ((s / h).round() as i64 - i64::from(grid.offset[a])).clamp(0, grid.size[a] as i64 - 1);
-        let lo: [usize; 3] = std::array::from_fn(|a| bound(center[a] - radius, a) as usize);
-        let hi: [usize; 3] = std::array::from_fn(|a| bound(center[a] + radius, a) as usize);
+    fn within(body: &Body, near: &dyn Nearby, center: DVec3, radius: f64, by_volume: bool) -> Option<AffineFit> {
+        let h = near.spacing();
         let (mut nodes, mut offsets, mut kernel) = (Vec::new(), Vec::new(), Vec::new());
-        for k in lo[2]..=hi[2] {
-            for j in lo[1]..=hi[1] {
-                for i in lo[0]..=hi[0] {
-                    let Some(n) = lookup.node(grid, [i, j, k]) else { continue };
-                    let d = body.nodes[n as usize] - center;
-                    let q = 1.0 - d.length_squared() / (radius * radius);
-                    let volume = if by_volume { body.node_volume[n as usize] / h.powi(3) } else { 1.0 };
-                    // Negative or vanishing volumes (rounding of moment fitting) carry no information about the body.
-                    if q > 0.0 && volume > 1e-9 {
-                        nodes.push(n);
-                        offsets.push(d);
-                        kernel.push(q * q * volume);
-                    }
-                }
+        near.visit(center, radius, &mut |n, part| {
+            let d = body.nodes[n as usize] - center;
+            let q = 1.0 - d.length_squared() / (radius * radius);
+            let volume = if by_volume { part } else { 1.0 };
+            // Negative or vanishing volumes (rounding of moment fitting) carry no information about the body.
+            if q > 0.0 && volume > 1e-9 {
+                nodes.push(n);
+                offsets.push(d);
+                kernel.push(q * q * volume);
             }
-        }
+        });
         let total: f64 = kernel.iter().sum();
         if nodes.len() < 4 {
             return None;
@@ -120,7 +152,7 @@ impl AffineFit {
     }
 
     /// Weights of the nodes for the value at `p`; they sum to one.
-    fn value(&self, p: DVec3) -> Vec<f64> {
+    pub(super) fn value(&self, p: DVec3) -> Vec<f64> {
         let a = self.inverse * (p - self.mean);
         self.offsets.iter().zip(&self.kernel).map(|(d, k)| k * (1.0 / self.total + a.dot(*d))).collect()
     }
@@ -134,7 +166,7 @@ impl AffineFit {
 /// Stencil that carries a point of the rest configuration [m] and its surroundings: its position by trilinear interpolation if it lies in an active cell, else
 /// by the affine fit; the gradient always by the affine fit of radius about `radius` [m] around the point.
 pub fn affine_weights(body: &Body, lookup: &NodeLookup, point: DVec3, radius: f64) -> StencilBuf {
-    let fit = AffineFit::new(body, lookup, point, radius);
+    let fit = AffineFit::new(body, &OnLattice { body, lookup }, point, radius);
     let mut nodes = fit.nodes.clone();
     let mut gradient_weights = fit.gradient();
     let mut position_weights = vec![0.0; nodes.len()];
@@ -188,16 +220,36 @@ pub fn active_cell(body: &Body, point: DVec3) -> Option<(usize, DVec3)> {
     None
 }
 
-/// The band of width `width` [m] around a body: its cells, their signed distances, and the extension to its nodes.
+/// The band of width `width` [m] around a body of cells: its cells, their signed distances, and the extension to its nodes.
 pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
     let grid = &body.cut().grid;
-    let h = grid.h;
-    let width = width.max(0.0);
     let lookup = NodeLookup::new(body);
     let mut active = vec![false; grid.len()];
     for c in body.cells() {
         active[grid.index(c.lattice)] = true;
     }
+    let near = OnLattice { body, lookup: &lookup };
+    let row = |p: DVec3| {
+        let fit = AffineFit::new(body, &near, shape.closest_point(p), RADIUS * grid.h);
+        let weights = fit.value(p);
+        (fit.nodes, weights)
+    };
+    band_of(body, shape, width, grid.clone(), &active, lookup.number.clone(), row)
+}
+
+/// A band on a lattice: `active` cells and those within the width, with the lattice's corners that are simulation nodes in `number` (the others
+/// `u32::MAX`), and of any other corner a `row` of nodes and weights.
+pub(super) fn band_of(
+    body: &Body,
+    shape: &dyn Shape,
+    width: f64,
+    grid: Grid,
+    active: &[bool],
+    mut number: Vec<u32>,
+    row: impl Fn(DVec3) -> (Vec<u32>, Vec<f64>) + Sync + Send,
+) -> Band {
+    let h = grid.h;
+    let width = width.max(0.0);
     // No point of a cell is farther than this from its middle, or (over the steps) from the nearest of its samples.
     let reach = 0.5 * 3f64.sqrt() * h;
     let cells = grid.size.map(|n| n - 1);
@@ -239,7 +291,6 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
         .into_iter()
         .filter(|&c| active[grid.index(c)] || points(c).any(|i| distance[i] <= width + reach / STEPS as f64))
         .collect();
-    let mut number = lookup.number.clone();
     for &c in &kept {
         for o in CORNERS {
             let n = &mut number[grid.index(std::array::from_fn(|a| c[a] + o[a] as usize))];
@@ -253,14 +304,7 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
         *n = (body.nodes.len() + nodes.len()) as u32;
         nodes.push(grid.position(grid.coordinates(index)));
     }
-    let fits: Vec<(Vec<u32>, Vec<f64>)> = nodes
-        .par_iter()
-        .map(|&p| {
-            let fit = AffineFit::new(body, &lookup, shape.closest_point(p), RADIUS * h);
-            let weights = fit.value(p);
-            (fit.nodes, weights)
-        })
-        .collect();
+    let fits: Vec<(Vec<u32>, Vec<f64>)> = nodes.par_iter().map(|&p| row(p)).collect();
     let mut band = Band { width, nodes, rows: vec![0], ..Band::default() };
     for (columns, values) in fits {
         band.columns.extend(columns);
@@ -281,6 +325,7 @@ pub fn band(body: &Body, shape: &dyn Shape, width: f64) -> Band {
             }
         })
         .collect();
+    band.grid = grid;
     band
 }
 

@@ -23,7 +23,7 @@ fn shapes() -> Vec<Placed> {
 fn affine_fields_are_continued_exactly() {
     for shape in shapes() {
         let body = Body::build(&shape, 0.07, 0.28, 4).unwrap();
-        let band = body.band();
+        let band = &body.band;
         assert!(!band.nodes.is_empty() && band.rows.len() == band.nodes.len() + 1);
         for (m, x) in band.nodes.iter().enumerate() {
             let row = band.rows[m] as usize..band.rows[m + 1] as usize;
@@ -40,7 +40,7 @@ fn weights_stay_moderate() {
     // like 1 + c L/R; at four cells and R = 2.5 that is below 20 even on the thin bodies.
     for shape in shapes() {
         let body = Body::build(&shape, 0.07, 0.28, 4).unwrap();
-        let band = body.band();
+        let band = &body.band;
         for m in 0..band.nodes.len() {
             let row = band.rows[m] as usize..band.rows[m + 1] as usize;
             let size: f64 = band.values[row].iter().map(|v| v.abs()).sum();
@@ -54,7 +54,7 @@ fn band_holds_every_point_near_the_surface() {
     for shape in shapes() {
         let (h, width) = (0.07, 0.15);
         let body = Body::build(&shape, h, width, 4).unwrap();
-        let band = body.band();
+        let band = &body.band;
         let find =
             |c: [usize; 3]| band.cells.binary_search_by_key(&body.cut().grid.index(c), |b| body.cut().grid.index(b.lattice)).ok();
         let (lo, hi) = shape.bounds();

@@ -18,7 +18,7 @@ pub const SIGNS: [[f64; 3]; 8] = [
 ];
 
 /// An axis-aligned lattice: node (i, j, k) lies at `(offset + (i, j, k)) · h`, linear order x fastest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grid {
     /// Lattice coordinates of node (0, 0, 0).
     pub offset: [i32; 3],

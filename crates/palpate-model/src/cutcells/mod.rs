@@ -19,3 +19,4 @@ pub mod held;
 mod moments;
 pub mod places;
 pub mod pullback;
+pub mod shadow;

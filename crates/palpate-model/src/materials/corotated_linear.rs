@@ -12,6 +12,7 @@ pub(super) const MODEL: Model = Model {
     doc: "linear in the stretch, whatever the rotation; exact for small strains, and calm for any",
     law: &CorotatedLinear,
     is_linear: true,
+    has_curves: false,
 };
 
 /// Steps of the iteration for the rotation: it doubles its digits in each, from any F that squeezes to no less than a twentieth.
@@ -19,16 +20,20 @@ const STEPS: usize = 9;
 
 impl Hyperelastic for CorotatedLinear {
     fn energy<D: Number>(&self, h: &Gradient<D>, lambda: D, mu: D) -> D {
-        let f = deformation(h);
-        // R ← ½ (R + R⁻ᵀ) (Higham, SIAM J. Sci. Stat. Comput. 7, 1986), with derivatives that converge along.
-        let mut r = f;
-        for _ in 0..STEPS {
-            let c = cofactors(&r);
-            let det = r[0][0] * c[0][0] + r[0][1] * c[0][1] + r[0][2] * c[0][2];
-            r = std::array::from_fn(|i| std::array::from_fn(|j| (r[i][j] + c[i][j] / det) * 0.5));
-        }
-        let product = |i: usize, j: usize| (0..3).fold(D::from(0.0), |sum, k| sum + r[k][i] * f[k][j]);
-        let s: Gradient<D> = std::array::from_fn(|i| std::array::from_fn(|j| product(i, j) - f64::from(u8::from(i == j))));
-        linear(&s, lambda, mu)
+        linear(&stretch(h), lambda, mu)
     }
+}
+
+/// S − I with F = R S.
+pub(super) fn stretch<D: Number>(h: &Gradient<D>) -> Gradient<D> {
+    let f = deformation(h);
+    // R ← ½ (R + R⁻ᵀ) (Higham, SIAM J. Sci. Stat. Comput. 7, 1986), with derivatives that converge along.
+    let mut r = f;
+    for _ in 0..STEPS {
+        let c = cofactors(&r);
+        let det = r[0][0] * c[0][0] + r[0][1] * c[0][1] + r[0][2] * c[0][2];
+        r = std::array::from_fn(|i| std::array::from_fn(|j| (r[i][j] + c[i][j] / det) * 0.5));
+    }
+    let product = |i: usize, j: usize| (0..3).fold(D::from(0.0), |sum, k| sum + r[k][i] * f[k][j]);
+    std::array::from_fn(|i| std::array::from_fn(|j| product(i, j) - f64::from(u8::from(i == j))))
 }

@@ -10,9 +10,13 @@
 //! negative do no harm. At points of stencils ψ is taken at F itself.
 
 mod corotated_linear;
+pub mod curve;
 mod neo_hookean;
 mod neo_hookean_log;
+pub mod principal_stretch;
 mod stable_neo_hookean;
+pub mod stretching;
+pub mod viscosity;
 
 use crate::effects::law::Number;
 use num_dual::HyperDual64;
@@ -30,6 +34,15 @@ pub struct Model {
     pub law: &'static dyn Solid,
     /// True for the material that the elements of cut cells are made of.
     pub is_linear: bool,
+    /// True where scenes state curves of the stiffness ([`curve`]).
+    pub has_curves: bool,
+}
+
+impl Model {
+    /// True where the GPU has it: of curves, which are numbers of their own, it knows nothing yet.
+    pub fn has_twin(&self) -> bool {
+        !self.has_curves
+    }
 }
 
 impl std::fmt::Debug for Model {
@@ -45,7 +58,8 @@ impl PartialEq for Model {
 }
 
 /// All materials; the first is the default.
-pub static ALL: &[Model] = &[corotated_linear::MODEL, neo_hookean::MODEL, neo_hookean_log::MODEL, stable_neo_hookean::MODEL];
+pub static ALL: &[Model] =
+    &[corotated_linear::MODEL, neo_hookean::MODEL, neo_hookean_log::MODEL, stable_neo_hookean::MODEL, principal_stretch::MODEL];
 
 /// The material of this name.
 pub fn find(name: &str) -> Option<&'static Model> {
@@ -74,6 +88,10 @@ pub trait Solid: Sync {
     fn stress(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Stress;
     /// ∂P/∂λ and ∂P/∂μ.
     fn by_moduli(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [[f64; 9]; 2];
+    /// ∂P/∂(factor) for every corner of the curves of a material that has some.
+    fn by_curves(&self, _h: &Gradient<f64>, _lambda: f64, _mu: f64) -> Vec<[f64; 9]> {
+        Vec::new()
+    }
 }
 
 impl<L: Hyperelastic> Solid for L {

@@ -11,6 +11,7 @@ pub(super) const MODEL: Model = Model {
     doc: "rubber and gels at large strains; resists being squeezed to nothing",
     law: &NeoHookean,
     is_linear: false,
+    has_curves: false,
 };
 
 impl Hyperelastic for NeoHookean {

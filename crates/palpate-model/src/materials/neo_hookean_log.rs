@@ -12,6 +12,7 @@ pub(super) const MODEL: Model = Model {
     doc: "neo-Hookean with the square of the volume's logarithm, as many programs have it",
     law: &NeoHookeanLog,
     is_linear: false,
+    has_curves: false,
 };
 
 impl Hyperelastic for NeoHookeanLog {

@@ -14,6 +14,7 @@ pub(super) const MODEL: Model = Model {
     doc: "neo-Hookean for bodies that may turn inside out",
     law: &StableNeoHookean,
     is_linear: false,
+    has_curves: false,
 };
 
 impl Hyperelastic for StableNeoHookean {

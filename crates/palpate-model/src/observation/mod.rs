@@ -5,6 +5,7 @@ pub mod frame;
 pub mod instant;
 pub mod kernel;
 pub mod marker;
+pub mod target;
 
 pub use channel::{Channel, ReadingKind, Sensor};
 pub use frame::{Camera, Frame, ObservedDisplacement, ObservedMarker, ObservedPoint};

@@ -32,6 +32,10 @@ pub struct Sought {
     pub density: bool,
     /// Rayleigh damping of either kind: mass, stiffness.
     pub damping: [bool; 2],
+    /// Numbers of the viscosity.
+    pub viscosity: bool,
+    /// Factors of the material's curves.
+    pub curves: bool,
     /// Gravity.
     pub gravity: bool,
     /// Time of the start.
@@ -57,6 +61,8 @@ impl Sought {
                 ParamKey::Density => s.density = true,
                 ParamKey::MassDamping => s.damping[0] = true,
                 ParamKey::StiffnessDamping => s.damping[1] = true,
+                ParamKey::Viscosity | ParamKey::ViscosityExponent => s.viscosity = true,
+                ParamKey::StretchFactor(_) | ParamKey::VolumeFactor(_) => s.curves = true,
                 ParamKey::Gravity(_) => s.gravity = true,
                 ParamKey::Velocity(_) | ParamKey::AngularVelocity(_) => {}
                 ParamKey::TimeStart => s.start = true,

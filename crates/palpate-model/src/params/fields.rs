@@ -5,6 +5,7 @@
 //! one modulus a cell, one a node or blended regions are the same thing with other matrices.
 
 use crate::space::body::Body;
+use crate::space::neighbours::Neighbours;
 use crate::space::pattern::{BlockRows, Pattern};
 use glam::DVec3;
 
@@ -78,6 +79,37 @@ pub enum Basis {
     Regions(Vec<Region>, Blend),
 }
 
+/// What is expected of a field before the recording is looked at; m is the logarithm of its values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// How neighbours go together.
+    pub kind: PriorKind,
+    /// Length over which m is alike [m]; `None` = the data choose. Not of [`PriorKind::EdgePreserving`].
+    pub length: Option<f64>,
+    /// Standard deviation of m, or typical height of its steps; `None` = the data choose.
+    pub deviation: Option<f64>,
+}
+
+/// How neighbouring values go together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PriorKind {
+    /// Smooth: a Gaussian field with the covariance of Matérn.
+    Matern,
+    /// In parts: smoothed total variation.
+    EdgePreserving,
+}
+
+impl PriorKind {
+    /// All, by name.
+    pub const ALL: [(&'static str, PriorKind); 2] =
+        [("matern", PriorKind::Matern), ("edge-preserving", PriorKind::EdgePreserving)];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        PriorKind::ALL.iter().find(|k| k.1 == self).map_or("", |k| k.0)
+    }
+}
+
 /// A `[[field]]` of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldSpec {
@@ -89,6 +121,8 @@ pub struct FieldSpec {
     pub scale: Scale,
     /// Values read from a file; `None` = the regions' own, or one everywhere.
     pub values: Option<Vec<f64>>,
+    /// What is expected of the values, of cells or nodes.
+    pub prior: Option<Prior>,
 }
 
 impl FieldSpec {
@@ -98,6 +132,15 @@ impl FieldSpec {
             Basis::Cells => body.elements(),
             Basis::Nodes => body.nodes.len(),
             Basis::Regions(regions, _) => regions.len(),
+        }
+    }
+
+    /// Which of its values lie beside each other on a body; `None` of regions.
+    pub fn neighbours(&self, body: &Body) -> Option<Neighbours> {
+        match self.basis {
+            Basis::Cells => Some(Neighbours::of_elements(body)),
+            Basis::Nodes => Some(Neighbours::of_nodes(body)),
+            Basis::Regions(..) => None,
         }
     }
 
@@ -341,7 +384,7 @@ mod tests {
             for scale in [Scale::Log, Scale::Linear] {
                 let blends = [Blend::Harmonic, Blend::Axis, Blend::Nearest].map(|b| Basis::Regions(three.clone(), b));
                 for basis in [Basis::Cells, Basis::Nodes].into_iter().chain(blends) {
-                    out.push(FieldSpec { varied, basis, scale, values: None });
+                    out.push(FieldSpec { varied, basis, scale, values: None, prior: None });
                 }
             }
         }

@@ -9,6 +9,8 @@ pub mod fields;
 pub mod grips;
 
 use crate::effects;
+use crate::materials::curve::Curve;
+use crate::scene::Scene;
 
 /// How an optimiser sees a parameter; the transforms themselves live in `palpate-fit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +64,14 @@ pub enum ParamKey {
         /// Place in the law's parameters.
         slot: u16,
     },
+    /// Coefficient η of the material's viscosity.
+    Viscosity,
+    /// Its exponent h.
+    ViscosityExponent,
+    /// Factor at a corner of the curve of the stiffness along a stretch.
+    StretchFactor(u8),
+    /// Factor at a corner of the curve of the volume's stiffness.
+    VolumeFactor(u8),
     /// Value `index` of field `field` of the scene.
     Field {
         /// Number of the field in the scene.
@@ -123,6 +133,11 @@ impl ParamSpec {
     }
 }
 
+/// True for what may follow a path to be a part of what it names: nothing, an axis, or the number of a corner.
+pub fn is_component(rest: &str) -> bool {
+    matches!(rest, "" | ".x" | ".y" | ".z") || rest.strip_prefix('.').is_some_and(|k| k.parse::<u8>().is_ok())
+}
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl ParamKey {
@@ -140,6 +155,32 @@ impl ParamKey {
             StiffnessDamping => {
                 ("material.stiffness_damping".into(), "s", Log, 1e-12, 1e3, 1e-3, "Rayleigh damping of fast vibration")
             }
+            // Honey in slow motion to a stiff putty; below h = 0.1 the stress no longer depends on the rate.
+            Viscosity => {
+                ("material.viscosity.coefficient".into(), "Pa·s^h", Log, 1e-9, 1e9, 1.0, "viscosity at a shear rate of 1/s")
+            }
+            ViscosityExponent => {
+                ("material.viscosity.exponent".into(), "1", Log, 0.1, 3.0, 1.0, "power of the shear rate in the viscous stress")
+            }
+            // A thousand times: from a foam's plateau to what is left when it is closed.
+            StretchFactor(k) => (
+                format!("material.stretch_curve.factors.{k}"),
+                "1",
+                Log,
+                1e-3,
+                1e3,
+                1.0,
+                "stiffness along a stretch, over that at rest",
+            ),
+            VolumeFactor(k) => (
+                format!("material.volume_curve.factors.{k}"),
+                "1",
+                Log,
+                1e-3,
+                1e3,
+                1.0,
+                "stiffness of the volume, over that at rest",
+            ),
             Gravity(a) => (format!("world.gravity.{}", AXES[a as usize]), "m/s²", Linear, -inf, inf, 9.81, "gravity"),
             Velocity(a) => {
                 (format!("initial.velocity.{}", AXES[a as usize]), "m/s", Linear, -inf, inf, 1.0, "velocity at the start")
@@ -203,6 +244,10 @@ pub struct Layout {
     masses: usize,
     effects: Vec<usize>,
     fields: Vec<usize>,
+    /// Place of the viscosity's numbers, where there is one.
+    viscosity: Option<usize>,
+    /// Where the factors of the curves begin: along stretches, of the volume; and their end.
+    curves: [usize; 3],
 }
 
 /// Places of the numbers that every scene has, in their order.
@@ -235,7 +280,33 @@ impl Layout {
             keys.extend((0..count as u32).map(|index| Field { field: i as u16, index }));
             starts.push(keys.len());
         }
-        Layout { keys, planes: first_plane, masses: first_mass, effects, fields: starts }
+        Layout { keys, planes: first_plane, masses: first_mass, effects, fields: starts, viscosity: None, curves: [0; 3] }
+    }
+
+    /// The same with the numbers that only some materials have, at the end.
+    pub fn with_material(mut self, scene: &Scene) -> Layout {
+        if scene.material.viscosity.is_some() {
+            self.viscosity = Some(self.keys.len());
+            self.keys.extend([ParamKey::Viscosity, ParamKey::ViscosityExponent]);
+        }
+        let corners = |curve: &Curve| 0..curve.factors.len() as u8;
+        let first = self.keys.len();
+        self.keys.extend(corners(&scene.curves.stretch).map(ParamKey::StretchFactor));
+        let second = self.keys.len();
+        self.keys.extend(corners(&scene.curves.volume).map(ParamKey::VolumeFactor));
+        self.curves = [first, second, self.keys.len()];
+        self
+    }
+
+    /// Places in θ of the factors of the material's curves: along stretches, of the volume.
+    pub fn curves(&self) -> [std::ops::Range<usize>; 2] {
+        let [first, second, end] = self.curves;
+        [first..second, second..end]
+    }
+
+    /// True where the material has a viscosity.
+    pub fn is_viscous(&self) -> bool {
+        self.viscosity.is_some()
     }
 
     /// The effects in their order: law, and the places of its numbers in θ.
@@ -290,6 +361,10 @@ impl Layout {
             PointMass(i) => self.masses + usize::from(i),
             Effect { effect, slot, .. } => self.effects[usize::from(effect)] + usize::from(slot),
             Field { field, index } => self.fields[usize::from(field)] + index as usize,
+            Viscosity => self.viscosity.unwrap_or(usize::MAX),
+            ViscosityExponent => self.viscosity.map_or(usize::MAX, |first| first + 1),
+            StretchFactor(k) => self.curves[0] + usize::from(k),
+            VolumeFactor(k) => self.curves[1] + usize::from(k),
         };
         assert!(self.keys.get(place) == Some(&key), "parameter key {key:?} belongs to this scene's layout");
         place
@@ -307,8 +382,9 @@ impl Layout {
                 Some(_) => 0..0,
             };
         }
-        let matches = |spec: &str| spec == path || spec.strip_prefix(path).is_some_and(|r| matches!(r, ".x" | ".y" | ".z"));
-        let mut found = (0..self.fields[0]).filter(|&p| matches(&self.keys[p].spec().path));
+        let matches = |spec: &str| spec.strip_prefix(path).is_some_and(is_component);
+        let last = self.fields[self.fields.len() - 1];
+        let mut found = (0..self.fields[0]).chain(last..self.keys.len()).filter(|&p| matches(&self.keys[p].spec().path));
         found.next().map_or(0..0, |first| first..found.next_back().unwrap_or(first) + 1)
     }
 }

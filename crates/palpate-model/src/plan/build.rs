@@ -4,19 +4,20 @@ mod sites;
 mod tets;
 
 pub use sites::marker_sites;
-pub use tets::HELD;
+pub use tets::{HELD, made};
 
 use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
 use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
+use crate::cutcells::shadow::shadow;
 use crate::effects::check_choices;
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
 use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
-use crate::scene::{BodySource, Clamp, Inertia, Resolution, Scene};
+use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::Body;
 use crate::space::stencil::Stencils;
@@ -39,22 +40,33 @@ fn error(key: impl Into<String>, message: String) -> PlanError {
 
 /// Cuts a scene's body. The shape is returned with it.
 pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanError> {
-    let (parts, shape) = build_parts(scene)?;
+    let (parts, shape) = build_parts(scene, false)?;
     Ok((Arc::new(parts.body), shape))
 }
 
-fn build_parts(scene: &Scene) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
+/// `seen`: observed points are to be looked up; bodies of cells are always ready for them.
+fn build_parts(scene: &Scene, seen: bool) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
     let shape = shape_of(&scene.object);
-    if let BodySource::Tetrahedra { mesh, .. } = &scene.object.source {
+    let mesh = match (&scene.object.source, scene.object.resolution) {
+        (BodySource::Tetrahedra { mesh, .. }, _) => Some(mesh.transformed(&scene.object.pose)),
+        (_, Resolution::Edge(_)) => Some(tets::made(&scene.object)?.0),
+        _ => None,
+    };
+    if let Some(mesh) = mesh {
         tets::refuse_what_needs_cells(scene)?;
-        let body = Body::of_tets(&mesh.transformed(&scene.object.pose));
+        let mut body = Body::of_tets(&mesh, scene.solver.tetrahedron);
+        if seen {
+            let (h, width) = (body.length, band_cells(scene) * body.length);
+            body.band = shadow(&body, shape.as_ref(), h, width).map_err(|e| error("observation.band", e.to_string()))?;
+        }
         return Ok((Parts { body, merged: Vec::new() }, shape));
     }
     let (min, max) = shape.bounds();
     let (key, h) = match scene.object.resolution {
         Resolution::CellSize(h) => ("object.cell_size", h),
         Resolution::Cells(n) => ("object.cells", (max - min).max_element() / f64::from(n)),
-        Resolution::Own | Resolution::Open => {
+        Resolution::OpenEdge => return Err(error("object.edge_length", "is missing: how fine are the tetrahedra to be?".into())),
+        Resolution::Own | Resolution::Open | Resolution::Edge(_) => {
             return Err(error("object.cell_size", "is missing: a shape has no cells of its own".into()));
         }
     };
@@ -77,7 +89,7 @@ fn band_cells(scene: &Scene) -> f64 {
 /// Everything a backend needs for a scene. `observation` comes with frames, cameras and channels; its markers are filled here: one per
 /// entry of `marker_rest` in the same order, then one per rest place of its tracks.
 pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
-    let (parts, shape) = build_parts(scene)?;
+    let (parts, shape) = build_parts(scene, observation.frames.iter().any(|f| !f.points.is_empty()))?;
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     let body = Arc::new(parts.body);
@@ -94,7 +106,6 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     if !observation.frames.is_empty() {
         check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
     }
-    tets::refuse_depth(&body, &observation)?;
     let planes = scene
         .planes
         .iter()
@@ -110,6 +121,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         theta: theta(scene, &layout, &planes, &starts, &body),
         layout,
         model: scene.material.model,
+        curves: scene.curves.clone(),
         fields,
         planes,
         clamps,
@@ -137,6 +149,10 @@ fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64
         },
         ParamKey::MassDamping => m.mass_damping,
         ParamKey::StiffnessDamping => m.stiffness_damping,
+        ParamKey::Viscosity => m.viscosity.map_or(0.0, |v| v.coefficient),
+        ParamKey::ViscosityExponent => m.viscosity.map_or(1.0, |v| v.exponent),
+        ParamKey::StretchFactor(k) => scene.curves.stretch.factors[usize::from(k)],
+        ParamKey::VolumeFactor(k) => scene.curves.volume.factors[usize::from(k)],
         ParamKey::Gravity(a) => scene.gravity[a as usize],
         ParamKey::Velocity(a) => scene.initial.velocity[a as usize],
         ParamKey::AngularVelocity(a) => scene.initial.angular_velocity[a as usize],
@@ -156,24 +172,27 @@ fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc
     if !body.points.is_empty() {
         return tets::clamp_site(i, clamp, scene, body, shape);
     }
-    let to_frame = if clamp.object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
-    let region = ClipBox { to_frame, min: clamp.min, max: clamp.max };
+    let ClampRegion::Box { min, max, object_frame } = clamp.region else {
+        let message =
+            "names a group of a volume mesh, and this body is cut out of a lattice: give a box, or a volume_mesh with groups";
+        return Err(error(format!("clamp.{i}.group"), message.into()));
+    };
+    let to_frame = if object_frame { scene.object.pose.inverse() } else { DAffine3::IDENTITY };
+    let region = ClipBox { to_frame, min, max };
     let cells = held_cells(&region, parts, shape.as_ref());
     if cells.is_empty() {
         let (lo, hi) = shape.bounds();
         return Err(error(
             format!("clamp.{i}.box"),
             format!(
-                "the box from {} to {} m ({}) holds no part of the body, which lies between {lo} and {hi} m (world); \
+                "the box from {min} to {max} m ({}) holds no part of the body, which lies between {lo} and {hi} m (world); \
                  move or enlarge the box",
-                clamp.min,
-                clamp.max,
-                if clamp.object_frame { "in the object's own frame" } else { "world" }
+                if object_frame { "in the object's own frame" } else { "world" }
             ),
         ));
     }
     let edge = Edge::new(shape.clone(), SUBDIVISIONS, region, parts.merged.clone());
-    Ok(ClampSite { cells, nodes: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
+    Ok(ClampSite { cells, nodes: Vec::new(), areas: Vec::new(), motion: clamp.motion.clone(), edge: Arc::new(edge) })
 }
 
 #[cfg(test)]

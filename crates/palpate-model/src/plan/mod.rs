@@ -1,11 +1,15 @@
 //! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
 
 pub mod build;
+pub mod locking;
 pub mod scheme;
 
 pub use crate::cutcells::clamp_cell::ClampCell;
 use crate::cutcells::clamp_edge::Edge;
 use crate::materials::Model;
+use crate::materials::curve::Curve;
+use crate::materials::principal_stretch::PrincipalStretch;
+use crate::materials::viscosity::Viscosity;
 use crate::mechanics::motion::RigidMotion;
 use crate::observation::Observation;
 use crate::params::fields::Field;
@@ -29,6 +33,8 @@ pub struct Plan {
     pub body: Arc<Body>,
     /// Material model.
     pub model: &'static Model,
+    /// Corners of its curves; their factors are parameters.
+    pub curves: PrincipalStretch,
     /// Order of θ.
     pub layout: Layout,
     /// The scene's own parameter values [P].
@@ -55,6 +61,18 @@ pub struct Plan {
     pub solver: Solver,
 }
 
+impl Plan {
+    /// The material's law for a member's numbers, where they make another of it than [`Model::law`].
+    pub fn own_law(&self, physics: &Physics) -> Option<PrincipalStretch> {
+        if !self.model.has_curves {
+            return None;
+        }
+        let [stretch, volume] = [&self.curves.stretch, &self.curves.volume];
+        let with = |curve: &Curve, factors: &Vec<f64>| Curve { stretches: curve.stretches.clone(), factors: factors.clone() };
+        Some(PrincipalStretch { stretch: with(stretch, &physics.curves[0]), volume: with(volume, &physics.curves[1]) })
+    }
+}
+
 /// A contact plane's constant part; height and angles are parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneSite {
@@ -71,6 +89,8 @@ pub struct ClampSite {
     pub cells: Vec<ClampCell>,
     /// Held nodes and the stiffness of each one's spring [N/m], of bodies without cells.
     pub nodes: Vec<(u32, f64)>,
+    /// Area of the held surface that each of them stands for, or a substitute within the body: what a compliant layer acts over [m²].
+    pub areas: Vec<f64>,
     /// Prescribed motion; `None` = held still.
     pub motion: Option<RigidMotion>,
     /// What is held when an effect moves the region's edge.
@@ -117,6 +137,10 @@ pub struct Physics {
     pub mass_damping: f64,
     /// Rayleigh damping [s].
     pub stiffness_damping: f64,
+    /// The material's viscosity, where it has one.
+    pub viscosity: Option<Viscosity>,
+    /// Factors of the material's curves: along stretches, of the volume.
+    pub curves: [Vec<f64>; 2],
     /// Gravity [m/s²].
     pub gravity: DVec3,
     /// Initial velocity [m/s].
@@ -146,6 +170,10 @@ impl Physics {
             density: get(ParamKey::Density),
             mass_damping: get(ParamKey::MassDamping),
             stiffness_damping: get(ParamKey::StiffnessDamping),
+            viscosity: layout
+                .is_viscous()
+                .then(|| Viscosity { coefficient: get(ParamKey::Viscosity), exponent: get(ParamKey::ViscosityExponent) }),
+            curves: layout.curves().map(|range| theta[range].to_vec()),
             gravity: vec(ParamKey::Gravity),
             velocity: vec(ParamKey::Velocity),
             angular_velocity: vec(ParamKey::AngularVelocity),
@@ -167,6 +195,10 @@ impl Physics {
             ParamKey::Density => self.density,
             ParamKey::MassDamping => self.mass_damping,
             ParamKey::StiffnessDamping => self.stiffness_damping,
+            ParamKey::Viscosity => self.viscosity.map_or(0.0, |v| v.coefficient),
+            ParamKey::ViscosityExponent => self.viscosity.map_or(0.0, |v| v.exponent),
+            ParamKey::StretchFactor(k) => self.curves[0][usize::from(k)],
+            ParamKey::VolumeFactor(k) => self.curves[1][usize::from(k)],
             ParamKey::Gravity(a) => self.gravity[usize::from(a)],
             ParamKey::Velocity(a) => self.velocity[usize::from(a)],
             ParamKey::AngularVelocity(a) => self.angular_velocity[usize::from(a)],

@@ -10,6 +10,7 @@ impl Scene {
             title: String::new(),
             object,
             material,
+            curves: PrincipalStretch::default(),
             gravity: DVec3::ZERO,
             clamps: Vec::new(),
             planes: Vec::new(),
@@ -20,6 +21,7 @@ impl Scene {
             time: Time::default(),
             solver: Solver::default(),
             observation: None,
+            targets: Vec::new(),
             fit: None,
         }
     }
@@ -35,6 +37,7 @@ impl Material {
             poisson_ratio,
             mass_damping: 0.0,
             stiffness_damping: 0.0,
+            viscosity: None,
         }
     }
 }
@@ -42,6 +45,32 @@ impl Material {
 impl Clamp {
     /// A box of the world that is held still.
     pub fn still(min: DVec3, max: DVec3) -> Clamp {
-        Clamp { min, max, object_frame: false, motion: None, motion_path: None }
+        Clamp { region: ClampRegion::Box { min, max, object_frame: false }, motion: None, motion_path: None }
+    }
+
+    /// A named group of nodes of a volume mesh that is held still.
+    pub fn group(name: &str) -> Clamp {
+        Clamp { region: ClampRegion::Group(name.into()), motion: None, motion_path: None }
+    }
+
+    /// Lowest and highest corner of its box [m], where it has one.
+    pub fn corners(&self) -> Option<(DVec3, DVec3)> {
+        match self.region {
+            ClampRegion::Box { min, max, .. } => Some((min, max)),
+            ClampRegion::Group(_) => None,
+        }
+    }
+
+    /// The same with its box in the mesh's own coordinates.
+    pub fn in_object_frame(mut self) -> Clamp {
+        if let ClampRegion::Box { object_frame, .. } = &mut self.region {
+            *object_frame = true;
+        }
+        self
+    }
+
+    /// The same, moved.
+    pub fn moved(self, motion: Option<RigidMotion>) -> Clamp {
+        Clamp { motion, ..self }
     }
 }

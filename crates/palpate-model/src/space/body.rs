@@ -1,7 +1,7 @@
 //! The body: nodes with their shares of its volume, the surface, and one of two kinds of elastic domain, cut cells or elastic points.
 
 use crate::cutcells::domain::{Band, Cell, CutCells, GhostLine};
-use crate::space::points::{Points, TetMesh};
+use crate::space::points::Points;
 use crate::space::stencil::{Stencil, Stencils};
 use glam::DVec3;
 
@@ -13,8 +13,9 @@ pub struct Body {
     pub length: f64,
     /// Rest positions of the simulation nodes [m], shape `[N]`.
     pub nodes: Vec<DVec3>,
-    /// Lumped volumes [m³], shape `[N]`: ∫ N_i over the body, after [`Body::mend_moments`] times a factor near 1; their sum is `volume`,
-    /// their centre `center`.
+    /// Lumped volumes [m³], shape `[N]`: of cells ∫ N_i over the body, after [`Body::mend_moments`] times a factor near 1; of tetrahedra positive
+    /// shares ([`super::tets::lumped`]), by which laws of nodes weigh, while inertia and weight have the whole matrix. Their sum is `volume`, their
+    /// centre `center`.
     pub node_volume: Vec<f64>,
     /// Surface of the body in small pieces, grouped by cell in increasing order.
     pub patches: Vec<Patch>,
@@ -24,6 +25,8 @@ pub struct Body {
     pub cut: Option<CutCells>,
     /// Elastic points, of bodies that are not.
     pub points: Points,
+    /// Where observed points are looked up; empty where none are.
+    pub band: Band,
     /// Volume [m³].
     pub volume: f64,
     /// Surface area [m²].
@@ -58,66 +61,25 @@ impl Body {
         self.cut.as_ref().map_or(&[], |c| &c.ghosts)
     }
 
-    /// The band around the cells; an empty one of a body of elastic points.
-    pub fn band(&self) -> &Band {
-        static NONE: Band =
-            Band { width: 0.0, nodes: Vec::new(), rows: Vec::new(), columns: Vec::new(), values: Vec::new(), cells: Vec::new() };
-        self.cut.as_ref().map_or(&NONE, |c| &c.band)
-    }
-
     /// Longest side of the body [m], at least one element.
     pub fn size(&self) -> f64 {
         (self.corners.1 - self.corners.0).max_element().max(self.length)
     }
 
-    /// Number of elements: cells, or elastic points.
+    /// Number of elements: cells, or tetrahedra.
     pub fn elements(&self) -> usize {
-        self.cells().len() + self.points.len()
+        self.cells().len() + self.points.elements()
     }
 
     /// Nodes of every element.
     pub fn element_nodes(&self) -> impl Iterator<Item = &[u32]> + '_ {
-        self.cells().iter().map(|c| &c.nodes[..]).chain(self.points.stencils.iter().map(|s| s.nodes))
+        self.cells().iter().map(|c| &c.nodes[..]).chain(self.points.means().map(|s| s.nodes))
     }
 
     /// Rest position of the middle of every element [m].
     pub fn middles(&self) -> impl Iterator<Item = DVec3> + '_ {
         let cells = self.cut.iter().flat_map(|cut| cut.cells.iter().map(|c| cut.middle(c)));
-        cells.chain(self.points.stencils.iter().map(|s| s.at(&self.nodes)))
-    }
-
-    /// A body of tetrahedra.
-    pub fn of_tets(mesh: &TetMesh) -> Body {
-        let (points, node_volume) = mesh.points();
-        let volume: f64 = points.volume.iter().sum();
-        let center = points.stencils.iter().zip(&points.volume).map(|(s, v)| s.at(&mesh.nodes) * *v).sum::<DVec3>() / volume;
-        let (mut patches, mut surface) = (Vec::new(), Stencils::default());
-        for (element, face) in mesh.faces() {
-            let [a, b, c] = face.map(|n| mesh.nodes[n as usize]);
-            let twice = (b - a).cross(c - a);
-            surface.push(&face, &[1.0 / 3.0; 3]);
-            patches.push(Patch {
-                cell: element,
-                area: 0.5 * twice.length(),
-                normal: twice.normalize(),
-                point: (a + b + c) / 3.0,
-            });
-        }
-        let low = mesh.nodes.iter().copied().reduce(DVec3::min).unwrap_or(center);
-        let high = mesh.nodes.iter().copied().reduce(DVec3::max).unwrap_or(center);
-        Body {
-            length: (6.0 * volume / points.len() as f64).cbrt(),
-            nodes: mesh.nodes.clone(),
-            node_volume,
-            area: patches.iter().map(|p| p.area).sum(),
-            patches,
-            surface,
-            cut: None,
-            points,
-            volume,
-            center,
-            corners: (low, high),
-        }
+        cells.chain(self.points.means().map(|s| s.at(&self.nodes)))
     }
 }
 

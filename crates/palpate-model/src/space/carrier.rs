@@ -3,20 +3,24 @@
 use crate::cutcells::places::CellLookup;
 use crate::space::body::Body;
 use crate::space::stencil::StencilBuf;
+use crate::space::tets::TetLookup;
 use glam::DVec3;
 
 /// Finds the element that carries a place.
 pub enum Carrier<'a> {
     /// A cell.
     Cells(CellLookup<'a>),
-    /// An elastic point of a body without cells.
-    Points(&'a Body),
+    /// A tetrahedron.
+    Tets(Box<TetLookup<'a>>),
 }
 
 impl Body {
     /// Looks every element up once.
     pub fn carrier(&self) -> Carrier<'_> {
-        self.cut.as_ref().map_or(Carrier::Points(self), |cut| Carrier::Cells(CellLookup::new(cut)))
+        match &self.cut {
+            Some(cut) => Carrier::Cells(CellLookup::new(cut)),
+            None => Carrier::Tets(Box::new(TetLookup::new(self))),
+        }
     }
 }
 
@@ -25,7 +29,7 @@ impl Carrier<'_> {
     pub fn carry(&self, place: DVec3) -> (StencilBuf, f64) {
         match self {
             Carrier::Cells(cells) => cells.carry(place),
-            Carrier::Points(body) => body.points.carry(&body.nodes, place),
+            Carrier::Tets(tets) => tets.carry(place),
         }
     }
 }

@@ -2,6 +2,11 @@
 
 pub mod body;
 pub mod carrier;
+pub mod kept_volume;
+pub mod neighbours;
 pub mod pattern;
 pub mod points;
 pub mod stencil;
+pub mod stuffing;
+pub mod tet_checks;
+pub mod tets;

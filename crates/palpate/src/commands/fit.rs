@@ -1,6 +1,7 @@
 //! `palpate fit`: parameters that explain a recording.
 
 use crate::cli::{Console, INTERRUPTED};
+use crate::curves;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -178,7 +179,9 @@ fn write_all(
 ) -> Result<FitDocument, Error> {
     let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
     let found = write_fields(folder, experiments, fitted)?;
-    let result = fit_document(fitted, experiments, found);
+    // What was found stands without them.
+    let curves = curves::found(experiments, fitted, backend).unwrap_or_default();
+    let result = fit_document(fitted, experiments, found, curves);
     // Results first: a report that fails must not cost them.
     results::write(folder.join("result.json"), &result)?;
     text("history.csv", &history_csv(fitted))?;
@@ -204,6 +207,7 @@ fn write_all(
         fitted,
         experiments,
         fields: &result.fields,
+        curves: &result.curves,
         pictures,
         scale,
         command: command(scenes, a, fitted),

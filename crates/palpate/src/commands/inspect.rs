@@ -1,5 +1,8 @@
 //! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
 
+mod identify;
+mod tets;
+
 use crate::catalogue;
 use crate::cli::Console;
 use crate::commands::devices;
@@ -7,11 +10,13 @@ use crate::error::Error;
 use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
+use crate::options::BackendName;
 use crate::results::inspection::{
     CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
     SceneInspection, SequenceInspection, Time,
 };
-use crate::results::{self, finite};
+use crate::results::{self, finite, inspection};
+use crate::suited::{Suited, suited};
 use clap::Args;
 use palpate_gpu::AdapterReport;
 use palpate_io::recording::{Recording, Sequence, read_recording};
@@ -25,10 +30,12 @@ Examples:
   palpate inspect beam.toml
   palpate inspect my-recording
   palpate inspect beam.toml --json
+  palpate inspect beam.toml --identify         which of its free numbers the recording would determine
   palpate inspect --devices                    graphics adapters, their limits, what they can run
   palpate inspect --effects                    laws that a scene can add, with parameters and units
 
-A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is simulated.";
+A scene is checked together with its recording: where both lie, and whether their times overlap. Nothing is
+simulated but with --identify.";
 
 /// Show what a scene or recording holds, without computing anything
 #[derive(Clone, Debug, Args)]
@@ -40,6 +47,12 @@ pub struct Arguments {
     /// Show the effects that scenes can name, with their parameters, units and defaults
     #[arg(long, conflicts_with = "path")]
     effects: bool,
+    /// Say what the recording would determine before anything is fitted, and which second motion would help most; this simulates
+    #[arg(long, requires = "path")]
+    identify: bool,
+    /// What computes, with --identify
+    #[arg(long, value_enum, default_value = "auto", requires = "identify")]
+    backend: BackendName,
     /// List the graphics adapters of this machine and what they can run
     #[arg(long, conflicts_with_all = ["path", "effects"])]
     devices: bool,
@@ -67,7 +80,13 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         ("recording", Inspected::Recording(Box::new(content)), lines, r.warnings)
     } else {
         let e = Experiment::open(path)?;
-        let (content, lines) = scene(&e);
+        let (mut content, mut lines) = scene(&e);
+        if a.identify {
+            let (backend, _) = a.backend.choose(e.plan(), 1)?;
+            let found = crate::identify::identify(&e, backend, |what| console.note(&format!("looking at {what}")))?;
+            lines.extend(identify::identified(&found));
+            content.identification = Some(found);
+        }
         ("scene", Inspected::Scene(Box::new(content)), lines, e.warnings().to_vec())
     };
     if console.json() {
@@ -179,16 +198,19 @@ fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
         lines.push(("open edges", text));
     }
     (content.cell_size, content.cells) = (body.length, Cells { all, full, cut });
-    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band().cells.len());
+    (content.nodes, content.degrees_of_freedom, content.band_cells) = (nodes, 3 * nodes, body.band.cells.len());
     match body.cut {
         Some(_) => lines.extend([
             ("cell size", format!("{:.5} m{}", body.length, why(e, "object.cell_size"))),
             ("cells", format!("{all} ({full} full, {cut} cut)")),
-            ("band cells", format!("{} of {:.4} m", body.band().cells.len(), plan.band)),
+            ("band cells", format!("{} of {:.4} m", body.band.cells.len(), plan.band)),
         ]),
-        None => lines.push(("tetrahedra", format!("{all} of about {:.5} m", body.length))),
+        None => tets::tetrahedra(e, content, lines),
     }
     lines.extend([("nodes", nodes.to_string()), ("degrees of freedom", (3 * nodes).to_string())]);
+    let Suited { discretisation, reason } = suited(e);
+    lines.push(("suited", format!("{discretisation}: {reason}")));
+    content.suited = Some(inspection::Suited { discretisation: discretisation.to_string(), reason });
 }
 
 /// Why a number of the scene is what it is, where it was chosen.

@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub mod batch;
+pub mod coarsen;
 pub mod devices;
 pub mod diagnose;
 pub mod fit;

@@ -3,8 +3,10 @@
 use super::{FreeNumber, specs};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use palpate_fit::{FreeParameter, Slot};
+use palpate_fit::{FieldPrior, FreeParameter, Mean, Slot};
 use palpate_model::params::ParamKey;
+use palpate_model::params::fields::Prior;
+use std::sync::Arc;
 
 /// A number or field that reaches θ: its first place with θ per unit, and how many values it has.
 fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot, usize)> {
@@ -14,6 +16,32 @@ fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, 
     let places = plan.layout.resolve(path);
     let key = plan.layout.keys.get(places.start).filter(|_| !places.is_empty())?;
     Some((*key, Slot { scene, place: places.start, factor }, places.len()))
+}
+
+/// The field that a path stands for as a whole, with its prior.
+fn with_prior(e: &Experiment, path: &str) -> Option<(usize, Prior)> {
+    let field = path.strip_prefix("field.")?.parse::<usize>().ok()?;
+    Some((field, e.scene().fields.get(field)?.prior?))
+}
+
+/// The prior of a field as the fit sees it. Where the number that the field varies is free as well, or another field varies it, that holds
+/// the mean.
+fn prior(e: &Experiment, path: &str) -> Option<FieldPrior> {
+    let (field, prior) = with_prior(e, path)?;
+    let fields = &e.scene().fields;
+    let varied = fields[field].varied;
+    let of_same = |i: usize| fields.get(i).is_some_and(|f| f.varied == varied);
+    let holds_mean = |other: &str| {
+        let number = other == varied.path() || (other == "material.mass" && varied.path() == "material.density");
+        let before = other.strip_prefix("field.").and_then(|r| r.split('.').next()?.parse::<usize>().ok());
+        number || before.is_some_and(|i| i < field && of_same(i))
+    };
+    let mean = match specs(e).iter().flat_map(|f| &f.parameters).any(|p| holds_mean(&p.path)) {
+        true => Mean::Zero,
+        false => Mean::Free,
+    };
+    let around = Arc::new(fields[field].neighbours(&e.plan().body)?);
+    Some(FieldPrior { around, kind: prior.kind, length: prior.length, deviation: prior.deviation, mean })
 }
 
 type Free = (Vec<FreeNumber>, Vec<FreeParameter>, Vec<String>);
@@ -70,6 +98,13 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                     );
                     return Err(Error::scene(file(scene), &p.path, message));
                 }
+                if with_prior(e, &p.path).map(|w| w.1) != with_prior(&experiments[f.slots[0].scene], &p.path).map(|w| w.1) {
+                    let message = format!(
+                        "has another prior here than in {}; a shared field has the same in both, or say per_scene = true",
+                        file(f.slots[0].scene).display()
+                    );
+                    return Err(Error::scene(file(scene), &p.path, message));
+                }
                 f.slots.push(slot);
                 continue;
             }
@@ -86,6 +121,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                 bounds: p.bounds,
                 start: p.start,
                 known: p.known,
+                prior: prior(e, &p.path),
                 count,
                 slots: vec![slot],
             });

@@ -5,6 +5,9 @@ use crate::experiment::Experiment;
 use crate::results::fit::{FitStatus, Verdict, VerdictWord};
 use palpate_fit::Status;
 use palpate_model::params::Transform;
+use palpate_model::scene::ClampRegion;
+use palpate_model::space::body::Patch;
+use palpate_model::space::stencil::Stencil;
 
 /// Standard errors from the optimum up to which a search that met no criterion has arrived all the same.
 const NEAR: f64 = 0.1;
@@ -122,17 +125,20 @@ fn at_bounds(fitted: &Fitted) -> Vec<String> {
 
 /// True where clamps hold all of a body's surface, up to a thousandth.
 fn held_whole(e: &Experiment) -> bool {
-    let boxes: Vec<_> = e.scene().clamps.iter().map(|c| (c, e.scene().object.pose.inverse())).collect();
-    if boxes.is_empty() {
+    let (clamps, to_object) = (&e.scene().clamps, e.scene().object.pose.inverse());
+    if clamps.is_empty() {
         return false;
     }
-    let holds = |p: glam::DVec3| {
-        boxes.iter().any(|(c, to_object)| {
-            let p = if c.object_frame { to_object.transform_point3(p) } else { p };
-            p.cmpge(c.min).all() && p.cmple(c.max).all()
+    let body = &e.plan().body;
+    let holds = |(place, of): (&Patch, Stencil)| {
+        clamps.iter().zip(&e.plan().clamps).any(|(c, site)| match &c.region {
+            ClampRegion::Box { min, max, object_frame } => {
+                let p = if *object_frame { to_object.transform_point3(place.point) } else { place.point };
+                p.cmpge(*min).all() && p.cmple(*max).all()
+            }
+            ClampRegion::Group(_) => of.nodes.iter().all(|n| site.nodes.binary_search_by_key(n, |held| held.0).is_ok()),
         })
     };
-    let patches = &e.plan().body.patches;
-    let free = patches.iter().filter(|p| !holds(p.point)).count();
-    free as f64 <= FREE * patches.len() as f64
+    let free = body.pieces().filter(|piece| !holds(*piece)).count();
+    free as f64 <= FREE * body.patches.len() as f64
 }

@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{Fitted, FreeNumber, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
-use crate::results::fit::{Cost, FieldReference, FitDocument, Parameter, Parts, Residual, ResidualBefore, Run};
+use crate::results::fit::{Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
@@ -61,8 +61,13 @@ fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
     }
 }
 
-/// What `result.json` says of a fit of these experiments, whose fields lie beside it.
-pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<FieldReference>) -> FitDocument {
+/// What `result.json` says of a fit of these experiments, whose fields lie beside it, with the curves found.
+pub fn fit_document(
+    fitted: &Fitted,
+    experiments: &[Experiment],
+    fields: Vec<FieldReference>,
+    curves: Vec<FoundCurve>,
+) -> FitDocument {
     let r = &fitted.result;
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
@@ -78,6 +83,7 @@ pub fn fit_document(fitted: &Fitted, experiments: &[Experiment], fields: Vec<Fie
         error: r.broken.clone(),
         parameters: (0..fitted.free.len()).map(|i| parameter(fitted, i)).collect(),
         fields,
+        curves,
         correlation: r.correlation.iter().map(|row| row.iter().map(|c| finite(*c)).collect()).collect(),
         cost: Cost { initial: finite(r.initial_cost), last: finite(r.cost) },
         reduced_chi_square: finite(r.reduced_chi_square),
@@ -153,6 +159,37 @@ pub(super) fn field_line(f: &FieldReference) -> String {
     )
 }
 
+/// What is known of a found field with a prior, in sentences; none without.
+pub(super) fn posterior_lines(f: &FieldReference) -> Vec<String> {
+    let Some(p) = &f.posterior else { return Vec::new() };
+    let text = |x: Option<f64>| x.map_or("?".into(), number);
+    let whose = |key: &str| if p.chosen.iter().any(|c| c == key) { "chosen by the recording" } else { "as stated" };
+    let length = p.length.map_or(String::new(), |l| format!("length {} m ({}), ", number(l), whose("length")));
+    let best = format!("{length}deviation {} ({})", text(p.deviation), whose("deviation"));
+    let one = p.tried.iter().find(|t| t.deviation == 0.0).and_then(|t| t.evidence);
+    let one = one.map_or(String::new(), |e| format!("; evidence of one value everywhere e^{e:.1} of the best tried"));
+    let percent = p.undetermined_share.map_or("?".into(), |s| format!("{:.0}", 100.0 * s));
+    let mut out = vec![
+        format!("prior of {}: {}, {best}{one}", f.path, p.prior),
+        format!(
+            "the recording tells about {} numbers of it; standard deviation of the logarithm {} to {}, median {}; {} residuals count as one",
+            p.effective.map_or("?".into(), |e| format!("{e:.1}")),
+            text(p.sd[0]),
+            text(p.sd[2]),
+            text(p.sd[1]),
+            text(p.residuals_as_one)
+        ),
+    ];
+    out.push(match p.undetermined {
+        0 => format!("of all {} {} the recording says something", f.count, f.basis),
+        n => format!(
+            "{n} of {} {} are undetermined, {percent} % of the volume: what stands there is the prior's (`undetermined` in {})",
+            f.count, f.basis, f.grid
+        ),
+    });
+    out
+}
+
 /// The parts of a number's error, and what was done to its value; empty where there is nothing to say.
 pub(super) fn parts(fitted: &Fitted, i: usize) -> String {
     let (h, effect) = (fitted.headline(i), fitted.grid.as_ref().map(|g| g.numbers[i]));
@@ -199,7 +236,8 @@ pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     };
     let mut text = format!("  {}\n", fitted.verdict);
     text.extend(fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row));
-    fields.iter().for_each(|f| text += &format!("  {}\n", field_line(f)));
+    let lines = |f: &FieldReference| [vec![field_line(f)], posterior_lines(f)].concat();
+    fields.iter().flat_map(lines).for_each(|line| text += &format!("  {line}\n"));
     text += &fitted.chosen.as_ref().map_or(String::new(), |c| format!("  {c}\n"));
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();

@@ -30,6 +30,9 @@ pub struct FitDocument {
     /// The fields found; their values lie in array files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fields: Vec<FieldReference>,
+    /// Curves of stiffness of which factors were free.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curves: Vec<FoundCurve>,
     /// Correlation matrix of the numbers' errors `[q][q]`, of the logarithms where these are fitted.
     pub correlation: Vec<Vec<Option<f64>>>,
     /// Cost per scalar residual at the first start and at the best point.
@@ -56,6 +59,23 @@ pub struct FitDocument {
 
 impl Document for FitDocument {
     const FORMAT: &'static str = "fit/2";
+}
+
+/// A curve of stiffness.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundCurve {
+    /// Its path in the scene.
+    pub path: String,
+    /// Number of the scene.
+    pub scene: usize,
+    /// Stretches, or ratios of volumes, of the corners.
+    pub corners: Vec<f64>,
+    /// Factors there, over the stiffness at rest.
+    pub factors: Vec<f64>,
+    /// Their standard errors; `None` where there is none.
+    pub errors: Vec<Option<f64>>,
+    /// Smallest and largest that occurred in the motion: of corners far beyond it says nothing.
+    pub range: [f64; 2],
 }
 
 /// What a fit is worth.
@@ -168,7 +188,8 @@ pub struct FieldReference {
     pub count: usize,
     /// The NPZ file beside this document.
     pub file: String,
-    /// Name of its array of values; others are `factor` and `place` (of every cell or node) and, where errors are known, `standard_error`.
+    /// Name of its array of values; others are `factor` and `place` (of every cell or node) and, where errors are known, `standard_error`. With a
+    /// prior also `ln_sd`, `ln_prior_sd`, `gain` and `undetermined`.
     pub array: String,
     /// The VTU file beside this document with the fields on the grid.
     pub grid: String,
@@ -178,8 +199,50 @@ pub struct FieldReference {
     pub median: Option<f64>,
     /// Largest value.
     pub max: Option<f64>,
+    /// What its prior and the recording say of it together, of a field with a prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub posterior: Option<Posterior>,
     /// The scene that it belongs to, from 0.
     pub scene: usize,
+}
+
+/// What a prior and the recording say of a field; deviations are of logarithms of values.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Posterior {
+    /// Kind of the prior: `matern` or `edge-preserving`.
+    pub prior: String,
+    /// Length over which values are alike [m]; absent of edge-preserving priors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
+    /// Deviation of the prior.
+    pub deviation: Option<f64>,
+    /// Which of both the recording chose.
+    pub chosen: Vec<String>,
+    /// How many residuals count as one reading of the stated noise.
+    pub residuals_as_one: Option<f64>,
+    /// How many numbers the recording tells of all fields with priors.
+    pub effective: Option<f64>,
+    /// Smallest, median and largest standard deviation of the values.
+    pub sd: [Option<f64>; 3],
+    /// Values of whose variance the recording takes less than a tenth.
+    pub undetermined: usize,
+    /// Their share of the body's volume.
+    pub undetermined_share: Option<f64>,
+    /// What was tried, with the logarithm of its evidence over that of the best; a deviation of 0 is one value everywhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tried: Vec<Tried>,
+}
+
+/// Numbers of a prior that were tried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tried {
+    /// Length [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
+    /// Deviation.
+    pub deviation: f64,
+    /// Logarithm of the evidence over that of the best.
+    pub evidence: Option<f64>,
 }
 
 /// Cost per scalar residual, half a mean square in units of noise.
@@ -275,7 +338,26 @@ mod tests {
             error: Some("the device was \"lost\"".into()),
             optimizer: "gauss-newton".into(),
             parameters: vec![plain, held],
-            fields: vec![FieldReference { path: "field.0".into(), min: Some(0.5), max: None, ..FieldReference::default() }],
+            fields: vec![
+                FieldReference { path: "field.0".into(), min: Some(0.5), max: None, ..FieldReference::default() },
+                FieldReference {
+                    posterior: Some(Posterior {
+                        length: Some(0.1),
+                        sd: [Some(0.1), None, Some(0.3)],
+                        tried: vec![Tried { length: None, deviation: 0.4, evidence: Some(-1.0 / 3.0) }],
+                        ..Posterior::default()
+                    }),
+                    ..FieldReference::default()
+                },
+            ],
+            curves: vec![FoundCurve {
+                path: "material.stretch_curve".into(),
+                scene: 1,
+                corners: vec![0.8, 1.25],
+                factors: vec![2.0, 0.5],
+                errors: vec![Some(0.1), None],
+                range: [0.9, 1.1],
+            }],
             correlation: vec![vec![Some(1.0), None], vec![None, Some(1.0)]],
             cost: Cost { initial: None, last: Some(0.5) },
             reduced_chi_square: Some(1.1),
@@ -306,6 +388,7 @@ mod tests {
             "best",
             "correlation",
             "cost",
+            "curves",
             "error",
             "evaluations",
             "fields",

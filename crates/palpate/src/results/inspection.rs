@@ -50,6 +50,12 @@ pub struct SceneInspection {
     pub cell_size: f64,
     /// Cells of the body, or its tetrahedra, which count as full.
     pub cells: Cells,
+    /// The mesh of a body of tetrahedra; absent for one of cells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tetrahedra: Option<Tetrahedra>,
+    /// Which discretisation suits the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suited: Option<Suited>,
     /// Its nodes.
     pub nodes: usize,
     /// Three for every node.
@@ -79,6 +85,53 @@ pub struct SceneInspection {
     /// Paths of the numbers to be found; absent where nothing is fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Vec<String>>,
+    /// What the recording would determine; absent unless asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identification: Option<Identification>,
+}
+
+/// What a recording would determine, before anything is fitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Identification {
+    /// Scalar residuals that it is taken from.
+    pub residuals: usize,
+    /// Every free number, or part of a field.
+    pub numbers: Vec<Expectation>,
+    /// Second motions, the one that would tell most first.
+    pub motions: Vec<Proposal>,
+    /// Motions that could not be looked at.
+    pub warnings: Vec<String>,
+}
+
+/// What is to be expected of one number, at the scene's own values and with residuals as large as the noise.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Expectation {
+    /// Its path; of a part of a field, with where it is.
+    pub path: String,
+    /// The scene's value.
+    pub value: f64,
+    /// Expected standard error in its unit.
+    pub error: f64,
+    /// SI unit.
+    pub unit: String,
+    /// The same of its logarithm; absent of numbers that are not fitted by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative: Option<f64>,
+    /// False where the recording says next to nothing of it.
+    pub determined: bool,
+    /// Numbers that it would not be told apart from.
+    pub with: Vec<String>,
+}
+
+/// A second motion, watched by the same sensors.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Proposal {
+    /// What would be done.
+    pub motion: String,
+    /// What it adds, ½ ln det(H₁ + H₂)/det(H₁) [nats].
+    pub information: f64,
+    /// Expected standard error of every number with both recordings, in its unit.
+    pub errors: Vec<f64>,
 }
 
 /// Cells of a body.
@@ -90,6 +143,53 @@ pub struct Cells {
     pub full: usize,
     /// Those that the surface cuts.
     pub cut: usize,
+}
+
+/// The mesh of a body of tetrahedra.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tetrahedra {
+    /// Number of tetrahedra.
+    pub count: usize,
+    /// Number of nodes at their corners.
+    pub corner_nodes: usize,
+    /// Their volume [m³].
+    pub volume: f64,
+    /// Smallest and largest angle between two faces [°].
+    pub dihedral_angles: [f64; 2],
+    /// Named groups of nodes.
+    pub groups: Vec<Group>,
+    /// How they were made; absent where a file has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_here: Option<MadeHere>,
+}
+
+/// A named group of nodes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// Its name.
+    pub name: String,
+    /// Number of corner nodes in it.
+    pub nodes: usize,
+}
+
+/// Tetrahedra that a shape was filled with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MadeHere {
+    /// Longest edge of those inside [m].
+    pub edge_length: f64,
+    /// Error of the volume before the surface was moved, relative.
+    pub volume_error: f64,
+    /// How far the surface was moved outwards to make up for it [m].
+    pub moved: f64,
+}
+
+/// Which discretisation suits a body.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Suited {
+    /// `cells` or `tetrahedra`.
+    pub discretisation: String,
+    /// Why.
+    pub reason: String,
 }
 
 /// What holds, stops and weighs a body down.

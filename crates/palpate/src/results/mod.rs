@@ -8,6 +8,7 @@
 
 pub mod batch;
 pub mod checkpoint;
+pub mod coarsening;
 pub mod devices;
 pub mod diagnosis;
 pub mod effects;

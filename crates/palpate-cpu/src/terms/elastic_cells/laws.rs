@@ -1,12 +1,13 @@
-//! What cells do beyond linear elasticity: effects that are laws of cells, and the material where it is not linear. Force, potential and
-//! derivatives follow from scalar functions of a cell's deformation.
+//! What cells do beyond linear elasticity: effects that are laws of cells, the material where it is not linear, and its viscosity. Force,
+//! potential and derivatives follow from scalar functions of a cell's deformation.
 //!
 //! A law gives ψ(s) and φ(d, a₀) of scalars s = (a, ε) (see [`palpate_model::effects::cell`]). With θ the weight of the new state, the
 //! incremental potential is E V [θ ψ(s₁) + φ] + (1 − θ) f(x₀)·x₁, and all derivatives follow from those of ψ and φ by the chain rule
 //! through q: ∇a = Kq/V, ∇ε constant, and q(x) by [`CellPose`].
 
 mod derivatives;
-mod material;
+pub(in crate::terms) mod material;
+mod viscosity;
 
 use super::{Cells, Corners, dot24 as dot, pick};
 use glam::DVec3;
@@ -14,16 +15,18 @@ use palpate_model::cutcells::corotation::{CellPose, M24, V24, flatten, multiply}
 use palpate_model::effects::Site;
 use palpate_model::effects::cell::{Cell, ENERGY, LOSS, MOST, Part};
 use palpate_model::materials::Solid;
+use palpate_model::materials::stretching::PAIRS;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::plan::{Physics, Plan};
+use viscosity::{Flow, FlowState};
 
 /// A law of cells with its parameters.
 #[derive(Clone)]
 pub struct CellActing {
     /// Number of the effect in the scene.
     pub effect: usize,
-    law: &'static dyn Cell,
-    p: Vec<f64>,
+    pub(in crate::terms) law: &'static dyn Cell,
+    pub(in crate::terms) p: Vec<f64>,
     /// Its amplitudes are zero: it has no energy, only derivatives by them.
     pub absent: bool,
 }
@@ -50,7 +53,7 @@ pub(super) struct CellLaws<'a> {
     cells: Cells<'a>,
     laws: &'a [CellActing],
     /// The material where it is not linear.
-    material: Option<&'static dyn Solid>,
+    material: Option<&'a dyn Solid>,
     /// λ and μ over E, and their derivatives by Poisson's ratio.
     lame: [(f64, f64); 2],
     /// 1/ℓ [1/s]; 0 in a static problem.
@@ -68,11 +71,13 @@ pub(super) struct LawState {
     second: [[f64; ENERGY]; ENERGY],
     /// K(q₁ − q̃) and the factor of its square.
     loss: (V24, f64),
+    /// Of the material's viscosity.
+    flow: Option<FlowState>,
 }
 
 impl Default for LawState {
     fn default() -> LawState {
-        LawState { stress: [0.0; 24], scale: 0.0, second: [[0.0; ENERGY]; ENERGY], loss: ([0.0; 24], 0.0) }
+        LawState { stress: [0.0; 24], scale: 0.0, second: [[0.0; ENERGY]; ENERGY], loss: ([0.0; 24], 0.0), flow: None }
     }
 }
 
@@ -117,14 +122,12 @@ struct Local<'a> {
     kd: V24,
     d: f64,
     loss: Loss,
+    flow: Flow,
 }
 
 fn add(a: &mut V24, factor: f64, b: &V24) {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
 }
-
-/// Rows and columns of the strain components xx, yy, zz, yz, zx, xy.
-const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [1, 2], [2, 0], [0, 1]];
 
 /// Gradient of mean strain component c by q.
 fn strain_row(c: usize, gradient: &[DVec3; 8]) -> V24 {
@@ -200,7 +203,7 @@ impl Local<'_> {
 }
 
 /// Input of a law: scalars, then parameters.
-fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
+pub(in crate::terms) fn input(scalars: &[f64], p: &[f64]) -> ([f64; ENERGY + MOST], usize) {
     let mut z = [0.0; ENERGY + MOST];
     z[..scalars.len()].copy_from_slice(scalars);
     z[scalars.len()..scalars.len() + p.len()].copy_from_slice(p);
@@ -213,7 +216,7 @@ impl<'a> CellLaws<'a> {
         CellLaws {
             cells,
             laws: &cells.c.altered.laws,
-            material: (!model.is_linear).then_some(model.law),
+            material: (!model.is_linear).then(|| cells.c.law()),
             lame: [lame(1.0, nu), lame_by_nu(1.0, nu)],
             rate: cells.c.inertia.map_or(0.0, |t| t.rate),
         }
@@ -221,7 +224,7 @@ impl<'a> CellLaws<'a> {
 
     /// True where something acts.
     pub(super) fn act(&self) -> bool {
-        self.material.is_some() || self.acting().next().is_some()
+        self.material.is_some() || self.acting().next().is_some() || self.viscous().is_some()
     }
 
     fn loss_part(&self) -> Part {
@@ -239,9 +242,14 @@ impl<'a> CellLaws<'a> {
         if self.material.is_some() { ENERGY } else { of_laws }
     }
 
-    /// True where something dissipates.
+    /// True where some law dissipates.
     fn lossy(&self) -> bool {
         self.rate > 0.0 && self.laws.iter().any(|l| l.law.needs(self.loss_part()) > 0)
+    }
+
+    /// True where the force that goes with the new pose depends on the past.
+    fn sees_past(&self) -> bool {
+        self.lossy() || self.viscous().is_some()
     }
 
     /// K q, which is zero where nothing asks for it, and the first `n` scalars of a deformation.
@@ -319,13 +327,13 @@ impl<'a> CellLaws<'a> {
 
     /// The same with at least `n` scalars, and with the past where it has a force of its own or what is lost depends on it.
     fn local_with(&self, n: usize, e: usize, u1: &[DVec3]) -> Local<'a> {
-        let seen = self.cells.c.weights.old != 0.0 || self.lossy();
+        let seen = self.cells.c.weights.old != 0.0 || self.sees_past();
         self.local_at(n, e, self.cells.pose(e, u1), if seen { self.past(e) } else { None })
     }
 
     /// The same for the force that goes with the new pose alone.
     fn local_new(&self, e: usize, pose: CellPose) -> Local<'a> {
-        self.local_at(self.needs(), e, pose, if self.lossy() { self.past(e) } else { None })
+        self.local_at(self.needs(), e, pose, if self.sees_past() { self.past(e) } else { None })
     }
 
     fn local_at(&self, n: usize, e: usize, pose: CellPose, past: Option<(CellPose, V24)>) -> Local<'a> {
@@ -346,7 +354,8 @@ impl<'a> CellLaws<'a> {
                 loss.by_da += l.law.slopes(self.loss_part(), &z[..len], 0, 1)[2];
             }
         }
-        Local { k, volume, young: cells.young_of(e), n, gradient, new, old, kd, d, loss }
+        let flow = old.as_ref().map(|old| self.flow(e, volume, &new, old)).unwrap_or_default();
+        Local { k, volume, young: cells.young_of(e), n, gradient, new, old, kd, d, loss, flow }
     }
 
     /// The laws at a pose of a cell, and their forces on the corners that go with it.
@@ -354,12 +363,14 @@ impl<'a> CellLaws<'a> {
         // The old state's own force is computed once a solve.
         let l = self.local_new(e, *pose);
         let weight = self.cells.c.weights.new;
-        let stress = l.force_new(weight);
+        let mut stress = l.force_new(weight);
+        add(&mut stress, l.flow.by_d, &l.flow.kd);
         let state = LawState {
             stress,
             scale: l.young * (weight * l.new.slopes.first[0] + l.loss.by_d),
             second: l.new.slopes.second.map(|row| row.map(|v| v * weight * l.young / l.volume)),
             loss: (l.kd, l.loss.by_dd * l.young / l.volume),
+            flow: self.viscous().map(|_| l.flow.state(l.volume)),
         };
         (state, l.new.pose.force(&stress))
     }
@@ -384,11 +395,23 @@ impl<'a> CellLaws<'a> {
         let weight = self.cells.c.weights.new;
         let cell = |e: usize| {
             let (pose, volume) = (self.cells.pose(e, u1), self.volume(e));
-            let loss = if self.lossy() { self.local_new(e, pose).loss.value } else { 0.0 };
+            let (loss, flow) = if self.sees_past() {
+                let l = self.local_new(e, pose);
+                (l.loss.value, l.flow.value)
+            } else {
+                (0.0, 0.0)
+            };
             let s = self.scalars(self.cells.stiffness(e), volume, &pose.q, self.needs(), self.gradient(e)).1;
-            self.cells.young_of(e) * volume * (weight * self.energy(&s) + loss)
+            self.cells.young_of(e) * volume * (weight * self.energy(&s) + loss) + volume * flow
         };
         self.cells.each_cell(cell).iter().sum()
+    }
+
+    /// The matrix that goes with the pose, world frame left to it: `scale` times K, and K₀ times what the viscosity makes of it [N/m].
+    pub(super) fn matrix(&self, e: usize, state: &LawState, scale: f64) -> Option<M24> {
+        let (flow, still) = (state.flow?, self.flow_matrix(e)?);
+        let k = self.cells.stiffness(e);
+        Some(std::array::from_fn(|i| scale * k[i] + flow.scale * still[i]))
     }
 
     /// Adds the part of the tangent of cell e that no matrix K has: Σ E V ψ_kl ∇s_k ∇s_lᵀ and E V φ_dd ∇d ∇dᵀ, world frame, blocks
@@ -416,9 +439,10 @@ impl<'a> CellLaws<'a> {
             rows.iter().enumerate().for_each(|(l, other)| add(&mut b, second[first + k][first + l], other));
             rank_one(1.0, a, &b);
         }
-        if state.loss.1 != 0.0 {
-            let turned = flatten(&pose.force(&state.loss.0));
-            rank_one(state.loss.1, &turned, &turned);
+        let flow = state.flow.map_or(([0.0; 24], 0.0), |f| (f.kd, f.second));
+        for (kd, second) in [state.loss, flow].iter().filter(|(_, second)| *second != 0.0) {
+            let turned = flatten(&pose.force(kd));
+            rank_one(*second, &turned, &turned);
         }
     }
 }

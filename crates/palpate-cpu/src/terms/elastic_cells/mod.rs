@@ -213,7 +213,10 @@ impl<'a> ElasticCells<'a> {
         match (&self.laws, self.lawful.get(e)) {
             (Some(laws), Some(state)) => {
                 let both = std::array::from_fn(|i| stress[i] + state.stress[i]);
-                pose.upper_hessian(self.cells.stiffness(e), scale + state.scale, (!convex).then_some(&both), out);
+                match laws.matrix(e, state, scale + state.scale) {
+                    Some(k) => pose.upper_hessian(&k, 1.0, (!convex).then_some(&both), out),
+                    None => pose.upper_hessian(self.cells.stiffness(e), scale + state.scale, (!convex).then_some(&both), out),
+                }
                 laws.add_upper_tangent(e, pose, state, convex.then_some(scale + state.scale), out);
             }
             _ => pose.upper_hessian(self.cells.stiffness(e), scale, (!convex).then_some(stress), out),

@@ -34,16 +34,13 @@ impl Elements for Tangents<'_, '_> {
         let Point { s, v, moduli: (lambda, mu), .. } = term.point(e);
         let h = s.gradient_of(self.u1);
         let f = h + DMat3::IDENTITY;
-        let mut tangent = term.c.plan.model.law.stress(&rows(h), lambda, mu).1.map(|r| r.map(|t| t * w.new));
+        let mut tangent = term.c.law().stress(&rows(h), lambda, mu).1.map(|r| r.map(|t| t * w.new));
         if let (Some(past), true) = (term.past.get(e), w.rate != 0.0) {
-            let held = linear_stress(green(h) - *past, (lambda, mu));
-            for l in 0..9 {
-                let mut unit = [0.0; 9];
-                unit[l] = 1.0;
-                let dh = matrix_of(&unit);
-                let change = rows(dh * held + f * linear_stress(green_rate(f, dh), (lambda, mu)));
-                (0..9).for_each(|k| tangent[k][l] += w.rate * change[k / 3][k % 3]);
-            }
+            let held = linear_stress(green(h) - *past, (lambda, mu)) * w.rate;
+            add_rate(&mut tangent, f, held, |dg| linear_stress(dg, (lambda, mu)) * w.rate);
+        }
+        if term.flow.is_some() {
+            add_rate(&mut tangent, f, term.flow_stress(e, h), |dg| term.flow_rate(e, h, dg));
         }
         if self.curvature != Curvature::Exact {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
@@ -56,5 +53,16 @@ impl Elements for Tangents<'_, '_> {
                 put(i, j, DMat3::from_cols_array(&std::array::from_fn(|k| entry(k % 3, k / 3))) * v);
             }
         }
+    }
+}
+
+/// Adds the derivative by F of the stress F S, of which `stress` is S and `rate` gives its change with Green's strain.
+fn add_rate(tangent: &mut [[f64; 9]; 9], f: DMat3, stress: DMat3, rate: impl Fn(DMat3) -> DMat3) {
+    for l in 0..9 {
+        let mut unit = [0.0; 9];
+        unit[l] = 1.0;
+        let dh = matrix_of(&unit);
+        let change = rows(dh * stress + f * rate(green_rate(f, dh)));
+        (0..9).for_each(|k| tangent[k][l] += change[k / 3][k % 3]);
     }
 }

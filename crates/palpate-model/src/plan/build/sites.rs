@@ -7,6 +7,7 @@ use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, Track
 use crate::shape::Shape;
 use crate::space::body::Body;
 use crate::space::stencil::StencilBuf;
+use crate::space::tets::TetLookup;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -22,16 +23,27 @@ const SAME_NODE: f64 = 1e-3;
 /// # Errors
 /// A marker that lies far from the surface.
 pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
-    let lookup = lookup(body);
-    rest.iter().map(|m| marker_site(m, body, lookup.as_ref(), shape)).collect()
+    let lookup = Lookup::new(body);
+    rest.iter().map(|m| marker_site(m, body, &lookup, shape)).collect()
 }
 
-/// Finds nodes by lattice place, on a body that has a lattice.
-fn lookup(body: &Body) -> Option<NodeLookup> {
-    body.cut.as_ref().map(|_| NodeLookup::new(body))
+/// Finds what carries a place.
+enum Lookup<'a> {
+    /// Nodes by their place on the lattice.
+    Cells(NodeLookup),
+    Tets(Box<TetLookup<'a>>),
 }
 
-fn marker_site(m: &MarkerRest, body: &Body, lookup: Option<&NodeLookup>, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
+impl Lookup<'_> {
+    fn new(body: &Body) -> Lookup<'_> {
+        match &body.cut {
+            Some(_) => Lookup::Cells(NodeLookup::new(body)),
+            None => Lookup::Tets(Box::new(TetLookup::new(body))),
+        }
+    }
+}
+
+fn marker_site(m: &MarkerRest, body: &Body, lookup: &Lookup, shape: &dyn Shape) -> Result<MarkerSite, PlanError> {
     let h = body.length;
     let surface = m.surface.unwrap_or_else(|| shape.closest_point(m.position));
     let (min, max) = shape.bounds();
@@ -59,8 +71,8 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: Option<&NodeLookup>, shape: 
         name: m.name.clone(),
         kind: ReadingKind::Marker,
         stencil: match lookup {
-            Some(lookup) => affine_weights(body, lookup, surface, MARKER_RADIUS * h),
-            None => body.points.carry(&body.nodes, surface).0,
+            Lookup::Cells(nodes) => affine_weights(body, nodes, surface, MARKER_RADIUS * h),
+            Lookup::Tets(tets) => tets.carry(surface).0,
         },
         stalk: m.position - surface,
     })
@@ -89,13 +101,13 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
             ),
         ));
     }
-    let lookup = lookup(body);
+    let lookup = Lookup::new(body);
     let site = |(number, place): (usize, &DVec3)| MarkerSite {
         name: format!("points.{number}"),
         kind: ReadingKind::Track,
         stencil: match &lookup {
-            Some(lookup) => material_point(body, lookup, *place, MARKER_RADIUS * body.length),
-            None => body.points.carry(&body.nodes, *place).0,
+            Lookup::Cells(nodes) => material_point(body, nodes, *place, MARKER_RADIUS * body.length),
+            Lookup::Tets(tets) => tets.carry(*place).0,
         },
         stalk: DVec3::ZERO,
     };
@@ -106,7 +118,7 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
 pub(super) fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<StencilBuf, PlanError> {
     let (place, away) = match &body.cut {
         Some(_) => beside(body, point),
-        None => body.points.carry(&body.nodes, point),
+        None => TetLookup::new(body).carry(point),
     };
     if away > body.length {
         let message = format!(

@@ -3,11 +3,11 @@
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
-use crate::report::fit::{beforehand, field_line, grid_line, number, parts, worth};
+use crate::report::fit::{beforehand, field_line, grid_line, number, parts, posterior_lines, worth};
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::{FieldReference, VerdictWord};
+use crate::results::fit::{FieldReference, FoundCurve, VerdictWord};
 use maud::{Markup, html};
 
 /// What a report is made of.
@@ -18,6 +18,8 @@ pub struct ReportInput<'a> {
     pub experiments: &'a [Experiment],
     /// The fields found.
     pub fields: &'a [FieldReference],
+    /// The curves of stiffness found.
+    pub curves: &'a [FoundCurve],
     /// Pictures scene by scene: at the first start, and with the values found.
     pub pictures: Vec<(Vec<FramePicture>, Vec<FramePicture>)>,
     /// Residual at which colours are saturated [m].
@@ -37,6 +39,7 @@ pub fn fit_html(input: &ReportInput) -> String {
         (distances(fitted))
         (parameters(fitted))
         (fields(input))
+        @for c in input.curves { (curve(c)) }
         (warnings(fitted))
         (correlation(fitted))
         (progress(fitted))
@@ -104,9 +107,64 @@ fn fields(input: &ReportInput) -> Markup {
     html! {
         @for f in input.fields {
             p { (field_line(f)) "." }
+            @for line in posterior_lines(f) {
+                p { (line) "." }
+            }
+            (evidence(f))
         }
         @if let Some(why) = &input.fitted.chosen {
             p { (why) "." }
+        }
+    }
+}
+
+/// A curve with its band, and where the motion says nothing of it.
+fn curve(found: &FoundCurve) -> Markup {
+    let labels = ["factor", "+ one standard error", "− one standard error"];
+    let lines: Vec<Curve> =
+        labels.into_iter().zip(found.band()).map(|(label, points)| Curve { label: label.into(), points }).collect();
+    let what = if found.path.ends_with("volume_curve") { "ratio of volumes" } else { "principal stretch" };
+    let unseen: Vec<String> = found.unseen().iter().map(|c| number(*c)).collect();
+    html! {
+        h2 { "Stiffness over that at rest: " code { (found.path) } }
+        @if let Some(drawing) = plot(&lines, what, "factor", false) { (drawing) }
+        p {
+            "In the motion it went from " (number(found.range[0])) " to " (number(found.range[1])) "."
+            @if !unseen.is_empty() { " Of the corners at " (unseen.join(", ")) " the recording says nothing." }
+        }
+    }
+}
+
+/// Evidence of every prior that was tried, lengths across and deviations down, the darker the better.
+fn evidence(f: &FieldReference) -> Markup {
+    let Some(p) = f.posterior.as_ref().filter(|p| p.tried.len() > 2) else { return Markup::default() };
+    let (mut lengths, mut deviations) = (Vec::new(), Vec::new());
+    for t in p.tried.iter().filter(|t| t.deviation > 0.0) {
+        if !lengths.contains(&t.length) {
+            lengths.push(t.length);
+        }
+        if !deviations.contains(&t.deviation) {
+            deviations.push(t.deviation);
+        }
+    }
+    let of = |length, deviation| p.tried.iter().find(|t| t.length == length && t.deviation == deviation).and_then(|t| t.evidence);
+    let colour = |e: f64| format!("background:rgba(33,102,172,{:.2})", 0.5 * (0.5 * e).exp());
+    html! {
+        p { "Logarithm of the evidence over that of the best, by length [m] across and deviation of the logarithm down." }
+        table {
+            tr {
+                th {}
+                @for l in &lengths { th.n { (l.map_or("–".to_string(), number)) } }
+            }
+            @for d in &deviations {
+                tr {
+                    td { (number(*d)) }
+                    @for l in &lengths {
+                        @let e = of(*l, *d).unwrap_or(f64::NEG_INFINITY);
+                        td.n style=(colour(e)) { (format!("{e:.1}")) }
+                    }
+                }
+            }
         }
     }
 }

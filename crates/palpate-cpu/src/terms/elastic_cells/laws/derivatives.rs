@@ -24,7 +24,9 @@ impl CellLaws<'_> {
             |e| {
                 let (l, d) = (self.local(e, u1), pick(self.cells.body(), e, d));
                 let dq = self.cells.pose(e, u).strain_rate(&d).map(|q| weight * q);
-                let mut f = l.new.pose.force(&l.by_old(&dq));
+                let mut y = l.by_old(&dq);
+                self.flow_by_old(e, &l, &dq, &mut y);
+                let mut f = l.new.pose.force(&y);
                 self.old_own(&l, &d, &mut f);
                 f
             },
@@ -38,8 +40,10 @@ impl CellLaws<'_> {
         self.cells.gather(
             |e| {
                 let (l, z) = (self.local(e, u1), pick(self.cells.body(), e, z));
-                let y = l.by_old_transposed(&l.new.pose.strain_rate(&z)).map(|y| weight * y);
-                let mut f = self.cells.pose(e, u).force(&y);
+                let rate = l.new.pose.strain_rate(&z);
+                let mut y = l.by_old_transposed(&rate);
+                self.flow_by_old(e, &l, &rate, &mut y);
+                let mut f = self.cells.pose(e, u).force(&y.map(|y| weight * y));
                 self.old_own(&l, &z, &mut f);
                 f
             },
@@ -63,6 +67,14 @@ impl CellLaws<'_> {
             add(&mut new, l.young * by(self.loss_part(), &scalars, 0), &l.kd);
         }
         [new, l.old.as_ref().map_or([0.0; 24], energy)]
+    }
+
+    /// The same by every factor of the material's curves.
+    fn by_curves(&self, l: &Local) -> Vec<[V24; 2]> {
+        let at = |side: &Side| self.material_by_curves(&side.s).into_iter().map(|c| l.stress(side, &c)).collect::<Vec<V24>>();
+        let old = l.old.as_ref().map(at).unwrap_or_default();
+        let both = |(k, y): (usize, V24)| [y.map(|v| self.cells.c.weights.new * v), old.get(k).copied().unwrap_or([0.0; 24])];
+        at(&l.new).into_iter().enumerate().map(both).collect()
     }
 
     /// The same by Poisson's ratio.
@@ -98,7 +110,10 @@ impl CellLaws<'_> {
         let present = self.act();
         let rest = rates.changes.rest.as_deref().filter(|_| self.cells.c.altered.rest.is_some());
         let through = ln_young != 0.0 || d.poisson_ratio != 0.0 || rest.is_some() || rates.changes.modulus.is_some();
-        if own.is_none() && !(present && through) {
+        let flow = d.viscosity.filter(|r| self.viscous().is_some() && (r.coefficient != 0.0 || r.exponent != 0.0));
+        let curves: Vec<f64> = d.curves.iter().flatten().copied().collect();
+        let bent = curves.iter().any(|r| *r != 0.0);
+        if own.is_none() && flow.is_none() && !bent && !(present && through) {
             return;
         }
         let n = self.needs().max(own.unwrap_or(0));
@@ -115,6 +130,12 @@ impl CellLaws<'_> {
                 sum([l.force_new(weights.new), l.old.as_ref().map_or([0.0; 24], own)], ln);
                 if d.poisson_ratio != 0.0 {
                     sum(self.by_poisson(e, &l), d.poisson_ratio);
+                }
+                if bent {
+                    self.by_curves(&l).into_iter().zip(&curves).for_each(|(y, rate)| sum(y, *rate));
+                }
+                if let Some(rates) = &flow {
+                    sum([self.flow_along(&l, rates), [0.0; 24]], 1.0);
                 }
                 for acting in self.laws.iter().filter(moved) {
                     for (slot, rate) in d.effects[acting.effect].iter().enumerate().filter(|(_, r)| **r != 0.0) {
@@ -148,7 +169,8 @@ impl CellLaws<'_> {
         let asked: Vec<&CellActing> = self.laws.iter().filter(|l| sought.effects[l.effect]).collect();
         let present = self.act();
         let through = sought.modulus || sought.poisson || gradient.changes.rest.is_some();
-        if asked.is_empty() && !(present && through) {
+        let flows = sought.viscosity && self.viscous().is_some();
+        if !(!asked.is_empty() || flows || sought.curves || present && through) {
             return;
         }
         let n = asked.iter().map(|l| l.law.needs(Part::Energy)).fold(self.needs(), usize::max);
@@ -170,12 +192,19 @@ impl CellLaws<'_> {
             LawPull {
                 ln_young: work([l.force_new(weights.new), l.old.as_ref().map_or([0.0; 24], own)]),
                 poisson: if sought.poisson { work(self.by_poisson(e, &l)) } else { 0.0 },
+                curves: if sought.curves { self.by_curves(&l).into_iter().map(work).collect() } else { Vec::new() },
+                flow: if flows { self.flow_by_numbers(&l).map(|g| g * dot(&l.flow.kd, &s1)) } else { [0.0; 2] },
                 numbers: asked.iter().flat_map(|a| (0..a.p.len()).map(|slot| work(self.by_number(&l, a, slot)))).collect(),
                 rest: rest.unwrap_or_default(),
             }
         });
         for part in &parts {
             gradient.physics.poisson_ratio += part.poisson;
+            self.cells.c.pull_curves(&part.curves, gradient);
+            if let Some(v) = gradient.physics.viscosity.as_mut().filter(|_| flows) {
+                v.coefficient += part.flow[0];
+                v.exponent += part.flow[1];
+            }
             let slots = asked.iter().flat_map(|a| (0..a.p.len()).map(|slot| (a.effect, slot)));
             part.numbers.iter().zip(slots).for_each(|(g, (effect, slot))| gradient.physics.effects[effect][slot] += g);
         }
@@ -194,6 +223,10 @@ struct LawPull {
     /// By the logarithm of its modulus.
     ln_young: f64,
     poisson: f64,
+    /// By the factors of the material's curves.
+    curves: Vec<f64>,
+    /// By the viscosity's numbers.
+    flow: [f64; 2],
     /// By the numbers of the effects that are asked for, one after another.
     numbers: Vec<f64>,
     /// By the stress-free shape at the corners.

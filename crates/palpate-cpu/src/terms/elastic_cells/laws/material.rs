@@ -1,6 +1,7 @@
 //! The material of a cut cell where it is not linear: its energy of the mean strain, less the linear one's, over E.
 
-use super::{CellLaws, ENERGY, PAIRS, Slopes};
+use super::{CellLaws, ENERGY, Slopes};
+use palpate_model::materials::stretching::PAIRS;
 use palpate_model::materials::{self, Gradient, Solid};
 
 /// The mean strain as a displacement gradient.
@@ -15,12 +16,12 @@ fn entries([a, b]: [usize; 2]) -> impl Iterator<Item = usize> + Clone {
 }
 
 /// Derivative of the linear material's energy by a component of the strain.
-fn linear_stress([a, b]: [usize; 2], strain: f64, trace: f64, (lambda, mu): (f64, f64)) -> f64 {
+pub(in crate::terms) fn linear_stress([a, b]: [usize; 2], strain: f64, trace: f64, (lambda, mu): (f64, f64)) -> f64 {
     if a == b { lambda * trace + 2.0 * mu * strain } else { 4.0 * mu * strain }
 }
 
 /// Derivative of that by another component.
-fn linear_tangent(c: usize, d: usize, (lambda, mu): (f64, f64)) -> f64 {
+pub(in crate::terms) fn linear_tangent(c: usize, d: usize, (lambda, mu): (f64, f64)) -> f64 {
     let normal = |c: usize| PAIRS[c][0] == PAIRS[c][1];
     match (normal(c) && normal(d), c == d) {
         (true, same) => lambda + if same { 2.0 * mu } else { 0.0 },
@@ -76,5 +77,14 @@ impl CellLaws<'_> {
             own - linear_stress(PAIRS[c], s[1 + c], trace, by_nu)
         };
         std::array::from_fn(|k| if k == 0 { 0.0 } else { of(k - 1) })
+    }
+
+    /// Derivatives of the material's first derivatives by the factors of its curves.
+    pub(super) fn material_by_curves(&self, s: &[f64; ENERGY]) -> Vec<[f64; ENERGY]> {
+        let Some(law) = self.material else { return Vec::new() };
+        let ((lambda, mu), h) = (self.lame[0], strain(s));
+        let of =
+            |by: [f64; 9]| std::array::from_fn(|k| if k == 0 { 0.0 } else { entries(PAIRS[k - 1]).map(|i| by[i]).sum::<f64>() });
+        law.by_curves(&h, lambda, mu).into_iter().map(of).collect()
     }
 }

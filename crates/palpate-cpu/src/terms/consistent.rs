@@ -1,0 +1,100 @@
+//! The mass matrix of a body of tetrahedra: ∫ ρ N_i N_j, exactly, with one density an element.
+//!
+//! The density around a node is a coefficient of the model; an element's is the mean over its nodes, weighed as `space::tets::lumped` has them. So
+//! the whole mass is the sum of the nodes' densities times their volumes, and every entry is linear in each node's density.
+
+use super::Context;
+use glam::DVec3;
+use palpate_model::params::coefficients::Coefficients;
+use palpate_model::space::stencil::Stencil;
+use palpate_model::space::tets::{lumped, lumped_mean, mass};
+
+/// Most nodes of an element.
+const MOST: usize = 10;
+
+/// The matrix, element by element.
+pub(super) struct Consistent<'a> {
+    c: Context<'a>,
+    /// Mass of every element [kg], or its change.
+    masses: Vec<f64>,
+    /// Entries of an element's matrix over its mass.
+    unit: [[f64; MOST]; MOST],
+}
+
+impl<'a> Consistent<'a> {
+    /// With the densities at hand.
+    pub(super) fn new(c: &Context<'a>) -> Consistent<'a> {
+        let all = Consistent { c: *c, masses: Vec::new(), unit: [[0.0; MOST]; MOST] };
+        let nodes = all.nodes();
+        let unit = std::array::from_fn(|i| std::array::from_fn(|j| if i < nodes && j < nodes { mass(nodes, i, j) } else { 0.0 }));
+        let (rho, factors) = (c.physics().density, c.coefficients.changes.density.as_deref());
+        let masses = all.elements().map(|(_, s, v)| rho * factors.map_or(1.0, |f| lumped_mean(&s, f)) * v).collect();
+        Consistent { masses, unit, ..all }
+    }
+
+    /// Its change along a change of the coefficients.
+    pub(super) fn along(&self, rates: &Coefficients) -> Consistent<'a> {
+        let (rho, factors) = (self.c.physics().density, self.c.coefficients.changes.density.as_deref());
+        let (d_rho, d_factors) = (rates.physics.density, rates.changes.density.as_deref());
+        let change =
+            |s: &Stencil| d_rho * factors.map_or(1.0, |f| lumped_mean(s, f)) + rho * d_factors.map_or(0.0, |f| lumped_mean(s, f));
+        Consistent { c: self.c, masses: self.elements().map(|(_, s, v)| change(&s) * v).collect(), unit: self.unit }
+    }
+
+    /// Nodes of an element.
+    fn nodes(&self) -> usize {
+        self.c.plan.body.points.means().next().map_or(0, |s| s.nodes.len())
+    }
+
+    /// Number, nodes and volume [m³] of every element.
+    fn elements(&self) -> impl Iterator<Item = (usize, Stencil<'a>, f64)> + use<'a> {
+        let points = &self.c.plan.body.points;
+        points.means().enumerate().map(|(e, s)| (e, s, points.element_volume(e)))
+    }
+
+    /// Rows of an element's matrix over its mass, times a vector per node.
+    fn product(&self, s: &Stencil, a: &impl Fn(usize) -> DVec3) -> [DVec3; MOST] {
+        let mut own = [DVec3::ZERO; MOST];
+        s.nodes.iter().zip(&mut own).for_each(|(n, own)| *own = a(*n as usize));
+        let n = s.nodes.len();
+        std::array::from_fn(|i| own[..n].iter().zip(&self.unit[i]).map(|(a, m)| *m * *a).sum())
+    }
+
+    /// Adds M a for accelerations a(node).
+    pub(super) fn add(&self, a: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        for (e, s, _) in self.elements() {
+            let rows = self.product(&s, &a);
+            s.nodes.iter().zip(rows).for_each(|(n, row)| out[*n as usize] += self.masses[e] * row);
+        }
+    }
+
+    /// Hands every entry to `put`: its place in the matrix, and its mass [kg].
+    pub(super) fn each_block(&self, mut put: impl FnMut(usize, f64)) {
+        for (e, s, _) in self.elements() {
+            let n = s.nodes.len();
+            let places = self.c.places.points.of(self.c.plan.body.points.mean_point(e));
+            for (k, place) in places.iter().enumerate() {
+                put(*place as usize, self.masses[e] * self.unit[k / n][k % n]);
+            }
+        }
+    }
+
+    /// Sum of the diagonal [kg].
+    pub(super) fn diagonal(&self) -> f64 {
+        let trace: f64 = (0..MOST).map(|i| self.unit[i][i]).sum();
+        trace * self.masses.iter().sum::<f64>()
+    }
+
+    /// Adds z · ∂M/∂ρ a, by the density and by the factor on it at every node.
+    pub(super) fn pull_density(&self, z: &[DVec3], a: impl Fn(usize) -> DVec3, gradient: &mut Coefficients) {
+        let (rho, factors) = (self.c.physics().density, self.c.coefficients.changes.density.as_deref());
+        for (_, s, v) in self.elements() {
+            let by_density: f64 =
+                s.nodes.iter().zip(self.product(&s, &a)).map(|(n, row)| z[*n as usize].dot(row)).sum::<f64>() * v;
+            gradient.physics.density += factors.map_or(1.0, |f| lumped_mean(&s, f)) * by_density;
+            if let Some(by_factor) = &mut gradient.changes.density {
+                s.nodes.iter().zip(lumped(s.nodes.len())).for_each(|(n, w)| by_factor[*n as usize] += rho * w * by_density);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! What a recording would tell before anything is fitted: expected errors from sensitivities at one point alone.
+//!
+//! With H the Gauss–Newton matrix by z of n residuals, cov = τ H⁻¹ with τ = 1/n + systematic²/groups: residuals as large as the noise and errors of
+//! their own, which is the best that a fit can do ([`crate::Settings::errors`]). Values may be taken together, as parts of a field.
+
+use crate::dense::eigen;
+use crate::optimise::Sample;
+use crate::problem::{Problem, Want};
+use crate::settings::ErrorModel;
+use palpate_engine::MOST_SENSITIVITIES;
+
+/// Eigenvalues below this share of the largest are rounding errors.
+const RANK: f64 = 1e-12;
+
+/// What is to be expected of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expected {
+    /// Standard error of every group in z (relative errors for logarithms), for a change that its values share.
+    pub errors: Vec<f64>,
+    /// Correlation of every two groups.
+    pub correlation: Vec<Vec<f64>>,
+    /// ½ Σ ln(λ/τ) over the eigenvalues λ of H: what two recordings differ by is how much more the one tells [nats].
+    pub information: f64,
+    /// Residuals that it is taken from.
+    pub residuals: usize,
+}
+
+/// Expected errors at values `[q]` of the problem, with values in groups that change together.
+///
+/// # Errors
+/// Why it could not be simulated, or that nothing is seen.
+pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], errors: &ErrorModel) -> Result<Expected, String> {
+    let z: Vec<f64> = problem.charts().iter().zip(values).map(|(c, v)| c.coordinate(*v)).collect();
+    let (q, m) = (z.len(), groups.len());
+    let whole = q <= MOST_SENSITIVITIES;
+    let sample: Sample = problem.evaluate(std::slice::from_ref(&z), if whole { Want::Curvature } else { Want::Cost }).remove(0);
+    if let Some(why) = sample.failure {
+        return Err(why);
+    }
+    if sample.residuals == 0 {
+        return Err("nothing is compared".into());
+    }
+    let mut h = vec![0.0; m * m];
+    for (a, group) in groups.iter().enumerate() {
+        let row: Vec<f64> = if whole {
+            (0..q).map(|j| group.iter().map(|i| sample.curvature[i * q + j]).sum()).collect()
+        } else {
+            let mut along = vec![0.0; q];
+            group.iter().for_each(|i| along[*i] = 1.0);
+            problem.product(&z, &along).map_err(|f| f.to_string())?
+        };
+        for (b, other) in groups.iter().enumerate() {
+            h[a * m + b] = other.iter().map(|j| row[*j]).sum();
+        }
+    }
+    // Products are symmetric but for rounding.
+    let h: Vec<f64> = (0..m * m).map(|k| 0.5 * (h[k] + h[k % m * m + k / m])).collect();
+    let tau = 1.0 / sample.residuals as f64 + errors.systematic.powi(2) / errors.groups as f64;
+    let (lambda, vectors) = eigen(&h, m).ok_or("the curvature of the cost is not finite")?;
+    let largest = lambda.iter().fold(0.0, |m: f64, l| m.max(*l));
+    if largest <= 0.0 {
+        return Err("no free number changes what is read".into());
+    }
+    let lambda: Vec<f64> = lambda.into_iter().map(|l| l.max(RANK * largest)).collect();
+    let covariance = |a: usize, b: usize| (0..m).map(|k| tau / lambda[k] * vectors[k][a] * vectors[k][b]).sum::<f64>();
+    let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
+    let correlation = (0..m).map(|a| (0..m).map(|b| covariance(a, b) / (sd[a] * sd[b])).collect()).collect();
+    let information = 0.5 * lambda.iter().map(|l| (l / tau).ln()).sum::<f64>();
+    Ok(Expected { errors: sd, correlation, information, residuals: sample.residuals })
+}

@@ -1,0 +1,47 @@
+//! A scene as the template of another one.
+
+use super::write::{rebase, section, set};
+use crate::error::InputError;
+use palpate_model::scene::{Resolution, Scene};
+use std::path::Path;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
+
+/// The text of `scene` with another grid and another recording, readable from `folder`: its `[observation]`, targets and `[fit]` give way to a recording
+/// of tracked points at `recording` (relative to `folder`) and a fit of the numbers at `free`, from the scene's own values.
+///
+/// # Errors
+/// A template that is no TOML.
+pub fn recast_scene(
+    template: &str,
+    scene: &Scene,
+    resolution: Resolution,
+    recording: &str,
+    free: &[String],
+    folder: &Path,
+) -> Result<String, InputError> {
+    let mut doc: DocumentMut = template
+        .parse()
+        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
+    for key in ["observation", "target", "fit"] {
+        doc.remove(key);
+    }
+    let wrong = |key: &str| InputError { key: key.into(), ..InputError::file(&scene.path, "must be a table") };
+    let object = section(&mut doc, "object").ok_or_else(|| wrong("object"))?;
+    let (cells, tetrahedra) = (&["cell_size", "cells"][..], &["edge_length", "discretisation"][..]);
+    let (without, with): (&[&[&str]], Vec<(&str, Value)>) = match resolution {
+        Resolution::CellSize(h) => (&[cells, tetrahedra], vec![("cell_size", h.into())]),
+        Resolution::Cells(n) => (&[cells, tetrahedra], vec![("cells", i64::from(n).into())]),
+        Resolution::Edge(h) => (&[cells], vec![("discretisation", "tetrahedra".into()), ("edge_length", h.into())]),
+        Resolution::Own | Resolution::Open | Resolution::OpenEdge => (&[], Vec::new()),
+    };
+    without.iter().flat_map(|keys| *keys).for_each(|key| drop(object.remove(key)));
+    with.into_iter().for_each(|(key, value)| set(object, key, value));
+    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    let observation = section(&mut doc, "observation").ok_or_else(|| wrong("observation"))?;
+    set(observation, "recording", Value::from(recording));
+    set(observation, "cost", Value::from("points"));
+    let parameters: Array = free.iter().map(|p| Value::InlineTable(InlineTable::from_iter([("path", p.as_str())]))).collect();
+    let fit = section(&mut doc, "fit").ok_or_else(|| wrong("fit"))?;
+    fit.insert("parameter", Item::Value(Value::Array(parameters)));
+    Ok(doc.to_string())
+}

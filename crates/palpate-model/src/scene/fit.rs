@@ -1,0 +1,68 @@
+//! `[fit]`: what is to be found out, and how.
+
+/// What is to be found out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitSpec {
+    /// The optimiser; `None` where the scene leaves the choice.
+    pub optimizer: Option<Optimizer>,
+    /// Most iterations per start.
+    pub iterations: usize,
+    /// Number of starts.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Threads; 0 = all.
+    pub threads: usize,
+    /// Free parameters.
+    pub parameters: Vec<FitParameter>,
+}
+
+/// Optimisers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Optimizer {
+    /// Resilient propagation: signs of the gradient only (the paper).
+    Rprop,
+    /// Gradient descent with adaptive (Barzilai–Borwein) steps.
+    GradientDescent,
+    /// Limited-memory quasi-Newton.
+    Lbfgs,
+    /// Gauss–Newton with Levenberg–Marquardt damping.
+    GaussNewton,
+    /// The same without a matrix: products by a tangent and an adjoint, for fields.
+    GaussNewtonCg,
+    /// Simplex search without gradients.
+    NelderMead,
+}
+
+impl Optimizer {
+    /// All by their names in files and on the command line.
+    pub const ALL: [(&'static str, Optimizer); 6] = [
+        ("rprop", Optimizer::Rprop),
+        ("gradient-descent", Optimizer::GradientDescent),
+        ("lbfgs", Optimizer::Lbfgs),
+        ("gauss-newton", Optimizer::GaussNewton),
+        ("gauss-newton-cg", Optimizer::GaussNewtonCg),
+        ("nelder-mead", Optimizer::NelderMead),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Optimizer::ALL.iter().find(|o| o.1 == self).map_or("", |o| o.0)
+    }
+}
+
+/// One free number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitParameter {
+    /// Path in the scene file: a component of a vector and a region of a field have their own entry, a field by cells or nodes has one for
+    /// all its values; `material.mass` stays as written.
+    pub path: String,
+    /// Where starts are drawn from (equal ends: a fixed start).
+    pub start: (f64, f64),
+    /// Allowed range.
+    pub bounds: (f64, f64),
+    /// Value and standard deviation that are known beforehand: a Gaussian prior in the number's own unit.
+    pub known: Option<(f64, f64)>,
+    /// With several scenes: not shared between them.
+    pub per_scene: bool,
+}
