@@ -55,7 +55,7 @@ impl Sums {
             ("cell_pulls", cells),
             ("cell_sums", cell_rows * each(shape.cells, 8)),
             ("elastic_pulls", shape.elastic.into()),
-            ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * each(shape.elastic, 64)),
+            ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * u64::from(shape.elastic)),
             ("density_pulls", shape.elastic.into()),
             ("held_sums", each(shape.nodes, 64)),
             ("hold_pulls", holds),
@@ -145,7 +145,7 @@ impl Member<'_> {
     }
 
     fn elastic(&self, row: u32) -> f64 {
-        self.sum("elastic_sums", row, self.shape.elastic.div_ceil(64), 1)[0]
+        self.sum("elastic_sums", row, self.shape.elastic, 1)[0]
     }
 
     fn holds(&self, row: u32) -> f64 {
