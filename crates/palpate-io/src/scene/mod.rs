@@ -9,6 +9,7 @@ mod material;
 mod motion;
 mod object;
 mod rework;
+mod rows;
 pub(crate) mod scale;
 mod target;
 #[cfg(test)]

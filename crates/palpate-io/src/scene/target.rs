@@ -1,5 +1,6 @@
 //! `[[target]]`: where points of the body shall be.
 
+use super::rows::rows;
 use crate::document::Table;
 use crate::error::InputError;
 use glam::DVec3;
@@ -50,25 +51,8 @@ fn target(t: &Table) -> Result<Target, InputError> {
 
 /// Rows `x,y,z,to_x,to_y,to_z` (m).
 fn read(path: &Path) -> Result<(Vec<DVec3>, Vec<DVec3>), InputError> {
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
-    let broken = |e: csv::Error| {
-        let line = e.position().map(|p| p.line() as usize);
-        InputError { line, ..InputError::file(path, format!("not a readable CSV file: {e}")) }
-    };
-    let header: Vec<String> = reader.headers().map_err(broken)?.iter().map(str::to_string).collect();
-    if header != COLUMNS {
-        return Err(InputError::line(path, 1, format!("columns are {}, expected {}", header.join(","), COLUMNS.join(","))));
-    }
     let (mut points, mut positions) = (Vec::new(), Vec::new());
-    for record in reader.records() {
-        let record = record.map_err(broken)?;
-        let line = record.position().map_or(0, |p| p.line() as usize);
-        let mut v = [0.0; 6];
-        for (i, field) in record.iter().enumerate() {
-            v[i] = (field.parse().ok().filter(|x: &f64| x.is_finite()))
-                .ok_or_else(|| InputError::line(path, line, format!("{}: \"{field}\" is not a finite number", COLUMNS[i])))?;
-        }
+    for (_, v) in rows(path, COLUMNS)? {
         points.push(DVec3::from_slice(&v[..3]));
         positions.push(DVec3::from_slice(&v[3..]));
     }
