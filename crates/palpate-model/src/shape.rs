@@ -1,6 +1,7 @@
 //! Rest shapes as signed distances: analytic bodies and triangle meshes.
 
 mod analytic;
+pub(crate) mod components;
 mod mesh;
 mod pseudonormal;
 mod repair;

@@ -1,5 +1,6 @@
 //! What is wrong with a triangle mesh, and what of it can be put right without guessing.
 
+use super::components::components;
 use super::{MeshShape, TriMesh};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -54,32 +55,6 @@ fn edge_uses(mesh: &TriMesh) -> BTreeMap<[u32; 2], Vec<(usize, bool)>> {
     uses
 }
 
-/// Number of each triangle's component (joined by common vertices), and how many there are.
-fn components(mesh: &TriMesh) -> (Vec<usize>, usize) {
-    let mut parent: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
-    for t in &mesh.triangles {
-        for v in &t[1..] {
-            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, *v));
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let mut numbers = BTreeMap::new();
-    let of = mesh.triangles.iter().map(|t| {
-        let r = root(&mut parent, t[0]);
-        let next = numbers.len();
-        *numbers.entry(r).or_insert(next)
-    });
-    let of: Vec<usize> = of.collect();
-    (of, numbers.len())
-}
-
 /// Examines a mesh.
 pub fn diagnose(mesh: &TriMesh) -> MeshReport {
     let uses = edge_uses(mesh);
@@ -92,7 +67,7 @@ pub fn diagnose(mesh: &TriMesh) -> MeshReport {
         inconsistent_edges: count(|u| u.len() == 2 && u[0].1 == u[1].1),
         signed_volume: mesh.volume(),
         intersecting_pairs: intersecting_pairs(mesh),
-        components: components(mesh).1,
+        components: components(&mesh.triangles, mesh.vertices.len()).1,
         degenerate_triangles: (0..mesh.triangles.len()).filter(|&t| is_degenerate(mesh, t)).count(),
         size: mesh.size(),
         holes,
@@ -292,7 +267,7 @@ fn orient(mesh: &mut TriMesh) -> usize {
 
 /// Turns parts with negative volume, unless they lie inside another part (a cavity).
 fn turn_outward(mesh: &mut TriMesh) -> usize {
-    let (of, count) = components(mesh);
+    let (of, count) = components(&mesh.triangles, mesh.vertices.len());
     let part = |mesh: &TriMesh, keep: &dyn Fn(usize) -> bool| TriMesh {
         vertices: mesh.vertices.clone(),
         triangles: (0..of.len()).filter(|&t| keep(of[t])).map(|t| mesh.triangles[t]).collect(),

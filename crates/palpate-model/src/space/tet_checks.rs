@@ -1,5 +1,6 @@
 //! What keeps a mesh of tetrahedra from being a body, and what only deserves a word: each with counts and what to do.
 
+use crate::shape::components::components;
 use crate::space::points::TetMesh;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -159,25 +160,7 @@ impl TetMesh {
 
     /// Number of parts that share no node.
     fn parts(&self) -> usize {
-        let mut root: Vec<u32> = (0..self.nodes.len() as u32).collect();
-        fn find(root: &mut [u32], mut n: u32) -> u32 {
-            while root[n as usize] != n {
-                root[n as usize] = root[root[n as usize] as usize];
-                n = root[n as usize];
-            }
-            n
-        }
-        for t in &self.tets {
-            let first = find(&mut root, t[0]);
-            for n in &t[1..] {
-                let other = find(&mut root, *n);
-                root[other as usize] = first;
-            }
-        }
-        let mut used: Vec<u32> = self.tets.iter().map(|t| find(&mut root, t[0])).collect();
-        used.sort_unstable();
-        used.dedup();
-        used.len()
+        components(&self.tets, self.nodes.len()).1
     }
 
     /// The same without nodes that no tetrahedron has; groups lose them too.
