@@ -3,8 +3,8 @@
 //!
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
-//! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, and
-//! `effects/cells` for every law of cells; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
+//! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, `effects/nodes`
+//! and `effects/patches` for those that act there (a kernel compiles as long as all its laws take), and `effects/cells` for every law of cells; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
 
 mod validate;
 
@@ -132,8 +132,13 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
     if !done.insert(file.to_string()) {
         return;
     }
-    if file == "effects/points" {
-        return include_points(shaders, variant, done, out);
+    let on_nodes = |law: &Law| matches!(law.site, Site::Nodes(_));
+    let on_patches = |law: &Law| matches!(law.site, Site::Surface(_) | Site::Contact(_));
+    match file {
+        "effects/points" => return include_points(shaders, variant, done, out, |law| on_nodes(law) || on_patches(law)),
+        "effects/nodes" => return include_points(shaders, variant, done, out, on_nodes),
+        "effects/patches" => return include_points(shaders, variant, done, out, on_patches),
+        _ => {}
     }
     if file == "effects/cells" {
         return include_cells(shaders, variant, done, out);
@@ -155,11 +160,16 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
     }
 }
 
-/// All laws of points, the function `potential` that calls the one of a number in the table of effects, and where the input holds
+/// The laws of points that `acts` picks, the function `potential` that calls the one of a number in the table of effects, and where the input holds
 /// what.
-fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
+fn include_points(
+    shaders: &Path,
+    variant: &str,
+    done: &mut BTreeSet<String>,
+    out: &mut String,
+    acts: impl Fn(&Law) -> bool,
+) {
     include(shaders, "shared/points", variant, done, out);
-    let acts = |law: &Law| matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_));
     let cases = include_laws(shaders, variant, done, out, acts, "");
     let places = [
         ("COMMON", law::COMMON),

@@ -1,7 +1,7 @@
 //! What an effect does to every node, added to what the balance's own passes left there. call.extra: the effect and the
 //! question (shared/points.wgsl).
 //! `forces` is the residual (with the energy), the right-hand side of a tangent, the adjoint of the old state or a column.
-// use effects/points
+// use effects/nodes
 
 // [B][rows][N]: volumes of the nodes, or their shares of the effect's load, and the shares' derivatives.
 var<storage, read> effect_measures: array<f32>;
@@ -45,11 +45,9 @@ fn press_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if what == COLUMN {
         change_along(effect, p.member);
         if effect.slopes != NONE {
-            for (var i = 0u; i < MOST; i++) {
-                if i < effect.count {
-                    let slope = effect_measures[(p.member * effect.rows + effect.slopes + i) * shape.nodes + p.item];
-                    measure.z += slope * change[COMMON + i];
-                }
+            for (var i = 0u; i < effect.count; i++) {
+                let slope = effect_measures[(p.member * effect.rows + effect.slopes + i) * shape.nodes + p.item];
+                measure.z += slope * change[COMMON + i];
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What an effect does to every surface patch, at every plane where it is one of contact, added to `touches` of touch_patches.
 //! call.extra as of press_nodes. No effect of patches reads the old velocity, so that BACK has nothing to say of it.
-// use effects/points
+// use effects/patches
 // use shared/patch_way
 // use shared/probed
 
@@ -35,7 +35,7 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         if (effect.site != AT_CONTACT && k > 0u) || (effect.site == AT_CONTACT && shape.planes == 0u) {
             break;
         }
-        for (var i = 0u; i < INPUTS; i++) {
+        for (var i = 0u; i < inputs; i++) {
             change[i] = 0.0;
         }
         if what == BY_OLD {

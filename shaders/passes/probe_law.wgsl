@@ -23,7 +23,8 @@ fn probe_law(@builtin(global_invocation_id) id: vec3<u32>) {
     let x = vec3(probes[input], probes[input + 1u], probes[input + 2u]);
     let old = vec3(probes[input + OLD_AT], probes[input + OLD_AT + 1u], probes[input + OLD_AT + 2u]);
     place_point(origin, x - origin, vec3(0.0), old - origin, vec3(0.0), vec3(0.0));
-    for (var i = 0u; i < INPUTS; i++) {
+    inputs = INPUTS;
+    for (var i = 0u; i < inputs; i++) {
         z[i] = number(probes[input + i]);
         change[i] = probes[input + INPUTS + i];
     }

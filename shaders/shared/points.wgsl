@@ -54,6 +54,8 @@ var<private> z: array<vec4<f32>, INPUTS>;
 var<private> change: array<f32, INPUTS>;
 // Volume, area or share.
 var<private> measure: vec4<f32>;
+// Entries of the input that the law at hand has. Loops over inputs go as far and no farther, which also keeps compilers from unrolling them.
+var<private> inputs: u32;
 
 fn three_of(at: u32) -> Three {
     return Three(z[at], z[at + 1u], z[at + 2u]);
@@ -195,14 +197,13 @@ fn prepare(effect: EffectSite, member: u32, m: Member, mix: Mix) {
         spot.inertia = mix.inertia;
         spot.momentum = 1.0 / (shape.theta * shape.dt);
     }
-    for (var i = 0u; i < INPUTS; i++) {
+    inputs = COMMON + effect.count;
+    for (var i = 0u; i < inputs; i++) {
         z[i] = vec4(0.0);
         change[i] = 0.0;
     }
-    for (var i = 0u; i < MOST; i++) {
-        if i < effect.count {
-            z[COMMON + i] = number(effect_values[member * effect.stride + effect.first + i]);
-        }
+    for (var i = 0u; i < effect.count; i++) {
+        z[COMMON + i] = number(effect_values[member * effect.stride + effect.first + i]);
     }
     for (var i = 0u; i < 3u; i++) {
         z[GRAVITY_AT + i] = number(m.gravity[i]);
@@ -229,10 +230,8 @@ fn place_point(origin: vec3<f32>, whole: vec3<f32>, rest: vec3<f32>, old_whole: 
 // Change of the input along a direction, but for a plane's part of it.
 fn change_along(effect: EffectSite, member: u32) {
     let r = rates[member];
-    for (var i = 0u; i < MOST; i++) {
-        if i < effect.count {
-            change[COMMON + i] = rate_numbers[numbers_at(member) + shape.rate_effects + effect.first + i];
-        }
+    for (var i = 0u; i < effect.count; i++) {
+        change[COMMON + i] = rate_numbers[numbers_at(member) + shape.rate_effects + effect.first + i];
     }
     for (var i = 0u; i < 3u; i++) {
         change[GRAVITY_AT + i] = r.gravity[i];
@@ -245,10 +244,8 @@ fn change_along(effect: EffectSite, member: u32) {
 fn respond(law: u32, what: u32, weight: vec3<f32>) -> Response {
     var r: Response;
     let slope = measure.z;
-    for (var k = 0u; k < 6u; k++) {
-        if (what == FORCE && k >= 2u) || ((what == BY_OLD || what == COLUMN) && k >= 3u) {
-            break;
-        }
+    let pairs = select(select(3u, 6u, what == STIFFNESS || what == BACK), 2u, what == FORCE);
+    for (var k = 0u; k < pairs; k++) {
         // Entries of x that ε₁ and ε₂ stand for: of STIFFNESS the pairs xx, yy, zz, xy, xz, yz.
         var first = k % 3u;
         var second = NONE;
@@ -260,7 +257,7 @@ fn respond(law: u32, what: u32, weight: vec3<f32>) -> Response {
             first = select(k, max(k, 4u) - 4u, k >= 3u);
             second = select(k, select(2u, 1u, k == 3u), k >= 3u);
         }
-        for (var i = 0u; i < INPUTS; i++) {
+        for (var i = 0u; i < inputs; i++) {
             var e = vec2(0.0);
             if i < 3u {
                 e.x = select(f32(i == first), weight[i], what == BACK);

@@ -36,7 +36,7 @@ struct Shape { // mirrored
     time: f32,
     contact_width: f32,
     aging_rows: u32,
-    point_groups: u32,
+    point_items: u32,
     rate_numbers: u32,
     rate_effects: u32,
     first_patch: u32,

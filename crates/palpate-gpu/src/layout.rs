@@ -77,8 +77,8 @@ pub struct Shape {
     pub contact_width: f32,
     /// Numbers of effects that change the stiffness in time.
     pub aging_rows: u32,
-    /// Workgroups of 64 over nodes or patches, whichever are more.
-    pub point_groups: u32,
+    /// Nodes or patches, whichever are more.
+    pub point_items: u32,
     /// Numbers of a member among the rates of a direction.
     pub rate_numbers: u32,
     /// Where those of effects begin.

@@ -40,14 +40,19 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("instant < end") => 2,
         () if has("< instant_count") => palpate_model::mechanics::contact::INSTANTS as u64,
         () if has("hold_start") || has("patch_start") => most.supports,
-        () if has("max(shape.planes, 1u)") => most.pressed.max(1),
+        () if has("max(shape.planes, 1u)") || has("select(1u, shape.planes") => most.pressed.max(1),
         () if has("shape.planes") => most.planes,
         () if has("shape.masses") => most.masses,
         () if has("row < poses") => most.grips,
         () if has("row < matrices") => most.grips,
         () if has("shape.aging_rows") => most.aging,
         () if has("< PLANE_ROWS") => pulls::PLANE_ROWS.into(),
-        () if has("MOST + POINT_ROWS") => palpate_model::effects::law::MOST as u64 + u64::from(pulls::POINT_ROWS),
+        () if has("effect.count + POINT_ROWS") => {
+            palpate_model::effects::law::MOST as u64 + u64::from(pulls::POINT_ROWS + pulls::PLANE_ROWS)
+        }
+        () if has("< effect.count") => palpate_model::effects::law::MOST as u64,
+        // Second derivatives of a law: pairs of x.
+        () if has("k < pairs") => 6,
         () if has("call.extra * shape.members") => columns(most.members) * most.members,
         () if has("q < call.extra") => columns(most.members),
         () if has("shape.members") => most.members,
@@ -56,7 +61,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("< KINDS") => KINDS as u64,
         // H, λ and μ.
         () if has("< MATERIAL_INPUTS") => 11,
-        () if has("< INPUTS") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
+        () if has("< inputs") => (palpate_model::effects::law::COMMON + palpate_model::effects::law::MOST) as u64,
         () if has("i = SCALARS; i < CELL_INPUTS") => palpate_model::effects::cell::MOST as u64,
         () if has("< CELL_INPUTS") => (palpate_model::effects::cell::ENERGY + palpate_model::effects::cell::MOST) as u64,
         () if has("< SCALARS") => palpate_model::effects::cell::ENERGY as u64,

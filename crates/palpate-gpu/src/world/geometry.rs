@@ -166,7 +166,7 @@ impl Geometry {
             fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
             time: plan.clock.step as f32,
             aging_rows: effects.aging_rows,
-            point_groups: n.max(if touched { patches.len() } else { 0 }).div_ceil(64) as u32,
+            point_items: n.max(if touched { patches.len() } else { 0 }) as u32,
             rate_numbers,
             rate_effects,
             first_patch,

@@ -65,7 +65,7 @@ impl Sums {
             ("rest_pulls", if self.sought.rest { 4 * nodes } else { 0 }),
             ("mass_pulls", u64::from(shape.masses)),
             ("patch_sums", 4 * u64::from(shape.planes) * each(shape.patches, 64)),
-            ("point_sums", u64::from(self.point_rows * shape.point_groups)),
+            ("point_sums", u64::from(self.point_rows) * u64::from(shape.point_items)),
             ("velocity_sums", 8 * each(shape.nodes, 64)),
         ];
         floats.into_iter().map(|(name, count)| (name, 4 * count * members)).collect()
@@ -105,7 +105,7 @@ impl Sums {
             }
         }
         for ((number, site), first) in effects.points.iter().zip(&self.points) {
-            let row = |k: u32| at.sum("point_sums", first + k, shape.point_groups, 1)[0];
+            let row = |k: u32| at.sum("point_sums", first + k, shape.point_items, 1)[0];
             g.physics.effects[*number].iter_mut().enumerate().for_each(|(slot, out)| *out += row(slot as u32));
             g.physics.gravity += DVec3::from_array([0, 1, 2].map(|a| row(site.count + a)));
             g.physics.youngs_modulus += row(site.count + 3);
