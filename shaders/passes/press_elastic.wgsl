@@ -16,20 +16,29 @@ fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let m = members[p.member];
     let mix = mix_of(m);
     let lame = lame_at(m, p.item).xy;
+    // One call of the material for both states: kernels compile as long as materials take.
+    var h = mat3x3<f32>();
+    var weight = mix.fresh;
+    if call.extra == STRESS_OLD {
+        h = gradient_now(p.member, p.item);
+        weight = mix.old;
+    } else {
+        h = gradient_next(p.member, p.item);
+    }
     var stress = mat3x3<f32>();
     var energy = 0.0;
+    if weight != 0.0 {
+        let r = stress_at(h, lame);
+        stress = r.stress * weight;
+        energy = r.energy * weight;
+    }
     // What no modulus scales.
     var flow: Flow;
     var flowing = mat3x3<f32>();
     if call.extra == STRESS_OLD {
-        if mix.old != 0.0 {
-            stress = stress_at(gradient_now(p.member, p.item), lame).stress * mix.old;
-        }
+        energy = 0.0;
     } else {
-        let h = gradient_next(p.member, p.item);
-        let r = stress_at(h, lame);
-        stress = r.stress * mix.fresh + viscous(p.member, p.item, h, lame) * mix.rate;
-        energy = mix.fresh * r.energy;
+        stress += viscous(p.member, p.item, h, lame) * mix.rate;
         if mix.rate != 0.0 {
             let g = strained(p.member, p.item, h);
             energy += 0.5 * mix.rate * contract(g, linear_stress(g, lame));
