@@ -4,7 +4,7 @@
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
 //! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, and
-//! `effects/cells` for every law of cells; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
+//! `effects/cells` and `effects/tets` for every law of cells, on cells and on tetrahedra; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
 
 mod validate;
 
@@ -136,7 +136,10 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
         return include_points(shaders, variant, done, out);
     }
     if file == "effects/cells" {
-        return include_cells(shaders, variant, done, out);
+        return include_cells(shaders, variant, "shared/cell_laws", done, out);
+    }
+    if file == "effects/tets" {
+        return include_cells(shaders, variant, "shared/tet_laws", done, out);
     }
     if file == "materials/all" {
         return include_materials(shaders, variant, done, out);
@@ -182,9 +185,10 @@ fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, ou
     .expect("a String takes all");
 }
 
-/// All laws of cells, the function `cell_law` that calls the one of a number in the table of effects, and the sizes of the input.
-fn include_cells(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
-    include(shaders, "shared/laws", variant, done, out);
+/// All laws of cells with the file that asks them, the function `cell_law` that calls the one of a number in the table of effects, and the sizes
+/// of the input.
+fn include_cells(shaders: &Path, variant: &str, asking: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    include(shaders, asking, variant, done, out);
     let cases = include_laws(shaders, variant, done, out, |law| matches!(law.site, Site::Cells(_)), "which");
     let (scalars, inputs) = (cell::ENERGY, cell::ENERGY + cell::MOST);
     write!(
