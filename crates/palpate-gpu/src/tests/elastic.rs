@@ -244,7 +244,7 @@ fn evaluations_with_markers_and_displacements_agree_with_the_cpu() {
 fn memory_of_a_body_of_tetrahedra_is_foreseen() {
     let Some(gpu) = own_device() else { return };
     let mut scene = of_tets(held(0.03), Quadratic, 3);
-    for (kind, key, value) in [("structural-damping", "loss", 1.0), ("compliant-clamp", "layer", 0.004)] {
+    for (kind, key, value) in [("strain-stiffening", "coefficient", 5.0), ("compliant-clamp", "layer", 0.004)] {
         super::effects::with(&mut scene, kind, &[(key, &[value])]);
     }
     let plan = plan(&scene);
