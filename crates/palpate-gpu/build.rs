@@ -4,7 +4,8 @@
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
 //! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
 //! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, `effects/nodes`
-//! and `effects/patches` for those that act there (a kernel compiles as long as all its laws take), and `effects/cells` for every law of cells; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
+//! and `effects/patches` for those that act there (a kernel compiles as long as all its laws take), `effects/cells` and `effects/tets` for
+//! every law of cells, on cells and on tetrahedra; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
 
 mod validate;
 
@@ -138,13 +139,10 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
         "effects/points" => return include_points(shaders, variant, done, out, |law| on_nodes(law) || on_patches(law)),
         "effects/nodes" => return include_points(shaders, variant, done, out, on_nodes),
         "effects/patches" => return include_points(shaders, variant, done, out, on_patches),
+        "effects/cells" => return include_cells(shaders, variant, "shared/cell_laws", done, out),
+        "effects/tets" => return include_cells(shaders, variant, "shared/tet_laws", done, out),
+        "materials/all" => return include_materials(shaders, variant, done, out),
         _ => {}
-    }
-    if file == "effects/cells" {
-        return include_cells(shaders, variant, done, out);
-    }
-    if file == "materials/all" {
-        return include_materials(shaders, variant, done, out);
     }
     let path = shaders.join(format!("{file}.wgsl"));
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -162,13 +160,7 @@ fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String
 
 /// The laws of points that `acts` picks, the function `potential` that calls the one of a number in the table of effects, and where the input holds
 /// what.
-fn include_points(
-    shaders: &Path,
-    variant: &str,
-    done: &mut BTreeSet<String>,
-    out: &mut String,
-    acts: impl Fn(&Law) -> bool,
-) {
+fn include_points(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String, acts: impl Fn(&Law) -> bool) {
     include(shaders, "shared/points", variant, done, out);
     let cases = include_laws(shaders, variant, done, out, acts, "");
     let places = [
@@ -192,9 +184,10 @@ fn include_points(
     .expect("a String takes all");
 }
 
-/// All laws of cells, the function `cell_law` that calls the one of a number in the table of effects, and the sizes of the input.
-fn include_cells(shaders: &Path, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {
-    include(shaders, "shared/laws", variant, done, out);
+/// All laws of cells with the file that asks them, the function `cell_law` that calls the one of a number in the table of effects, and the sizes
+/// of the input.
+fn include_cells(shaders: &Path, variant: &str, asking: &str, done: &mut BTreeSet<String>, out: &mut String) {
+    include(shaders, asking, variant, done, out);
     let cases = include_laws(shaders, variant, done, out, |law| matches!(law.site, Site::Cells(_)), "which");
     let (scalars, inputs) = (cell::ENERGY, cell::ENERGY + cell::MOST);
     write!(

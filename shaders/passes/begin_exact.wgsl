@@ -38,7 +38,7 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         cg_along[a] = vec4(z, 0.0);
         state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
         if shape.held != 0u {
-            state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(i));
+            state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(p.member, i));
         }
     }
     let s = total(local, state);

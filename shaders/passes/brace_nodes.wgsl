@@ -1,6 +1,5 @@
 //! Adds the springs of nodes that are held to the diagonal of the matrix of a body without cells.
-// use shared/grid
-// use shared/held
+// use shared/springs
 
 var<storage, read> diagonals: array<u32>;
 var<storage, read_write> values: array<f32>;
@@ -12,7 +11,11 @@ fn brace_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !p.live {
         return;
     }
-    let added = spring_of(p.item);
+    let firm = firm_of(members[p.member], p.member);
+    var added = 0.0;
+    for (var k = held_rows[p.item]; k < held_rows[p.item + 1u]; k++) {
+        added += spring_at(firm, layer_of(p.member), holders[k]).stiffness;
+    }
     let at = (p.member * shape.blocks + diagonals[p.item]) * 9u;
     for (var axis = 0u; axis < 3u; axis++) {
         values[at + 4u * axis] += added;

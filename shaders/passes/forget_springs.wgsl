@@ -9,7 +9,7 @@ var<storage, read_write> inverses: array<vec4<f32>>;
 fn forget_springs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
     let p = find_place(group, groups, local, shape.nodes, 64u);
-    if p.live && is_held(p.item) {
+    if p.live && is_held(p.member, p.item) {
         inverses[2u * at_node(p.member, p.item) + 1u].z = 0.0;
     }
 }

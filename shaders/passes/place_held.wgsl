@@ -1,5 +1,4 @@
 //! Puts nodes that are held where their clamps want them, whatever the trial says.
-// use shared/mix
 // use shared/wanted
 
 var<storage, read> now: array<vec4<f32>>;
@@ -10,7 +9,7 @@ var<storage, read_write> trial: array<vec4<f32>>;
 fn place_held(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) local: u32) {
     let p = find_place(group, groups, local, shape.nodes, 64u);
-    if !p.live || !is_held(p.item) {
+    if !p.live || !is_held(p.member, p.item) {
         return;
     }
     let a = at_node(p.member, p.item);

@@ -11,6 +11,8 @@ var<storage, read> elastic_list: array<vec2<u32>>;
 var<storage, read> elastic_stress: array<vec4<f32>>;
 var<storage, read> touches: array<vec4<f32>>;
 var<storage, read_write> forces: array<vec4<f32>>;
+// [B][N]: force of the clamps on nodes that they hold, where effects act on clamps.
+var<storage, read_write> reactions: array<vec4<f32>>;
 // As gather_residual has it.
 var<storage, read_write> sizes: array<vec4<f32>>;
 
@@ -43,8 +45,12 @@ fn spread_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         return;
     }
     let r = forces[a] + elastic + support;
-    // A node that is held has no balance of its own.
-    forces[a] = vec4(select(r.xyz, vec3(0.0), is_held(p.item)), r.w);
+    // A node that is held has no balance of its own: what is left is what its clamp bears.
+    let held = is_held(p.member, p.item);
+    if held && (shape.fields & FIELD_GRIPS) != 0u {
+        reactions[a] = vec4(-r.xyz, 0.0);
+    }
+    forces[a] = vec4(select(r.xyz, vec3(0.0), held), r.w);
     sizes[a] += vec4(elastic.xyz, abs(elastic.w) + abs(support.w));
     sizes[part(1u) + a] += vec4(support.xyz, 0.0);
 }

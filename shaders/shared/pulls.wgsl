@@ -22,6 +22,8 @@ const ROW_AT = 13u;
 // Rows of the sums over cells and over clamp cells before those of effects' numbers, and numbers of a law of cells.
 const CELL_ROWS = 4u;
 const HOLD_ROWS = 2u;
+// Rows of the sums over held nodes before those of changes in time.
+const HELD_ROWS = 3u;
 const CELL_SLOTS = 8u;
 // Rows of a law of points beside its own numbers: gravity, stiffness, time; and of each plane: height and angles, stiffness.
 const POINT_ROWS = 5u;

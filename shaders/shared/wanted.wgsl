@@ -1,31 +1,40 @@
 //! Where clamps want the nodes that they hold.
-// use shared/held
+// use shared/springs
 
 var<storage, read> rest: array<vec4<f32>>;
 // As in shared/holds.
 var<storage, read> poses: array<ClampPose>;
 
+fn instant_now() -> u32 {
+    return select(0u, call.step + 1u, call.mode != 0u);
+}
+
 fn pose_now(member: u32, by: u32) -> ClampPose {
-    let instant = select(0u, call.step + 1u, call.mode != 0u);
-    return poses[(member * (shape.steps + 1u) + instant) * shape.clamps + by];
+    return poses[(member * (shape.steps + 1u) + instant_now()) * shape.clamps + by];
 }
 
 // Displacement at which the springs of a node balance [m].
 fn wanted_at(member: u32, node: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var k = held_rows[node]; k < held_rows[node + 1u]; k++) {
-        let pose = pose_now(member, holders[k].by);
-        sum += (holders[k].stiffness / spring_of(node)) * (pose.excess * rest[node].xyz + pose.shift.xyz);
+        sum += (holders[k].stiffness / spring_of(node)) * wanted_by(member, holders[k].by, node);
     }
     return sum;
 }
 
+// Where clamp `by` wants a node [m].
+fn wanted_by(member: u32, by: u32, node: u32) -> vec3<f32> {
+    let pose = pose_now(member, by);
+    return pose.excess * rest[node].xyz + pose.shift.xyz;
+}
+
 // Derivative of the springs' pull by time [N/s].
-fn pull_rate(member: u32, node: u32) -> vec3<f32> {
+fn pull_rate(m: Member, member: u32, node: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var k = held_rows[node]; k < held_rows[node + 1u]; k++) {
         let pose = pose_now(member, holders[k].by);
-        sum += holders[k].stiffness * (pose.turn_rate * rest[node].xyz + pose.shift_rate.xyz);
+        let spring = spring_at(firm_of(m, member), layer_of(member), holders[k]);
+        sum += spring.stiffness * (pose.turn_rate * rest[node].xyz + pose.shift_rate.xyz);
     }
     return sum;
 }

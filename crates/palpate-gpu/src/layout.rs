@@ -251,6 +251,8 @@ pub struct Holder {
     pub by: u32,
     /// Stiffness of the spring [N/m].
     pub stiffness: f32,
+    /// Held surface that the node stands for [m²].
+    pub area: f32,
 }
 
 /// Pose of a clamp at one time: x ↦ A x + b and its rate.

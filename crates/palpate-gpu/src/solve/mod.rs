@@ -123,6 +123,7 @@ impl<'a> Passes<'a, '_> {
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.mix_states();
         self.prepare();
+        self.react();
         self.touch(ALL);
         self.assemble(ALL);
     }

@@ -10,7 +10,7 @@ use palpate_model::effects::Site;
 pub(super) struct Clamps;
 
 /// How many numbers effects on clamps have, for kernels.
-fn numbers(s: &Passes, grips: bool) -> u32 {
+pub(super) fn numbers(s: &Passes, grips: bool) -> u32 {
     let numbers = if grips { s.world.geometry.effects.hold_numbers() } else { [0; 2] };
     numbers[0] << POSES_AT | numbers[1] << MATRICES_AT
 }

@@ -1,15 +1,45 @@
-//! Elastic and viscous force of points that stand for a volume each. A body of cells has none of these passes.
+//! Elastic and viscous force of points that stand for a volume each, and laws of cells, which elements add at their means. A body of cells has none
+//! of these passes.
 
-use super::{Along, Past, Pull, Term};
+use super::{Along, Past, Pull, Term, seeks_effect};
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::elastic_asks::{SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD};
+use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
+use palpate_model::effects::Site;
 
 pub(super) struct ElasticPoints;
 
 impl Passes<'_, '_> {
     pub(super) fn has_points(&self) -> bool {
         self.world.geometry.shape.elastic != 0
+    }
+
+    /// Whether laws of cells act on elements of such points.
+    fn has_element_laws(&self) -> bool {
+        self.has_points() && self.world.geometry.effects.cell_laws() > 0
+    }
+
+    /// A pass of laws of cells on elements. There are no more elements than points.
+    fn element_laws(&mut self, pass: usize, section: u32, extra: u32, more: &Named) {
+        if self.has_element_laws() {
+            self.run_with(pass, section, Per::Elastic, extra, more);
+        }
+    }
+
+    /// Sums up what elements strained in the past.
+    fn strain_elements(&mut self) {
+        if !self.has_element_laws() {
+            return;
+        }
+        let stretches = ("stretches", &self.world.buffers["past_stretches"]);
+        self.recorder.clear(stretches.1);
+        for (weight, state) in self.past.clone() {
+            self.element_laws(pass::STRAIN_TET_LAWS, ALL, weight.to_bits(), &[("now", state), stretches]);
+        }
+        if self.past.is_empty() {
+            self.element_laws(pass::STRAIN_TET_LAWS, ALL, 1.0f32.to_bits(), &[stretches]);
+        }
     }
 
     /// Adds what points, and patches where they take part, do to nodes to `forces`.
@@ -28,10 +58,12 @@ impl Term for ElasticPoints {
         for (weight, state) in s.past.clone() {
             s.run_with(pass::STRAIN_ELASTIC, ALL, Per::Elastic, weight.to_bits(), &[("now", state)]);
         }
+        s.strain_elements();
         // Of several past states none has a force of its own.
         if s.past.is_empty() {
             s.run(pass::STRAIN_ELASTIC, ALL, Per::Elastic, 1.0f32.to_bits());
             s.run(pass::PRESS_ELASTIC, ALL, Per::Elastic, STRESS_OLD);
+            s.element_laws(pass::PRESS_TET_LAWS, ALL, STRESS_OLD, &[]);
             s.spread_elastic(ALL, 0, false, &s.world.buffers["old_force"]);
         }
     }
@@ -40,6 +72,7 @@ impl Term for ElasticPoints {
     fn residual(&self, s: &mut Passes, section: u32) {
         if s.has_points() {
             s.run(pass::PRESS_ELASTIC, section, Per::Elastic, STRESS_NEW);
+            s.element_laws(pass::PRESS_TET_LAWS, section, STRESS_NEW, &[]);
             s.spread_elastic(section, SPREAD_RESIDUAL, true, &s.world.buffers["residual"]);
         }
     }
@@ -48,6 +81,7 @@ impl Term for ElasticPoints {
     fn tangent(&self, s: &mut Passes, section: u32) {
         if s.has_points() {
             s.run(pass::TANGENT_ELASTIC, section, Per::Elastic, 0);
+            s.element_laws(pass::TANGENT_TET_LAWS, section, 0, &[]);
             s.run(pass::GATHER_ELASTIC, section, Per::Block, 0);
             s.run(pass::BRACE_NODES, section, Per::Node, 0);
         }
@@ -56,7 +90,9 @@ impl Term for ElasticPoints {
     /// With what patches left for it.
     fn by_past(&self, s: &mut Passes, past: &Past) {
         if s.has_points() {
-            s.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, past.ask(), &[("probe", past.probe), ("now", past.state)]);
+            let named = [("probe", past.probe), ("now", past.state)];
+            s.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, past.ask(), &named);
+            s.element_laws(pass::COUPLE_TET_LAWS, ALL, past.ask(), &named);
             s.spread_elastic(ALL, SPREAD_MINUS, s.patches_see_past(), past.to);
         }
     }
@@ -65,6 +101,9 @@ impl Term for ElasticPoints {
     fn by_coefficients(&self, s: &mut Passes, along: &Along) {
         if s.has_points() && along.gathered {
             s.run_with(pass::PUSH_ELASTIC, ALL, Per::Elastic, along.flags, &along.named);
+            if along.body || along.laws {
+                s.element_laws(pass::PUSH_TET_LAWS, ALL, along.flags, &along.named);
+            }
             s.spread_elastic(ALL, 0, true, &s.world.buffers["column"]);
         }
     }
@@ -72,6 +111,9 @@ impl Term for ElasticPoints {
     fn by_coefficients_transposed(&self, s: &mut Passes, pull: &Pull) {
         if s.has_points() && (pull.material || pull.sought().damping[1] || pull.sought().viscosity) {
             s.run_with(pass::PULL_ELASTIC, ALL, Per::Elastic, 0, &pull.named);
+        }
+        if pull.material || seeks_effect(s.world, pull.sought(), |s| matches!(s, Site::Cells(_))) {
+            s.element_laws(pass::PULL_TET_LAWS, ALL, 0, &pull.named);
         }
     }
 }

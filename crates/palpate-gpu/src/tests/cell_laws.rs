@@ -108,7 +108,7 @@ fn every_law_of_cells_agrees_with_its_twin_and_one_percent_shows() {
 }
 
 /// All laws of cells, at sizes that show beside the linear material.
-fn lawful(s: &mut Scene) {
+pub(super) fn lawful(s: &mut Scene) {
     with(s, "strain-stiffening", &[("coefficient", &[15.0])]);
     with(s, "transverse-anisotropy", &[("stiffness", &[5.0]), ("fibre", &[1.0, 0.5, -0.3])]);
     with(s, "power-law-viscosity", &[("coefficient", &[0.2]), ("exponent", &[0.6])]);

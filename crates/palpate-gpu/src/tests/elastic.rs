@@ -46,7 +46,7 @@ fn tetrahedra(count: usize) -> BodySource {
 }
 
 /// A scene with tetrahedra in place of its ball.
-fn of_tets(mut scene: Scene, kind: Tetrahedron, count: usize) -> Scene {
+pub(super) fn of_tets(mut scene: Scene, kind: Tetrahedron, count: usize) -> Scene {
     scene.solver.tetrahedron = kind;
     scene.object.source = tetrahedra(count);
     scene.object.resolution = Resolution::Own;
@@ -195,7 +195,7 @@ fn a_clamped_node_is_where_its_clamp_wants_it() {
 }
 
 /// The plan of a scene whose markers, one on a stalk, and last displacements were seen a little after its states, a little off.
-fn seen(scene: &Scene) -> Plan {
+pub(super) fn seen(scene: &Scene) -> Plan {
     let marker = |name: &str, surface: DVec3, stalk: DVec3| MarkerRest {
         name: name.into(),
         position: surface + stalk,
@@ -243,6 +243,10 @@ fn evaluations_with_markers_and_displacements_agree_with_the_cpu() {
 #[test]
 fn memory_of_a_body_of_tetrahedra_is_foreseen() {
     let Some(gpu) = own_device() else { return };
-    let plan = plan(&of_tets(held(0.03), Quadratic, 3));
+    let mut scene = of_tets(held(0.03), Quadratic, 3);
+    for (kind, key, value) in [("strain-stiffening", "coefficient", 5.0), ("compliant-clamp", "layer", 0.004)] {
+        super::effects::with(&mut scene, kind, &[(key, &[value])]);
+    }
+    let plan = plan(&scene);
     super::memory::check(&gpu, &plan, 2, &Request { gradient: Wanted::All, sensitivities: vec![0] });
 }

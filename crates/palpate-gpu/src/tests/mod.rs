@@ -24,5 +24,6 @@ mod products;
 pub(crate) mod scenes;
 mod schemes;
 mod sizes;
+mod tet_effects;
 mod twins;
 mod wgsl;

@@ -61,8 +61,8 @@ impl ElasticTables {
             }
         }
         for (by, clamp) in (0u32..).zip(&plan.clamps) {
-            for (node, stiffness) in &clamp.nodes {
-                holders[*node as usize].push(Holder { by, stiffness: *stiffness as f32 });
+            for ((node, stiffness), area) in clamp.nodes.iter().zip(&clamp.areas) {
+                holders[*node as usize].push(Holder { by, stiffness: *stiffness as f32, area: *area as f32 });
             }
         }
         ElasticTables {

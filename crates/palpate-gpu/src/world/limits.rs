@@ -57,7 +57,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 20] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 24] {
         [
             ("list_members", columns(self.members) * self.members + LISTING),
             ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
@@ -79,6 +79,11 @@ impl Most {
             ("tangent_elastic", 9 * 800 + 20 * self.stencil),
             ("place_held", self.holders * (1 + self.holders)),
             ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
+            // Laws of cells at up to three states of an element, by every number.
+            ("push_tet_laws", 2 * (1300 + 2 * self.stencil) + self.aging + 10),
+            ("pull_tet_laws", 3 * (2200 + 2 * self.stencil) + self.stencil + self.aging + 10),
+            ("push_held", self.holders * 4 + self.aging + self.grips * (2 + self.holders) + 10),
+            ("pull_held", self.holders * 4 + 10 * self.aging + self.grips * (20 + self.holders) + 40),
             ("pull_densities", self.stencil * (self.stencil + 1)),
             ("push_nodes", 60 + 2 * self.row + (4 + 2 * self.stencil) * self.masses),
             ("push_cells", 2600 + 2 * self.supports + self.aging),

@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 24] = [
+const WORK: [Work; 26] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -35,6 +35,8 @@ const WORK: [Work; 24] = [
     ("hold_forces", |s| 8 * s.holds, VECTOR),
     ("elastic_stress", |s| 3 * s.elastic, VECTOR),
     ("past_strains", |s| 2 * s.elastic, VECTOR),
+    ("past_stretches", |s| if s.elastic == 0 || laws(s.fields) == 0 { 0 } else { 2 * s.elements }, VECTOR),
+    ("reactions", |s| if s.held == 0 || s.fields & structs::FIELD_GRIPS == 0 { 0 } else { s.nodes }, VECTOR),
     ("elastic_tangents", |s| elastic_asks::TANGENT_NUMBERS * s.elastic, 4),
 ];
 
@@ -55,6 +57,11 @@ fn modes(fields: u32) -> u32 {
         0 => 0,
         n => 1 + 8 * (n + 2) + 2 * n,
     }
+}
+
+/// Number of laws of cells.
+fn laws(fields: u32) -> u32 {
+    (fields >> structs::LAWS_AT) & structs::MOST_COUNT
 }
 
 /// Sections of the roster, and kinds of items, of `list_members`.

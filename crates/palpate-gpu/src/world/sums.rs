@@ -3,7 +3,7 @@
 use super::effects::Effects;
 use super::geometry::Geometry;
 use crate::device::pipelines::shared::points::{AT_CONTACT, AT_NODES};
-use crate::device::pipelines::shared::pulls::{CELL_ROWS, CELL_SLOTS, HOLD_ROWS, PLANE_ROWS, POINT_ROWS};
+use crate::device::pipelines::shared::pulls::{CELL_ROWS, CELL_SLOTS, HELD_ROWS, HOLD_ROWS, PLANE_ROWS, POINT_ROWS};
 use crate::layout::Shape;
 use glam::DVec3;
 use palpate_engine::Wanted;
@@ -49,15 +49,19 @@ impl Sums {
         let each = |items: u32, width: u32| u64::from(items.div_ceil(width));
         let [nodes, cells, holds] = [shape.nodes, shape.cells, shape.holds].map(u64::from);
         let cell_rows = u64::from(CELL_ROWS + shape.aging_rows + CELL_SLOTS * effects.cell_laws());
-        let hold_rows =
-            u64::from(HOLD_ROWS + shape.aging_rows) + effects.hold_numbers().iter().map(|n| u64::from(*n)).sum::<u64>();
+        let own_rows = u64::from(shape.aging_rows) + effects.hold_numbers().iter().map(|n| u64::from(*n)).sum::<u64>();
+        let hold_rows = u64::from(HOLD_ROWS) + own_rows;
         let floats = [
             ("cell_pulls", cells),
             ("cell_sums", cell_rows * each(shape.cells, 8)),
             ("elastic_pulls", shape.elastic.into()),
             ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * u64::from(shape.elastic)),
             ("density_pulls", shape.elastic.into()),
-            ("held_sums", each(shape.nodes, 64)),
+            (
+                "law_sums",
+                u64::from(CELL_SLOTS * effects.cell_laws()) * if shape.elastic == 0 { 0 } else { shape.elements.into() },
+            ),
+            ("held_sums", if shape.held == 0 { 0 } else { (u64::from(HELD_ROWS) + own_rows) * each(shape.nodes, 64) }),
             ("hold_pulls", holds),
             ("hold_sums", hold_rows * each(shape.holds, 8)),
             ("node_pulls", nodes),
@@ -87,19 +91,25 @@ impl Sums {
     /// The numbers of effects, and what laws of points depend on beside them.
     fn add_effects(&self, plan: &Plan, effects: &Effects, at: &Member, g: &mut Coefficients) {
         let shape = at.shape;
-        let ([poses, _], grips) = (effects.hold_numbers(), HOLD_ROWS + shape.aging_rows);
+        let [poses, _] = effects.hold_numbers();
+        let grips = |row: u32| at.holds(HOLD_ROWS + shape.aging_rows + row) + at.held(HELD_ROWS + shape.aging_rows + row);
         for (number, (law, _)) in plan.layout.effects().enumerate() {
             for (slot, out) in g.physics.effects[number].iter_mut().enumerate() {
                 let row = effects.slope_row(number, slot as u32);
                 *out += match (&law.site, row, effects.cell_law(number)) {
                     (Site::Aging(_), Some(row), _) => {
-                        at.cells(CELL_ROWS + row) + at.elastic(CELL_ROWS + row) + at.holds(HOLD_ROWS + row)
+                        at.cells(CELL_ROWS + row)
+                            + at.elastic(CELL_ROWS + row)
+                            + at.holds(HOLD_ROWS + row)
+                            + at.held(HELD_ROWS + row)
                     }
                     (Site::Clamps(_) | Site::Edges(_), Some(row), _) => {
-                        let matrix = effects.matrix_row(row).map_or(0.0, |k| at.holds(grips + poses + k));
-                        at.holds(grips + row) + matrix
+                        grips(row) + effects.matrix_row(row).map_or(0.0, |k| grips(poses + k))
                     }
-                    (_, _, Some(law)) => at.cells(CELL_ROWS + shape.aging_rows + CELL_SLOTS * law + slot as u32),
+                    (_, _, Some(law)) => {
+                        let own = CELL_SLOTS * law + slot as u32;
+                        at.cells(CELL_ROWS + shape.aging_rows + own) + at.sum("law_sums", own, shape.elements, 1)[0]
+                    }
                     _ => 0.0,
                 };
             }
@@ -148,6 +158,10 @@ impl Member<'_> {
         self.sum("elastic_sums", row, self.shape.elastic, 1)[0]
     }
 
+    fn held(&self, row: u32) -> f64 {
+        self.sum("held_sums", row, self.shape.nodes.div_ceil(64), 1)[0]
+    }
+
     fn holds(&self, row: u32) -> f64 {
         self.sum("hold_sums", row, self.shape.holds.div_ceil(8), 1)[0]
     }
@@ -172,7 +186,7 @@ impl Member<'_> {
             Some(f) => by.iter().zip(f).map(|(b, f)| b * f).sum::<f64>(),
             None => by.iter().sum(),
         };
-        g.physics.youngs_modulus += whole(&modulus, &own.changes.modulus) / own.physics.youngs_modulus;
+        g.physics.youngs_modulus += (whole(&modulus, &own.changes.modulus) + self.held(1)) / own.physics.youngs_modulus;
         // Of tetrahedra the factors are in the matrix already.
         let factors = if geometry.mass.entries() == 0 { &own.changes.density } else { &None };
         g.physics.density += whole(&density, factors);
@@ -208,14 +222,14 @@ impl Member<'_> {
         let nodes = |name, row| self.sum(name, row, shape.nodes.div_ceil(64), 4);
         let by = nodes("node_sums", 0);
         p.youngs_modulus += by[0];
-        p.poisson_ratio += self.cells(0) + self.elastic(0) + self.holds(0) + by[1];
+        p.poisson_ratio += self.cells(0) + self.elastic(0) + self.holds(0) + self.held(2) + by[1];
         p.stiffness_damping += self.cells(1) + self.elastic(1) + by[2];
         p.mass_damping += by[3];
         if let Some(v) = &mut p.viscosity {
             v.coefficient += self.cells(2) + self.elastic(2);
             v.exponent += self.cells(3) + self.elastic(3);
         }
-        p.start += self.holds(1) + self.sum("held_sums", 0, shape.nodes.div_ceil(64), 1)[0];
+        p.start += self.holds(1) + self.held(0);
         p.gravity += DVec3::from_slice(&nodes("node_sums", 1));
         p.velocity += DVec3::from_slice(&nodes("velocity_sums", 0));
         p.angular_velocity += DVec3::from_slice(&nodes("velocity_sums", 1));

@@ -115,6 +115,21 @@ impl Effects {
         bytemuck::cast_slice(&out).to_vec()
     }
 
+    /// Thickness of the layers at held nodes and its derivatives by the numbers of [`Effects::matrix_rows`], `[1 + rows][B]` [m]; constant in time.
+    pub(super) fn layers(&self, plan: &Plan, batch: &[Physics]) -> Vec<f32> {
+        if !self.on_clamps() {
+            return Vec::new();
+        }
+        let spot = Spot::of(plan);
+        let mut out: Vec<f32> = batch.iter().map(|p| changes::hold(plan, p, &spot)[1] as f32).collect();
+        for row in &self.matrix_rows {
+            let [effect, slot] = self.grip_rows[*row];
+            let slope = |p: &Physics| changes::hold_slope(plan, p, &spot, effect, slot).map_or(0.0, |s| s[1]);
+            out.extend(batch.iter().map(|p| slope(p) as f32));
+        }
+        out
+    }
+
     /// Clamp matrices of all members, `[B][K, dK/dν][clamp cell]`, then the slopes of K, `[rows][B][clamp cell]`; `holds` are (clamp,
     /// cell of the body) in the device's order, `elements` those at each member's Poisson's ratio. What a member does not hold is zero.
     ///

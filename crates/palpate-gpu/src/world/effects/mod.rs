@@ -66,9 +66,6 @@ impl Effects {
             let count = places.len() as u32;
             let mut row = None;
             let site = match law.site {
-                Site::Cells(_) | Site::Clamps(_) if plan.body.cut.is_none() => {
-                    return Err(GpuError::Plan { what: format!("\"{}\" on a body of tetrahedra", law.kind) });
-                }
                 Site::Nodes(_) => Some(AT_NODES),
                 Site::Surface(_) => Some(AT_SURFACE),
                 Site::Contact(_) => Some(AT_CONTACT),
@@ -200,6 +197,7 @@ impl Effects {
         ];
         all.extend(self.rest_sizes(members, nodes, cells));
         all.push(("hold_slopes", grips::FLOATS * self.grip_rows.len() * members * (self.steps + 1) * clamps));
+        all.push(("layers", of(FIELD_GRIPS, 1 + self.matrix_rows.len())));
         all
     }
 
@@ -246,6 +244,7 @@ impl Effects {
             self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[5 + k] = v);
         }
         data[7] = self.hold_slopes(plan, batch);
+        data[8] = self.layers(plan, batch);
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
             buffers.insert(name, gpu.upload(name, values)?);

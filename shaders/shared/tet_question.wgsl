@@ -1,0 +1,62 @@
+//! All laws of cells at once at an element's strains: θψ + φ with its derivatives by the components of a strain, and the change of these.
+// use effects/tets
+// A pass says how numbers of laws change: `number_along`.
+
+struct Question {
+    strain: mat3x3<f32>,
+    past: mat3x3<f32>,
+    // Changes of both, and of Poisson's ratio.
+    dstrain: mat3x3<f32>,
+    dpast: mat3x3<f32>,
+    poisson: f32,
+    // Weight of ψ, and whether φ counts.
+    weight: f32,
+    lossy: bool,
+    // Derivatives are by ε̃ instead of ε₁.
+    by_past: bool,
+}
+
+fn ask_laws(m: Member, member: u32, q: Question) -> Said {
+    var said: Said;
+    step_rate = 1.0 / shape.dt;
+    for (var part = 0u; part < 2u; part++) {
+        let loses = part == LOSS_PART;
+        if (loses && !q.lossy) || (!loses && q.weight == 0.0) {
+            continue;
+        }
+        let weight = select(q.weight, 1.0, loses);
+        var asked: Asked;
+        asked.x = q.strain - q.past * f32(loses);
+        asked.past = q.past;
+        asked.second = q.dstrain - q.dpast * f32(loses);
+        asked.second_past = q.dpast;
+        asked.lame = m.lame.xy;
+        asked.dlame = m.lame.zw * q.poisson;
+        for (var k = 0u; k < MOST_LAWS; k++) {
+            if k >= law_count() {
+                break;
+            }
+            let effect = cell_effects[k];
+            for (var i = SCALARS; i < CELL_INPUTS; i++) {
+                input[i] = number(0.0);
+                if i - SCALARS < effect.count {
+                    let value = effect_values[member * effect.stride + effect.first + i - SCALARS];
+                    input[i] = vec4(value, 0.0, number_along(member, effect, i - SCALARS), 0.0);
+                }
+            }
+            for (var c = 0u; c < 6u; c++) {
+                let unit = unit_strain(c);
+                asked.first = unit * select(1.0, -1.0, q.by_past);
+                asked.first_past = unit * f32(q.by_past);
+                put_scalars(part, asked);
+                let v = cell_law(effect.law, part) * weight;
+                // Components off the diagonal stand for two entries.
+                let half = unit * select(1.0, 0.5, c >= 3u);
+                said.value += select(0.0, v.x, c == 0u);
+                said.t += half * v.y;
+                said.change += half * v.w;
+            }
+        }
+    }
+    return said;
+}
