@@ -75,6 +75,11 @@ pub trait Hyperelastic: Sync {
     fn stress_by_formula(&self, _h: &Gradient<f64>, _lambda: f64, _mu: f64) -> Option<Stress> {
         None
     }
+
+    /// True where ψ is linear in λ and μ: then [`Solid::by_moduli`] are the stresses at moduli of one and zero.
+    fn is_linear_in_moduli(&self) -> bool {
+        false
+    }
 }
 
 /// P [Pa] and ∂P/∂F [Pa], matrices flattened row by row.
@@ -104,6 +109,9 @@ impl<L: Hyperelastic> Solid for L {
     }
 
     fn by_moduli(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [[f64; 9]; 2] {
+        if self.is_linear_in_moduli() {
+            return [self.stress(h, 1.0, 0.0).0, self.stress(h, 0.0, 1.0).0];
+        }
         let mut lifted = h.map(|row| row.map(HyperDual64::from));
         let mut out = [[0.0; 9]; 2];
         for k in 0..9 {

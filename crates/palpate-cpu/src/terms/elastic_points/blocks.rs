@@ -45,12 +45,15 @@ impl Elements for Tangents<'_, '_> {
         if self.curvature != Curvature::Exact {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
         }
-        for (i, ga) in s.gradient.iter().enumerate() {
-            for (j, gb) in s.gradient.iter().enumerate() {
-                let entry = |r: usize, c: usize| -> f64 {
-                    (0..3).map(|k| (0..3).map(|l| tangent[3 * r + k][3 * c + l] * gb[l]).sum::<f64>() * ga[k]).sum()
-                };
-                put(i, j, DMat3::from_cols_array(&std::array::from_fn(|k| entry(k % 3, k / 3))) * v);
+        for (j, gb) in s.gradient.iter().enumerate() {
+            // Contracted with one gradient for all of the other nodes.
+            let part = |row: &[f64; 9], c: usize| v * (row[3 * c] * gb.x + row[3 * c + 1] * gb.y + row[3 * c + 2] * gb.z);
+            let half: [[DVec3; 3]; 3] = std::array::from_fn(|r| {
+                std::array::from_fn(|c| DVec3::from_array([0, 1, 2].map(|k| part(&tangent[3 * r + k], c))))
+            });
+            for (i, ga) in s.gradient.iter().enumerate() {
+                let column = |c: usize| DVec3::new(half[0][c].dot(*ga), half[1][c].dot(*ga), half[2][c].dot(*ga));
+                put(i, j, DMat3::from_cols(column(0), column(1), column(2)));
             }
         }
     }
