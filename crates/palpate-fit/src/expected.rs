@@ -7,6 +7,7 @@ use crate::dense::eigen;
 use crate::optimise::Sample;
 use crate::problem::{Problem, Want};
 use crate::settings::ErrorModel;
+use crate::{priors, uncertainty};
 use palpate_engine::MOST_SENSITIVITIES;
 
 /// Eigenvalues below this share of the largest are rounding errors.
@@ -21,6 +22,10 @@ pub struct Expected {
     pub correlation: Vec<Vec<f64>>,
     /// ½ Σ ln(λ/τ) over the eigenvalues λ of H: what two recordings differ by is how much more the one tells [nats].
     pub information: f64,
+    /// Of groups of a field with a prior: the share of the prior's own variance that the recording takes away, 0 to 1.
+    pub gain: Vec<Option<f64>>,
+    /// Whether the recording tells of a group, as a fit would say afterwards.
+    pub told: Vec<bool>,
     /// Residuals that it is taken from.
     pub residuals: usize,
 }
@@ -41,20 +46,24 @@ pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], er
         return Err("nothing is compared".into());
     }
     let mut h = vec![0.0; m * m];
+    let mut prior = vec![0.0; m * m];
     for (a, group) in groups.iter().enumerate() {
+        let mut along = vec![0.0; q];
+        group.iter().for_each(|i| along[*i] = 1.0);
         let row: Vec<f64> = if whole {
             (0..q).map(|j| group.iter().map(|i| sample.curvature[i * q + j]).sum()).collect()
         } else {
-            let mut along = vec![0.0; q];
-            group.iter().for_each(|i| along[*i] = 1.0);
             problem.product(&z, &along).map_err(|f| f.to_string())?
         };
+        let before = problem.prior_product(&z, &along);
         for (b, other) in groups.iter().enumerate() {
             h[a * m + b] = other.iter().map(|j| row[*j]).sum();
+            prior[a * m + b] = other.iter().map(|j| before[*j]).sum();
         }
     }
     // Products are symmetric but for rounding.
-    let h: Vec<f64> = (0..m * m).map(|k| 0.5 * (h[k] + h[k % m * m + k / m])).collect();
+    let symmetric = |h: &[f64]| -> Vec<f64> { (0..m * m).map(|k| 0.5 * (h[k] + h[k % m * m + k / m])).collect() };
+    let (h, prior) = (symmetric(&h), symmetric(&prior));
     let tau = 1.0 / sample.residuals as f64 + errors.systematic.powi(2) / errors.groups as f64;
     let (lambda, vectors) = eigen(&h, m).ok_or("the curvature of the cost is not finite")?;
     let largest = lambda.iter().fold(0.0, |m: f64, l| m.max(*l));
@@ -63,8 +72,15 @@ pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], er
     }
     let lambda: Vec<f64> = lambda.into_iter().map(|l| l.max(RANK * largest)).collect();
     let covariance = |a: usize, b: usize| (0..m).map(|k| tau / lambda[k] * vectors[k][a] * vectors[k][b]).sum::<f64>();
+    let (stiff, axes) = eigen(&prior, m).ok_or("the prior of a field is not finite")?;
+    let most = stiff.iter().fold(0.0, |m: f64, l| m.max(*l));
+    let alone =
+        |a: usize| (0..m).filter(|k| stiff[*k] > RANK * most).map(|k| tau / stiff[k] * axes[k][a] * axes[k][a]).sum::<f64>();
+    let gain = |a: usize| (prior[a * m + a] > 0.0).then(|| (1.0 - covariance(a, a) / alone(a)).clamp(0.0, 1.0));
     let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
     let correlation = (0..m).map(|a| (0..m).map(|b| covariance(a, b) / (sd[a] * sd[b])).collect()).collect();
     let information = 0.5 * lambda.iter().map(|l| (l / tau).ln()).sum::<f64>();
-    Ok(Expected { errors: sd, correlation, information, residuals: sample.residuals })
+    let gain: Vec<Option<f64>> = (0..m).map(gain).collect();
+    let told = gain.iter().zip(&sd).map(|(g, sd)| g.map_or(*sd < uncertainty::UNDETERMINED, |g| g >= priors::UNDETERMINED));
+    Ok(Expected { told: told.collect(), errors: sd, correlation, information, gain, residuals: sample.residuals })
 }

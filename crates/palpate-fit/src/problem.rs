@@ -224,11 +224,17 @@ impl<'a> Problem<'a> {
             self.evaluate_values(&[values], Want::Cost);
         }
         let mut out = self.data_product(z, direction)?;
-        if !self.priors.is_empty() {
-            let weight = self.priors.temper / self.residual_count();
-            out.iter_mut().zip(self.priors.product(z, direction)).for_each(|(o, p)| *o += weight * p);
-        }
+        out.iter_mut().zip(self.prior_product(z, direction)).for_each(|(o, p)| *o += p);
         Ok(out)
+    }
+
+    /// What priors of fields give to such a product, once residuals have been counted; zeros without any.
+    pub(crate) fn prior_product(&self, z: &[f64], direction: &[f64]) -> Vec<f64> {
+        if self.priors.is_empty() {
+            return vec![0.0; z.len()];
+        }
+        let weight = self.priors.temper / self.residual_count();
+        self.priors.product(z, direction).into_iter().map(|p| weight * p).collect()
     }
 
     /// The same without priors of fields.

@@ -30,7 +30,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Correlation beyond which two parameters are reported together.
 const CORRELATED: f64 = 0.95;
 /// Standard error in z beyond which a direction counts as undetermined (a factor 1.6 for logarithms).
-const UNDETERMINED: f64 = 0.5;
+pub(crate) const UNDETERMINED: f64 = 0.5;
 /// Correlated parameters whose standard errors in z are all smaller are known well enough to be told apart.
 const KNOWN: f64 = 0.02;
 /// Confidence with which costs are called equal.

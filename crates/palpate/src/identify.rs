@@ -21,8 +21,6 @@ use palpate_model::scene::ObservationSpec;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Expected error in z (of a logarithm: relative) from which on a number counts as undetermined, as after a fit.
-const UNDETERMINED: f64 = 0.5;
 /// Correlation from which on two numbers are named together, as after a fit.
 const CORRELATED: f64 = 0.95;
 /// Values of a field that are looked at one by one; of more, parts.
@@ -61,7 +59,8 @@ pub(crate) fn identify(e: &Experiment, backend: Backend, mut hear: impl FnMut(&s
             error: error * g.slope,
             unit: g.unit.clone(),
             relative: matches!(g.transform, Transform::Log | Transform::Relative).then_some(error),
-            determined: error < UNDETERMINED,
+            determined: first.told[k],
+            gain: first.gain[k],
             with: with.map(|o| groups[o].name.clone()).collect(),
         }
     };

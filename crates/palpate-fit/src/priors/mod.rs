@@ -22,7 +22,7 @@ mod tests;
 
 pub use evidence::Tried;
 pub use posterior::FieldPosterior;
-pub(crate) use posterior::assess;
+pub(crate) use posterior::{UNDETERMINED, assess};
 pub use precision::Mean;
 pub(crate) use precision::Precision;
 

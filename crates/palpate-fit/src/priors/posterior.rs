@@ -12,7 +12,7 @@ use crate::uncertainty::{self, Uncertainty};
 use palpate_model::params::fields::PriorKind;
 
 /// A value is undetermined where the recording lowers its variance by less than this share.
-const UNDETERMINED: f64 = 0.1;
+pub const UNDETERMINED: f64 = 0.1;
 /// Logarithms of evidences that differ by less tell nothing apart.
 const ALIKE: f64 = 2.0;
 

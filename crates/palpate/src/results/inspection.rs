@@ -119,6 +119,9 @@ pub struct Expectation {
     pub relative: Option<f64>,
     /// False where the recording says next to nothing of it.
     pub determined: bool,
+    /// Of a field with a prior: the share of the prior's variance that the recording takes away.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
     /// Numbers that it would not be told apart from.
     pub with: Vec<String>,
 }

@@ -13,9 +13,13 @@ pub(super) fn identified(found: &Identification) -> Lines {
         let relative = n.relative.map_or(String::new(), |r| format!(" ({:.2} %)", 100.0 * r));
         let with = if n.with.is_empty() { String::new() } else { format!("; not told apart from {}", n.with.join(", ")) };
         let (value, error) = (number(n.value), number(n.error));
-        let text = match n.determined {
-            true => format!("{} = {value}{}: expected ± {error}{}{relative}{with}", n.path, unit(&n.unit), unit(&n.unit)),
-            false => format!("{}: undetermined by this recording{with}", n.path),
+        let text = match (n.determined, n.gain) {
+            (true, None) => format!("{} = {value}{}: expected ± {error}{}{relative}{with}", n.path, unit(&n.unit), unit(&n.unit)),
+            (true, Some(gain)) => {
+                let percent = n.relative.map_or(error, |r| format!("{:.1} %", 100.0 * r));
+                format!("{}: expected ± {percent}, {:.0} % less variance than the prior alone has", n.path, 100.0 * gain)
+            }
+            (false, _) => format!("{}: undetermined by this recording{with}", n.path),
         };
         lines.push(("identify", text));
     }
