@@ -129,7 +129,13 @@ impl Fitted {
     /// Looks at what cells and time step do to the numbers found ([`GridCheck`]): one evaluation on finer ones, and one on coarser ones
     /// where that moves a number by more than noise does. A check that cannot be made is a warning, one that is stopped an interruption.
     pub fn check_grid(&mut self, experiments: &[Experiment], backend: Backend, interrupt: &Interrupt) {
-        if self.status() != FitStatus::Complete || self.free.is_empty() {
+        if self.status() != FitStatus::Complete {
+            return;
+        }
+        if self.free.is_empty() {
+            if !self.result.fields.is_empty() {
+                self.warnings.push("± of a field holds noise and prior; what cells and step do is not in it".into());
+            }
             return;
         }
         if self.result.distance > ARRIVED {
