@@ -186,6 +186,6 @@ fn a_field_with_a_prior_says_what_the_recording_does_not_know() {
     for name in ["ln_sd", "ln_prior_sd", "gain", "undetermined", "standard_error"] {
         assert_eq!(palpate_io::npy::read_array(&npz, Some(name)).unwrap().values.len() as u64, field["count"].as_u64().unwrap());
     }
-    assert!(text.contains("prior of field.0: matern, length ") && text.contains("residuals count as one"), "{text}");
+    assert!(text.contains("prior of field.0: matern, length ") && text.contains("the recording tells about"), "{text}");
     assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("Logarithm of the evidence"));
 }

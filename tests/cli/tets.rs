@@ -152,7 +152,7 @@ fn a_group_of_a_gmsh_file_holds_its_nodes() {
     fs::write(&scene, &held).unwrap();
 
     let said = succeed(&["inspect", arg(&scene)]).out;
-    for words in ["144 of about", "bar (63 nodes), base (9 nodes)", "45.0° to 90.0°", "tetrahedra: a mesh is given", "1 clamps"]
+    for words in ["144 of about", "bar (63 nodes), base (9 nodes)", "45.0° to 90.0°", "tetrahedra: a mesh is given", "1 clamp,"]
     {
         assert!(said.contains(words), "{words} is not in: {said}");
     }

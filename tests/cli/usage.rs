@@ -122,7 +122,7 @@ fn inspect_tells_sizes_and_problems_of_scenes_and_recordings() {
     // One camera: what an image shows is what a frame has.
     let [low, high] = [0, 1].map(|k| v["frames"]["readings_per_image"][k].as_u64().unwrap());
     assert!(0 < low && low < high, "{}", v["frames"]);
-    assert!(text.contains(&format!("1 cameras, {low} to {high} depth points a frame, ")), "{text}");
+    assert!(text.contains(&format!("1 camera, {low} to {high} depth points a frame")), "{text}");
 
     // The same recording around a body a metre away.
     let far = (BLOCK.to_string() + STIFFNESS).replace("[object]", "[object]\npose = [[1,0,0,1],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");

@@ -223,7 +223,11 @@ fn world(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let plan = e.plan();
     let [clamps, planes, masses] = [plan.clamps.len(), plan.planes.len(), plan.masses.len()];
     content.constraints = Constraints { clamps, planes, masses };
-    lines.push(("world", format!("{clamps} clamps, {planes} planes, {masses} point masses")));
+    lines.push((
+        "world",
+        [counted(clamps, "clamp", "clamps"), counted(planes, "plane", "planes"), counted(masses, "point mass", "point masses")]
+            .join(", "),
+    ));
     let (steps, time, end) = (plan.clock.steps, &e.scene().time, e.end_time());
     content.time = Time { step: time.step, steps, start: time.start, end };
     let text = match steps {
@@ -265,13 +269,15 @@ fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     lines.push((
         "observed",
         format!(
-            "{} frames from {} s to {} s, {} cameras, {low} to {high} depth points a frame, {} markers ({readings} readings){}{}; \
-             noise {noise}; lies around the object",
-            o.frames.len(),
+            "{} from {} s to {} s{}{}{}{}; noise {noise}; lies around the object",
+            counted(o.frames.len(), "frame", "frames"),
             short(first.time),
             short(last.time),
-            o.cameras.len(),
-            o.marker_count(),
+            more(
+                o.cameras.len() + high,
+                format!(", {}, {low} to {high} depth points a frame", counted(o.cameras.len(), "camera", "cameras"))
+            ),
+            more(o.marker_count(), format!(", {} ({readings} readings)", counted(o.marker_count(), "marker", "markers"))),
             more(tracks, format!(", {tracked} tracked points ({tracks} readings)")),
             more(displacements, format!(", {displacements} displacements of nodes")),
         ),
@@ -301,9 +307,15 @@ fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
 fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let Some(fit) = &e.scene().fit else { return };
     let paths: Vec<String> = fit.parameters.iter().map(|p| p.path.clone()).collect();
-    let text = format!("{} ({} starts of at most {} iterations)", paths.join(", "), fit.starts, fit.iterations);
+    let text =
+        format!("{} ({} of at most {} iterations)", paths.join(", "), counted(fit.starts, "start", "starts"), fit.iterations);
     lines.push(("to be found", text));
     content.free = Some(paths);
+}
+
+/// So many of a thing.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// Smallest and largest of some numbers; zeros without any.

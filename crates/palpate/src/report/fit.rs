@@ -167,21 +167,25 @@ pub(super) fn posterior_lines(f: &FieldReference) -> Vec<String> {
     let length = p.length.map_or(String::new(), |l| format!("length {} m ({}), ", number(l), whose("length")));
     let best = format!("{length}deviation {} ({})", text(p.deviation), whose("deviation"));
     let one = p.tried.iter().find(|t| t.deviation == 0.0).and_then(|t| t.evidence);
-    let one = one.map_or(String::new(), |e| format!("; evidence of one value everywhere e^{e:.1} of the best tried"));
+    let one = match one {
+        Some(e) if e == 0.0 => "; one value everywhere explains the recording best".into(),
+        Some(e) => format!("; one value everywhere is e^{:.1} times less likely", -e),
+        None => String::new(),
+    };
     let percent = p.undetermined_share.map_or("?".into(), |s| format!("{:.0}", 100.0 * s));
     let mut out = vec![
         format!("prior of {}: {}, {best}{one}", f.path, p.prior),
         format!(
-            "the recording tells about {} numbers of it; standard deviation of the logarithm {} to {}, median {}; {} residuals count as one",
+            "the recording tells about {} numbers of it; standard deviation of the logarithm {} to {}, median {}{}",
             p.effective.map_or("?".into(), |e| format!("{e:.1}")),
             text(p.sd[0]),
             text(p.sd[2]),
             text(p.sd[1]),
-            text(p.residuals_as_one)
+            p.residuals_as_one.filter(|n| *n > 1.0).map_or(String::new(), |n| format!("; {} residuals count as one", number(n)))
         ),
     ];
     out.push(match p.undetermined {
-        0 => format!("of all {} {} the recording says something", f.count, f.basis),
+        0 => format!("the recording says something of each of the {} {}", f.count, f.basis),
         n => format!(
             "{n} of {} {} are undetermined, {percent} % of the volume: what stands there is the prior's (`undetermined` in {})",
             f.count, f.basis, f.grid
