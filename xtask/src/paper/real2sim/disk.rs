@@ -47,7 +47,7 @@ fn scene(free: Free) -> String {
     let list = |v: &[f64]| v.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ");
     let (mut material, mut more, mut parameters) = (String::from("model = \"neo-hookean\"\n"), String::new(), String::new());
     let mut free_too = |path: &str, rest: &str| parameters += &format!("[[fit.parameter]]\npath = \"{path}\"\n{rest}");
-    free_too("material.youngs_modulus", "bounds = [1.0, 1.0e4]\n");
+    free_too("material.youngs_modulus", "bounds = [1.0e-2, 1.0e4]\n");
     free_too("material.poisson_ratio", "bounds = [-0.3, 0.49]\n");
     free_too("material.viscosity.coefficient", "bounds = [1.0e-3, 1.0e3]\n");
     match free {
