@@ -154,6 +154,8 @@ fn old_forces(c: Context) -> Vec<DVec3> {
     let none = vec![DVec3::ZERO; c.past.u.len()];
     let mut still = c.coefficients.clone();
     (still.physics.gravity, still.physics.mass_damping) = (DVec3::ZERO, 0.0);
+    // What is lost on the way is no force of the old state.
+    still.physics.viscosity = None;
     let mut smooth = c.plan.clone();
     smooth.solver.ghost = 0.0;
     let inertia = c.inertia.map(|t| Rates { displacement: 0.0, velocity: 0.0, ..t });
