@@ -1,9 +1,12 @@
-//! The points' tangents block by block, for the assembly of the matrix.
+//! The points' tangents block by block, for the assembly of the matrix: those of an element have the same nodes and are summed before they go there.
 
 use super::{ElasticPoints, Point, green, green_rate, linear_stress, matrix_of, rows};
 use crate::terms::Curvature;
 use crate::terms::assembly::Elements;
 use glam::{DMat3, DVec3};
+
+/// Most nodes of an element.
+const MOST: usize = 10;
 
 /// Points with what their tangents are taken at.
 pub(super) struct Tangents<'a, 'b> {
@@ -12,49 +15,72 @@ pub(super) struct Tangents<'a, 'b> {
     pub(super) curvature: Curvature,
 }
 
-impl Elements for Tangents<'_, '_> {
-    type Scratch = ();
-
-    fn count(&self) -> usize {
-        self.term.c.plan.body.points.len()
-    }
-
-    fn nodes(&self, e: usize) -> &[u32] {
-        self.term.c.plan.body.points.stencils.get(e).nodes
-    }
-
-    fn places(&self, e: usize) -> &[u32] {
-        self.term.c.places.points.of(e)
-    }
-
-    fn scratch(&self) {}
-
-    fn blocks(&self, e: usize, _scratch: &mut (), mut put: impl FnMut(usize, usize, DMat3)) {
+impl Tangents<'_, '_> {
+    /// ∂P/∂F of a point, times its volume.
+    fn tangent(&self, Point { e, s, v, moduli: (lambda, mu), .. }: &Point) -> [[f64; 9]; 9] {
         let (term, w) = (self.term, &self.term.c.weights);
-        let Point { s, v, moduli: (lambda, mu), .. } = term.point(e);
         let h = s.gradient_of(self.u1);
         let f = h + DMat3::IDENTITY;
-        let mut tangent = term.c.law().stress(&rows(h), lambda, mu).1.map(|r| r.map(|t| t * w.new));
-        if let (Some(past), true) = (term.past.get(e), w.rate != 0.0) {
-            let held = linear_stress(green(h) - *past, (lambda, mu)) * w.rate;
-            add_rate(&mut tangent, f, held, |dg| linear_stress(dg, (lambda, mu)) * w.rate);
+        let mut tangent = term.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));
+        if let (Some(past), true) = (term.past.get(*e), w.rate != 0.0) {
+            let held = linear_stress(green(h) - *past, (*lambda, *mu)) * w.rate;
+            add_rate(&mut tangent, f, held, |dg| linear_stress(dg, (*lambda, *mu)) * w.rate);
         }
         if term.flow.is_some() {
-            add_rate(&mut tangent, f, term.flow_stress(e, h), |dg| term.flow_rate(e, h, dg));
+            add_rate(&mut tangent, f, term.flow_stress(*e, h), |dg| term.flow_rate(*e, h, dg));
         }
         if self.curvature != Curvature::Exact {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
         }
-        for (j, gb) in s.gradient.iter().enumerate() {
-            // Contracted with one gradient for all of the other nodes.
-            let part = |row: &[f64; 9], c: usize| v * (row[3 * c] * gb.x + row[3 * c + 1] * gb.y + row[3 * c + 2] * gb.z);
-            let half: [[DVec3; 3]; 3] = std::array::from_fn(|r| {
-                std::array::from_fn(|c| DVec3::from_array([0, 1, 2].map(|k| part(&tangent[3 * r + k], c))))
-            });
-            for (i, ga) in s.gradient.iter().enumerate() {
-                let column = |c: usize| DVec3::new(half[0][c].dot(*ga), half[1][c].dot(*ga), half[2][c].dot(*ga));
-                put(i, j, DMat3::from_cols(column(0), column(1), column(2)));
+        tangent.map(|r| r.map(|t| t * v))
+    }
+}
+
+impl Elements for Tangents<'_, '_> {
+    type Scratch = [[DMat3; MOST]; MOST];
+
+    fn count(&self) -> usize {
+        self.term.c.plan.body.points.elements()
+    }
+
+    fn nodes(&self, e: usize) -> &[u32] {
+        self.term.c.plan.body.points.mean(e).nodes
+    }
+
+    fn places(&self, e: usize) -> &[u32] {
+        self.term.c.places.points.of(self.term.c.plan.body.points.mean_point(e))
+    }
+
+    fn scratch(&self) -> Self::Scratch {
+        [[DMat3::ZERO; MOST]; MOST]
+    }
+
+    /// The tangent is symmetric: blocks below the diagonal are those above it, transposed.
+    fn blocks(&self, e: usize, sum: &mut Self::Scratch, mut put: impl FnMut(usize, usize, DMat3)) {
+        let points = &self.term.c.plan.body.points;
+        let (last, n) = (points.mean_point(e), points.mean(e).nodes.len());
+        sum.iter_mut().flatten().for_each(|block| *block = DMat3::ZERO);
+        for k in last + 1 - points.per_element..=last {
+            let point = self.term.point(k);
+            let tangent = self.tangent(&point);
+            for (j, gb) in point.s.gradient.iter().enumerate() {
+                // Contracted with one gradient for all of the other nodes.
+                let part = |row: &[f64; 9], c: usize| row[3 * c] * gb.x + row[3 * c + 1] * gb.y + row[3 * c + 2] * gb.z;
+                let half: [[DVec3; 3]; 3] = std::array::from_fn(|r| {
+                    std::array::from_fn(|c| DVec3::from_array([0, 1, 2].map(|k| part(&tangent[3 * r + k], c))))
+                });
+                for (i, ga) in point.s.gradient.iter().enumerate().take(j + 1) {
+                    let column = |c: usize| DVec3::new(half[0][c].dot(*ga), half[1][c].dot(*ga), half[2][c].dot(*ga));
+                    sum[i][j] += DMat3::from_cols(column(0), column(1), column(2));
+                }
             }
+        }
+        for j in 0..n {
+            for i in 0..j {
+                put(i, j, sum[i][j]);
+                put(j, i, sum[i][j].transpose());
+            }
+            put(j, j, sum[j][j]);
         }
     }
 }
