@@ -22,7 +22,7 @@ pub struct Expected {
     pub correlation: Vec<Vec<f64>>,
     /// ½ Σ ln(λ/τ) over the eigenvalues λ of H: what two recordings differ by is how much more the one tells [nats].
     pub information: f64,
-    /// Of groups of a field with a prior: the share of the prior's own variance that the recording takes away, 0 to 1.
+    /// Of groups of a field with a prior: the share of the prior's own variance, around the field's mean, that the recording takes away, 0 to 1.
     pub gain: Vec<Option<f64>>,
     /// Whether the recording tells of a group, as a fit would say afterwards.
     pub told: Vec<bool>,
@@ -74,9 +74,20 @@ pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], er
     let covariance = |a: usize, b: usize| (0..m).map(|k| tau / lambda[k] * vectors[k][a] * vectors[k][b]).sum::<f64>();
     let (stiff, axes) = eigen(&prior, m).ok_or("the prior of a field is not finite")?;
     let most = stiff.iter().fold(0.0, |m: f64, l| m.max(*l));
-    let alone =
-        |a: usize| (0..m).filter(|k| stiff[*k] > RANK * most).map(|k| tau / stiff[k] * axes[k][a] * axes[k][a]).sum::<f64>();
-    let gain = |a: usize| (prior[a * m + a] > 0.0).then(|| (1.0 - covariance(a, a) / alone(a)).clamp(0.0, 1.0));
+    let before = |a: usize, b: usize| {
+        (0..m).filter(|k| stiff[*k] > RANK * most).map(|k| tau / stiff[k] * axes[k][a] * axes[k][b]).sum::<f64>()
+    };
+    // Variance of a group around the mean of its field, which is all but free beforehand.
+    let placed: Vec<_> = problem.priors().placed.iter().map(|p| p.range.clone()).collect();
+    let field = |a: usize| groups[a].first().and_then(|i| placed.iter().position(|range| range.contains(i)));
+    let alone = |a: usize| {
+        let own: Vec<usize> = (0..m).filter(|b| field(*b) == field(a)).collect();
+        let n = own.len() as f64;
+        let rows = own.iter().map(|b| before(a, *b)).sum::<f64>() / n;
+        let all = own.iter().map(|b| own.iter().map(|c| before(*b, *c)).sum::<f64>()).sum::<f64>() / (n * n);
+        before(a, a) - 2.0 * rows + all
+    };
+    let gain = |a: usize| field(a).map(|_| (1.0 - covariance(a, a) / alone(a)).clamp(0.0, 1.0));
     let sd: Vec<f64> = (0..m).map(|a| covariance(a, a).sqrt()).collect();
     let correlation = (0..m).map(|a| (0..m).map(|b| covariance(a, b) / (sd[a] * sd[b])).collect()).collect();
     let information = 0.5 * lambda.iter().map(|l| (l / tau).ln()).sum::<f64>();
