@@ -206,6 +206,24 @@ fn a_linear_problem_ends_at_its_gaussian_posterior() {
 }
 
 #[test]
+fn what_is_expected_of_a_field_is_what_a_fit_says_afterwards() {
+    let (around, truth, readings) = chain();
+    let prior = prior(&around, PriorKind::Matern, Some((8.0, 0.5)));
+    let p = Precision::new(&prior, Hyper { length: 8.0, deviation: 0.5 }, &[]).unwrap();
+    let variance = posterior(&readings, &p, 1.0).1;
+    let values: Vec<f64> = truth.iter().map(|m| m.exp()).collect();
+    let groups: Vec<Vec<usize>> = (0..40).map(|k| vec![k]).collect();
+    let found = crate::expected(&mut problem(&readings, prior, false), &values, &groups, &ErrorModel::default()).unwrap();
+    let off = found.errors.iter().zip(&variance).map(|(e, v)| (e / v.sqrt() - 1.0).abs()).fold(0.0, f64::max);
+    assert!(off < 1e-6, "{off}");
+    // A fit takes the mean over the whole, and this one over the values.
+    for (k, (gain, v)) in found.gain.iter().zip(variance.iter().zip(p.marginal())).map(|(g, (v, m))| (g, v / m)).enumerate() {
+        assert!((gain.unwrap() - (1.0 - v).max(0.0)).abs() < 0.02, "{k}: {gain:?}, {}", 1.0 - v);
+    }
+    assert!(found.told[..22].iter().all(|t| *t) && !found.told[34..].iter().any(|t| *t), "{:?}", found.told);
+}
+
+#[test]
 fn numbers_beside_a_field_have_the_errors_of_dense_algebra() {
     let (around, _, mut readings) = chain();
     readings.by_number = (0..readings.y.len()).map(|j| 0.2 * (j as f64).cos()).collect();
