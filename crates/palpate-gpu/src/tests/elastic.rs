@@ -127,6 +127,7 @@ fn passes_of_derivatives_agree_with_the_cpu_and_one_percent_shows() {
 }
 
 #[test]
+// Every material has kernels of its own to compile; passes of a step say the same of two of them.
 #[ignore = "slow: cargo xtask test --full"]
 fn states_by_every_material_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
@@ -142,6 +143,7 @@ fn states_by_every_material_agree_with_the_cpu_and_one_percent_shows() {
 }
 
 #[test]
+// Cells run through every scheme in any case.
 #[ignore = "slow: cargo xtask test --full"]
 fn states_of_every_scheme_agree_with_the_cpu() {
     let Some(gpu) = device(None) else { return };

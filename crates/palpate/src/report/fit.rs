@@ -168,7 +168,7 @@ pub(super) fn posterior_lines(f: &FieldReference) -> Vec<String> {
     let best = format!("{length}deviation {} ({})", text(p.deviation), whose("deviation"));
     let one = p.tried.iter().find(|t| t.deviation == 0.0).and_then(|t| t.evidence);
     let one = match one {
-        Some(e) if e == 0.0 => "; one value everywhere explains the recording best".into(),
+        Some(0.0) => "; one value everywhere explains the recording best".into(),
         Some(e) => format!("; one value everywhere is e^{:.1} times less likely", -e),
         None => String::new(),
     };
