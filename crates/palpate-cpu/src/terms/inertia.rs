@@ -1,5 +1,5 @@
 //! Inertia of nodes and point masses, damping in proportion to mass, and weight. Cells have lumped masses; tetrahedra have the whole matrix
-//! ([`Consistent`]).
+//! (`Consistent`).
 
 use super::consistent::Consistent;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal, zeros};

@@ -2,7 +2,7 @@
 //!
 //! With ε = S − I of F = R S, a = ½ ε:C:ε/E and d that of ε₁ − ε̃, ε̃ = Σ w ε(x_past), the incremental potential is
 //! E V [θ ψ(a, ε₁) + φ(d, a₀) + (1 − θ) P_ψ(F₀):F₁]: what `elastic_cells::laws` has for cells, where q takes the place of ε. All derivatives follow from
-//! those of a law by the chain rule, first to ε ([`Slopes`]) and then to F ([`Stretch`]).
+//! those of a law by the chain rule, first to ε (`Slopes`) and then to F ([`Stretch`]).
 
 mod slopes;
 
