@@ -19,13 +19,7 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let d = gradient_probe(p.member, point);
     var sides: array<Stretch, 2>;
     for (var side = 0u; side < 2u; side++) {
-        var h: mat3x3<f32>;
-        if side == 0u {
-            h = gradient_now(p.member, point);
-        } else {
-            h = gradient_next(p.member, point);
-        }
-        sides[side] = stretch_at(h);
+        sides[side] = stretch_at(gradient_of(p.member, point, side == 0u));
     }
     let old = sides[0];
     let fresh = sides[1];

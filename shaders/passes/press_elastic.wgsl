@@ -17,14 +17,9 @@ fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let mix = mix_of(m);
     let lame = lame_at(m, p.item).xy;
     // One call of the material for both states: kernels compile as long as materials take.
-    var h = mat3x3<f32>();
-    var weight = mix.fresh;
-    if call.extra == STRESS_OLD {
-        h = gradient_now(p.member, p.item);
-        weight = mix.old;
-    } else {
-        h = gradient_next(p.member, p.item);
-    }
+    let old = call.extra == STRESS_OLD;
+    let h = gradient_of(p.member, p.item, old);
+    let weight = select(mix.fresh, mix.old, old);
     var stress = mat3x3<f32>();
     var energy = 0.0;
     if weight != 0.0 {
@@ -35,7 +30,7 @@ fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     // What no modulus scales.
     var flow: Flow;
     var flowing = mat3x3<f32>();
-    if call.extra == STRESS_OLD {
+    if old {
         energy = 0.0;
     } else {
         stress += viscous(p.member, p.item, h, lame) * mix.rate;

@@ -17,20 +17,8 @@ fn press_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let mix = mix_of(m);
     let point = mean_point(p.item);
     let old = call.extra == STRESS_OLD;
-    var h: mat3x3<f32>;
-    if old {
-        h = gradient_now(p.member, point);
-    } else {
-        h = gradient_next(p.member, point);
-    }
-    let a = stretch_at(h);
-    var q: Question;
-    q.strain = a.strain;
-    q.weight = select(mix.fresh, mix.old, old);
-    if !old && call.mode != 0u {
-        q.past = past_stretch(p.member, p.item);
-        q.lossy = true;
-    }
+    let a = stretch_at(gradient_of(p.member, point, old));
+    let q = question_of(p.member, p.item, mix, a, old);
     let said = ask_laws(m, p.member, q);
     let scale = young_at(m, p.member, p.item) * elastic_volumes[point];
     let stress = stress_back(a, said.t) * scale;

@@ -34,13 +34,7 @@ fn pull_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             continue;
         }
         let weight = select(select(1.0, mix.fresh, instant == 0u), mix.old, old);
-        var h: mat3x3<f32>;
-        if old {
-            h = gradient_now(p.member, point);
-        } else {
-            h = gradient_next(p.member, point);
-        }
-        let a = stretch_at(h);
+        let a = stretch_at(gradient_of(p.member, point, old));
         var asked: Asked;
         asked.x = a.strain - past * f32(part == LOSS_PART);
         asked.past = past;

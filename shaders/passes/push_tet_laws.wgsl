@@ -23,20 +23,8 @@ fn push_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     var stress = mat3x3<f32>();
     for (var instant = 0u; instant < 2u; instant++) {
         let old = instant == 1u;
-        var h: mat3x3<f32>;
-        if old {
-            h = gradient_now(p.member, point);
-        } else {
-            h = gradient_next(p.member, point);
-        }
-        let a = stretch_at(h);
-        var q: Question;
-        q.strain = a.strain;
-        q.weight = select(mix.fresh, mix.old, old);
-        if !old && call.mode != 0u {
-            q.past = past_stretch(p.member, p.item);
-            q.lossy = true;
-        }
+        let a = stretch_at(gradient_of(p.member, point, old));
+        var q = question_of(p.member, p.item, mix, a, old);
         if with_rate(WITH_POISSON) {
             q.poisson = rates[p.member].poisson;
         }

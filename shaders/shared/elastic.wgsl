@@ -65,6 +65,14 @@ fn gradient_now(member: u32, point: u32) -> mat3x3<f32> {
     return h;
 }
 
+// H of the old or the new state.
+fn gradient_of(member: u32, point: u32, old: bool) -> mat3x3<f32> {
+    if old {
+        return gradient_now(member, point);
+    }
+    return gradient_next(member, point);
+}
+
 fn gradient_probe(member: u32, point: u32) -> mat3x3<f32> {
     let o = at_node(member, stencil_entries[stencil_rows[point]].node);
     var h = mat3x3<f32>();

@@ -16,6 +16,18 @@ struct Question {
     by_past: bool,
 }
 
+// What a force asks at the old state, which loses nothing, or at the new one.
+fn question_of(member: u32, element: u32, mix: Mix, a: Stretch, old: bool) -> Question {
+    var q: Question;
+    q.strain = a.strain;
+    q.weight = select(mix.fresh, mix.old, old);
+    if !old && call.mode != 0u {
+        q.past = past_stretch(member, element);
+        q.lossy = true;
+    }
+    return q;
+}
+
 fn ask_laws(m: Member, member: u32, q: Question) -> Said {
     var said: Said;
     step_rate = 1.0 / shape.dt;
