@@ -24,14 +24,49 @@ impl Hyperelastic for CorotatedLinear {
         linear(&stretch(h), lambda, mu)
     }
 
-    /// P = R σ, σ = λ tr(ε) I + 2μ ε, ε = S − I. Along dF, with M = Rᵀ dF: dR = R [ω]× with (tr(S) I − S) ω = axial(M), as the skew part of
-    /// M = [ω]× S + dS says; then dP = R ([ω]× σ + dσ).
     fn stress_by_formula(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Option<Stress> {
-        let back = matrix(&rotation(h)).transpose();
+        let at = Turned::new(h, lambda, mu);
+        Some((at.first(), at.second(lambda, mu)))
+    }
+
+    fn first_by_formula(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Option<[f64; 9]> {
+        Some(Turned::new(h, lambda, mu).first())
+    }
+
+    fn is_linear_in_moduli(&self) -> bool {
+        true
+    }
+}
+
+/// A deformation F = R S: P = R σ, σ = λ tr(ε) I + 2μ ε, ε = S − I. Along dF, with M = Rᵀ dF: dR = R [ω]× with (tr(S) I − S) ω = axial(M), as the skew
+/// part of M = [ω]× S + dS says; then dP = R ([ω]× σ + dσ).
+struct Turned {
+    /// Rᵀ.
+    back: DMat3,
+    s: DMat3,
+    sigma: DMat3,
+}
+
+/// λ tr(ε) I + 2μ ε.
+fn stress_of(e: DMat3, lambda: f64, mu: f64) -> DMat3 {
+    DMat3::IDENTITY * (lambda * trace(e)) + e * (2.0 * mu)
+}
+
+impl Turned {
+    fn new(h: &Gradient<f64>, lambda: f64, mu: f64) -> Turned {
         let f = matrix(&deformation(h));
+        let back = nearest(f).transpose();
         let s = half(back * f);
-        let linear = |e: DMat3| DMat3::IDENTITY * (lambda * trace(e)) + e * (2.0 * mu);
-        let sigma = linear(s - DMat3::IDENTITY);
+        Turned { back, s, sigma: stress_of(s - DMat3::IDENTITY, lambda, mu) }
+    }
+
+    fn first(&self) -> [f64; 9] {
+        let p = self.back.transpose() * self.sigma;
+        std::array::from_fn(|k| p.col(k % 3)[k / 3])
+    }
+
+    fn second(&self, lambda: f64, mu: f64) -> [[f64; 9]; 9] {
+        let Turned { back, s, sigma } = *self;
         let pairs = (DMat3::IDENTITY * trace(s) - s).inverse();
         let mut tangent = [[0.0; 9]; 9];
         for l in 0..9 {
@@ -40,16 +75,29 @@ impl Hyperelastic for CorotatedLinear {
             *m.col_mut(l % 3) = back.col(l / 3);
             let omega = pairs * DVec3::new(m.y_axis.z - m.z_axis.y, m.z_axis.x - m.x_axis.z, m.x_axis.y - m.y_axis.x);
             let turn = DMat3::from_cols(omega.cross(DVec3::X), omega.cross(DVec3::Y), omega.cross(DVec3::Z));
-            let change = back.transpose() * (turn * sigma + linear(half(m - turn * s)));
+            let change = back.transpose() * (turn * sigma + stress_of(half(m - turn * s), lambda, mu));
             (0..9).for_each(|k| tangent[k][l] = change.col(k % 3)[k / 3]);
         }
-        let p = back.transpose() * sigma;
-        Some((std::array::from_fn(|k| p.col(k % 3)[k / 3]), tangent))
+        tangent
     }
+}
 
-    fn is_linear_in_moduli(&self) -> bool {
-        true
+/// R with F = R S, as [`rotation`] finds it; done when a step leaves nothing to do.
+fn nearest(f: DMat3) -> DMat3 {
+    let size = |m: DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
+    let mut r = f;
+    for _ in 0..STEPS {
+        let (a, b, c) = (r.x_axis, r.y_axis, r.z_axis);
+        let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
+        let next = (r + cofactors * (1.0 / a.dot(cofactors.x_axis))) * 0.5;
+        let moved = size(next - r);
+        r = next;
+        // What is off after a step is half its square: below rounding, where the step was below its root.
+        if moved < 1e-16 {
+            break;
+        }
     }
+    r
 }
 
 /// Rows as a matrix.

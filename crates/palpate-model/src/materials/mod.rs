@@ -76,6 +76,11 @@ pub trait Hyperelastic: Sync {
         None
     }
 
+    /// [`Solid::first`] likewise.
+    fn first_by_formula(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Option<[f64; 9]> {
+        self.stress_by_formula(h, lambda, mu).map(|s| s.0)
+    }
+
     /// True where ψ is linear in λ and μ: then [`Solid::by_moduli`] are the stresses at moduli of one and zero.
     fn is_linear_in_moduli(&self) -> bool {
         false
@@ -91,6 +96,10 @@ pub trait Solid: Sync {
     fn value(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> f64;
     /// First Piola–Kirchhoff stress P = ∂ψ/∂F [Pa] and its derivative ∂P/∂F [Pa].
     fn stress(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Stress;
+    /// P alone, which forces need more often than its derivative.
+    fn first(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [f64; 9] {
+        self.stress(h, lambda, mu).0
+    }
     /// ∂P/∂λ and ∂P/∂μ.
     fn by_moduli(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [[f64; 9]; 2];
     /// ∂P/∂(factor) for every corner of the curves of a material that has some.
@@ -108,9 +117,13 @@ impl<L: Hyperelastic> Solid for L {
         self.stress_by_formula(h, lambda, mu).unwrap_or_else(|| by_dual_numbers(self, h, lambda, mu))
     }
 
+    fn first(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [f64; 9] {
+        self.first_by_formula(h, lambda, mu).unwrap_or_else(|| self.stress(h, lambda, mu).0)
+    }
+
     fn by_moduli(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [[f64; 9]; 2] {
         if self.is_linear_in_moduli() {
-            return [self.stress(h, 1.0, 0.0).0, self.stress(h, 0.0, 1.0).0];
+            return [self.first(h, 1.0, 0.0), self.first(h, 0.0, 1.0)];
         }
         let mut lifted = h.map(|row| row.map(HyperDual64::from));
         let mut out = [[0.0; 9]; 2];
@@ -178,27 +191,54 @@ fn shear<D: Number>(h: &Gradient<D>, [_, c, det]: [D; 3], j: D) -> D {
     squares(h) * 0.5 - c - det + minus_ln1p(j)
 }
 
-/// Stress and tangent of ψ = μ · shear + U(J), given p = J U′ and q = J p′ as functions of j = J − 1. With G = F⁻ᵀ:
+/// A deformation as materials of ψ = μ · shear + U(J) see it. With G = F⁻ᵀ, p = J U′ and q = J p′:
 /// P = μ (F − G) + p G, where F − G = G (HᵀH + H + Hᵀ) loses no digits at small strains, and ∂P[δ] = μ δ + (μ − p) G δᵀ G + q (G : δ) G.
-fn with_barrier(h: &Gradient<f64>, mu: f64, pressure: impl Fn(f64) -> [f64; 2]) -> Stress {
-    let [trace, c, det] = volume_parts(h);
-    let j = trace + c + det;
-    let g = cofactors(&deformation(h)).map(|row| row.map(|v| v / (1.0 + j)));
-    let [p, q] = if j > -1.0 { pressure(j) } else { [f64::NAN; 2] };
-    let twice: Gradient<f64> =
-        std::array::from_fn(|a| std::array::from_fn(|b| h[a][b] + h[b][a] + (0..3).map(|k| h[k][a] * h[k][b]).sum::<f64>()));
-    let (mut first, mut second) = ([0.0; 9], [[0.0; 9]; 9]);
-    for a in 0..9 {
-        let (i, k) = (a / 3, a % 3);
-        first[a] = mu * (0..3).map(|m| g[i][m] * twice[m][k]).sum::<f64>() + p * g[i][k];
-        for b in 0..9 {
-            let (m, n) = (b / 3, b % 3);
-            // (G δᵀ G)_ik for δ = e_m ⊗ e_n is G_in G_mk.
-            second[a][b] = (mu - p) * g[i][n] * g[m][k] + q * g[m][n] * g[i][k];
-        }
-        second[a][a] += mu;
+struct Barrier {
+    g: Gradient<f64>,
+    mu: f64,
+    p: f64,
+    q: f64,
+}
+
+impl Barrier {
+    /// At H, for p and q as functions of j = J − 1.
+    fn new(h: &Gradient<f64>, mu: f64, pressure: impl Fn(f64) -> [f64; 2]) -> Barrier {
+        let [trace, c, det] = volume_parts(h);
+        let j = trace + c + det;
+        let g = cofactors(&deformation(h)).map(|row| row.map(|v| v / (1.0 + j)));
+        let [p, q] = if j > -1.0 { pressure(j) } else { [f64::NAN; 2] };
+        Barrier { g, mu, p, q }
     }
-    (first, second)
+
+    /// P.
+    fn first(&self, h: &Gradient<f64>) -> [f64; 9] {
+        let twice: Gradient<f64> =
+            std::array::from_fn(|a| std::array::from_fn(|b| h[a][b] + h[b][a] + (0..3).map(|k| h[k][a] * h[k][b]).sum::<f64>()));
+        std::array::from_fn(|a| {
+            let (i, k) = (a / 3, a % 3);
+            self.mu * (0..3).map(|m| self.g[i][m] * twice[m][k]).sum::<f64>() + self.p * self.g[i][k]
+        })
+    }
+
+    /// ∂P/∂F.
+    fn second(&self) -> [[f64; 9]; 9] {
+        let Barrier { g, mu, p, q } = self;
+        let mut second = [[0.0; 9]; 9];
+        for (a, row) in second.iter_mut().enumerate() {
+            let (i, k) = (a / 3, a % 3);
+            for (b, entry) in row.iter_mut().enumerate() {
+                let (m, n) = (b / 3, b % 3);
+                // (G δᵀ G)_ik for δ = e_m ⊗ e_n is G_in G_mk.
+                *entry = (mu - p) * g[i][n] * g[m][k] + q * g[m][n] * g[i][k];
+            }
+            row[a] += mu;
+        }
+        second
+    }
+
+    fn stress(&self, h: &Gradient<f64>) -> Stress {
+        (self.first(h), self.second())
+    }
 }
 
 /// Cofactors: the inverse's transpose times the determinant.

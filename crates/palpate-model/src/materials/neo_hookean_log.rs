@@ -1,7 +1,7 @@
 //! Neo-Hookean with a logarithmic volume term, ψ = ½μ (|F|² − 3) − μ ln J + ½λ ln²J (Hahn et al. 2019, Eq. 19): the same at small strains as
 //! [`super::neo_hookean`], twice as stiff at half the volume, and softer in expansion (not convex beyond J = e).
 
-use super::{Gradient, Hyperelastic, Model, Stress, shear, volume_parts, with_barrier};
+use super::{Barrier, Gradient, Hyperelastic, Model, Stress, shear, volume_parts};
 use crate::effects::law::Number;
 
 /// The law.
@@ -22,7 +22,16 @@ impl Hyperelastic for NeoHookeanLog {
         let ln = j.ln_1p();
         shear(h, parts, j) * mu + ln * ln * lambda * 0.5
     }
+
     fn stress_by_formula(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Option<Stress> {
-        Some(with_barrier(h, mu, |j| [lambda * j.ln_1p(), lambda]))
+        Some(barrier(h, lambda, mu).stress(h))
     }
+
+    fn first_by_formula(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> Option<[f64; 9]> {
+        Some(barrier(h, lambda, mu).first(h))
+    }
+}
+
+fn barrier(h: &Gradient<f64>, lambda: f64, mu: f64) -> Barrier {
+    Barrier::new(h, mu, |j| [lambda * j.ln_1p(), lambda])
 }

@@ -157,6 +157,12 @@ impl Solid for PrincipalStretch {
         (back(&frame, p), tangent)
     }
 
+    fn first(&self, h: &Gradient<f64>, lambda: f64, mu: f64) -> [f64; 9] {
+        let Some(frame) = frame(h) else { return [f64::NAN; 9] };
+        let w = self.volume.integrals(frame.x.iter().sum());
+        back(&frame, Self::principal(&frame, frame.x.map(|x| self.stretch.integrals(x).up), &w, 1.0, lambda, mu))
+    }
+
     fn by_moduli(&self, h: &Gradient<f64>, _lambda: f64, _mu: f64) -> [[f64; 9]; 2] {
         let Some(frame) = frame(h) else { return [[f64::NAN; 9]; 2] };
         let w = self.volume.integrals(frame.x.iter().sum());
