@@ -170,7 +170,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     // writing of what it has.
     let mut track = console.progress(plan.clock.steps as u64, "simulating");
     let mut states: Vec<(usize, Snapshot)> = Vec::new();
-    let mut farthest: f64 = 0.0;
+    let (mut farthest, mut reached): (f64, usize) = (0.0, 0);
     let mut extent: Vec<(DVec3, DVec3)> = Vec::new();
     let interrupt = console.interrupt.clone();
     backend.visit(plan, &plan.theta, |k, s, _| {
@@ -181,6 +181,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             states.push((k, s));
         }
         track.at(k as u64, "");
+        reached = k;
         if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let interrupted = interrupt.is_raised();
@@ -217,7 +218,15 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if !writer.series.is_empty() {
         palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
     }
-    report(console, &experiment, &folder, backend.name(), seconds, farthest, written, writer.files);
+    report(
+        console,
+        &experiment,
+        &folder,
+        (backend.name(), seconds, interrupted.then_some(reached)),
+        farthest,
+        written,
+        writer.files,
+    );
     Ok(if interrupted { INTERRUPTED } else { 0 })
 }
 
@@ -225,8 +234,7 @@ fn report(
     console: &mut Console,
     experiment: &Experiment,
     folder: &Path,
-    backend: &str,
-    seconds: f64,
+    (backend, seconds, interrupted): (&str, f64, Option<usize>),
     farthest: f64,
     frames: usize,
     files: usize,
@@ -237,6 +245,7 @@ fn report(
             scene: experiment.scene().path.display().to_string(),
             backend: backend.into(),
             steps: plan.clock.steps,
+            interrupted,
             nodes: plan.body.nodes.len(),
             frames,
             files,
@@ -245,8 +254,9 @@ fn report(
             seconds,
         }));
     } else {
+        let first = interrupted.map_or(String::new(), |reached| format!("interrupted after step {reached}: "));
         console.print(&format!(
-            "{}: {} steps of {} nodes in {seconds:.2} s ({backend}), largest displacement {:.4} m; {files} files in {}",
+            "{first}{}: {} steps of {} nodes in {seconds:.2} s ({backend}), largest displacement {:.4} m; {files} files in {}",
             experiment.scene().path.display(),
             plan.clock.steps,
             plan.body.nodes.len(),

@@ -12,6 +12,9 @@ pub struct SimulationDocument {
     pub backend: String,
     /// Time steps; 0 for a static problem.
     pub steps: usize,
+    /// The last step that was reached, where somebody stopped it before the end.
+    #[serde(default)]
+    pub interrupted: Option<usize>,
     /// Nodes of the body.
     pub nodes: usize,
     /// Frames written.
@@ -41,6 +44,7 @@ mod tests {
             scene: "a.toml".into(),
             backend: "cpu".into(),
             steps: 10,
+            interrupted: Some(7),
             nodes: 45,
             frames: 3,
             files: 9,
@@ -48,7 +52,19 @@ mod tests {
             largest_displacement: Some(1.0 / 3.0),
             seconds: 0.5,
         });
-        let all = ["backend", "files", "format", "frames", "largest_displacement", "nodes", "out", "scene", "seconds", "steps"];
+        let all = [
+            "backend",
+            "files",
+            "format",
+            "frames",
+            "interrupted",
+            "largest_displacement",
+            "nodes",
+            "out",
+            "scene",
+            "seconds",
+            "steps",
+        ];
         assert_eq!(keys(&file), all);
     }
 }
