@@ -9,6 +9,7 @@ use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
 use crate::results::fit::{FieldReference, FoundCurve, VerdictWord};
 use maud::{Markup, html};
+use palpate_model::observation::ReadingKind;
 
 /// What a report is made of.
 pub struct ReportInput<'a> {
@@ -235,9 +236,15 @@ fn scene(input: &ReportInput, s: usize, e: &Experiment) -> Markup {
         @if let Some(drawing) = plot(&lines, "time [s]", "rms distance [mm]", false) { (drawing) }
         @if let Some((before, found)) = input.pictures.get(s).filter(|p| !p.1.is_empty()) {
             p {
-                "Model in grey; measured points blue where they lie inside it, white on it, red outside (full colour at "
-                (format!("{:.2}", input.scale * 1e3)) " mm), black where they met nothing. Left of each pair: first start; right: "
-                "values found."
+                "Model in grey. "
+                @if e.plan().observation.readings(ReadingKind::Depth) > 0 {
+                    "Measured points are blue where they lie inside it, white on it, red outside (full colour at "
+                    (format!("{:.2}", input.scale * 1e3)) " mm), and black where they met nothing. "
+                }
+                @if [ReadingKind::Marker, ReadingKind::Track, ReadingKind::Displacement].iter().any(|k| e.plan().observation.readings(*k) > 0) {
+                    "Black dots are measured markers and points, each with a line to where the model has it. "
+                }
+                "Left of each pair: first start; right: values found."
             }
             @for (k, f) in found.iter().enumerate() {
                 (figure(before.get(k).into_iter().chain([f]), &format!("t = {:.4} s", f.time)))
