@@ -1,5 +1,5 @@
 //! Adds the derivative of the stress of laws of cells by a past state, times the vector `probe` (ALONG), or its transpose, to what
-//! couple_elastic left; `now` is that state.
+//! couple_elastic left; `now` is that state. Or that of the stress-free shape, as there.
 // use shared/tet_question
 // use shared/still_numbers
 // use shared/asks
@@ -16,7 +16,11 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let m = members[p.member];
     let mix = mix_of(m);
     let point = mean_point(p.item);
-    let d = gradient_probe(p.member, point);
+    let f0 = identity3() + gradient_now(p.member, point);
+    var d = gradient_probe(p.member, point);
+    if call.extra == ALONG_SHAPE {
+        d = f0 * d * -1.0;
+    }
     var sides: array<Stretch, 2>;
     for (var side = 0u; side < 2u; side++) {
         sides[side] = stretch_at(gradient_of(p.member, point, side == 0u));
@@ -35,7 +39,7 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             q.strain = fresh.strain;
             q.past = past_stretch(p.member, p.item);
             q.lossy = true;
-            q.by_past = call.extra != ALONG;
+            q.by_past = call.extra == TRANSPOSED || call.extra == TRANSPOSED_SHAPE;
             if q.by_past {
                 q.dstrain = strain_along(fresh, d);
             } else {
@@ -51,7 +55,10 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             stress += stress_back(fresh, said.change);
         }
     }
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[point];
+    if call.extra == TRANSPOSED_SHAPE {
+        stress = transpose(f0) * stress * -1.0;
+    }
+    let scale = young_at(m, p.member, p.item) * volume_at(p.member, point);
     let at = stress_place(p.member, point);
     for (var c = 0u; c < 3u; c++) {
         elastic_stress[at + c] += vec4(scale * stress[c], 0.0);

@@ -2,6 +2,7 @@
 // use shared/mix
 // use shared/inertia
 // use shared/elastic_asks
+// use shared/unstrained
 
 struct Pair { // mirrored
     // Both entries of a stencil that make the block.
@@ -18,9 +19,10 @@ var<storage, read_write> values: array<f32>;
 
 // Σ_kl ∂P_ik/∂F_jl g_k g'_l.
 fn elastic_block(member: u32, pair: Pair) -> mat3x3<f32> {
-    let here = stencil_gradients[pair.row].xyz;
-    let there = stencil_gradients[pair.column].xyz;
-    let start = (member * shape.elastic + pair.stencil) * TANGENT_NUMBERS;
+    let point = member * shape.elastic + pair.stencil;
+    let here = weight_unstrained(point, stencil_gradients[pair.row].xyz);
+    let there = weight_unstrained(point, stencil_gradients[pair.column].xyz);
+    let start = point * TANGENT_NUMBERS;
     var block = mat3x3<f32>();
     for (var c = 0u; c < 9u; c++) {
         let at = start + 9u * c;

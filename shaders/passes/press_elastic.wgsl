@@ -39,11 +39,11 @@ fn press_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             energy += 0.5 * mix.rate * contract(g, linear_stress(g, lame));
         }
         flow = flow_at(m, p.member, p.item, h);
-        flowing = (identity3() + h) * flow.stress * elastic_volumes[p.item];
+        flowing = (identity3() + h) * flow.stress * volume_at(p.member, p.item);
     }
-    let scale = young_at(m, p.member, element_of(p.item)) * elastic_volumes[p.item];
+    let scale = young_at(m, p.member, element_of(p.item)) * volume_at(p.member, p.item);
     let at = stress_place(p.member, p.item);
-    elastic_stress[at] = vec4(scale * stress[0] + flowing[0], scale * energy + elastic_volumes[p.item] * flow.energy);
+    elastic_stress[at] = vec4(scale * stress[0] + flowing[0], scale * energy + volume_at(p.member, p.item) * flow.energy);
     elastic_stress[at + 1u] = vec4(scale * stress[1] + flowing[1], 0.0);
     elastic_stress[at + 2u] = vec4(scale * stress[2] + flowing[2], 0.0);
 }

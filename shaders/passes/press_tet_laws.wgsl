@@ -20,7 +20,7 @@ fn press_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let a = stretch_at(gradient_of(p.member, point, old));
     let q = question_of(p.member, p.item, mix, a, old);
     let said = ask_laws(m, p.member, q);
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[point];
+    let scale = young_at(m, p.member, p.item) * volume_at(p.member, point);
     let stress = stress_back(a, said.t) * scale;
     let at = stress_place(p.member, point);
     // Of the old state's force the potential is linear; gather_residual knows it.

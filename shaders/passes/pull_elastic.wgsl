@@ -17,7 +17,7 @@ fn pull_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let m = members[p.member];
     let way = elastic_way(p.member, p.item, m, mix_of(m));
-    let z = gradient_probe(p.member, p.item) * elastic_volumes[p.item];
+    let z = gradient_probe(p.member, p.item) * volume_at(p.member, p.item);
     let whole = contract(z, way.stress);
     let young = young_at(m, p.member, element_of(p.item));
     elastic_pulls[p.member * shape.elastic + p.item] -= unvaried(m, p.member) * whole;

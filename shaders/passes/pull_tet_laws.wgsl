@@ -21,7 +21,7 @@ fn pull_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let point = mean_point(p.item);
     let z = gradient_probe(p.member, point);
     let young = young_at(m, p.member, p.item);
-    let unit = young * elastic_volumes[point];
+    let unit = young * volume_at(p.member, point);
     step_rate = 1.0 / shape.dt;
     let past = past_stretch(p.member, p.item);
     var own = 0.0;
@@ -69,7 +69,7 @@ fn pull_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             }
         }
     }
-    elastic_pulls[p.member * shape.elastic + point] -= unvaried(m, p.member) * elastic_volumes[point] * own;
+    elastic_pulls[p.member * shape.elastic + point] -= unvaried(m, p.member) * volume_at(p.member, point) * own;
     elastic_sums[row_at(0u, p.member, point, shape.elastic, 1u)] -= unit * poisson;
     for (var row = 0u; row < shape.aging_rows; row++) {
         let slope = aging_at(p.member, 1u + row) / aging_at(p.member, 0u);

@@ -25,6 +25,6 @@ fn push_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     stress += way.by_coefficient * flow.x + way.by_exponent * flow.y;
     let at = stress_place(p.member, p.item);
     for (var c = 0u; c < 3u; c++) {
-        elastic_stress[at + c] = vec4(elastic_volumes[p.item] * stress[c], 0.0);
+        elastic_stress[at + c] = vec4(volume_at(p.member, p.item) * stress[c], 0.0);
     }
 }

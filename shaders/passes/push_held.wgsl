@@ -3,6 +3,8 @@
 // use shared/held_slopes
 // use shared/rates
 
+// [B][N]: of the stress-free shape.
+var<storage, read> rate_rests: array<vec4<f32>>;
 var<storage, read_write> column: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -15,6 +17,9 @@ fn push_held(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let m = members[p.member];
     let r = rates[p.member];
     var sum = -r.start * pull_rate(m, p.member, p.item);
+    if with_rate(WITH_RESTS) {
+        sum += by_shape(m, p.member, p.item, rate_rests[at_node(p.member, p.item)].xyz, false);
+    }
     let numbers = aging_numbers(p.member) + shape.aging_rows;
     let poses = pose_rows();
     let matrices = layer_rows();

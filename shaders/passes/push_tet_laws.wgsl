@@ -33,6 +33,6 @@ fn push_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     }
     let at = stress_place(p.member, point);
     for (var c = 0u; c < 3u; c++) {
-        elastic_stress[at + c] += vec4(elastic_volumes[point] * stress[c], 0.0);
+        elastic_stress[at + c] += vec4(volume_at(p.member, point) * stress[c], 0.0);
     }
 }

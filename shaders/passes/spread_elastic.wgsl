@@ -4,6 +4,7 @@
 // use shared/stencil
 // use shared/elastic_asks
 // use shared/held
+// use shared/unstrained
 
 // Elastic points, then patches, that have the node: stencil and entry.
 var<storage, read> elastic_rows: array<u32>;
@@ -31,7 +32,7 @@ fn spread_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         let w = stencil_entries[at.y].weight;
         if at.x < shape.elastic {
             let s = 3u * (p.member * shape.elastic + at.x);
-            let g = stencil_gradients[at.y].xyz;
+            let g = weight_unstrained(p.member * shape.elastic + at.x, stencil_gradients[at.y].xyz);
             let f = elastic_stress[s].xyz * g.x + elastic_stress[s + 1u].xyz * g.y + elastic_stress[s + 2u].xyz * g.z;
             elastic += vec4(f, w * elastic_stress[s].w);
         } else if (call.extra & SPREAD_PATCHES) != 0u {

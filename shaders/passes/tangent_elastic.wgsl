@@ -20,7 +20,7 @@ fn tangent_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let lame = lame_at(m, p.item).xy;
     let h = gradient_next(p.member, p.item);
     let f = identity3() + h;
-    let scale = young_at(m, p.member, element_of(p.item)) * elastic_volumes[p.item];
+    let scale = young_at(m, p.member, element_of(p.item)) * volume_at(p.member, p.item);
     let convex = newton[p.member].convex != 0u;
     var held = mat3x3<f32>();
     if mix.rate != 0.0 {
@@ -40,7 +40,7 @@ fn tangent_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
         }
         let at = (p.member * shape.elastic + p.item) * TANGENT_NUMBERS + 9u * column;
         for (var row = 0u; row < 9u; row++) {
-            elastic_tangents[at + row] = scale * component(change, row) + elastic_volumes[p.item] * component(flowing, row);
+            elastic_tangents[at + row] = scale * component(change, row) + volume_at(p.member, p.item) * component(flowing, row);
         }
     }
 }

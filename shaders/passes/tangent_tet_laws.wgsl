@@ -31,7 +31,7 @@ fn tangent_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgr
         t = said.t;
         by[c] = said.change;
     }
-    let scale = young_at(m, p.member, p.item) * elastic_volumes[point];
+    let scale = young_at(m, p.member, p.item) * volume_at(p.member, point);
     let convex = newton[p.member].convex != 0u;
     for (var column = 0u; column < 9u; column++) {
         var df = mat3x3<f32>();

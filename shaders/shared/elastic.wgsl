@@ -1,9 +1,10 @@
 //! Elastic points: stencils with gradients, each of which stands for a volume and has the material at F itself. Twin of
-//! palpate-cpu/src/terms/elastic_points.rs. Strains are counted from differences of displacements, so that a long way costs no digits.
+//! palpate-cpu/src/terms/elastic_points. Strains are counted from differences of displacements, so that a long way costs no digits.
 // use shared/mix
 // use shared/fields
 // use shared/stencil
 // use shared/rotation
+// use shared/unstrained
 // use materials/all
 
 // [m³]
@@ -44,6 +45,17 @@ fn contract(a: mat3x3<f32>, b: mat3x3<f32>) -> f32 {
     return dot(a[0], b[0]) + dot(a[1], b[1]) + dot(a[2], b[2]);
 }
 
+// Volume of a point in the stress-free shape [m³].
+fn volume_at(member: u32, point: u32) -> f32 {
+    return elastic_volumes[point] * swelling(member * shape.elastic + point);
+}
+
+// H = F − I, measured from the stress-free shape.
+fn measured(member: u32, point: u32, h: mat3x3<f32>) -> mat3x3<f32> {
+    let at = member * shape.elastic + point;
+    return by_unstrained(at, h) - shift_of(at);
+}
+
 // Displacement gradients H of both states, and the gradient of `probe`; weights of a gradient sum to zero.
 fn gradient_next(member: u32, point: u32) -> mat3x3<f32> {
     let o = at_node(member, stencil_entries[stencil_rows[point]].node);
@@ -52,7 +64,7 @@ fn gradient_next(member: u32, point: u32) -> mat3x3<f32> {
         let a = at_node(member, stencil_entries[k].node);
         h += outer((next[a].xyz - next[o].xyz) + (next[part(1u) + a].xyz - next[part(1u) + o].xyz), stencil_gradients[k].xyz);
     }
-    return h;
+    return measured(member, point, h);
 }
 
 fn gradient_now(member: u32, point: u32) -> mat3x3<f32> {
@@ -62,7 +74,7 @@ fn gradient_now(member: u32, point: u32) -> mat3x3<f32> {
         let a = at_node(member, stencil_entries[k].node);
         h += outer((now[a].xyz - now[o].xyz) + (now[part(1u) + a].xyz - now[part(1u) + o].xyz), stencil_gradients[k].xyz);
     }
-    return h;
+    return measured(member, point, h);
 }
 
 // H of the old or the new state.
@@ -79,7 +91,7 @@ fn gradient_probe(member: u32, point: u32) -> mat3x3<f32> {
     for (var k = stencil_rows[point]; k < stencil_rows[point + 1u]; k++) {
         h += outer(probe[at_node(member, stencil_entries[k].node)].xyz - probe[o].xyz, stencil_gradients[k].xyz);
     }
-    return h;
+    return by_unstrained(member * shape.elastic + point, h);
 }
 
 // Green's strain.

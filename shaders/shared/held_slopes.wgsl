@@ -23,7 +23,18 @@ fn by_pose(m: Member, member: u32, node: u32, row: u32) -> vec3<f32> {
         let at = ((row * shape.members + member) * (shape.steps + 1u) + instant_now()) * shape.clamps + holders[k].by;
         let slope = hold_slopes[at];
         let spring = spring_at(firm_of(m, member), layer_of(member), holders[k]);
-        sum -= spring.stiffness * (slope.turn * rest[node].xyz + slope.shift.xyz);
+        sum -= spring.stiffness * (slope.turn * (rest[node].xyz + unloaded(member, node)) + slope.shift.xyz);
+    }
+    return sum;
+}
+
+// Change of the force on a node when the stress-free shape moves it by `v`, or the transposed product.
+fn by_shape(m: Member, member: u32, node: u32, v: vec3<f32>, transposed: bool) -> vec3<f32> {
+    var sum = vec3(0.0);
+    for (var k = held_rows[node]; k < held_rows[node + 1u]; k++) {
+        let turn = pose_now(member, holders[k].by).turn;
+        let moved = select(turn * v, transpose(turn) * v, transposed);
+        sum -= spring_at(firm_of(m, member), layer_of(member), holders[k]).stiffness * moved;
     }
     return sum;
 }

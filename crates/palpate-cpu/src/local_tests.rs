@@ -116,9 +116,10 @@ fn everywhere(check: impl Fn(&At)) {
     }
     // Laws of cells, of the clamps and of the body on them.
     for (model, kind, count) in [(&materials::ALL[0], Tetrahedron::Quadratic, 1), (&materials::ALL[1], Tetrahedron::Linear, 2)] {
-        let on_tets = |e: &Effect| !matches!(e.law().site, Site::Rest(_) | Site::Edges(_));
+        let on_tets = |e: &Effect| !matches!(e.law().site, Site::Edges(_));
         let effects = altering().into_iter().filter(on_tets).collect();
-        let made = Made { tetrahedron: kind, ..Made::of(tetrahedra(count), effects) };
+        let viscosity = Some(Viscosity { coefficient: 40.0, exponent: 0.6 });
+        let made = Made { tetrahedron: kind, viscosity, ..Made::of(tetrahedra(count), effects) };
         check_all(Plan { model, ..made.plan() }, &check);
     }
 }

@@ -132,6 +132,12 @@ fn check_parameters(member: &Member) -> Result<(), Reason> {
             format!("material.poisson_ratio = {} must lie in (-1, 0.5)", number(p.poisson_ratio)),
         ));
     }
+    if member.altered.points.as_ref().is_some_and(|p| p.is_folded()) {
+        return Err((
+            FailureKind::BadParameter,
+            "the stress-free shape is folded: rest-shape bends or stretches it too far".into(),
+        ));
+    }
     Ok(())
 }
 

@@ -101,8 +101,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
         matrices(if geometry.effects.on_clamps() { b } else { ratios }, shape.holds),
         b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64,
     ]);
-    let [nodes, elements, clamps] = [shape.nodes, shape.elements, shape.clamps].map(|n| n as usize);
-    let effects = geometry.effects.sizes(members, nodes, elements, geometry.mass.entries(), clamps);
+    let effects = geometry.effects.sizes(members, &plan.body, geometry.mass.entries(), shape.clamps as usize);
     constants.extend(effects.iter().map(|s| 4 * s.1 as u64));
     constants.extend(costs::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();

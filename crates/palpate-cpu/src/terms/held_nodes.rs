@@ -1,10 +1,11 @@
-//! Nodes that clamps hold, of bodies without cells: a stiff spring draws each to where its clamp wants it, A X + b. The stiffness is the
+//! Nodes that clamps hold, of bodies without cells: a stiff spring draws each to where its clamp wants it, A (X + W) + b, where W is the
+//! displacement of the stress-free shape. The stiffness is the
 //! plan's and no parameter, but for a layer of thickness ℓ that gives way ([`palpate_model::effects`], "compliant-clamp"): the layer is in series with
 //! the spring, S/ℓ with S = (λ + 2μ) times the area that the node stands for. Effects move what is wanted as they move the clamps of cells.
 
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal};
 use crate::linear::matrix::Matrix;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::changes::{hold, hold_slope};
 use palpate_model::params::coefficients::{Coefficients, Sought};
@@ -32,6 +33,8 @@ struct Held {
     node: usize,
     /// Rest position [m].
     rest: DVec3,
+    /// The same in the stress-free shape, which is what a clamp holds [m].
+    whole: DVec3,
     /// Of the spring with its layer [N/m], and its derivatives by the layer's thickness and by the logarithm of S.
     stiffness: f64,
     by_layer: f64,
@@ -56,8 +59,9 @@ impl<'a> HeldNodes<'a> {
         };
         self.c.plan.clamps.iter().enumerate().flat_map(of).map(|(clamp, node, k, area)| {
             let rest = self.c.plan.body.nodes[node];
+            let whole = rest + self.c.coefficients.changes.rest.as_ref().map_or(DVec3::ZERO, |w| w[node]);
             if self.grips.is_none() {
-                return Held { clamp, node, rest, stiffness: k, by_layer: 0.0, by_firm: 0.0 };
+                return Held { clamp, node, rest, whole, stiffness: k, by_layer: 0.0, by_firm: 0.0 };
             }
             // k S/(S + k ℓ).
             let s = self.firm.0 * area;
@@ -66,6 +70,7 @@ impl<'a> HeldNodes<'a> {
                 clamp,
                 node,
                 rest,
+                whole,
                 stiffness: k * s / sum,
                 by_layer: -k * k * s / (sum * sum),
                 by_firm: k * k * self.layer * s / (sum * sum),
@@ -87,7 +92,7 @@ impl<'a> HeldNodes<'a> {
         let poses = self.poses(self.c.time);
         self.held().map(move |h| {
             let (a, b) = poses[h.clamp];
-            (h, h.rest + u1[h.node] - (a * h.rest + b))
+            (h, h.rest + u1[h.node] - (a * h.whole + b))
         })
     }
 
@@ -97,7 +102,7 @@ impl<'a> HeldNodes<'a> {
             let poses = self.poses(self.c.time + sign * MOMENT);
             for h in self.held() {
                 let (a, b) = poses[h.clamp];
-                visit(h.node, sign * h.stiffness / (2.0 * MOMENT) * (a * h.rest + b));
+                visit(h.node, sign * h.stiffness / (2.0 * MOMENT) * (a * h.whole + b));
             }
         }
     }
@@ -109,7 +114,7 @@ impl<'a> HeldNodes<'a> {
         let poses: Vec<Option<Pose>> =
             (0..self.c.plan.clamps.len()).map(|i| grips.pose_slope(i, self.c.time, effect, slot)).collect();
         for (h, away) in self.away(u1) {
-            let moved = poses[h.clamp].map_or(DVec3::ZERO, |(a, b)| a * h.rest + b);
+            let moved = poses[h.clamp].map_or(DVec3::ZERO, |(a, b)| a * h.whole + b);
             visit(h.node, slope[1] * h.by_layer * away - h.stiffness * moved);
         }
     }
@@ -119,6 +124,12 @@ impl<'a> HeldNodes<'a> {
         if self.layer != 0.0 {
             self.away(u1).for_each(|(h, away)| visit(h.node, h.by_firm * away));
         }
+    }
+
+    /// A of every held node's clamp, times the stiffness: minus the force's derivative by the stress-free shape there.
+    fn by_rest(&self, mut visit: impl FnMut(usize, DMat3)) {
+        let poses = self.poses(self.c.time);
+        self.held().for_each(|h| visit(h.node, poses[h.clamp].0 * h.stiffness));
     }
 
     /// Numbers of all effects: effect and slot.
@@ -155,6 +166,9 @@ impl Term for HeldNodes<'_> {
         for (effect, slot) in self.numbers().filter(|(e, slot)| d.effects[*e][*slot] != 0.0) {
             self.by_number(u1, effect, slot, |n, f| out[n] += d.effects[effect][slot] * f);
         }
+        if let Some(dw) = &rates.changes.rest {
+            self.by_rest(|n, a| out[n] -= a * dw[n]);
+        }
         let firmer = self.c.ln_young_along(rates) + self.firm.1 * d.poisson_ratio;
         if firmer != 0.0 {
             self.by_firm(u1, |n, f| out[n] += firmer * f);
@@ -167,6 +181,9 @@ impl Term for HeldNodes<'_> {
         }
         for (effect, slot) in self.numbers().filter(|(e, _)| sought.effects[*e]) {
             self.by_number(u1, effect, slot, |n, f| gradient.physics.effects[effect][slot] += z[n].dot(f));
+        }
+        if let Some(rest) = &mut gradient.changes.rest {
+            self.by_rest(|n, a| rest[n] -= a.transpose() * z[n]);
         }
         if sought.modulus || sought.poisson {
             let mut firmer = 0.0;

@@ -16,6 +16,7 @@ pub mod held_nodes;
 pub mod inertia;
 pub mod point_laws;
 pub mod tet_laws;
+pub mod unstrained;
 
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;

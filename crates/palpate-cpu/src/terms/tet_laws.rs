@@ -7,6 +7,7 @@
 mod slopes;
 
 use super::elastic_cells::laws::CellActing;
+use super::unstrained;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_blocks};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
@@ -31,12 +32,25 @@ pub struct TetLaws<'a> {
     past: Vec<Six>,
 }
 
-/// An element: number, mean, and what turns densities over E into J.
+/// An element: number, mean, what is taken off a displacement's gradient, and what turns densities over E into J.
 #[derive(Clone, Copy)]
 struct Element<'a> {
     e: usize,
     s: Stencil<'a>,
+    shift: DMat3,
     scale: f64,
+}
+
+impl Element<'_> {
+    /// H = F − I at a displacement.
+    fn h(&self, u: &[DVec3]) -> Gradient<f64> {
+        rows(self.s.gradient_of(u) - self.shift)
+    }
+
+    /// F at a displacement.
+    fn f(&self, u: &[DVec3]) -> DMat3 {
+        self.s.gradient_of(u) - self.shift + DMat3::IDENTITY
+    }
 }
 
 fn rows(m: DMat3) -> Gradient<f64> {
@@ -80,9 +94,7 @@ impl<'a> TetLaws<'a> {
         };
         let mut term = TetLaws { c, laws, young: c.young(), past: Vec::new() };
         if c.inertia.is_some() {
-            let sum = |e: Element| {
-                c.past.each.iter().fold([0.0; 6], |sum, (w, u)| plus(sum, *w, Stretch::new(&rows(e.s.gradient_of(u))).value))
-            };
+            let sum = |e: Element| c.past.each.iter().fold([0.0; 6], |sum, (w, u)| plus(sum, *w, Stretch::new(&e.h(u)).value));
             term.past = term.each(sum);
         }
         term
@@ -90,7 +102,11 @@ impl<'a> TetLaws<'a> {
 
     fn element(&self, e: usize) -> Element<'a> {
         let points = &self.c.plan.body.points;
-        Element { e, s: points.mean(e), scale: self.young * self.c.factor(e) * points.element_volume(e) }
+        let (mean, young) = (points.mean_point(e), self.young * self.c.factor(e));
+        match &self.c.altered.points {
+            None => Element { e, s: points.mean(e), shift: DMat3::ZERO, scale: young * points.volume[mean] },
+            Some(p) => Element { e, s: p.stencils.get(mean), shift: p.shift[mean], scale: young * p.volume[mean] },
+        }
     }
 
     /// A value of every element.
@@ -100,14 +116,14 @@ impl<'a> TetLaws<'a> {
 
     /// Adds P g of every element to its nodes, where `of` gives P times the volume: element by element.
     fn gather(&self, of: impl Fn(Element<'a>) -> [f64; 9] + Sync + Send, out: &mut [DVec3]) {
-        for (p, s) in self.each(of).iter().zip(self.c.plan.body.points.means()) {
-            s.spread_gradient(matrix_of(p), out);
+        for (e, p) in self.each(of).iter().enumerate() {
+            self.element(e).s.spread_gradient(matrix_of(p), out);
         }
     }
 
     /// The stretch of an element's mean at a displacement.
     fn stretch(&self, el: Element, u: &[DVec3]) -> Stretch {
-        Stretch::new(&rows(el.s.gradient_of(u)))
+        Stretch::new(&el.h(u))
     }
 
     /// The laws at the new state.
@@ -132,10 +148,59 @@ impl<'a> TetLaws<'a> {
 
     /// Derivative of P_ψ at a displacement, times a change of F.
     fn own_rate(&self, el: Element, u: &[DVec3], df: &[f64; 9]) -> [f64; 9] {
-        let h = rows(el.s.gradient_of(u));
+        let h = el.h(u);
         let at = Stretch::new(&h);
         let (first, second) = self.laws.energy_slopes(&at.value);
         plus(at.back(&product(&second, &at.along(df))), 1.0, product(&Stretch::bend(&h, &first), df))
+    }
+
+    /// Change of the whole stress over E when F at the new state changes; symmetric.
+    fn along_new(&self, el: Element, u1: &[DVec3], df: &[f64; 9]) -> [f64; 9] {
+        let (new, slopes) = self.now(el, u1);
+        let p = new.back(&product(&slopes.second, &new.along(df)));
+        plus(p, 1.0, product(&Stretch::bend(&el.h(u1), &slopes.first), df))
+    }
+
+    /// The same with past state `i`.
+    fn along_past(&self, el: Element, i: usize, u1: &[DVec3], df: &[f64; 9]) -> [f64; 9] {
+        let ((new, slopes), (weight, u)) = (self.now(el, u1), self.c.past.each[i]);
+        let strain = self.stretch(el, u).along(df).map(|s| weight * s);
+        let p = new.back(&product(&slopes.by_past, &strain));
+        self.with_own(el, i, df, p)
+    }
+
+    /// Its transpose.
+    fn pull_past(&self, el: Element, i: usize, u1: &[DVec3], dz: &[f64; 9]) -> [f64; 9] {
+        let ((new, slopes), (weight, u)) = (self.now(el, u1), self.c.past.each[i]);
+        let strain = transposed(&slopes.by_past, &new.along(dz)).map(|s| weight * s);
+        let p = self.stretch(el, u).back(&strain);
+        self.with_own(el, i, dz, p)
+    }
+
+    /// Adds what the old state's own stress changes by, which is symmetric.
+    fn with_own(&self, el: Element, i: usize, df: &[f64; 9], p: [f64; 9]) -> [f64; 9] {
+        match self.c.weights.old != 0.0 && i == 0 {
+            true => plus(p, self.c.weights.old, self.own_rate(el, self.c.past.each[i].1, df)),
+            false => p,
+        }
+    }
+
+    /// Change of the whole stress over E when the stress-free shape moves by `dw`.
+    fn along_rest(&self, el: Element, u1: &[DVec3], dw: &[DVec3]) -> [f64; 9] {
+        let l = el.s.gradient_of(dw);
+        let away = |u: &[DVec3]| flat(el.f(u) * l * -1.0);
+        let past = (0..self.c.past.each.len()).map(|i| self.along_past(el, i, u1, &away(self.c.past.each[i].1)));
+        let change = past.fold(self.along_new(el, u1, &away(u1)), |sum, p| plus(sum, 1.0, p));
+        flat(unstrained::moved(l, matrix_of(&self.stress(el, u1)), matrix_of(&change)))
+    }
+
+    /// Its transpose, before it goes to the nodes.
+    fn pull_rest(&self, el: Element, u1: &[DVec3], z: &[DVec3]) -> [f64; 9] {
+        let dz = el.s.gradient_of(z);
+        let new = std::iter::once((el.f(u1), self.along_new(el, u1, &flat(dz))));
+        let past = (0..self.c.past.each.len()).map(|i| (el.f(self.c.past.each[i].1), self.pull_past(el, i, u1, &flat(dz))));
+        let states = new.chain(past).map(|(f, p)| (f, matrix_of(&p)));
+        flat(unstrained::pulled(dz, matrix_of(&self.stress(el, u1)), states))
     }
 
     fn add_force(&self, u1: &[DVec3], out: &mut [DVec3]) {
@@ -161,9 +226,9 @@ impl Term for TetLaws<'_> {
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
         let of = |el: Element| {
-            let h = el.s.gradient_of(u1);
+            let h = flat(el.f(u1) - DMat3::IDENTITY);
             let value = self.laws.potential(&self.stretch(el, u1).value, self.past.get(el.e));
-            let old = if self.c.weights.old == 0.0 { 0.0 } else { self.c.weights.old * dot(&self.old_stress(el), &flat(h)) };
+            let old = if self.c.weights.old == 0.0 { 0.0 } else { self.c.weights.old * dot(&self.old_stress(el), &h) };
             el.scale * (value + old)
         };
         self.each(of).iter().sum()
@@ -171,9 +236,8 @@ impl Term for TetLaws<'_> {
 
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
         let of = |el: Element| {
-            let h = rows(el.s.gradient_of(u1));
             let (new, slopes) = self.now(el, u1);
-            let bend = Stretch::bend(&h, &slopes.first);
+            let bend = Stretch::bend(&el.h(u1), &slopes.first);
             let image: [[f64; 6]; 9] = std::array::from_fn(|l| product(&slopes.second, &new.slopes.map(|row| row[l])));
             let entry = |k: usize, l: usize| bend[k][l] + (0..6).map(|c| new.slopes[c][k] * image[l][c]).sum::<f64>();
             let mut t: [[f64; 9]; 9] = std::array::from_fn(|k| std::array::from_fn(|l| el.scale * entry(k, l)));
@@ -184,38 +248,20 @@ impl Term for TetLaws<'_> {
         };
         let points = &self.c.plan.body.points;
         for (e, t) in self.each(of).iter().enumerate() {
-            add_blocks(points.mean(e).gradient, self.c.places.points.of(points.mean_point(e)), t, matrix);
+            add_blocks(self.element(e).s.gradient, self.c.places.points.of(points.mean_point(e)), t, matrix);
         }
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
-        for (i, ((weight, u), d)) in self.c.past.each.iter().zip(change.each).enumerate() {
-            let of = |el: Element| {
-                let (new, slopes) = self.now(el, u1);
-                let df = flat(el.s.gradient_of(d));
-                let strain = self.stretch(el, u).along(&df).map(|s| weight * s);
-                let mut p = new.back(&product(&slopes.by_past, &strain));
-                if self.c.weights.old != 0.0 && i == 0 {
-                    p = plus(p, self.c.weights.old, self.own_rate(el, u, &df));
-                }
-                p.map(|p| el.scale * p)
-            };
+        for (i, d) in change.each.iter().enumerate() {
+            let of = |el: Element| self.along_past(el, i, u1, &flat(el.s.gradient_of(d))).map(|p| el.scale * p);
             self.gather(of, out);
         }
     }
 
     fn by_past_transposed(&self, u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
-        for (i, ((weight, u), to)) in self.c.past.each.iter().zip(&mut out.each).enumerate() {
-            let of = |el: Element| {
-                let (new, slopes) = self.now(el, u1);
-                let dz = flat(el.s.gradient_of(z));
-                let strain = transposed(&slopes.by_past, &new.along(&dz)).map(|s| weight * s);
-                let mut p = self.stretch(el, u).back(&strain);
-                if self.c.weights.old != 0.0 && i == 0 {
-                    p = plus(p, self.c.weights.old, self.own_rate(el, u, &dz));
-                }
-                p.map(|p| el.scale * p)
-            };
+        for (i, to) in out.each.iter_mut().enumerate() {
+            let of = |el: Element| self.pull_past(el, i, u1, &flat(el.s.gradient_of(z))).map(|p| el.scale * p);
             self.gather(of, to);
         }
     }
@@ -224,6 +270,7 @@ impl Term for TetLaws<'_> {
         let (ln_young, d) = (self.c.ln_young_along(rates), &rates.physics);
         let moved = |l: &&CellActing| d.effects[l.effect].iter().any(|r| *r != 0.0);
         let moving: Vec<&CellActing> = self.laws.all.iter().filter(moved).collect();
+        let rest = rates.changes.rest.as_deref().filter(|_| self.c.altered.points.is_some());
         let of = |el: Element| {
             let ln = ln_young + self.c.ln_factor_along(rates, el.e);
             let mut p = if ln == 0.0 { [0.0; 9] } else { self.stress(el, u1).map(|p| ln * p) };
@@ -234,6 +281,9 @@ impl Term for TetLaws<'_> {
                 for (slot, rate) in d.effects[l.effect].iter().enumerate().filter(|(_, r)| **r != 0.0) {
                     p = plus(p, *rate, self.work(el, u1, |at| self.laws.by_number(l, slot, at)));
                 }
+            }
+            if let Some(dw) = rest {
+                p = plus(p, 1.0, self.along_rest(el, u1, dw));
             }
             p.map(|p| el.scale * p)
         };
@@ -254,6 +304,9 @@ impl Term for TetLaws<'_> {
                 asked.iter().flat_map(|l| (0..l.p.len()).map(move |slot| (l, slot))).map(|(l, s)| number(l, s)).collect();
             (ln, poisson, numbers)
         };
+        if let (Some(out), true) = (&mut gradient.changes.rest, self.c.altered.points.is_some()) {
+            self.gather(|el| self.pull_rest(el, u1, z).map(|p| el.scale * p), out);
+        }
         let all = self.each(of);
         for (_, poisson, numbers) in &all {
             gradient.physics.poisson_ratio += poisson;

@@ -3,7 +3,10 @@
 
 use super::{Along, Past, Pull, Term, seeks_effect};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::elastic_asks::{SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD};
+use crate::device::pipelines::shared::asks::{ALONG_SHAPE, TRANSPOSED_SHAPE};
+use crate::device::pipelines::shared::elastic_asks::{
+    SHAPE_PULLS, SHAPE_TANGENT, SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD,
+};
 use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
 use palpate_model::effects::Site;
@@ -39,6 +42,32 @@ impl Passes<'_, '_> {
         }
         if self.past.is_empty() {
             self.element_laws(pass::STRAIN_TET_LAWS, ALL, 1.0f32.to_bits(), &[stretches]);
+        }
+    }
+
+    /// Leaves what points' forces do when the stress-free shape changes by `probe`, or what the adjoint `probe` says of the shape, in
+    /// `shape_stress`.
+    fn reshape(&mut self, probe: &wgpu::Buffer, pulls: bool) {
+        let bits = if pulls { SHAPE_PULLS } else { 0 };
+        let named = [("probe", probe)];
+        self.recorder.clear(&self.world.buffers["shape_stress"]);
+        for state in [STRESS_NEW, STRESS_OLD] {
+            self.run(pass::PRESS_ELASTIC, ALL, Per::Elastic, state);
+            self.element_laws(pass::PRESS_TET_LAWS, ALL, state, &[]);
+            self.run_with(pass::SHAPE_ELASTIC, ALL, Per::Elastic, bits, &named);
+        }
+        self.run_with(pass::SHAPE_ELASTIC, ALL, Per::Elastic, bits | SHAPE_TANGENT, &named);
+        if self.step.is_none() {
+            return;
+        }
+        let ask = if pulls { TRANSPOSED_SHAPE } else { ALONG_SHAPE };
+        let now = self.own.iter().find(|b| b.0 == "now").map(|b| (1.0, b.1));
+        let past = if self.past.is_empty() { Vec::from_iter(now) } else { self.past.clone() };
+        for (weight, state) in past {
+            let named = [("probe", probe), ("now", state)];
+            self.run_with(pass::COUPLE_ELASTIC, ALL, Per::Elastic, ask, &named);
+            self.element_laws(pass::COUPLE_TET_LAWS, ALL, ask, &named);
+            self.run_with(pass::SHAPE_PAST, ALL, Per::Elastic, weight.to_bits(), &named);
         }
     }
 
@@ -106,6 +135,12 @@ impl Term for ElasticPoints {
             }
             s.spread_elastic(ALL, 0, true, &s.world.buffers["column"]);
         }
+        let shape = along.named.iter().find(|b| b.0 == "rate_rests").filter(|_| along.moved.rest);
+        if let Some((_, change)) = shape.filter(|_| s.has_points()) {
+            s.reshape(change, false);
+            let named = [("forces", &s.world.buffers["column"]), ("elastic_stress", &s.world.buffers["shape_stress"])];
+            s.run_with(pass::SPREAD_ELASTIC, ALL, Per::Node, 0, &named);
+        }
     }
 
     fn by_coefficients_transposed(&self, s: &mut Passes, pull: &Pull) {
@@ -114,6 +149,14 @@ impl Term for ElasticPoints {
         }
         if pull.material || seeks_effect(s.world, pull.sought(), |s| matches!(s, Site::Cells(_))) {
             s.element_laws(pass::PULL_TET_LAWS, ALL, 0, &pull.named);
+        }
+        if pull.sought().rest && s.has_points() {
+            s.reshape(&s.world.buffers["direction"], true);
+            let pulls = pull.named.iter().find(|b| b.0 == "rest_pulls").map(|b| b.1);
+            let named = [("elastic_stress", &s.world.buffers["shape_stress"])];
+            if let Some(to) = pulls {
+                s.run_with(pass::SPREAD_ELASTIC, ALL, Per::Node, SPREAD_MINUS, &[named[0], ("forces", to)]);
+            }
         }
     }
 }

@@ -51,7 +51,7 @@ impl Term for HeldNodes {
     }
 
     fn by_coefficients(&self, s: &mut Passes, along: &Along) {
-        let moves = along.moved.start || along.grips || (along.body && s.has_layers());
+        let moves = along.moved.start || along.grips || along.moved.rest || (along.body && s.has_layers());
         if s.holds_nodes() && moves {
             s.run_with(pass::PUSH_HELD, ALL, Per::Node, along.flags | clamps::numbers(s, along.grips), &along.named);
         }
@@ -61,6 +61,9 @@ impl Term for HeldNodes {
         let grips = seeks_effect(s.world, pull.sought(), |s| matches!(s, Site::Clamps(_) | Site::Edges(_)));
         if s.holds_nodes() && (pull.sought().start || grips || (pull.material && s.has_layers())) {
             s.run_with(pass::PULL_HELD, ALL, Per::Node, clamps::numbers(s, grips), &pull.named);
+        }
+        if s.holds_nodes() && pull.sought().rest {
+            s.run_with(pass::PULL_HELD_SHAPE, ALL, Per::Node, 0, &pull.named);
         }
     }
 }

@@ -9,8 +9,10 @@ use super::passes::{Exact, apart, found, given};
 use super::scenes::{ball, device, held, plan};
 use crate::costs::rollout_tests::assert_agreement;
 use crate::{GpuBackend, Product, Tuning};
+use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::Scene;
@@ -54,11 +56,12 @@ fn passes_with_laws_of_cells_on_tetrahedra_agree_and_one_percent_shows() {
     }
 }
 
-/// A held body, of such a scene, whose clamp slips, and gives way by a layer of such a thickness [m].
+/// A held body of another stress-free shape, of such a scene, whose clamp slips, and gives way by a layer of such a thickness [m].
 fn slipping(mut s: Scene, layer: f64) -> Scene {
     s.time.steps = 2;
     with(&mut s, "compliant-clamp", &[("layer", &[layer])]);
     with(&mut s, "clamp-slip", &[("offset", &[0.002, -0.001, 0.001]), ("turn", &[0.02, 0.01, -0.03]), ("drift", &[0.02])]);
+    with(&mut s, "rest-shape", &[("stretch", &[0.02, -0.01, 0.015]), ("bend_x_to_y", &[0.8]), ("bend_z_to_x", &[-0.6])]);
     with(&mut s, "creep", &[("fraction", &[0.6]), ("time", &[0.005])]);
     with(&mut s, "transverse-anisotropy", &[("stiffness", &[3.0]), ("fibre", &[1.0, 0.5, -0.3])]);
     s
@@ -70,6 +73,19 @@ fn evaluations_with_laws_of_cells_and_a_clamp_that_gives_way_agree() {
     with(&mut scene, "power-law-viscosity", &[("coefficient", &[0.2]), ("exponent", &[0.6])]);
     // What is lost depends on differences of strains, which in a slow step leave three digits.
     compare_within(&seen(&scene), 1e-3);
+}
+
+#[test]
+fn evaluations_of_free_bodies_that_start_in_another_stress_free_shape_agree() {
+    let mut s = of_tets(busy(ball(0.03)), Quadratic, 1);
+    s.time.steps = 3;
+    s.time.scheme = palpate_model::plan::scheme::find("bdf2").unwrap();
+    s.material.model = &palpate_model::materials::ALL[1];
+    s.material.viscosity = Some(Viscosity { coefficient: 60.0, exponent: 0.8 });
+    s.initial.angular_velocity = DVec3::new(0.0, 3.0, 5.0);
+    with(&mut s, "rest-shape", &[("stretch", &[0.02, -0.01, 0.015]), ("bend_y_to_z", &[0.8])]);
+    with(&mut s, "structural-damping", &[("loss", &[0.2])]);
+    compare_within(&seen(&s), 5e-4);
 }
 
 #[test]

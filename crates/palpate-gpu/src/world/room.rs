@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 26] = [
+const WORK: [Work; 27] = [
     ("increment", |s| s.nodes, VECTOR),
     ("direction", |s| s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -37,6 +37,7 @@ const WORK: [Work; 26] = [
     ("past_strains", |s| 2 * s.elastic, VECTOR),
     ("past_stretches", |s| if s.elastic == 0 || laws(s.fields) == 0 { 0 } else { 2 * s.elements }, VECTOR),
     ("reactions", |s| if s.held == 0 || s.fields & structs::FIELD_GRIPS == 0 { 0 } else { s.nodes }, VECTOR),
+    ("shape_stress", |s| if s.fields & structs::FIELD_REST == 0 { 0 } else { 3 * s.elastic }, VECTOR),
     ("elastic_tangents", |s| elastic_asks::TANGENT_NUMBERS * s.elastic, 4),
 ];
 

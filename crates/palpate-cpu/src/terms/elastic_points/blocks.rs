@@ -17,9 +17,9 @@ pub(super) struct Tangents<'a, 'b> {
 
 impl Tangents<'_, '_> {
     /// ∂P/∂F of a point, times its volume.
-    fn tangent(&self, Point { e, s, v, moduli: (lambda, mu), .. }: &Point) -> [[f64; 9]; 9] {
-        let (term, w) = (self.term, &self.term.c.weights);
-        let h = s.gradient_of(self.u1);
+    fn tangent(&self, point: &Point) -> [[f64; 9]; 9] {
+        let (term, w, Point { e, v, moduli: (lambda, mu), .. }) = (self.term, &self.term.c.weights, point);
+        let h = point.h(self.u1);
         let f = h + DMat3::IDENTITY;
         let mut tangent = term.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));
         if let (Some(past), true) = (term.past.get(*e), w.rate != 0.0) {

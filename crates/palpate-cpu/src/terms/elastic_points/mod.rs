@@ -3,13 +3,15 @@
 //! The potential is `V [θ ψ(F₁) + (1 − θ) P(F₀):F₁ + (β/ℓ) ψ_lin(G₁ − G̃) + φ(|G₁ − G̃|²)]` with Green's strain 2G = H + Hᵀ + HᵀH,
 //! G̃ = Σ w G(x_past) and φ the material's viscosity: rigid motion neither stores nor dissipates.
 //!
-//! Where an element has several points, each has its [`Share`] of the Lamé parameters, in ψ and ψ_lin alike.
+//! Where an element has several points, each has its [`Share`] of the Lamé parameters, in ψ and ψ_lin alike. Where effects give the body another
+//! stress-free shape, F, gradients and volumes are those that [`unstrained`] has.
 //!
 //! What a point gives is computed side by side and summed by the points around a node in their order, so bits do not depend on threads.
 
 mod blocks;
 
 use super::assembly::assemble;
+use super::unstrained;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
 use blocks::Tangents;
@@ -19,7 +21,7 @@ use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::points::Share;
-use palpate_model::space::stencil::Stencil;
+use palpate_model::space::stencil::{Stencil, Stencils};
 use rayon::prelude::*;
 
 /// Points that one task treats at least.
@@ -30,6 +32,8 @@ const NODES: usize = 256;
 /// The term.
 pub struct ElasticPoints<'a> {
     c: Context<'a>,
+    /// Places and gradients of the points.
+    stencils: &'a Stencils,
     /// Of every share, λ and μ over E, and their derivatives by Poisson's ratio.
     lame: [[(f64, f64); 2]; 3],
     /// Young's modulus [Pa], creep included.
@@ -40,15 +44,24 @@ pub struct ElasticPoints<'a> {
     flow: Option<(Viscosity, f64)>,
 }
 
-/// A point: number and element, place and gradient, volume [m³], Lamé parameters [Pa], and as [`ElasticPoints::lame`] has them.
+/// A point: number and element, place and gradient, what is taken off a displacement's gradient, volume [m³], Lamé parameters [Pa], and as
+/// [`ElasticPoints::lame`] has them.
 #[derive(Clone, Copy)]
 struct Point<'a> {
     e: usize,
     element: usize,
     s: Stencil<'a>,
+    shift: DMat3,
     v: f64,
     moduli: (f64, f64),
     lame: [(f64, f64); 2],
+}
+
+impl Point<'_> {
+    /// H = F − I at a displacement.
+    fn h(&self, u: &[DVec3]) -> DMat3 {
+        self.s.gradient_of(u) - self.shift
+    }
 }
 
 /// Rows of a matrix, as materials take them.
@@ -61,7 +74,8 @@ fn matrix_of(v: &[f64; 9]) -> DMat3 {
     DMat3::from_cols_array(&std::array::from_fn(|k| v[3 * (k % 3) + k / 3]))
 }
 
-fn contract(a: DMat3, b: DMat3) -> f64 {
+/// A : B.
+pub(super) fn contract(a: DMat3, b: DMat3) -> f64 {
     (0..3).map(|c| a.col(c).dot(b.col(c))).sum()
 }
 
@@ -91,9 +105,10 @@ impl<'a> ElasticPoints<'a> {
     pub fn new(c: Context<'a>) -> ElasticPoints<'a> {
         let nu = c.physics().poisson_ratio;
         let lame = Share::ALL.map(|s| s.of(lame(1.0, nu), lame_by_nu(1.0, nu)));
-        let mut term = ElasticPoints { c, lame, young: c.young(), past: Vec::new(), flow: None };
+        let stencils = c.altered.points.as_ref().map_or(&c.plan.body.points.stencils, |p| &p.stencils);
+        let mut term = ElasticPoints { c, stencils, lame, young: c.young(), past: Vec::new(), flow: None };
         if c.inertia.is_some() {
-            let sum = |p: Point| c.past.each.iter().map(|(w, u)| green(p.s.gradient_of(u)) * *w).sum::<DMat3>();
+            let sum = |p: Point| c.past.each.iter().map(|(w, u)| green(p.h(u)) * *w).sum::<DMat3>();
             term.past = term.each(sum);
         }
         term.flow = c.physics().viscosity.zip(c.inertia.map(|t| t.rate));
@@ -104,7 +119,8 @@ impl<'a> ElasticPoints<'a> {
         let points = &self.c.plan.body.points;
         let (element, lame) = (points.element_of(e), self.lame[points.share(e) as usize]);
         let moduli = scaled(lame[0], self.young * self.c.factor(element));
-        Point { e, element, s: points.stencils.get(e), v: points.volume[e], moduli, lame }
+        let (shift, v) = self.c.altered.points.as_ref().map_or((DMat3::ZERO, points.volume[e]), |p| (p.shift[e], p.volume[e]));
+        Point { e, element, s: self.stencils.get(e), shift, v, moduli, lame }
     }
 
     /// A value of every point.
@@ -114,7 +130,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// Adds P g of every point to its nodes, where `of` gives P times the volume: every node's sum in the order of the points.
     fn gather(&self, of: impl Fn(Point<'a>) -> DMat3 + Sync + Send, out: &mut [DVec3]) {
-        let (stresses, pattern, stencils) = (self.each(of), self.c.pattern, &self.c.plan.body.points.stencils);
+        let (stresses, pattern, stencils) = (self.each(of), self.c.pattern, self.stencils);
         out.par_iter_mut().with_min_len(NODES).enumerate().for_each(|(n, sum)| {
             for (e, i) in &pattern.point_list[pattern.point_rows[n]..pattern.point_rows[n + 1]] {
                 *sum += stresses[*e as usize] * stencils.get(*e as usize).gradient[usize::from(*i)];
@@ -122,9 +138,9 @@ impl<'a> ElasticPoints<'a> {
         });
     }
 
-    /// First Piola–Kirchhoff stress at a displacement, elastic [Pa].
-    fn stress(&self, s: Stencil, u: &[DVec3], (lambda, mu): (f64, f64)) -> DMat3 {
-        matrix_of(&self.c.law().stress(&rows(s.gradient_of(u)), lambda, mu).0)
+    /// First Piola–Kirchhoff stress, elastic [Pa].
+    fn stress(&self, h: DMat3, (lambda, mu): (f64, f64)) -> DMat3 {
+        matrix_of(&self.c.law().first(&rows(h), lambda, mu))
     }
 
     /// The viscous part for a damping of one over the length of the solve, F S with S = C (G₁ − G̃) [Pa].
@@ -161,37 +177,39 @@ impl<'a> ElasticPoints<'a> {
     }
 
     /// Whole stress that a modulus scales at u₁, the old state's share included [Pa].
-    fn total(&self, e: usize, s: Stencil, u1: &[DVec3], moduli: (f64, f64)) -> DMat3 {
-        let w = &self.c.weights;
-        let mut p = self.stress(s, u1, moduli) * w.new;
+    fn total(&self, p: Point, u1: &[DVec3]) -> DMat3 {
+        let (w, h) = (&self.c.weights, p.h(u1));
+        let mut stress = self.stress(h, p.moduli) * w.new;
         if w.old != 0.0 {
-            p += self.stress(s, self.c.past.u, moduli) * w.old;
+            stress += self.stress(p.h(self.c.past.u), p.moduli) * w.old;
         }
         if w.rate != 0.0 {
-            p += self.viscous(e, s.gradient_of(u1), moduli) * w.rate;
+            stress += self.viscous(p.e, h, p.moduli) * w.rate;
         }
-        p
+        stress
+    }
+
+    /// The same with what the material's viscosity adds.
+    fn whole(&self, p: Point, u1: &[DVec3]) -> DMat3 {
+        let h = p.h(u1);
+        self.total(p, u1) + (h + DMat3::IDENTITY) * self.flow_stress(p.e, h)
     }
 
     fn add_force(&self, u1: &[DVec3], out: &mut [DVec3]) {
-        let of = |Point { e, s, v, moduli, .. }: Point| {
-            let h = s.gradient_of(u1);
-            (self.total(e, s, u1, moduli) + (h + DMat3::IDENTITY) * self.flow_stress(e, h)) * v
-        };
-        self.gather(of, out);
+        self.gather(|p| self.whole(p, u1) * p.v, out);
     }
 
-    /// ∂P/∂F : δ of the elastic stress at a displacement.
-    fn stress_rate(&self, s: Stencil, u: &[DVec3], (lambda, mu): (f64, f64), dh: DMat3) -> DMat3 {
-        let tangent = self.c.law().stress(&rows(s.gradient_of(u)), lambda, mu).1;
+    /// ∂P/∂F : δ of the elastic stress.
+    fn stress_rate(&self, h: DMat3, (lambda, mu): (f64, f64), dh: DMat3) -> DMat3 {
+        let tangent = self.c.law().stress(&rows(h), lambda, mu).1;
         let d = rows(dh);
         matrix_of(&std::array::from_fn(|k| (0..9).map(|l| tangent[k][l] * d[l / 3][l % 3]).sum()))
     }
 
     /// Derivatives of the whole stress by the factors of the material's curves.
-    fn by_curves(&self, s: Stencil, u1: &[DVec3], (lambda, mu): (f64, f64)) -> Vec<DMat3> {
-        let (w, law) = (&self.c.weights, self.c.law());
-        let at = |u: &[DVec3]| law.by_curves(&rows(s.gradient_of(u)), lambda, mu);
+    fn by_curves(&self, p: Point, u1: &[DVec3]) -> Vec<DMat3> {
+        let (w, law, (lambda, mu)) = (&self.c.weights, self.c.law(), p.moduli);
+        let at = |u: &[DVec3]| law.by_curves(&rows(p.h(u)), lambda, mu);
         let mut all: Vec<DMat3> = at(u1).iter().map(|p| matrix_of(p) * w.new).collect();
         if w.old != 0.0 {
             all.iter_mut().zip(at(self.c.past.u)).for_each(|(p, old)| *p += matrix_of(&old) * w.old);
@@ -200,17 +218,84 @@ impl<'a> ElasticPoints<'a> {
     }
 
     /// Derivative of the whole stress by Poisson's ratio, over E.
-    fn by_poisson(&self, Point { e, s, lame: [(lambda, mu), by_nu], .. }: Point, u1: &[DVec3]) -> DMat3 {
-        let w = &self.c.weights;
+    fn by_poisson(&self, point: Point, u1: &[DVec3]) -> DMat3 {
+        let (w, [(lambda, mu), by_nu]) = (&self.c.weights, point.lame);
         let elastic = |u: &[DVec3]| {
-            let [by_lambda, by_mu] = self.c.law().by_moduli(&rows(s.gradient_of(u)), lambda, mu);
+            let [by_lambda, by_mu] = self.c.law().by_moduli(&rows(point.h(u)), lambda, mu);
             matrix_of(&std::array::from_fn(|k| by_nu.0 * by_lambda[k] + by_nu.1 * by_mu[k]))
         };
         let mut p = elastic(u1) * w.new;
         if w.old != 0.0 {
             p += elastic(self.c.past.u) * w.old;
         }
-        p + self.viscous(e, s.gradient_of(u1), by_nu) * w.rate
+        p + self.viscous(point.e, point.h(u1), by_nu) * w.rate
+    }
+
+    /// True where the force depends on the past.
+    fn sees_past(&self) -> bool {
+        self.c.weights.sees_past() || self.flow.is_some()
+    }
+
+    /// Change of the whole stress when F at the new state changes by `dh`; symmetric.
+    fn along_new(&self, p: Point, u1: &[DVec3], dh: DMat3) -> DMat3 {
+        let (w, h) = (&self.c.weights, p.h(u1));
+        let f = h + DMat3::IDENTITY;
+        let mut change = self.stress_rate(h, p.moduli, dh) * w.new;
+        if let (Some(past), true) = (self.past.get(p.e), self.sees_past()) {
+            let dg = green_rate(f, dh);
+            let stress = linear_stress(green(h) - *past, p.moduli) * w.rate + self.flow_stress(p.e, h);
+            change += dh * stress + f * (linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg));
+        }
+        change
+    }
+
+    /// The same with past state `i`.
+    fn along_past(&self, p: Point, i: usize, u1: &[DVec3], dh: DMat3) -> DMat3 {
+        let (w, (weight, u), h) = (&self.c.weights, self.c.past.each[i], p.h(u1));
+        let before = p.h(u);
+        let dg = green_rate(before + DMat3::IDENTITY, dh) * weight;
+        let stress = linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg);
+        let mut change = (h + DMat3::IDENTITY) * stress * -1.0;
+        if w.old != 0.0 && i == 0 {
+            change += self.stress_rate(before, p.moduli, dh) * w.old;
+        }
+        change
+    }
+
+    /// Its transpose.
+    fn pull_past(&self, p: Point, i: usize, u1: &[DVec3], dz: DMat3) -> DMat3 {
+        let (w, (weight, u), h) = (&self.c.weights, self.c.past.each[i], p.h(u1));
+        let before = p.h(u);
+        let dg = green_rate(h + DMat3::IDENTITY, dz);
+        let stress = linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg);
+        let mut pulled = (before + DMat3::IDENTITY) * stress * -weight;
+        if w.old != 0.0 && i == 0 {
+            pulled += self.stress_rate(before, p.moduli, dz) * w.old;
+        }
+        pulled
+    }
+
+    /// Past states that the force depends on.
+    fn pasts(&self) -> std::ops::Range<usize> {
+        0..if self.sees_past() { self.c.past.each.len() } else { 0 }
+    }
+
+    /// Change of the whole stress when the stress-free shape moves by `dw`.
+    fn along_rest(&self, p: Point, u1: &[DVec3], dw: &[DVec3]) -> DMat3 {
+        let l = p.s.gradient_of(dw);
+        let away = |u: &[DVec3]| (p.h(u) + DMat3::IDENTITY) * l * -1.0;
+        let past = self.pasts().map(|i| self.along_past(p, i, u1, away(self.c.past.each[i].1)));
+        let change = self.along_new(p, u1, away(u1)) + past.sum::<DMat3>();
+        unstrained::moved(l, self.whole(p, u1), change)
+    }
+
+    /// Its transpose, before it goes to the nodes.
+    fn pull_rest(&self, p: Point, u1: &[DVec3], z: &[DVec3]) -> DMat3 {
+        let dz = p.s.gradient_of(z);
+        let f = |u: &[DVec3]| p.h(u) + DMat3::IDENTITY;
+        let new = std::iter::once((f(u1), self.along_new(p, u1, dz)));
+        let past = self.pasts().map(|i| (f(self.c.past.each[i].1), self.pull_past(p, i, u1, dz)));
+        unstrained::pulled(dz, self.whole(p, u1), new.chain(past))
     }
 }
 
@@ -221,11 +306,11 @@ impl Term for ElasticPoints<'_> {
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
         let w = &self.c.weights;
-        let of = |Point { e, s, v, moduli: (lambda, mu), .. }: Point| {
-            let h = s.gradient_of(u1);
+        let of = |p: Point| {
+            let (Point { e, v, moduli: (lambda, mu), .. }, h) = (p, p.h(u1));
             let mut psi = w.new * self.c.law().value(&rows(h), lambda, mu);
             if w.old != 0.0 {
-                psi += w.old * contract(self.stress(s, self.c.past.u, (lambda, mu)), h);
+                psi += w.old * contract(self.stress(p.h(self.c.past.u), (lambda, mu)), h);
             }
             if let (Some(past), true) = (self.past.get(e), w.rate != 0.0) {
                 let g = green(h) - *past;
@@ -245,40 +330,14 @@ impl Term for ElasticPoints<'_> {
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
-        let w = &self.c.weights;
-        for (i, ((weight, u), d)) in self.c.past.each.iter().zip(change.each).enumerate() {
-            let of = |Point { e, s, v, moduli, .. }: Point| {
-                let (h, dh) = (s.gradient_of(u1), s.gradient_of(d));
-                let dg = green_rate(s.gradient_of(u) + DMat3::IDENTITY, dh) * *weight;
-                let stress = linear_stress(dg, moduli) * w.rate + self.flow_rate(e, h, dg);
-                let mut p = (h + DMat3::IDENTITY) * stress * -1.0;
-                if w.old != 0.0 && i == 0 {
-                    p += self.stress_rate(s, u, moduli, dh) * w.old;
-                }
-                p * v
-            };
-            if w.sees_past() || self.flow.is_some() {
-                self.gather(of, out);
-            }
+        for i in self.pasts() {
+            self.gather(|p| self.along_past(p, i, u1, p.s.gradient_of(change.each[i])) * p.v, out);
         }
     }
 
     fn by_past_transposed(&self, u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
-        let w = &self.c.weights;
-        for (i, ((weight, u), to)) in self.c.past.each.iter().zip(&mut out.each).enumerate() {
-            let of = |Point { e, s, v, moduli, .. }: Point| {
-                let (h, dz) = (s.gradient_of(u1), s.gradient_of(z));
-                let dg = green_rate(h + DMat3::IDENTITY, dz);
-                let stress = linear_stress(dg, moduli) * w.rate + self.flow_rate(e, h, dg);
-                let mut p = (s.gradient_of(u) + DMat3::IDENTITY) * stress * -*weight;
-                if w.old != 0.0 && i == 0 {
-                    p += self.stress_rate(s, u, moduli, dz) * w.old;
-                }
-                p * v
-            };
-            if w.sees_past() || self.flow.is_some() {
-                self.gather(of, to);
-            }
+        for i in self.pasts() {
+            self.gather(|p| self.pull_past(p, i, u1, p.s.gradient_of(z)) * p.v, &mut out.each[i]);
         }
     }
 
@@ -288,22 +347,26 @@ impl Term for ElasticPoints<'_> {
         let flow = d.viscosity.filter(|_| self.flow.is_some());
         let curves: Vec<f64> = d.curves.iter().flatten().copied().collect();
         let curves = if curves.iter().any(|r| *r != 0.0) { curves } else { Vec::new() };
+        let rest = rates.changes.rest.as_deref().filter(|_| self.c.altered.points.is_some());
         let of = |p: Point| {
-            let Point { e, element, s, v, moduli, .. } = p;
+            let (Point { e, element, v, moduli, .. }, h) = (p, p.h(u1));
             let ln = ln_young + self.c.ln_factor_along(rates, element);
-            let mut stress = if ln == 0.0 { DMat3::ZERO } else { self.total(e, s, u1, moduli) * ln };
+            let mut stress = if ln == 0.0 { DMat3::ZERO } else { self.total(p, u1) * ln };
             if d.poisson_ratio != 0.0 {
                 stress += self.by_poisson(p, u1) * (d.poisson_ratio * self.young * self.c.factor(element));
             }
             if damping != 0.0 {
-                stress += self.viscous(e, s.gradient_of(u1), moduli) * damping;
+                stress += self.viscous(e, h, moduli) * damping;
             }
             if !curves.is_empty() {
-                stress += self.by_curves(s, u1, moduli).iter().zip(&curves).map(|(p, rate)| *p * *rate).sum::<DMat3>();
+                stress += self.by_curves(p, u1).iter().zip(&curves).map(|(p, rate)| *p * *rate).sum::<DMat3>();
             }
             if let Some(rates) = flow {
-                let [by_coefficient, by_exponent] = self.by_flow(e, s.gradient_of(u1));
+                let [by_coefficient, by_exponent] = self.by_flow(e, h);
                 stress += by_coefficient * rates.coefficient + by_exponent * rates.exponent;
+            }
+            if let Some(dw) = rest {
+                stress += self.along_rest(p, u1, dw);
             }
             stress * v
         };
@@ -315,15 +378,14 @@ impl Term for ElasticPoints<'_> {
         let flows = sought.viscosity && self.flow.is_some();
         // By the logarithm of the modulus, Poisson's ratio, damping and the viscosity's numbers.
         let of = |p: Point| {
-            let Point { e, element, s, v, moduli, .. } = p;
-            let dz = s.gradient_of(z) * v;
+            let (Point { e, element, v, moduli, .. }, h) = (p, p.h(u1));
+            let dz = p.s.gradient_of(z) * v;
             let along = |wanted: bool, p: &dyn Fn() -> DMat3| if wanted { contract(dz, p()) } else { 0.0 };
-            let [by_coefficient, by_exponent] =
-                if flows { self.by_flow(e, s.gradient_of(u1)).map(|p| contract(dz, p)) } else { [0.0; 2] };
+            let [by_coefficient, by_exponent] = if flows { self.by_flow(e, h).map(|p| contract(dz, p)) } else { [0.0; 2] };
             [
-                along(sought.modulus, &|| self.total(e, s, u1, moduli)),
+                along(sought.modulus, &|| self.total(p, u1)),
                 self.young * self.c.factor(element) * along(sought.poisson, &|| self.by_poisson(p, u1)),
-                rate * along(sought.damping[1], &|| self.viscous(e, s.gradient_of(u1), moduli)),
+                rate * along(sought.damping[1], &|| self.viscous(e, h, moduli)),
                 by_coefficient,
                 by_exponent,
             ]
@@ -338,11 +400,14 @@ impl Term for ElasticPoints<'_> {
             }
         }
         if sought.curves {
-            let of = |Point { s, v, moduli, .. }: Point| {
-                let dz = s.gradient_of(z) * v;
-                self.by_curves(s, u1, moduli).into_iter().map(|p| contract(dz, p)).collect::<Vec<_>>()
+            let of = |p: Point| {
+                let dz = p.s.gradient_of(z) * p.v;
+                self.by_curves(p, u1).into_iter().map(|p| contract(dz, p)).collect::<Vec<_>>()
             };
             self.each(of).iter().for_each(|by| self.c.pull_curves(by, gradient));
+        }
+        if let (Some(out), true) = (&mut gradient.changes.rest, self.c.altered.points.is_some()) {
+            self.gather(|p| self.pull_rest(p, u1, z) * p.v, out);
         }
         if sought.modulus {
             let points = &self.c.plan.body.points;

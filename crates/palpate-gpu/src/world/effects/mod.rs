@@ -21,6 +21,7 @@ use palpate_model::params::changes::{self, Changes};
 use palpate_model::params::fields::Varied;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::InitialShape;
+use palpate_model::space::body::Body;
 use std::collections::HashMap;
 
 /// Most laws of cells of a plan.
@@ -178,15 +179,9 @@ impl Effects {
         self.first_rows[effect].map(|first| first + slot)
     }
 
-    /// Numbers of every buffer of a batch of `members`, for a body of `nodes` and `cells` (or tetrahedra) and so many entries of a mass matrix.
-    pub(crate) fn sizes(
-        &self,
-        members: usize,
-        nodes: usize,
-        cells: usize,
-        masses: usize,
-        clamps: usize,
-    ) -> Vec<(&'static str, usize)> {
+    /// Numbers of every buffer of a batch of `members`, for a body and so many entries of a mass matrix.
+    pub(crate) fn sizes(&self, members: usize, body: &Body, masses: usize, clamps: usize) -> Vec<(&'static str, usize)> {
+        let [nodes, cells] = [body.nodes.len(), body.elements()];
         let of = |bit: u32, n: usize| if self.bits & bit == 0 { 0 } else { members * n };
         let mut all = vec![
             ("effect_values", members * self.stride as usize),
@@ -195,7 +190,7 @@ impl Effects {
             ("densities", if masses == 0 { of(FIELD_DENSITY, nodes) } else { members * masses }),
             ("agings", of(FIELD_AGING, (1 + self.aging_rows as usize) * (self.steps + 1))),
         ];
-        all.extend(self.rest_sizes(members, nodes, cells));
+        all.extend(self.rest_sizes(members, body));
         all.push(("hold_slopes", grips::FLOATS * self.grip_rows.len() * members * (self.steps + 1) * clamps));
         all.push(("layers", of(FIELD_GRIPS, 1 + self.matrix_rows.len())));
         all
@@ -214,7 +209,7 @@ impl Effects {
         buffers: &mut HashMap<&'static str, M::Buffer>,
     ) -> Result<(), GpuError> {
         let body = &plan.body;
-        let sizes = self.sizes(batch.len(), body.nodes.len(), body.elements(), mass.entries(), plan.clamps.len());
+        let sizes = self.sizes(batch.len(), body, mass.entries(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
         let put = |out: &mut Vec<f32>, v: &[f64]| out.extend(v.iter().map(|x| *x as f32));
         for physics in batch {

@@ -48,20 +48,12 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
 
 /// Refuses what only cut cells have.
 pub(super) fn refuse_what_needs_cells(scene: &Scene) -> Result<(), PlanError> {
-    for (i, effect) in scene.effects.iter().enumerate() {
-        let why = match effect.law().site {
-            Site::Edges(_) => {
-                "moves the edge of what is held within cells, and of a body of tetrahedra whole nodes are held: change the clamp's box"
-            }
-            Site::Rest(_) => "acts on cells of a lattice, and this body is made of tetrahedra",
-            _ => continue,
-        };
-        {
-            let message = format!("\"{}\" {why}", effect.law().kind);
-            return Err(error(format!("effect.{i}.kind"), message));
-        }
-    }
-    Ok(())
+    let Some(i) = scene.effects.iter().position(|e| matches!(e.law().site, Site::Edges(_))) else { return Ok(()) };
+    let message = format!(
+        "\"{}\" moves the edge of what is held within cells, and of a body of tetrahedra whole nodes are held: change the clamp's box",
+        scene.effects[i].law().kind
+    );
+    Err(error(format!("effect.{i}.kind"), message))
 }
 
 /// The nodes inside a clamp's box or of its group, each held by a stiff spring.
