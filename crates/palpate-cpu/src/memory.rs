@@ -86,7 +86,8 @@ impl<'a> Sizes<'a> {
         let bytes = |n: usize| n as u64;
         Memory {
             shared: bytes(tables + ratios * matrices * MATRICES),
-            matrices: bytes(members * blocks * size_of::<DMat3>()),
+            // Beside the stiffness tetrahedra keep a mass of every block.
+            matrices: bytes(members * blocks * (size_of::<DMat3>() + if plan.body.cut.is_none() { 8 } else { 0 })),
             solves: bytes(members.min(threads.max(1)) * solve),
             states: bytes(members * 2 * kept * vector),
             tangents: bytes(members * 4 * request.sensitivities.len() * vector),

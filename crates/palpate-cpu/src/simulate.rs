@@ -76,6 +76,7 @@ pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option
         elements: &member.elements,
         strains: shared.strains.as_ref(),
         coefficients: &member.coefficients,
+        masses: &member.masses,
         planes: &member.planes,
         effects: &member.effects,
         altered: &member.altered,

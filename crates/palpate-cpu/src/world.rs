@@ -6,6 +6,7 @@ use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::newton::Effort;
 use crate::terms::altered::Altered;
+use crate::terms::consistent::mass_matrix;
 use crate::terms::{Acting, Equation, acting};
 use glam::DVec3;
 use palpate_engine::{Direction, Evaluation, Failure, ParamBatch};
@@ -48,6 +49,8 @@ pub struct Member {
     pub(crate) effects: Vec<Acting>,
     pub(crate) sensors: Sensors,
     pub(crate) altered: Altered,
+    /// Mass matrix by block [kg], of a body of tetrahedra.
+    pub(crate) masses: Vec<f64>,
     pub(crate) elements: Arc<Elements>,
     pub(crate) matrix: Matrix,
     /// Of the time steps since the parameters were set.
@@ -102,6 +105,7 @@ impl World {
             let planes = planes(&shared.plan, physics);
             let effects = acting(&shared.plan, physics);
             let altered = Altered::new(&shared.plan, &coefficients, &elements);
+            let masses = mass_matrix(&shared.plan, &shared.pattern, &shared.places, &coefficients);
             self.members.push(Member {
                 theta: row.to_vec(),
                 coefficients,
@@ -109,6 +113,7 @@ impl World {
                 effects,
                 sensors: Sensors::new(&shared.plan.layout, row),
                 altered,
+                masses,
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),
                 effort: Effort::default(),

@@ -3,52 +3,75 @@
 //! The density around a node is a coefficient of the model; an element's is the mean over its nodes, weighed as `space::tets::lumped` has them. So
 //! the whole mass is the sum of the nodes' densities times their volumes, and every entry is linear in each node's density.
 
-use super::Context;
 use glam::DVec3;
 use palpate_model::params::coefficients::Coefficients;
+use palpate_model::plan::Plan;
+use palpate_model::space::pattern::{Pattern, Places};
 use palpate_model::space::stencil::Stencil;
 use palpate_model::space::tets::{lumped, lumped_mean, mass};
+use rayon::prelude::*;
 
 /// Most nodes of an element.
 const MOST: usize = 10;
+/// Rows that one task multiplies at least.
+const ROWS: usize = 256;
 
 /// The matrix, element by element.
 pub(super) struct Consistent<'a> {
-    c: Context<'a>,
+    plan: &'a Plan,
+    coefficients: &'a Coefficients,
     /// Mass of every element [kg], or its change.
     masses: Vec<f64>,
     /// Entries of an element's matrix over its mass.
     unit: [[f64; MOST]; MOST],
 }
 
+/// Entries of the mass matrix by block of the pattern [kg], of a body of tetrahedra; none of one of cells.
+pub fn mass_matrix(plan: &Plan, pattern: &Pattern, places: &Places, coefficients: &Coefficients) -> Vec<f64> {
+    if plan.body.cut.is_some() {
+        return Vec::new();
+    }
+    let mut out = vec![0.0; pattern.blocks.columns.len()];
+    Consistent::new(plan, coefficients).each_block(places, |place, m| out[place] += m);
+    out
+}
+
+/// Adds M a for accelerations a(node), with M by block of the pattern.
+pub(super) fn add_product(pattern: &Pattern, matrix: &[f64], a: impl Fn(usize) -> DVec3 + Sync, out: &mut [DVec3]) {
+    let blocks = &pattern.blocks;
+    out.par_iter_mut().with_min_len(ROWS).enumerate().for_each(|(n, sum)| {
+        *sum += (blocks.rows[n]..blocks.rows[n + 1]).map(|k| matrix[k] * a(blocks.columns[k] as usize)).sum::<DVec3>();
+    });
+}
+
 impl<'a> Consistent<'a> {
     /// With the densities at hand.
-    pub(super) fn new(c: &Context<'a>) -> Consistent<'a> {
-        let all = Consistent { c: *c, masses: Vec::new(), unit: [[0.0; MOST]; MOST] };
+    pub(super) fn new(plan: &'a Plan, coefficients: &'a Coefficients) -> Consistent<'a> {
+        let all = Consistent { plan, coefficients, masses: Vec::new(), unit: [[0.0; MOST]; MOST] };
         let nodes = all.nodes();
         let unit = std::array::from_fn(|i| std::array::from_fn(|j| if i < nodes && j < nodes { mass(nodes, i, j) } else { 0.0 }));
-        let (rho, factors) = (c.physics().density, c.coefficients.changes.density.as_deref());
+        let (rho, factors) = (coefficients.physics.density, coefficients.changes.density.as_deref());
         let masses = all.elements().map(|(_, s, v)| rho * factors.map_or(1.0, |f| lumped_mean(&s, f)) * v).collect();
         Consistent { masses, unit, ..all }
     }
 
     /// Its change along a change of the coefficients.
     pub(super) fn along(&self, rates: &Coefficients) -> Consistent<'a> {
-        let (rho, factors) = (self.c.physics().density, self.c.coefficients.changes.density.as_deref());
+        let (rho, factors) = (self.coefficients.physics.density, self.coefficients.changes.density.as_deref());
         let (d_rho, d_factors) = (rates.physics.density, rates.changes.density.as_deref());
         let change =
             |s: &Stencil| d_rho * factors.map_or(1.0, |f| lumped_mean(s, f)) + rho * d_factors.map_or(0.0, |f| lumped_mean(s, f));
-        Consistent { c: self.c, masses: self.elements().map(|(_, s, v)| change(&s) * v).collect(), unit: self.unit }
+        Consistent { masses: self.elements().map(|(_, s, v)| change(&s) * v).collect(), ..*self }
     }
 
     /// Nodes of an element.
     fn nodes(&self) -> usize {
-        self.c.plan.body.points.means().next().map_or(0, |s| s.nodes.len())
+        self.plan.body.points.means().next().map_or(0, |s| s.nodes.len())
     }
 
     /// Number, nodes and volume [m³] of every element.
     fn elements(&self) -> impl Iterator<Item = (usize, Stencil<'a>, f64)> + use<'a> {
-        let points = &self.c.plan.body.points;
+        let points = &self.plan.body.points;
         points.means().enumerate().map(|(e, s)| (e, s, points.element_volume(e)))
     }
 
@@ -69,25 +92,19 @@ impl<'a> Consistent<'a> {
     }
 
     /// Hands every entry to `put`: its place in the matrix, and its mass [kg].
-    pub(super) fn each_block(&self, mut put: impl FnMut(usize, f64)) {
+    fn each_block(&self, places: &Places, mut put: impl FnMut(usize, f64)) {
         for (e, s, _) in self.elements() {
             let n = s.nodes.len();
-            let places = self.c.places.points.of(self.c.plan.body.points.mean_point(e));
+            let places = places.points.of(self.plan.body.points.mean_point(e));
             for (k, place) in places.iter().enumerate() {
                 put(*place as usize, self.masses[e] * self.unit[k / n][k % n]);
             }
         }
     }
 
-    /// Sum of the diagonal [kg].
-    pub(super) fn diagonal(&self) -> f64 {
-        let trace: f64 = (0..MOST).map(|i| self.unit[i][i]).sum();
-        trace * self.masses.iter().sum::<f64>()
-    }
-
     /// Adds z · ∂M/∂ρ a, by the density and by the factor on it at every node.
     pub(super) fn pull_density(&self, z: &[DVec3], a: impl Fn(usize) -> DVec3, gradient: &mut Coefficients) {
-        let (rho, factors) = (self.c.physics().density, self.c.coefficients.changes.density.as_deref());
+        let (rho, factors) = (self.coefficients.physics.density, self.coefficients.changes.density.as_deref());
         for (_, s, v) in self.elements() {
             let by_density: f64 =
                 s.nodes.iter().zip(self.product(&s, &a)).map(|(n, row)| z[*n as usize].dot(row)).sum::<f64>() * v;

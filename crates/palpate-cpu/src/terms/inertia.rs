@@ -1,12 +1,16 @@
 //! Inertia of nodes and point masses, damping in proportion to mass, and weight. Cells have lumped masses; tetrahedra have the whole matrix
 //! (`Consistent`).
 
-use super::consistent::Consistent;
+use super::consistent::{Consistent, add_product};
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;
 use glam::DVec3;
 use palpate_model::params::coefficients::{Coefficients, Sought};
+use rayon::prelude::*;
+
+/// Blocks that one task adds to at least.
+const BLOCKS: usize = 4096;
 
 /// The term.
 pub struct Inertia<'a> {
@@ -29,21 +33,21 @@ fn density(c: &Context, node: usize) -> f64 {
 pub(crate) fn diagonal(c: &Context) -> f64 {
     match c.plan.body.cut {
         Some(_) => masses(c).sum(),
-        None => Consistent::new(c).diagonal(),
+        None => c.pattern.blocks.diagonal.iter().map(|k| c.masses[*k]).sum(),
     }
 }
 
 impl<'a> Inertia<'a> {
-    /// The mass matrix where it is none of numbers on nodes.
+    /// The mass matrix, element by element, where it is none of numbers on nodes.
     fn consistent(&self) -> Option<Consistent<'a>> {
-        self.c.plan.body.cut.is_none().then(|| Consistent::new(&self.c))
+        self.c.plan.body.cut.is_none().then(|| Consistent::new(self.c.plan, self.c.coefficients))
     }
 
     /// Adds M a for accelerations a(node) of the body and of the point masses.
-    fn add(&self, body: impl Fn(usize) -> DVec3, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
-        match self.consistent() {
-            Some(m) => m.add(body, out),
-            None => {
+    fn add(&self, body: impl Fn(usize) -> DVec3 + Sync, points: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        match self.c.plan.body.cut {
+            None => add_product(self.c.pattern, self.c.masses, body, out),
+            Some(_) => {
                 for (i, v) in self.c.plan.body.node_volume.iter().enumerate() {
                     out[i] += density(&self.c, i) * v * body(i);
                 }
@@ -97,9 +101,12 @@ impl Term for Inertia<'_> {
     fn tangent(&self, _u1: &[DVec3], _curvature: Curvature, matrix: &mut Matrix) {
         let Some(t) = self.c.inertia else { return };
         let factor = t.displacement + self.c.physics().mass_damping * t.rate;
-        match self.consistent() {
-            Some(m) => m.each_block(|place, m| add_to_diagonal(&mut matrix.values[place], m * factor)),
+        match self.c.plan.body.cut {
             None => {
+                let blocks = matrix.values.par_iter_mut().zip(self.c.masses);
+                blocks.with_min_len(BLOCKS).for_each(|(block, m)| add_to_diagonal(block, m * factor));
+            }
+            Some(_) => {
                 for (i, m) in masses(&self.c).enumerate() {
                     add_to_diagonal(&mut matrix.values[self.c.pattern.blocks.diagonal[i]], m * factor);
                 }
@@ -163,7 +170,7 @@ impl Term for Inertia<'_> {
                 m.pull_density(z, |i| self.pull(u1, i) + p.mass_damping * self.speed(u1, i), gradient);
             }
             let mut momentum = zeros(z.len());
-            m.add(|i| z[i], &mut momentum);
+            add_product(self.c.pattern, self.c.masses, |i| z[i], &mut momentum);
             if sought.damping[0] {
                 gradient.physics.mass_damping += momentum.iter().enumerate().map(|(i, z)| z.dot(self.speed(u1, i))).sum::<f64>();
             }

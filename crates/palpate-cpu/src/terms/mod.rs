@@ -7,7 +7,7 @@
 
 mod assembly;
 pub mod clamps;
-mod consistent;
+pub mod consistent;
 pub mod contact;
 pub mod elastic_cells;
 pub mod elastic_points;
@@ -144,6 +144,8 @@ pub struct Context<'a> {
     pub strains: Option<&'a Elements>,
     /// The member's coefficients.
     pub coefficients: &'a Coefficients,
+    /// Its mass matrix by block [kg], of a body of tetrahedra.
+    pub masses: &'a [f64],
     /// The member's planes.
     pub planes: &'a [PlaneNow],
     /// The member's effects.

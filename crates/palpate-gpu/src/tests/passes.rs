@@ -9,6 +9,7 @@ use crate::{GpuBackend, Product};
 use glam::{DMat3, DVec3};
 use palpate_cpu::linear::matrix::Matrix;
 use palpate_cpu::terms::altered::Altered;
+use palpate_cpu::terms::consistent::mass_matrix;
 use palpate_cpu::terms::elastic_cells::corners;
 use palpate_cpu::terms::{Context, Curvature, Equation, Past, Rates, Weights, acting};
 use palpate_engine::{Backend, ParamBatch, Request};
@@ -173,6 +174,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
     let pattern = Pattern::new(&plan.body);
     let places = Places::new(plan, &pattern);
     let altered = Altered::new(plan, &coefficients, &elements);
+    let masses = mass_matrix(plan, &pattern, &places, &coefficients);
     let effects = acting(plan, physics);
     let planes = planes(plan, physics);
     let (dt, theta) = (plan.clock.step, plan.clock.theta);
@@ -184,6 +186,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
         elements: &elements,
         strains: None,
         coefficients: &coefficients,
+        masses: &masses,
         planes: &planes,
         effects: &effects,
         altered: &altered,

@@ -1,6 +1,6 @@
 //! The points' tangents block by block, for the assembly of the matrix: those of an element have the same nodes and are summed before they go there.
 
-use super::{ElasticPoints, Point, green, green_rate, linear_stress, matrix_of, rows};
+use super::{ElasticPoints, Point, contract, green, linear_stress, rows};
 use crate::terms::Curvature;
 use crate::terms::assembly::Elements;
 use glam::{DMat3, DVec3};
@@ -24,10 +24,17 @@ impl Tangents<'_, '_> {
         let mut tangent = term.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));
         if let (Some(past), true) = (term.past.get(*e), w.rate != 0.0) {
             let held = linear_stress(green(h) - *past, (*lambda, *mu)) * w.rate;
-            add_rate(&mut tangent, f, held, |dg| linear_stress(dg, (*lambda, *mu)) * w.rate);
+            add_rate(&mut tangent, f, held, (*lambda * w.rate, *mu * w.rate));
         }
-        if term.flow.is_some() {
-            add_rate(&mut tangent, f, term.flow_stress(*e, h), |dg| term.flow_rate(*e, h, dg));
+        if let Some((law, rate)) = term.flow_of(*e) {
+            // S = 2 φ′ g, and along dG 2 φ′ dG + 4 φ″ g (g : dG), where g : dG = F g : dF.
+            let g = green(h) - term.past[*e];
+            let [_, first, second] = law.loss(contract(g, g), rate);
+            add_rate(&mut tangent, f, g * (2.0 * first), (0.0, first));
+            let along = rows(f * g);
+            for (k, row) in tangent.iter_mut().enumerate() {
+                (0..9).for_each(|l| row[l] += 4.0 * second * along[k / 3][k % 3] * along[l / 3][l % 3]);
+            }
         }
         if self.curvature != Curvature::Exact {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
@@ -85,13 +92,21 @@ impl Elements for Tangents<'_, '_> {
     }
 }
 
-/// Adds the derivative by F of the stress F S, of which `stress` is S and `rate` gives its change with Green's strain.
-fn add_rate(tangent: &mut [[f64; 9]; 9], f: DMat3, stress: DMat3, rate: impl Fn(DMat3) -> DMat3) {
-    for l in 0..9 {
-        let mut unit = [0.0; 9];
-        unit[l] = 1.0;
-        let dh = matrix_of(&unit);
-        let change = rows(dh * stress + f * rate(green_rate(f, dh)));
-        (0..9).for_each(|k| tangent[k][l] += change[k / 3][k % 3]);
+/// Adds the derivative by F of the stress F S, where S changes by λ tr(dG) I + 2μ dG with Green's strain: along dF it is
+/// dF S + λ F (F : dF) + μ (F Fᵀ dF + F dFᵀ F).
+fn add_rate(tangent: &mut [[f64; 9]; 9], f: DMat3, stress: DMat3, (lambda, mu): (f64, f64)) {
+    let (square, f, s) = (rows(f * f.transpose()), rows(f), rows(stress));
+    for (p, row) in tangent.iter_mut().enumerate() {
+        let (i, k) = (p / 3, p % 3);
+        for (q, entry) in row.iter_mut().enumerate() {
+            let (a, b) = (q / 3, q % 3);
+            *entry += lambda * f[i][k] * f[a][b] + mu * f[i][b] * f[a][k];
+            if b == k {
+                *entry += mu * square[i][a];
+            }
+            if i == a {
+                *entry += s[b][k];
+            }
+        }
     }
 }

@@ -40,6 +40,8 @@ pub struct ElasticPoints<'a> {
     young: f64,
     /// G̃ of every point; empty in a static problem.
     past: Vec<DMat3>,
+    /// The old state's own stress at every point, which no Newton iteration changes; empty where it has no weight.
+    old: Vec<DMat3>,
     /// The material's viscosity, and 1/ℓ [1/s]; `None` without one and in a static problem.
     flow: Option<(Viscosity, f64)>,
 }
@@ -106,10 +108,13 @@ impl<'a> ElasticPoints<'a> {
         let nu = c.physics().poisson_ratio;
         let lame = Share::ALL.map(|s| s.of(lame(1.0, nu), lame_by_nu(1.0, nu)));
         let stencils = c.altered.points.as_ref().map_or(&c.plan.body.points.stencils, |p| &p.stencils);
-        let mut term = ElasticPoints { c, stencils, lame, young: c.young(), past: Vec::new(), flow: None };
+        let mut term = ElasticPoints { c, stencils, lame, young: c.young(), past: Vec::new(), old: Vec::new(), flow: None };
         if c.inertia.is_some() {
             let sum = |p: Point| c.past.each.iter().map(|(w, u)| green(p.h(u)) * *w).sum::<DMat3>();
             term.past = term.each(sum);
+        }
+        if c.weights.old != 0.0 {
+            term.old = term.each(|p: Point| term.stress(p.h(c.past.u), p.moduli));
         }
         term.flow = c.physics().viscosity.zip(c.inertia.map(|t| t.rate));
         term
@@ -181,7 +186,7 @@ impl<'a> ElasticPoints<'a> {
         let (w, h) = (&self.c.weights, p.h(u1));
         let mut stress = self.stress(h, p.moduli) * w.new;
         if w.old != 0.0 {
-            stress += self.stress(p.h(self.c.past.u), p.moduli) * w.old;
+            stress += self.old[p.e] * w.old;
         }
         if w.rate != 0.0 {
             stress += self.viscous(p.e, h, p.moduli) * w.rate;
@@ -310,7 +315,7 @@ impl Term for ElasticPoints<'_> {
             let (Point { e, v, moduli: (lambda, mu), .. }, h) = (p, p.h(u1));
             let mut psi = w.new * self.c.law().value(&rows(h), lambda, mu);
             if w.old != 0.0 {
-                psi += w.old * contract(self.stress(p.h(self.c.past.u), (lambda, mu)), h);
+                psi += w.old * contract(self.old[e], h);
             }
             if let (Some(past), true) = (self.past.get(e), w.rate != 0.0) {
                 let g = green(h) - *past;
