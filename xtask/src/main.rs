@@ -28,6 +28,9 @@ enum Verb {
         /// of stiffness with priors, of which one case alone is real2sim-NAME and what this commit has measured is not run again
         #[arg(long, value_name = "TABLE")]
         only: Option<String>,
+        /// With --only real2sim: print what was measured and write the table of docs/real2sim.md, and run nothing
+        #[arg(long, requires = "only")]
+        report: bool,
     },
     /// Time and memory of a step, forward and back
     Bench {
@@ -169,8 +172,9 @@ enum Verb {
 
 fn run(verb: Verb) -> Result<(), String> {
     match verb {
+        Verb::Paper { only: Some(only), report: true, .. } if paper::real2sim::is_asked(&only) => paper::real2sim::report()?,
         Verb::Paper { only: Some(only), .. } if paper::real2sim::is_asked(&only) => paper::real2sim::run(&only)?,
-        Verb::Paper { quick, only } => {
+        Verb::Paper { quick, only, .. } => {
             let suffix = only.as_ref().map_or_else(String::new, |t| format!("-{t}"));
             let report = paper::tables::all(quick, only).map_err(|e| e.to_string())?;
             report.print();

@@ -1,6 +1,7 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
 use crate::coverage;
+use crate::paper::real2sim;
 use crate::real::report::Report;
 use crate::real::{diagnoses, models};
 use crate::suite::report as suite;
@@ -113,13 +114,16 @@ fn measured(root: &Path, found: &mut Vec<String>) {
 fn generated(root: &Path, found: &mut Vec<String>) {
     let suite = suite::stored(root).map(|lines| suite::markdown(&lines));
     let coverage = coverage::report::stored(root).map(|lines| coverage::report::markdown(&lines));
-    for (name, table) in [("suite", suite), ("coverage", coverage)] {
+    let real2sim = real2sim::stored(root).map(|rows| real2sim::acceptance::markdown(&rows));
+    for (name, table, verb) in [
+        ("suite", suite, "suite --report"),
+        ("coverage", coverage, "coverage --report"),
+        ("real2sim", real2sim, "paper --only real2sim --report"),
+    ] {
         let text = fs::read_to_string(root.join(format!("docs/{name}.md"))).unwrap_or_default();
         match table {
             Ok(table) if text.split(&mark(name)).nth(1) == Some(&table) => {}
-            Ok(_) => {
-                found.push(format!("docs/{name}.md: the table is not that of bench/{name}.json; cargo xtask {name} --report"))
-            }
+            Ok(_) => found.push(format!("docs/{name}.md: the table is not what bench/ holds; cargo xtask {verb}")),
             Err(e) => found.push(e),
         }
     }

@@ -4,7 +4,7 @@
 pub mod diagnoses;
 pub mod models;
 pub mod report;
-mod studies;
+pub(crate) mod studies;
 pub mod swing;
 pub mod tracks;
 

@@ -169,13 +169,17 @@ fn variants(data: &Path) -> Result<Vec<Row>, Error> {
     VARIANTS.iter().map(of).collect()
 }
 
-fn read(scene: &str) -> Result<String, Error> {
+/// The text of a scene of `assets/scenes`.
+///
+/// # Errors
+/// It cannot be read.
+pub(crate) fn read(scene: &str) -> Result<String, Error> {
     let path = scene_path(scene);
     std::fs::read_to_string(&path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
 }
 
 /// The table of a scene's text that makes `path` free.
-fn free(text: &str, path: &str) -> String {
+pub(crate) fn free(text: &str, path: &str) -> String {
     let named = format!("\"{path}\"");
     let tables = text.match_indices("[[fit.parameter]]").map(|(at, _)| &text[at..]);
     let table = tables.map(|t| &t[..t[2..].find("[[").map_or(t.len(), |e| e + 2)]).find(|t| t.contains(&named));

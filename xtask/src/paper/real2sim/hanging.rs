@@ -1,5 +1,6 @@
 //! The measured cantilever of two materials that hangs in front of one depth camera: a modulus a cell with a prior, beside a fit of two parts.
 
+use super::beams::{CELLS, Made, TETRAHEDRA};
 use super::{Figures, common, mean, moduli, posterior};
 use crate::real::open;
 use palpate::{Backend, Experiment, FitOptions, Fitted};
@@ -14,19 +15,23 @@ const BAR: [f64; 2] = [-0.07, 0.07];
 /// Width of a slice of the profile along the bar [m].
 const SLICE: f64 = 0.01;
 
-fn fit(data: &Path, field: &str) -> Result<(Experiment, Fitted), String> {
+fn fit(data: &Path, made: Made, field: &str) -> Result<(Experiment, Fitted), String> {
     let free = format!("\n[[fit.parameter]]\npath = \"field.0\"\nbounds = [0.05, 50]\n{field}");
-    let e = open(data, SCENE, &[(GAUSS_NEWTON, ""), (FREE, &free)]).map_err(|e| e.to_string())?;
+    let mut changes = vec![(GAUSS_NEWTON, ""), (FREE, &free)];
+    if made == Made::Tetrahedra {
+        changes.push((CELLS, TETRAHEDRA));
+    }
+    let e = open(data, SCENE, &changes).map_err(|e| e.to_string())?;
     let fitted = e.fit(FitOptions { backend: Backend::Cpu, ..FitOptions::default() }).map_err(|e| e.to_string())?;
     Ok((e, fitted))
 }
 
 /// Fits two parts, and the field of a kind of prior.
-pub fn run(data: &Path, kind: &str) -> Result<Figures, String> {
+pub fn run(data: &Path, kind: &str, made: Made) -> Result<Figures, String> {
     let field = "\n[[field]]\npath = \"material.youngs_modulus\"\n";
     let parts = "basis = \"regions\"\nblend = \"nearest\"\nregions = [{ center = [-0.05, 0, 0], radius = 0.01 }, { center = [0.05, 0, 0], radius = 0.01 }]\n";
-    let (_, two) = fit(data, &format!("{field}{parts}"))?;
-    let (e, fitted) = fit(data, &format!("{field}basis = \"cells\"\nprior = {{ kind = \"{kind}\" }}\n"))?;
+    let (_, two) = fit(data, made, &format!("{field}{parts}"))?;
+    let (e, fitted) = fit(data, made, &format!("{field}basis = \"cells\"\nprior = {{ kind = \"{kind}\" }}\n"))?;
     let mut figures = common(&e, &fitted)?;
     let p = posterior(&fitted)?;
     let (modulus, volume) = moduli(e.plan(), &fitted);

@@ -2,6 +2,7 @@
 //! 13) and a measured cantilever of two materials, the design of a disk, numerical coarsening, and the measured beams. `bench/real2sim.jsonl`
 //! holds a row a case and commit.
 
+pub(crate) mod acceptance;
 mod bar;
 mod beams;
 mod coarsening;
@@ -23,6 +24,9 @@ use std::time::Instant;
 /// Name under which `cargo xtask paper --only` runs all cases; a case alone is `real2sim-NAME`.
 pub const NAME: &str = "real2sim";
 
+/// The page that has the table of aims.
+pub const PAGE: &str = "docs/real2sim.md";
+
 /// What one case came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -40,15 +44,24 @@ pub struct Row {
 /// Figures of one case.
 type Figures = BTreeMap<String, f64>;
 
+/// All rows of a workspace.
+///
+/// # Errors
+/// A line is no row.
+pub fn stored(root: &Path) -> Result<Vec<Row>, String> {
+    rows::load(&root.join("bench").join(format!("{NAME}.jsonl")))
+}
+
 /// A case, from the folder of measured recordings and one to work in.
 type Case = fn(&Path, &Path) -> Result<Figures, String>;
 
-const CASES: [(&str, Case); 19] = [
+const CASES: [(&str, Case); 23] = [
     ("bar-two-clamps", |_, folder| bar::run(folder, bar::Held::Both, "matern")),
     ("bar-two-clamps-parts", |_, folder| bar::run(folder, bar::Held::Both, "edge-preserving")),
     ("bar-one-clamp", |_, folder| bar::run(folder, bar::Held::One, "matern")),
-    ("hanging-matern", |data, _| hanging::run(data, "matern")),
-    ("hanging-parts", |data, _| hanging::run(data, "edge-preserving")),
+    ("hanging-matern", |data, _| hanging::run(data, "matern", beams::Made::Cells)),
+    ("hanging-parts", |data, _| hanging::run(data, "edge-preserving", beams::Made::Cells)),
+    ("hanging-tet10", |data, _| hanging::run(data, "edge-preserving", beams::Made::Tetrahedra)),
     ("ten-thousand-cells", |_, folder| many::run(folder)),
     ("disk-homogeneous", |_, folder| disk::run(folder, disk::Free::Homogeneous)),
     ("disk-curve-5", |_, folder| disk::run(folder, disk::Free::Curve(4))),
@@ -60,9 +73,12 @@ const CASES: [(&str, Case); 19] = [
     ("coarsening-30mm", |data, folder| coarsening::run(data, folder, 0.03)),
     ("beams-cells", |data, _| beams::alone(data, beams::Made::Cells)),
     ("beams-tet10", |data, _| beams::alone(data, beams::Made::Tetrahedra)),
-    ("beams-rayleigh", |data, _| beams::together(data, beams::Law::Rayleigh)),
-    ("beams-viscosity", |data, _| beams::together(data, beams::Law::Viscosity)),
-    ("beams-structural", |data, _| beams::together(data, beams::Law::Structural)),
+    ("beams-rayleigh", |data, _| beams::together(data, beams::Made::Cells, beams::Law::Rayleigh)),
+    ("beams-viscosity", |data, _| beams::together(data, beams::Made::Cells, beams::Law::Viscosity)),
+    ("beams-structural", |data, _| beams::together(data, beams::Made::Cells, beams::Law::Structural)),
+    ("beams-viscosity-tet10", |data, _| beams::together(data, beams::Made::Tetrahedra, beams::Law::Viscosity)),
+    ("moldstar-cells", |data, _| beams::moldstar(data, beams::Made::Cells)),
+    ("moldstar-tet10", |data, _| beams::moldstar(data, beams::Made::Tetrahedra)),
 ];
 
 /// True where a table's name asks for these cases.
@@ -94,8 +110,17 @@ pub fn run(only: &str) -> Result<(), String> {
         let row = Row { made: made.clone(), case: (*name).into(), figures, seconds: clock.elapsed().as_secs_f64() };
         rows::append(&path, &row)?;
     }
-    print(&rows::load(&path)?);
-    Ok(())
+    report()
+}
+
+/// Prints the last row of every case, and writes the table of the page.
+///
+/// # Errors
+/// A file cannot be read or written.
+pub fn report() -> Result<(), String> {
+    let all = rows::load(&rows::path(NAME))?;
+    print(&all);
+    table::replace(PAGE, NAME, &acceptance::markdown(&all))
 }
 
 /// The last row of every case.
