@@ -34,7 +34,13 @@ pub struct Expected {
 ///
 /// # Errors
 /// Why it could not be simulated, or that nothing is seen.
-pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], errors: &ErrorModel) -> Result<Expected, String> {
+pub fn expected(
+    problem: &mut Problem,
+    values: &[f64],
+    groups: &[Vec<usize>],
+    errors: &ErrorModel,
+    hear: &mut dyn FnMut(usize),
+) -> Result<Expected, String> {
     let z: Vec<f64> = problem.charts().iter().zip(values).map(|(c, v)| c.coordinate(*v)).collect();
     let (q, m) = (z.len(), groups.len());
     let whole = q <= MOST_SENSITIVITIES;
@@ -60,6 +66,7 @@ pub fn expected(problem: &mut Problem, values: &[f64], groups: &[Vec<usize>], er
             h[a * m + b] = other.iter().map(|j| row[*j]).sum();
             prior[a * m + b] = other.iter().map(|j| before[*j]).sum();
         }
+        hear(a + 1);
     }
     // Products are symmetric but for rounding.
     let symmetric = |h: &[f64]| -> Vec<f64> { (0..m * m).map(|k| 0.5 * (h[k] + h[k % m * m + k / m])).collect() };

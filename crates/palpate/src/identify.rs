@@ -44,12 +44,18 @@ struct Group {
 ///
 /// # Errors
 /// As [`crate::fit`], and where the scene's own motion cannot be simulated. A second motion that cannot be is left out, with a warning.
-pub(crate) fn identify(e: &Experiment, backend: Backend, mut hear: impl FnMut(&str)) -> Result<Identification, Error> {
+///
+/// `hear` is told which motion is looked at, and how many of how many numbers and parts of it are done.
+pub(crate) fn identify(
+    e: &Experiment,
+    backend: Backend,
+    mut hear: impl FnMut(&str, [usize; 2]),
+) -> Result<Identification, Error> {
     let own = std::slice::from_ref(e);
     check(own)?;
     let (numbers, free, _) = free_parameters(own)?;
-    hear("the scene's own motion");
-    let (groups, first) = look(e, &numbers, &free, backend, None)?;
+    let own_motion = "the scene's own motion";
+    let (groups, first) = look(e, &numbers, &free, backend, None, &mut |done| hear(own_motion, done))?;
     let expectation = |(k, g): (usize, &Group)| {
         let error = first.errors[k];
         let with = (0..groups.len()).filter(|o| *o != k && first.correlation[k][*o].abs() > CORRELATED);
@@ -67,8 +73,9 @@ pub(crate) fn identify(e: &Experiment, backend: Backend, mut hear: impl FnMut(&s
     let expectations: Vec<Expectation> = groups.iter().enumerate().map(expectation).collect();
     let (mut proposals, mut warnings) = (Vec::new(), Vec::new());
     for motion in motions(e) {
-        hear(&motion.what);
-        match trial(e, &motion, backend).and_then(|second| look(e, &numbers, &free, backend, Some(&second))) {
+        let both = trial(e, &motion, backend)
+            .and_then(|second| look(e, &numbers, &free, backend, Some(&second), &mut |done| hear(&motion.what, done)));
+        match both {
             Ok((_, both)) => proposals.push(Proposal {
                 motion: motion.what,
                 information: both.information - first.information,
@@ -89,6 +96,7 @@ fn look(
     free: &[FreeParameter],
     backend: Backend,
     second: Option<&Experiment>,
+    hear: &mut dyn FnMut([usize; 2]),
 ) -> Result<(Vec<Group>, Expected), Error> {
     let mut scenes = Vec::new();
     for e in std::iter::once(e).chain(second) {
@@ -114,7 +122,9 @@ fn look(
     let groups = groups(e, numbers, &problem, &values);
     let places: Vec<Vec<usize>> = groups.iter().map(|g| g.values.clone()).collect();
     let model = errors(std::slice::from_ref(e));
-    let found = expected(&mut problem, &values, &places, &model).map_err(Error::Failed)?;
+    hear([0, places.len()]);
+    let each = &mut |done| hear([done, places.len()]);
+    let found = expected(&mut problem, &values, &places, &model, each).map_err(Error::Failed)?;
     Ok((groups, found))
 }
 
@@ -250,11 +260,12 @@ mod tests {
     fn what_rests_says_nothing_of_damping_and_a_shake_would() {
         let e = Experiment::from_toml(ROD, "rod.toml").unwrap_or_else(|e| panic!("{e}"));
         let mut heard = 0;
-        let found = identify(&e, Backend::Cpu, |_| heard += 1).unwrap_or_else(|e| panic!("{e}"));
+        let found =
+            identify(&e, Backend::Cpu, |_, [done, of]| heard += usize::from(done == of)).unwrap_or_else(|e| panic!("{e}"));
         println!("{found:#?}");
         let of = |path: &str| found.numbers.iter().find(|n| n.path == path).unwrap();
         assert!(of("material.youngs_modulus").determined && !of("material.stiffness_damping").determined);
-        assert_eq!(heard, 1 + found.motions.len() + found.warnings.len());
+        assert_eq!(heard, 1 + found.motions.len());
         let best = &found.motions[0];
         assert!(best.motion.starts_with("the clamps shaken"), "{}", best.motion);
         assert!(best.errors[1] < 1e-3 * of("material.stiffness_damping").error && best.information > 1.0, "{best:?}");

@@ -213,7 +213,8 @@ fn what_is_expected_of_a_field_is_what_a_fit_says_afterwards() {
     let variance = posterior(&readings, &p, 1.0).1;
     let values: Vec<f64> = truth.iter().map(|m| m.exp()).collect();
     let groups: Vec<Vec<usize>> = (0..40).map(|k| vec![k]).collect();
-    let found = crate::expected(&mut problem(&readings, prior, false), &values, &groups, &ErrorModel::default()).unwrap();
+    let found =
+        crate::expected(&mut problem(&readings, prior, false), &values, &groups, &ErrorModel::default(), &mut |_| {}).unwrap();
     let off = found.errors.iter().zip(&variance).map(|(e, v)| (e / v.sqrt() - 1.0).abs()).fold(0.0, f64::max);
     assert!(off < 1e-6, "{off}");
     // A fit takes the mean over the whole, and this one over the values.

@@ -11,6 +11,7 @@ use crate::experiment::{Experiment, short};
 use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
 use crate::options::BackendName;
+use crate::progress::Track;
 use crate::results::inspection::{
     CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
     SceneInspection, SequenceInspection, Time,
@@ -83,7 +84,14 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let (mut content, mut lines) = scene(&e);
         if a.identify {
             let (backend, _) = a.backend.choose(e.plan(), 1)?;
-            let found = crate::identify::identify(&e, backend, |what| console.note(&format!("looking at {what}")))?;
+            let mut track = None;
+            let found = crate::identify::identify(&e, backend, |what, [done, of]| {
+                if done == 0 {
+                    track.replace(console.progress(of as u64, &format!("looking at {what}"))).into_iter().for_each(Track::finish);
+                }
+                track.iter_mut().for_each(|t| t.at(done as u64, ""));
+            })?;
+            track.into_iter().for_each(Track::finish);
             lines.extend(identify::identified(&found));
             content.identification = Some(found);
         }
