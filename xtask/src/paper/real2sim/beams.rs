@@ -145,6 +145,25 @@ fn at_rest(data: &Path, made: Made, first: usize, modulus: f64) -> Result<f64, S
     Ok(hangs / hung)
 }
 
+/// Poisson's ratio free beside the others: a bending beam says nothing of it, and the fit has to say so.
+pub fn poisson(data: &Path) -> Result<Figures, String> {
+    const DAMPING: &str = "path   = \"material.stiffness_damping\"";
+    let more = "path   = \"material.poisson_ratio\"\nstart  = 0.4\nbounds = [0.0, 0.499]\n\n[[fit.parameter]]\n";
+    let (scene, _) = SCENES[0];
+    let e = beam(data, scene, &[material(Made::Cells), vec![(DAMPING.into(), format!("{more}{DAMPING}"))]].concat())?;
+    let fitted = e.fit(FitOptions::default()).map_err(|e| e.to_string())?;
+    println!("{}", fitted.verdict);
+    fitted.warnings.iter().for_each(|w| println!("  {w}"));
+    let told = fitted.warnings.iter().filter(|w| w.contains("poisson_ratio") && w.contains("not determined")).count();
+    let ratio = fitted.result.parameters.iter().find(|p| p.path == "material.poisson_ratio");
+    let mut out = Figures::new();
+    out.insert("Poisson's ratio".into(), found(&fitted, "material.poisson_ratio"));
+    out.insert("its standard error".into(), ratio.and_then(|p| p.standard_error).unwrap_or(f64::NAN));
+    out.insert("warnings that it is not determined".into(), told as f64);
+    out.insert("E [kPa]".into(), 1e-3 * found(&fitted, VALUES[0]));
+    Ok(out)
+}
+
 /// The cantilever of MoldStar 15 with a head, whose points were taken from its silhouette.
 pub fn moldstar(data: &Path, made: Made) -> Result<Figures, String> {
     let mut out = Figures::new();

@@ -3,14 +3,18 @@
 //! misses are 0.81, 0.45 and 0.42 (5 and 21 corners), 0.33 and 0.08 mm.
 
 use super::Figures;
-use palpate::{Experiment, FitOptions};
+use palpate::{Clock, Experiment, FitOptions, Interrupt};
+use palpate_fit::Status;
 use std::fmt::Write;
 use std::path::Path;
+use std::time::Duration;
 
 /// Radius and height [m], and cells [m].
 const RADIUS: f64 = 0.05;
 const HEIGHT: f64 = 0.02;
 const CELL: f64 = 0.005;
+/// Time after which a fit is stopped.
+const LONGEST: Duration = Duration::from_secs(1080);
 /// How far the lower face shall hang down [m], and by what share be drawn in.
 const DOWN: f64 = 0.02;
 const DRAWN: f64 = 0.2;
@@ -87,7 +91,9 @@ fn scene(free: Free) -> String {
 pub fn run(folder: &Path, free: Free) -> Result<Figures, String> {
     std::fs::write(folder.join("target.csv"), target()).map_err(|e| e.to_string())?;
     let experiment = Experiment::from_toml(&scene(free), folder.join("disk.toml")).map_err(|e| e.to_string())?;
-    let fitted = experiment.fit(FitOptions::default()).map_err(|e| e.to_string())?;
+    // What has not ended by then says so, and how far it came.
+    let interrupt = Interrupt::default().until(&Clock::start(), LONGEST);
+    let fitted = experiment.fit(FitOptions { interrupt, ..FitOptions::default() }).map_err(|e| e.to_string())?;
     let run = &fitted.result.runs[fitted.result.best];
     println!("{}", fitted.verdict);
     let mut out = Figures::new();
@@ -98,6 +104,8 @@ pub fn run(folder: &Path, free: Free) -> Result<Figures, String> {
     say("free values", run.end.len() as f64);
     say("miss at the start [mm]", fitted.before[0].as_ref().map_or(f64::NAN, |r| 1e3 * r.rms));
     say("miss [mm]", 1e3 * fitted.residual().0);
+    say("interrupted", f64::from(u8::from(run.status == Status::Interrupted)));
+    say("iterations", run.iterations as f64);
     say("evaluations", run.evaluations as f64);
     say("products", run.products as f64);
     fitted.result.parameters.iter().take(3).for_each(|p| say(&p.path, p.value));

@@ -55,7 +55,7 @@ pub fn stored(root: &Path) -> Result<Vec<Row>, String> {
 /// A case, from the folder of measured recordings and one to work in.
 type Case = fn(&Path, &Path) -> Result<Figures, String>;
 
-const CASES: [(&str, Case); 23] = [
+const CASES: [(&str, Case); 24] = [
     ("bar-two-clamps", |_, folder| bar::run(folder, bar::Held::Both, "matern")),
     ("bar-two-clamps-parts", |_, folder| bar::run(folder, bar::Held::Both, "edge-preserving")),
     ("bar-one-clamp", |_, folder| bar::run(folder, bar::Held::One, "matern")),
@@ -77,6 +77,7 @@ const CASES: [(&str, Case); 23] = [
     ("beams-viscosity", |data, _| beams::together(data, beams::Made::Cells, beams::Law::Viscosity)),
     ("beams-structural", |data, _| beams::together(data, beams::Made::Cells, beams::Law::Structural)),
     ("beams-viscosity-tet10", |data, _| beams::together(data, beams::Made::Tetrahedra, beams::Law::Viscosity)),
+    ("beams-poisson", |data, _| beams::poisson(data)),
     ("moldstar-cells", |data, _| beams::moldstar(data, beams::Made::Cells)),
     ("moldstar-tet10", |data, _| beams::moldstar(data, beams::Made::Tetrahedra)),
 ];
