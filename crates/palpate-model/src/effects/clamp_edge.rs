@@ -2,7 +2,8 @@
 //!
 //! The faces of the clamp's box that cut through the body move along their outward normals; faces beside the body stay. What the
 //! grown box holds of surface and body is integrated exactly ([`crate::cutcells::clamp_edge`]), so the held shares of the cells at the edge, and
-//! with them the motion, depend smoothly on the shift.
+//! with them the motion, depend smoothly on the shift. Of tetrahedra a clamp holds whole faces, so its edge is one of the mesh: moving it would
+//! move the mesh, and with it where markers are. Such bodies are refused by name.
 
 use super::field::{FieldLaw, Spot};
 use super::law::Number;
@@ -22,7 +23,7 @@ const PARAMS: [EffectParam; 1] = [number(
     "m",
     [-0.1, 0.1, 0.005],
     Unstated::Absent(0.0),
-    "how much further along the body the clamp holds it; below 0 it holds less",
+    "how much further along the body the clamp holds it; below 0 it holds less. Of bodies of cells: a mesh of tetrahedra has its edge where its nodes are",
 )];
 
 struct Edge;

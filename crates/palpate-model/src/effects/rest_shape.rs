@@ -5,6 +5,9 @@
 //! stress-free state is its own deformation at W, rotation removed, so X + W is free of stress whatever the size
 //! of W; that the bend keeps lengths holds for small κ·length. Mass and contact area stay those of the given shape. Clamps hold the stress-free
 //! shape. A free body starts at rest in the shape X + W.
+//!
+//! Elastic points of tetrahedra have X + W as the shape that deformations are counted from, volumes included
+//! (`palpate-cpu/src/terms/unstrained.rs`); for small W both are the same.
 
 use super::field::{FieldLaw, Spot};
 use super::law::Number;
