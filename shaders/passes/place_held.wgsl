@@ -1,7 +1,7 @@
 //! Puts nodes that are held where their clamps want them, whatever the trial says.
 // use shared/wanted
+// use shared/flight
 
-var<storage, read> now: array<vec4<f32>>;
 var<storage, read_write> next: array<vec4<f32>>;
 var<storage, read_write> trial: array<vec4<f32>>;
 
@@ -17,11 +17,5 @@ fn place_held(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let whole = round(u / shape.quantum) * shape.quantum;
     next[a] = vec4(whole, 0.0);
     next[part(1u) + a] = vec4(u - whole, 0.0);
-    var w = u;
-    if call.mode != 0u {
-        // The increment beyond free flight, as place_next counts it.
-        let flight = shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * members[p.member].gravity.xyz;
-        w = (whole - now[a].xyz) + ((u - whole) - now[part(1u) + a].xyz) - flight;
-    }
-    trial[a] = vec4(w, 0.0);
+    trial[a] = vec4(beyond_flight(p.member, a, whole, u - whole), 0.0);
 }

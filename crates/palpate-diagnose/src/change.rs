@@ -2,7 +2,7 @@
 
 use crate::laboratory::{Setting, Wall};
 use glam::DVec3;
-use palpate_model::effects::{ALL, Effect, EffectParam, Family, Numbered, Site, Trial, Unstated};
+use palpate_model::effects::{ALL, Effect, EffectParam, Family, Law, Numbered, Site, Trial, Unstated};
 use palpate_model::params::ParamKey;
 
 /// One change of a scene.
@@ -204,7 +204,8 @@ fn names(name: &str, path: &str) -> bool {
 /// Every hypothesis for a scene: the table of effects, and what the scene holds fixed.
 pub fn candidates(setting: &Setting) -> Vec<Candidate> {
     let mut out = Vec::new();
-    for (law, l) in ALL.iter().enumerate().filter(|(_, l)| l.trial != Trial::Never && l.family != Family::Slack) {
+    let tried = |l: &Law| l.trial != Trial::Never && l.family != Family::Slack && (setting.cells || !l.needs_cells());
+    for (law, l) in ALL.iter().enumerate().filter(|(_, l)| tried(l)) {
         let choices = l.params.iter().find_map(|p| match p.default {
             Unstated::Choice(Numbered::Camera) => Some(setting.cameras),
             Unstated::Choice(Numbered::Marker) => Some(setting.markers),
@@ -354,6 +355,9 @@ mod tests {
         assert_eq!(planes.variants[0].free_slots().len(), 5);
         assert!(planes.variants[0].is_tried(Trial::Walls));
         assert_eq!(planes.variants[0].typical().len(), 5);
+        // What moves edges within cells is not tried where there are none.
+        let edges = |setting: &Setting| candidates(setting).iter().filter(|c| c.kind() == "clamp-edge").count();
+        assert_eq!((edges(&setting), edges(&Setting { cells: false, ..setting.clone() })), (1, 0));
         // Without such planes it is tried all around.
         setting.walls.clear();
         assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));

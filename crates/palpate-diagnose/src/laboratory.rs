@@ -46,6 +46,8 @@ pub struct Setting {
     pub cameras: usize,
     /// Number of markers.
     pub markers: usize,
+    /// True where every body is made of cells, which some effects need.
+    pub cells: bool,
     /// Paths of numbers that the scene holds fixed.
     pub held: Vec<String>,
     /// Per scene: times [s] during which the baseline touches a plane.

@@ -114,6 +114,7 @@ impl Bench {
             spot: 0.01,
             cameras: 1,
             markers: 0,
+            cells: true,
             held: held.clone(),
             contact: vec![vec![(0.5, 0.8)]],
             still: Vec::new(),

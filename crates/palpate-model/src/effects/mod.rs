@@ -276,6 +276,11 @@ impl Law {
         let mut amplitudes = self.params.iter().zip(values).filter_map(at_rest).peekable();
         amplitudes.peek().is_some() && amplitudes.all(|at_rest| at_rest)
     }
+
+    /// True where bodies of tetrahedra cannot have it: it moves the edge of what is held within a cell, and of them whole faces are held.
+    pub fn needs_cells(&self) -> bool {
+        matches!(self.site, Site::Edges(_))
+    }
 }
 
 /// An effect of a scene.

@@ -88,6 +88,7 @@ impl<'a> Lab<'a> {
             spot: 0.5 * body.length,
             cameras: most(|e| e.plan.observation.cameras.len()),
             markers: most(|e| e.plan.observation.marker_count()),
+            cells: experiments.iter().all(|e| e.plan.body.cut.is_some()),
             held: held(experiments),
             contact: Vec::new(),
             still: Vec::new(),

@@ -4,7 +4,6 @@ use super::{PlanError, error};
 use crate::cutcells::build::SUBDIVISIONS;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
-use crate::effects::Site;
 use crate::mechanics::lame::lame;
 use crate::plan::ClampSite;
 use crate::scene::{BodySource, Clamp, ClampRegion, Object, Resolution, Scene};
@@ -48,7 +47,7 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
 
 /// Refuses what only cut cells have.
 pub(super) fn refuse_what_needs_cells(scene: &Scene) -> Result<(), PlanError> {
-    let Some(i) = scene.effects.iter().position(|e| matches!(e.law().site, Site::Edges(_))) else { return Ok(()) };
+    let Some(i) = scene.effects.iter().position(|e| e.law().needs_cells()) else { return Ok(()) };
     let message = format!(
         "\"{}\" moves the edge of what is held within cells, and of a body of tetrahedra whole nodes are held: change the clamp's box",
         scene.effects[i].law().kind
