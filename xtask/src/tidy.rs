@@ -115,15 +115,17 @@ fn generated(root: &Path, found: &mut Vec<String>) {
     let suite = suite::stored(root).map(|lines| suite::markdown(&lines));
     let coverage = coverage::report::stored(root).map(|lines| coverage::report::markdown(&lines));
     let real2sim = real2sim::stored(root).map(|rows| real2sim::acceptance::markdown(&rows));
-    for (name, table, verb) in [
-        ("suite", suite, "suite --report"),
-        ("coverage", coverage, "coverage --report"),
-        ("real2sim", real2sim, "paper --only real2sim --report"),
+    let pairs = real2sim::stored(root).map(|rows| real2sim::acceptance::side_by_side(&rows));
+    for (page, name, table, verb) in [
+        ("suite", "suite", suite, "suite --report"),
+        ("coverage", "coverage", coverage, "coverage --report"),
+        (real2sim::NAME, real2sim::NAME, real2sim, "paper --only real2sim --report"),
+        (real2sim::NAME, real2sim::PAIRS, pairs, "paper --only real2sim --report"),
     ] {
-        let text = fs::read_to_string(root.join(format!("docs/{name}.md"))).unwrap_or_default();
+        let text = fs::read_to_string(root.join(format!("docs/{page}.md"))).unwrap_or_default();
         match table {
             Ok(table) if text.split(&mark(name)).nth(1) == Some(&table) => {}
-            Ok(_) => found.push(format!("docs/{name}.md: the table is not what bench/ holds; cargo xtask {verb}")),
+            Ok(_) => found.push(format!("docs/{page}.md: the table of {name} is not what bench/ holds; cargo xtask {verb}")),
             Err(e) => found.push(e),
         }
     }

@@ -169,6 +169,86 @@ pub fn markdown(rows: &[Row]) -> String {
     out
 }
 
+/// The same bodies of cells and of tetrahedra: the two cases, and the figures that stand side by side.
+const PAIRS: &[(&str, &str, &[&str])] = &[
+    (
+        "beams-cells",
+        "beams-tet10",
+        &[
+            "beam-gravity: nodes",
+            "beam-gravity: E [kPa]",
+            "beam-gravity: its standard error [kPa]",
+            "beam-gravity: frequency off [%]",
+            "beam-gravity: damping ratio over measured",
+            "beam-gravity: rms [mm]",
+            "beam-gravity by the other's numbers: rms [mm]",
+            "beam-load52: E [kPa]",
+            "beam-load52: its standard error [kPa]",
+            "beam-load52: frequency off [%]",
+            "beam-load52: damping ratio over measured",
+            "beam-load52: rms [mm]",
+            "beam-load52 by the other's numbers: rms [mm]",
+            "sag at rest under 0 g over measured, by beam-gravity",
+            "sag at rest under 52 g over measured, by beam-gravity",
+            "sag at rest under 102 g over measured, by beam-gravity",
+            "sag at rest under 0 g over measured, by beam-load52",
+            "sag at rest under 52 g over measured, by beam-load52",
+            "sag at rest under 102 g over measured, by beam-load52",
+        ],
+    ),
+    (
+        "beams-viscosity",
+        "beams-viscosity-tet10",
+        &[
+            "E [kPa]",
+            "material.viscosity.coefficient",
+            "material.viscosity.exponent",
+            "beam-gravity: damping ratio over measured",
+            "beam-load52: damping ratio over measured",
+            "rms of both [mm]",
+        ],
+    ),
+    (
+        "moldstar-cells",
+        "moldstar-tet10",
+        &[
+            "moldstar: nodes",
+            "moldstar: E [kPa]",
+            "moldstar: its standard error [kPa]",
+            "moldstar: frequency off [%]",
+            "moldstar: damping ratio over measured",
+            "moldstar: rms [mm]",
+        ],
+    ),
+    (
+        "hanging-parts",
+        "hanging-tet10",
+        &[
+            "cells",
+            "two parts: E of the clamped half [kPa]",
+            "two parts: E of the free half [kPa]",
+            "clamped half of the bar: E, geometric mean [kPa]",
+            "free half of the bar: E, geometric mean [kPa]",
+            "free half of the bar: undetermined share",
+            "residual [mm]",
+            "residual of two parts [mm]",
+        ],
+    ),
+];
+
+/// Cells and tetrahedra side by side, in Markdown.
+pub fn side_by_side(rows: &[Row]) -> String {
+    let mut out = String::from("| | cells | tetrahedra |\n|---|---|---|\n");
+    for (cells, tetrahedra, figures) in PAIRS {
+        let row = |case: &str| rows.iter().rev().find(|r| r.case == case);
+        let said =
+            |case: &str, name: &str| row(case).and_then(|r| of(&r.figures, name)).map_or("–".into(), |x| format!("{x:.3}"));
+        out += &format!("| **{cells}, {tetrahedra}** | | |\n");
+        figures.iter().for_each(|name| out += &format!("| {name} | {} | {} |\n", said(cells, name), said(tetrahedra, name)));
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,5 +258,7 @@ mod tests {
         assert!(AIMS.iter().all(|a| CASES.iter().any(|c| c.0 == a.case)));
         let lines = markdown(&[]);
         assert_eq!(lines.lines().count(), AIMS.len() + 2);
+        let known = |case: &str| CASES.iter().any(|c| c.0 == case);
+        assert!(PAIRS.iter().all(|p| known(p.0) && known(p.1)));
     }
 }
