@@ -33,9 +33,11 @@ fn beam(which: usize) -> (&'static str, Changes) {
 }
 
 /// The states at rest: their places on the recording's clock [s], and the load of each [kg].
-const STATES: [(f64, f64); 6] = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.052_02), (3.0, 0.052_02), (4.0, 0.102_03), (5.0, 0.102_03)];
+pub(crate) const STATES: [(f64, f64); 6] =
+    [(0.0, 0.0), (1.0, 0.0), (2.0, 0.052_02), (3.0, 0.052_02), (4.0, 0.102_03), (5.0, 0.102_03)];
 
-fn at_rest((time, load): (f64, f64)) -> (&'static str, Changes) {
+/// The beam at rest in one of them.
+pub(crate) fn at_rest((time, load): (f64, f64)) -> (&'static str, Changes) {
     let share = |part: f64| (format!("mass  = {:.6} #", 0.052 * part), format!("mass  = {:.9} #", load * part));
     let mut changes = vec![("start    = 2.0".into(), format!("start    = {time:?}"))];
     changes.push(("{ from = 2.0, to = 2.0 }".into(), format!("{{ from = {time:?}, to = {time:?} }}")));

@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 
 const MODULUS: &str = "material.youngs_modulus";
 const DAMPING: &str = "material.stiffness_damping";
+/// Numbers of the material that one beam gives to the other.
+pub(crate) const VALUES: [&str; 2] = [MODULUS, DAMPING];
 
 /// A scene that fits a recording, and the marker whose swing is compared with a guess of its frequency [Hz]; none where nothing swings.
 #[derive(Clone, Copy)]
@@ -131,14 +133,7 @@ fn predictions(data: &Path, own: &[Fitted; 2]) -> Result<Vec<Row>, Error> {
     let mut rows = Vec::new();
     for (from, to) in [(0, 1), (1, 0)] {
         let scene = BEAMS[to].scene;
-        let text = read(scene)?;
-        let mut changes = vec![];
-        for path in [MODULUS, DAMPING] {
-            let key = path.trim_start_matches("material.");
-            let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default().to_string();
-            changes.push((line, format!("{key} = {}", found(&own[from], path))));
-            changes.push((free(&text, path), String::new()));
-        }
+        let changes = stated(scene, VALUES.map(|path| found(&own[from], path)))?;
         let changes: Vec<(&str, &str)> = changes.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
         let other = open(data, scene, &changes)?;
         let name = format!("{} → {}", BEAMS[from].scene, scene);
@@ -169,17 +164,29 @@ fn variants(data: &Path) -> Result<Vec<Row>, Error> {
     VARIANTS.iter().map(of).collect()
 }
 
-/// The text of a scene of `assets/scenes`.
+/// Texts of a scene, and what they are where it states these values of [`VALUES`] instead of fitting them.
 ///
 /// # Errors
 /// It cannot be read.
-pub(crate) fn read(scene: &str) -> Result<String, Error> {
+pub(crate) fn stated(scene: &str, values: [f64; 2]) -> Result<Vec<(String, String)>, Error> {
+    let text = read(scene)?;
+    let mut changes = Vec::new();
+    for (path, value) in VALUES.into_iter().zip(values) {
+        let key = path.trim_start_matches("material.");
+        let line = text.lines().find(|l| l.starts_with(key)).unwrap_or_default().to_string();
+        changes.push((line, format!("{key} = {value}")));
+        changes.push((free(&text, path), String::new()));
+    }
+    Ok(changes)
+}
+
+fn read(scene: &str) -> Result<String, Error> {
     let path = scene_path(scene);
     std::fs::read_to_string(&path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
 }
 
 /// The table of a scene's text that makes `path` free.
-pub(crate) fn free(text: &str, path: &str) -> String {
+fn free(text: &str, path: &str) -> String {
     let named = format!("\"{path}\"");
     let tables = text.match_indices("[[fit.parameter]]").map(|(at, _)| &text[at..]);
     let table = tables.map(|t| &t[..t[2..].find("[[").map_or(t.len(), |e| e + 2)]).find(|t| t.contains(&named));

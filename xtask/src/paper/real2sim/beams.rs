@@ -3,7 +3,8 @@
 //! swinging cantilever of MoldStar.
 
 use super::Figures;
-use crate::real::studies::{free, read};
+use crate::real::diagnoses::{self, STATES};
+use crate::real::studies::{VALUES, stated};
 use crate::real::tracks::track;
 use crate::real::{found, height_at_rest, open, swings};
 use palpate::{Experiment, FitOptions, Fitted};
@@ -64,36 +65,17 @@ pub fn alone(data: &Path, made: Made) -> Result<Figures, String> {
     out.insert("E, second over first".into(), found_values[1][0] / found_values[0][0]);
     for (from, to) in [(0, 1), (1, 0)] {
         let (scene, guess) = SCENES[to];
-        let e = beam(data, scene, &[material(made), stated(scene, found_values[from])?].concat())?;
+        let e = beam(data, scene, &[material(made), stated(scene, found_values[from]).map_err(|e| e.to_string())?].concat())?;
         let fitted = e.fit(FitOptions::default()).map_err(|e| e.to_string())?;
         swing(&e, &fitted, &format!("{scene} by the other's numbers"), (MARKER, guess), &mut out)?;
     }
-    for (load, grams) in [(0, "0 g"), (2, "52 g"), (4, "102 g")] {
-        let mut ratios = [0.0; 2];
-        for (ratio, values) in ratios.iter_mut().zip(&found_values) {
-            *ratio = at_rest(data, made, load, values[0])?;
-        }
-        for (ratio, (scene, _)) in ratios.iter().zip(SCENES) {
-            out.insert(format!("sag at rest under {grams} over measured, by {scene}"), *ratio);
+    for (_, load) in STATES.into_iter().step_by(2) {
+        for (values, (scene, _)) in found_values.iter().zip(SCENES) {
+            let name = format!("sag at rest under {:.0} g over measured, by {scene}", 1e3 * load);
+            out.insert(name, at_rest(data, made, load, values[0])?);
         }
     }
     Ok(out)
-}
-
-/// Numbers of the material that a beam gives to the other.
-const VALUES: [&str; 2] = ["material.youngs_modulus", "material.stiffness_damping"];
-
-/// Changes of a beam's scene that state these numbers instead of fitting them.
-fn stated(scene: &str, values: [f64; 2]) -> Result<Vec<Change>, String> {
-    let text = read(scene).map_err(|e| e.to_string())?;
-    let mut changes = Vec::new();
-    for (path, value) in VALUES.into_iter().zip(values) {
-        let key = path.trim_start_matches("material.");
-        let line = text.lines().find(|l| l.starts_with(key)).ok_or(format!("{scene} states no {key}"))?;
-        changes.push((line.to_string(), format!("{key} = {value}")));
-        changes.push((free(&text, path), String::new()));
-    }
-    Ok(changes)
 }
 
 /// What a fit says of a swing beside what was measured.
@@ -115,26 +97,13 @@ fn swing(e: &Experiment, fitted: &Fitted, name: &str, (marker, guess): (&str, f6
     Ok(())
 }
 
-/// Newtons that hang at the beam's upper front edge in the states of the recording at rest, by the data's own table.
-const LOADS: [f64; 6] = [0.0, 0.0, 0.51012, 0.51012, 1.00062, 1.00062];
-
-/// How far the tip hangs over how far it was measured to, of state `first` and the one after it, which have the same load, with a modulus [Pa].
-fn at_rest(data: &Path, made: Made, first: usize, modulus: f64) -> Result<f64, String> {
-    let text = read("beam-static").map_err(|e| e.to_string())?;
-    let masses = &text[text.find("[[mass]]").unwrap_or(0)..text.find("[initial]").unwrap_or(0)];
-    let shares = [(0.0, 0.125), (0.0075, 0.25), (0.015, 0.25), (0.0225, 0.25), (0.03, 0.125)];
+/// How far the tip hangs over how far it was measured to, in the states of a load, with a modulus [Pa].
+fn at_rest(data: &Path, made: Made, load: f64, modulus: f64) -> Result<f64, String> {
     let (mut hangs, mut hung) = (0.0, 0.0);
-    for state in [first, first + 1] {
-        let mass =
-            |(y, share): (f64, f64)| format!("[[mass]]\npoint = [0.1, {y}, 0.03]\nmass = {}\n\n", share * LOADS[state] / 9.807);
-        let tables: String = if LOADS[state] > 0.0 { shares.map(mass).concat() } else { String::new() };
-        let changes = [
-            (masses.to_string(), tables),
-            ("youngs_modulus = 2.5e5".into(), format!("youngs_modulus = {modulus}")),
-            ("start    = 2.0 ".into(), format!("start    = {state}.0 ")),
-            ("{ from = 2.0, to = 2.0 }".into(), format!("{{ from = {state}.0, to = {state}.0 }}")),
-        ];
-        let e = beam(data, "beam-static", &[material(made), changes.to_vec()].concat())?;
+    for state in STATES.into_iter().filter(|s| s.1 == load) {
+        let (scene, changes) = diagnoses::at_rest(state);
+        let stiff = ("youngs_modulus = 2.5e5".into(), format!("youngs_modulus = {modulus}"));
+        let e = beam(data, scene, &[material(made), changes, vec![stiff]].concat())?;
         for marker in ["tip1", "tip2", "tip3"] {
             let rest = height_at_rest(&e, marker);
             let seen = track(&e, &e.plan().theta, marker).map_err(|e| e.to_string())?;

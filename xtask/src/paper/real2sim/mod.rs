@@ -123,7 +123,7 @@ pub fn run(only: &str) -> Result<(), String> {
 /// # Errors
 /// A file cannot be read or written.
 pub fn report() -> Result<(), String> {
-    let all = rows::load(&rows::path(NAME))?;
+    let all = stored(&table::root())?;
     print(&all);
     table::replace(PAGE, NAME, &acceptance::markdown(&all))?;
     table::replace(PAGE, PAIRS, &acceptance::side_by_side(&all))
