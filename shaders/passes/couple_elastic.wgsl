@@ -19,7 +19,9 @@ fn couple_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     var d = gradient_probe(p.member, p.item);
     let h0 = gradient_now(p.member, p.item);
     let f0 = identity3() + h0;
-    if call.extra == ALONG_SHAPE {
+    let transposed = (call.extra & TRANSPOSED) != 0u;
+    let of_shape = (call.extra & OF_SHAPE) != 0u;
+    if of_shape && !transposed {
         d = f0 * d * -1.0;
     }
     let h1 = gradient_next(p.member, p.item);
@@ -27,7 +29,7 @@ fn couple_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let flow = flow_at(m, p.member, p.item, h1);
     var stress = mat3x3<f32>();
     var flowing = mat3x3<f32>();
-    if call.extra == ALONG || call.extra == ALONG_SHAPE {
+    if !transposed {
         let dg = green_rate(f0, d);
         stress = f1 * linear_stress(dg, lame);
         flowing = f1 * flow_rate(flow, dg);
@@ -42,7 +44,7 @@ fn couple_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     }
     let scale = young_at(m, p.member, element_of(p.item)) * volume_at(p.member, p.item);
     var change = stress * scale - flowing * volume_at(p.member, p.item);
-    if call.extra == TRANSPOSED_SHAPE {
+    if of_shape && transposed {
         change = transpose(f0) * change * -1.0;
     }
     let at = stress_place(p.member, p.item);

@@ -18,7 +18,9 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let point = mean_point(p.item);
     let f0 = identity3() + gradient_now(p.member, point);
     var d = gradient_probe(p.member, point);
-    if call.extra == ALONG_SHAPE {
+    let transposed = (call.extra & TRANSPOSED) != 0u;
+    let of_shape = (call.extra & OF_SHAPE) != 0u;
+    if of_shape && !transposed {
         d = f0 * d * -1.0;
     }
     var sides: array<Stretch, 2>;
@@ -39,7 +41,7 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             q.strain = fresh.strain;
             q.past = past_stretch(p.member, p.item);
             q.lossy = true;
-            q.by_past = call.extra == TRANSPOSED || call.extra == TRANSPOSED_SHAPE;
+            q.by_past = transposed;
             if q.by_past {
                 q.dstrain = strain_along(fresh, d);
             } else {
@@ -55,7 +57,7 @@ fn couple_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             stress += stress_back(fresh, said.change);
         }
     }
-    if call.extra == TRANSPOSED_SHAPE {
+    if of_shape && transposed {
         stress = transpose(f0) * stress * -1.0;
     }
     let scale = young_at(m, p.member, p.item) * volume_at(p.member, point);

@@ -14,9 +14,9 @@ const NO_HOLD = 3u;
 // Of the passes that couple a step with the old state: the derivative times `probe`, or its transpose.
 const ALONG = 0u;
 const TRANSPOSED = 1u;
-// The same with the stress-free shape, as far as the past sees it: along `probe`, a change of it, or transposed, before it goes to nodes.
-const ALONG_SHAPE = 2u;
-const TRANSPOSED_SHAPE = 3u;
+// A bit besides, of elastic points: the same by the stress-free shape, as far as the past sees it, along `probe`, a change of it, or transposed, before
+// it goes to nodes.
+const OF_SHAPE = 2u;
 
 // Bits that the passes of an iteration of conjugate gradients by many workgroups are told: its number is odd; products were made in groups
 // of WIDE nodes (else NARROW).

@@ -24,12 +24,10 @@ impl Unstrained {
     /// The points at W `[N]` [m].
     pub fn new(points: &Points, w: &[DVec3]) -> Unstrained {
         let mut out = Unstrained::default();
-        for (s, v) in points.stencils.iter().zip(&points.volume) {
-            let g = s.gradient_of(w) + DMat3::IDENTITY;
-            let back = g.inverse();
+        for ((s, v), (back, swelling)) in points.stencils.iter().zip(&points.volume).zip(points.unstrained(w)) {
             let turned: Vec<DVec3> = s.gradient.iter().map(|g| back.transpose() * *g).collect();
             out.stencils.push_with_gradient(s.nodes, s.value, &turned);
-            out.volume.push(v * g.determinant());
+            out.volume.push(v * swelling);
             out.shift.push(DMat3::IDENTITY - back);
         }
         out

@@ -3,7 +3,7 @@
 
 use super::{Along, Past, Pull, Term, seeks_effect};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks::{ALONG_SHAPE, TRANSPOSED_SHAPE};
+use crate::device::pipelines::shared::asks::{ALONG, OF_SHAPE, TRANSPOSED};
 use crate::device::pipelines::shared::elastic_asks::{
     SHAPE_PULLS, SHAPE_TANGENT, SPREAD_MINUS, SPREAD_PATCHES, SPREAD_RESIDUAL, STRESS_NEW, STRESS_OLD,
 };
@@ -51,7 +51,9 @@ impl Passes<'_, '_> {
         let bits = if pulls { SHAPE_PULLS } else { 0 };
         let named = [("probe", probe)];
         self.recorder.clear(&self.world.buffers["shape_stress"]);
-        for state in [STRESS_NEW, STRESS_OLD] {
+        // The old state has a stress of its own where it is the only past one.
+        let states: &[u32] = if self.step.is_some() && self.past.is_empty() { &[STRESS_NEW, STRESS_OLD] } else { &[STRESS_NEW] };
+        for state in states.iter().copied() {
             self.run(pass::PRESS_ELASTIC, ALL, Per::Elastic, state);
             self.element_laws(pass::PRESS_TET_LAWS, ALL, state, &[]);
             self.run_with(pass::SHAPE_ELASTIC, ALL, Per::Elastic, bits, &named);
@@ -60,7 +62,7 @@ impl Passes<'_, '_> {
         if self.step.is_none() {
             return;
         }
-        let ask = if pulls { TRANSPOSED_SHAPE } else { ALONG_SHAPE };
+        let ask = OF_SHAPE | if pulls { TRANSPOSED } else { ALONG };
         let now = self.own.iter().find(|b| b.0 == "now").map(|b| (1.0, b.1));
         let past = if self.past.is_empty() { Vec::from_iter(now) } else { self.past.clone() };
         for (weight, state) in past {

@@ -3,7 +3,7 @@
 
 use crate::shape::TriMesh;
 use crate::space::stencil::{Stencil, Stencils};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use std::collections::BTreeMap;
 
 /// Elastic points of a body, element by element: as many of each.
@@ -105,6 +105,11 @@ impl Points {
     /// The same of all elements.
     pub fn means(&self) -> impl Iterator<Item = Stencil<'_>> + Clone {
         (0..self.elements()).map(|e| self.mean(e))
+    }
+
+    /// Every point where the body's stress-free shape is X + W: G⁻¹ and det G of G = I + ∇W.
+    pub fn unstrained<'a>(&'a self, w: &'a [DVec3]) -> impl Iterator<Item = (DMat3, f64)> + 'a {
+        self.stencils.iter().map(|s| s.gradient_of(w) + DMat3::IDENTITY).map(|g| (g.inverse(), g.determinant()))
     }
 }
 

@@ -15,20 +15,20 @@ pub(super) struct Tangents<'a, 'b> {
     pub(super) curvature: Curvature,
 }
 
-impl Tangents<'_, '_> {
-    /// ∂P/∂F of a point, times its volume.
-    fn tangent(&self, point: &Point) -> [[f64; 9]; 9] {
-        let (term, w, Point { e, v, moduli: (lambda, mu), .. }) = (self.term, &self.term.c.weights, point);
-        let h = point.h(self.u1);
+impl ElasticPoints<'_> {
+    /// ∂P/∂F of a point at the new state [Pa].
+    pub(super) fn tangent_of(&self, point: &Point, u1: &[DVec3]) -> [[f64; 9]; 9] {
+        let (w, Point { e, moduli: (lambda, mu), .. }) = (&self.c.weights, point);
+        let h = point.h(u1);
         let f = h + DMat3::IDENTITY;
-        let mut tangent = term.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));
-        if let (Some(past), true) = (term.past.get(*e), w.rate != 0.0) {
+        let mut tangent = self.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));
+        if let (Some(past), true) = (self.past.get(*e), w.rate != 0.0) {
             let held = linear_stress(green(h) - *past, (*lambda, *mu)) * w.rate;
             add_rate(&mut tangent, f, held, (*lambda * w.rate, *mu * w.rate));
         }
-        if let Some((law, rate)) = term.flow_of(*e) {
+        if let Some((law, rate)) = self.flow_of(*e) {
             // S = 2 φ′ g, and along dG 2 φ′ dG + 4 φ″ g (g : dG), where g : dG = F g : dF.
-            let g = green(h) - term.past[*e];
+            let g = green(h) - self.past[*e];
             let [_, first, second] = law.loss(contract(g, g), rate);
             add_rate(&mut tangent, f, g * (2.0 * first), (0.0, first));
             let along = rows(f * g);
@@ -36,10 +36,18 @@ impl Tangents<'_, '_> {
                 (0..9).for_each(|l| row[l] += 4.0 * second * along[k / 3][k % 3] * along[l / 3][l % 3]);
             }
         }
+        tangent
+    }
+}
+
+impl Tangents<'_, '_> {
+    /// The same times the point's volume, with the curvature that is wanted.
+    fn tangent(&self, point: &Point) -> [[f64; 9]; 9] {
+        let mut tangent = self.term.tangent_of(point, self.u1);
         if self.curvature != Curvature::Exact {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
         }
-        tangent.map(|r| r.map(|t| t * v))
+        tangent.map(|r| r.map(|t| t * point.v))
     }
 }
 

@@ -76,6 +76,12 @@ fn matrix_of(v: &[f64; 9]) -> DMat3 {
     DMat3::from_cols_array(&std::array::from_fn(|k| v[3 * (k % 3) + k / 3]))
 }
 
+/// A tangent, row by row of both matrices, times a change.
+fn applied(tangent: &[[f64; 9]; 9], change: DMat3) -> DMat3 {
+    let d = rows(change);
+    matrix_of(&std::array::from_fn(|k| (0..9).map(|l| tangent[k][l] * d[l / 3][l % 3]).sum()))
+}
+
 /// A : B.
 pub(super) fn contract(a: DMat3, b: DMat3) -> f64 {
     (0..3).map(|c| a.col(c).dot(b.col(c))).sum()
@@ -206,9 +212,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// ∂P/∂F : δ of the elastic stress.
     fn stress_rate(&self, h: DMat3, (lambda, mu): (f64, f64), dh: DMat3) -> DMat3 {
-        let tangent = self.c.law().stress(&rows(h), lambda, mu).1;
-        let d = rows(dh);
-        matrix_of(&std::array::from_fn(|k| (0..9).map(|l| tangent[k][l] * d[l / 3][l % 3]).sum()))
+        applied(&self.c.law().stress(&rows(h), lambda, mu).1, dh)
     }
 
     /// Derivatives of the whole stress by the factors of the material's curves.
@@ -241,20 +245,7 @@ impl<'a> ElasticPoints<'a> {
         self.c.weights.sees_past() || self.flow.is_some()
     }
 
-    /// Change of the whole stress when F at the new state changes by `dh`; symmetric.
-    fn along_new(&self, p: Point, u1: &[DVec3], dh: DMat3) -> DMat3 {
-        let (w, h) = (&self.c.weights, p.h(u1));
-        let f = h + DMat3::IDENTITY;
-        let mut change = self.stress_rate(h, p.moduli, dh) * w.new;
-        if let (Some(past), true) = (self.past.get(p.e), self.sees_past()) {
-            let dg = green_rate(f, dh);
-            let stress = linear_stress(green(h) - *past, p.moduli) * w.rate + self.flow_stress(p.e, h);
-            change += dh * stress + f * (linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg));
-        }
-        change
-    }
-
-    /// The same with past state `i`.
+    /// Change of the whole stress when F at past state `i` changes by `dh`.
     fn along_past(&self, p: Point, i: usize, u1: &[DVec3], dh: DMat3) -> DMat3 {
         let (w, (weight, u), h) = (&self.c.weights, self.c.past.each[i], p.h(u1));
         let before = p.h(u);
@@ -290,7 +281,7 @@ impl<'a> ElasticPoints<'a> {
         let l = p.s.gradient_of(dw);
         let away = |u: &[DVec3]| (p.h(u) + DMat3::IDENTITY) * l * -1.0;
         let past = self.pasts().map(|i| self.along_past(p, i, u1, away(self.c.past.each[i].1)));
-        let change = self.along_new(p, u1, away(u1)) + past.sum::<DMat3>();
+        let change = applied(&self.tangent_of(&p, u1), away(u1)) + past.sum::<DMat3>();
         unstrained::moved(l, self.whole(p, u1), change)
     }
 
@@ -298,7 +289,7 @@ impl<'a> ElasticPoints<'a> {
     fn pull_rest(&self, p: Point, u1: &[DVec3], z: &[DVec3]) -> DMat3 {
         let dz = p.s.gradient_of(z);
         let f = |u: &[DVec3]| p.h(u) + DMat3::IDENTITY;
-        let new = std::iter::once((f(u1), self.along_new(p, u1, dz)));
+        let new = std::iter::once((f(u1), applied(&self.tangent_of(&p, u1), dz)));
         let past = self.pasts().map(|i| (f(self.c.past.each[i].1), self.pull_past(p, i, u1, dz)));
         unstrained::pulled(dz, self.whole(p, u1), new.chain(past))
     }

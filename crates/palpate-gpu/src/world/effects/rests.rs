@@ -32,10 +32,9 @@ impl Effects {
             put_nodes(&mut out[0], &w);
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
             body.cells().iter().for_each(|c| put(&mut out[1], &CellPose::new(&c.nodes.map(at), body.cut().grid.h).q));
-            for s in body.points.stencils.iter().take(body.points.len()) {
-                let g = s.gradient_of(&w) + DMat3::IDENTITY;
-                let shift = DMat3::IDENTITY - g.inverse();
-                let columns = [shift.x_axis.extend(g.determinant()), shift.y_axis.extend(0.0), shift.z_axis.extend(0.0)];
+            for (back, swelling) in body.points.unstrained(&w) {
+                let shift = DMat3::IDENTITY - back;
+                let columns = [shift.x_axis.extend(swelling), shift.y_axis.extend(0.0), shift.z_axis.extend(0.0)];
                 out[1].extend(columns.iter().flat_map(|c| c.to_array().map(|x| x as f32)));
             }
         }
