@@ -42,6 +42,9 @@ fn a_load_that_the_scene_does_not_know_is_a_mass_at_the_free_end() {
 }
 
 #[test]
+// In the quick tier `diagnose::a_sensor_that_reads_too_far_is_not_sold_as_physics` names an effect on the measurement, and
+// `real_data::fits::hanging_cantilever_and_the_bias_of_its_sensor` fits this one.
+#[ignore = "slow: cargo xtask test --full"]
 fn a_lidar_that_reads_through_silicone_is_biased_and_the_bar_not_soft() {
     let Some(data) = data_dir() else { return };
     // Every third row and column.

@@ -61,6 +61,8 @@ fn nothing_hidden_is_adequate() {
 }
 
 #[test]
+// In the quick tier the study's own tests compute the magnet's pull; docs/suite.md counts what is said of magnets.
+#[ignore = "slow: cargo xtask test --full"]
 fn a_magnet_is_seen_where_it_pulls() {
     let o = outcome(Some("magnet"), 13);
     // On this small ball a patchwork of known effects follows it to within noise and grid; docs/suite.md says how often magnets are called

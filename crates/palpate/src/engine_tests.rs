@@ -31,7 +31,7 @@ recording = "seen"
 cost = "sparse-surface"
 [fit]
 optimizer = "rprop"
-iterations = 12
+iterations = 6
 starts = 2
 [[fit.parameter]]
 path = "material.youngs_modulus"
@@ -138,7 +138,7 @@ fn a_batch_whose_device_is_lost_goes_on_with_another() {
     // Two scenes more after the one that is disturbed.
     for name in ["second.toml", "third.toml"] {
         let text = std::fs::read_to_string(path("fit.toml")).expect("a scene");
-        std::fs::write(path(name), text.replace("iterations = 12", "iterations = 2")).expect("writable");
+        std::fs::write(path(name), text.replace("iterations = 6", "iterations = 2")).expect("writable");
     }
     let whole = folder.path().join("whole");
     let alone = command(&["fit", &path("second.toml"), "--backend", "gpu", "--pictures", "0", "--out", &path("whole")]);
