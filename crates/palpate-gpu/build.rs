@@ -7,6 +7,7 @@
 //! and `effects/patches` for those that act there (a kernel compiles as long as all its laws take), `effects/cells` and `effects/tets` for
 //! every law of cells, on cells and on tetrahedra; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
 
+mod tables;
 mod validate;
 
 use naga::{AddressSpace, Expression, Literal, StorageAccess, TypeInner};
@@ -17,6 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
+use tables::Tables;
 use validate::validate;
 
 const VARIANTS: [&str; 2] = ["subgroup", "memory"];
@@ -33,10 +35,11 @@ fn main() {
     let mut structs = BTreeMap::new();
     let mut numbers = BTreeMap::new();
     let mut indices = String::new();
+    let tables = tables::all(&shaders);
     writeln!(out, "/// Every kernel, by name.\npub static PASSES: [PassSource; {}] = [", names.len())
         .expect("a String takes all");
     for (index, name) in names.iter().enumerate() {
-        let variants: Vec<Linked> = VARIANTS.iter().map(|v| link(&shaders, name, v)).collect();
+        let variants: Vec<Linked> = VARIANTS.iter().map(|v| link(&shaders, name, v, &tables)).collect();
         let facts: Vec<Facts> = variants.iter().map(|v| Facts::of(name, v, &mut structs, &mut numbers)).collect();
         let same = variants[0].text == variants[1].text;
         assert!(same || facts[0].bindings == facts[1].bindings, "variants of {name} bind different buffers");
@@ -52,6 +55,12 @@ fn main() {
     }
     writeln!(out, "];\n/// Numbers of the passes in [`PASSES`].\npub mod pass {{\n{indices}}}").expect("a String takes all");
     out.push_str(&constants(&shaders, &numbers));
+    writeln!(out, "/// Arenas by the names of their buffers, and their tables in the order of their starts.")
+        .expect("a String takes all");
+    let arenas: Vec<(String, &Vec<String>)> = tables.iter().map(|(arena, names)| (tables::buffer(arena), names)).collect();
+    writeln!(out, "pub static ARENAS: [(&str, &[&str]); {}] = [", arenas.len()).expect("a String takes all");
+    arenas.iter().for_each(|(buffer, names)| writeln!(out, "    ({buffer:?}, &{names:?}),").expect("a String takes all"));
+    out.push_str("];\n");
     for (name, (span, members)) in structs {
         writeln!(out, "const _: () = {{\n    assert!(size_of::<crate::layout::{name}>() == {span}, \"size of {name}\");")
             .expect("text");
@@ -69,8 +78,8 @@ fn main() {
 }
 
 /// Shared files whose whole numbers Rust uses as well.
-const NUMBERED: [&str; 10] =
-    ["asks", "directions", "elastic_asks", "laws", "points", "pulls", "rates", "reduce", "roster", "structs"];
+const NUMBERED: [&str; 11] =
+    ["asks", "directions", "elastic_asks", "laws", "points", "pulls", "rates", "reduce", "roster", "solving", "structs"];
 
 /// Whole numbers by file and name, as naga computed them.
 type Numbers = BTreeMap<(String, String), u32>;
@@ -108,13 +117,14 @@ struct Linked {
     shared: Vec<(String, String)>,
 }
 
-fn link(shaders: &Path, name: &str, variant: &str) -> Linked {
+fn link(shaders: &Path, name: &str, variant: &str, tables: &Tables) -> Linked {
     let mut text = String::new();
     let mut done = BTreeSet::new();
     include(shaders, &format!("passes/{name}"), variant, &mut done, &mut text);
     let used = NUMBERED.into_iter().filter(|file| done.contains(&format!("shared/{file}")));
     let shared = used.flat_map(|file| constants_of(shaders, file).into_iter().map(|name| (file.to_string(), name))).collect();
     let mut number = 0;
+    let text = tables::resolve(&text, tables);
     let lines: Vec<String> = text
         .lines()
         .map(|line| {

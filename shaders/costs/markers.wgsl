@@ -31,10 +31,10 @@ struct Carried { // mirrored
     spin: vec4<f32>,
 }
 
-var<storage, read> sites: array<Site>;
+var<body> sites: array<Site>;
 // [B][sites]: how far markers sit off the places that the recording states, on the rest shape [m].
 var<storage, read> offsets: array<vec4<f32>>;
-var<storage, read> marks: array<Mark>;
+var<body> marks: array<Mark>;
 // [slots][most markers]
 var<storage, read_write> carried: array<Carried>;
 

@@ -8,7 +8,7 @@ var<storage, read_write> sums: array<vec4<f32>>;
 @compute @workgroup_size(64)
 fn add_parts(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
              @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
     if !s.runs {
         return;
     }

@@ -4,26 +4,24 @@
 // use shared/precondition
 // use shared/iteration
 
-var<storage, read> cg_along: array<vec4<f32>>;
-var<storage, read> cg_image: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
-var<storage, read_write> cg_rest: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, local, shape.nodes, WIDE);
-    if !p.runs {
+    let share = find_share(group, groups, shape.nodes, WIDE);
+    if !share.runs {
         return;
     }
-    let s = cg_scalars[4u * p.member + parity()];
+    let p = place_in(share, local, shape.nodes);
+    let s = scalars_of(local, scalars_at(share.member) + parity());
     if s.z != 0.0 {
         return;
     }
-    let bend = sum_parts(local, p.member, 0u, product_width());
+    let bend = sum_parts(local, share.member, 0u, product_width());
     let bad = !(bend > 0.0);
     if p.item == 0u {
-        cg_scalars[4u * p.member + 2u + parity()] = vec4(select(0.0, 1.0, bad), 0.0, 0.0, 0.0);
+        cg_sums[scalars_at(p.member) + 2u + parity()] = vec4(select(0.0, 1.0, bad), 0.0, 0.0, 0.0);
     }
     if bad {
         return;
@@ -32,13 +30,14 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     var left = vec4(0.0);
     if p.live {
         let a = at_node(p.member, p.item);
-        direction[a] += alpha * cg_along[a];
-        let r = cg_rest[a].xyz - alpha * cg_image[a].xyz;
-        cg_rest[a] = vec4(r, 0.0);
+        solving[a] += alpha * solving[solving_part(ALONG_WAY) + a];
+        let rest = solving_part(REST) + a;
+        let r = solving[rest].xyz - alpha * solving[solving_part(IMAGE) + a].xyz;
+        solving[rest] = vec4(r, 0.0);
         left.x = dot(r, scaled(at_node(p.home, p.item), r));
     }
     let rz = total(local, left).x;
     if local == 0u {
-        cg_parts[parts_at(p.member, 1u) + p.item / WIDE] = rz;
+        cg_sums[parts_at(p.member, 1u) + p.item / WIDE] = vec4(rz, 0.0, 0.0, 0.0);
     }
 }

@@ -5,12 +5,11 @@
 // use shared/precondition
 // use shared/iteration
 // use shared/first_cg
+// use shared/solving
 // use shared/held
 
 var<storage, read> rhs: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
-var<storage, read_write> cg_rest: array<vec4<f32>>;
-var<storage, read_write> cg_along: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
 
@@ -33,9 +32,9 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let a = at_node(system, i);
         let r = rhs[at_node(p.member, i)].xyz;
         let z = scaled(at_node(p.member, i), r);
-        direction[a] = vec4(0.0);
-        cg_rest[a] = vec4(r, 0.0);
-        cg_along[a] = vec4(z, 0.0);
+        solving[a] = vec4(0.0);
+        solving[solving_part(REST) + a] = vec4(r, 0.0);
+        solving[solving_part(ALONG_WAY) + a] = vec4(z, 0.0);
         state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
         if shape.held != 0u {
             state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(p.member, i));

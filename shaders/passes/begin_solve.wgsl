@@ -5,13 +5,11 @@
 // use shared/precondition
 // use shared/iteration
 // use shared/first_cg
+// use shared/solving
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
-var<storage, read> sizes: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
-var<storage, read_write> cg_rest: array<vec4<f32>>;
-var<storage, read_write> cg_along: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
 
@@ -28,14 +26,14 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
         let r = residual[a].xyz;
-        let mass = sizes[part(1u) + a].w;
+        let mass = residual[part(2u) + a].w;
         let weight = mass * m.gravity.xyz;
         var momentum = vec3(0.0);
         if call.mode != 0u {
             momentum = mass * now[part(2u) + a].xyz / (shape.theta * shape.dt);
         }
-        let elastic = sizes[a].xyz;
-        let support = sizes[part(1u) + a].xyz;
+        let elastic = residual[part(1u) + a].xyz;
+        let support = residual[part(2u) + a].xyz;
         forces += vec4(dot(weight, scaled(a, weight)), dot(momentum, scaled(a, momentum)),
                        dot(elastic, scaled(a, elastic)), dot(support, scaled(a, support)));
         let extra = inverses[2u * a + 1u];
@@ -96,8 +94,8 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
         let r = -residual[a].xyz;
-        direction[a] = vec4(0.0);
-        cg_rest[a] = vec4(r, 0.0);
-        cg_along[a] = vec4(scaled(a, r), 0.0);
+        solving[a] = vec4(0.0);
+        solving[solving_part(REST) + a] = vec4(r, 0.0);
+        solving[solving_part(ALONG_WAY) + a] = vec4(scaled(a, r), 0.0);
     }
 }

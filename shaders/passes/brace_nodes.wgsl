@@ -1,7 +1,7 @@
 //! Adds the springs of nodes that are held to the diagonal of the matrix of a body without cells.
 // use shared/springs
 
-var<storage, read> diagonals: array<u32>;
+var<body> diagonals: array<u32>;
 var<storage, read_write> values: array<f32>;
 
 @compute @workgroup_size(64)

@@ -5,12 +5,13 @@
 @compute @workgroup_size(64)
 fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
     let shot = shots[s.look.shot];
-    if !s.runs || s.item >= shot.marker_count {
+    if !s.runs || index >= shot.marker_count {
         return;
     }
-    let mark = marks[shot.marker_start + s.item];
+    let mark = marks[shot.marker_start + index];
     let site = sites[mark.site];
     let first = stencil_rows[mark.site];
     let origin = seen_at(s.slot, stencil_entries[first].node);
@@ -29,8 +30,8 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let far = (seen[origin].xyz - mark.goal) + (seen[rest_part() + origin].xyz - mark.goal_rest);
     // The measured place is counted from the stated one: the offset itself comes on top of its turning.
     let r = far + (moved + excess * stalk + (stalk - site.stalk));
-    carried[s.slot * sight.markers + s.item] = pulled(c, r, s.look.member, mark.site);
-    let row = s.slot * sight.rows + shot.point_count + 3u * s.item;
+    carried[s.slot * sight.markers + index] = pulled(c, r, s.look.member, mark.site);
+    let row = s.slot * sight.rows + shot.point_count + 3u * index;
     rows[row] = vec2(r.x, site.weight);
     rows[row + 1u] = vec2(r.y, site.weight);
     rows[row + 2u] = vec2(r.z, site.weight);

@@ -2,7 +2,7 @@
 // use shared/structs
 
 var<uniform> shape: Shape;
-var<storage, read> members: array<Member>;
+var<batch> members: array<Member>;
 var<storage, read_write> health: array<Health>;
 
 @compute @workgroup_size(64)

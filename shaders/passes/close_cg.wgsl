@@ -9,13 +9,13 @@
 @compute @workgroup_size(256)
 fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
             @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, 0u, 1u, 1u);
+    let p = find_share(group, groups, 1u, 1u);
     if !p.runs {
         return;
     }
-    var n = newton[p.member];
-    let s = cg_scalars[4u * p.member + 1u];
-    let bad = cg_scalars[4u * p.member + 3u].x;
+    var n = newton_of(local, p.member);
+    let s = scalars_of(local, scalars_at(p.member) + 1u);
+    let bad = scalars_of(local, scalars_at(p.member) + 3u).x;
     let rz = sum_parts(local, p.member, 1u, WIDE);
     let negative = s.z == 2.0 || (s.z == 0.0 && bad != 0.0);
     let ended = !negative && (s.z == 1.0 || !(sqrt(max(rz, 0.0)) > n.goal) || s.y >= f32(shape.most));

@@ -8,8 +8,7 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> old_stress: array<vec4<f32>>;
-var<storage, read> touches: array<vec4<f32>>;
-var<storage, read> hold_forces: array<vec4<f32>>;
+var<storage, read> supports: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -37,12 +36,12 @@ fn couple_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         + second_body(turning, centred(before), body, c.sign);
     f += turning.r * (c.mix.old * own);
     for (var k = cells[c.cell].hold_start; k < cells[c.cell].hold_end; k++) {
-        f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
+        f += supports[hold_part() + (c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     // Contact and effects on patches leave their share where contact has its force.
     if (shape.fields & FIELD_COUPLED) != 0u {
         for (var k = cells[c.cell].patch_start; k < cells[c.cell].patch_end; k++) {
-            f -= corner_weight(k, c.number) * touches[3u * (c.member * shape.patches + k)].xyz;
+            f -= corner_weight(k, c.number) * supports[3u * (c.member * shape.patches + k)].xyz;
         }
     }
     if c.live {

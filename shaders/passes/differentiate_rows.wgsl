@@ -6,7 +6,7 @@
 
 var<storage, read> changes: array<vec4<f32>>;
 // [points][readings]: derivatives of the true points.
-var<storage, read> reading_slopes: array<vec4<f32>>;
+var<shots> reading_slopes: array<vec4<f32>>;
 // [slots][Q][most rows]
 var<storage, read_write> slopes: array<f32>;
 
@@ -32,11 +32,12 @@ fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -
 @compute @workgroup_size(64)
 fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                       @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
     let shot = shots[s.look.shot];
     let items = shot.point_count + shot.marker_count + shot.node_count;
-    let q = s.item / max(items, 1u);
-    let item = s.item % max(items, 1u);
+    let q = index / max(items, 1u);
+    let item = index % max(items, 1u);
     if !s.runs || items == 0u || q >= call.mode {
         return;
     }

@@ -3,7 +3,7 @@
 // use shared/mix
 // use shared/unstrained
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read_write> next: array<vec4<f32>>;
 var<storage, read> increment: array<vec4<f32>>;

@@ -7,10 +7,11 @@ var<storage, read_write> owners: array<u32>;
 @compute @workgroup_size(64)
 fn forget_matches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
-    if !s.runs || s.item >= shots[s.look.shot].point_count {
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
+    if !s.runs || index >= shots[s.look.shot].point_count {
         return;
     }
-    keys[s.slot * sight.points + s.item] = NONE;
-    owners[s.slot * sight.points + s.item] = NONE;
+    keys[s.slot * sight.points + index] = NONE;
+    owners[s.slot * sight.points + index] = NONE;
 }

@@ -11,10 +11,10 @@ struct Pair { // mirrored
     column: u32,
 }
 
-var<storage, read> pair_rows: array<u32>;
-var<storage, read> pairs: array<Pair>;
+var<body> pair_rows: array<u32>;
+var<body> pairs: array<Pair>;
 var<storage, read> elastic_tangents: array<f32>;
-var<storage, read> touches: array<vec4<f32>>;
+var<storage, read> supports: array<vec4<f32>>;
 var<storage, read_write> values: array<f32>;
 
 // Σ_kl ∂P_ik/∂F_jl g_k g'_l.
@@ -51,8 +51,8 @@ fn gather_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         } else {
             let w = stencil_entries[pair.row].weight * stencil_entries[pair.column].weight;
             let s = 3u * (p.member * shape.patches + pair.stencil - shape.first_patch);
-            let d = touches[s + 1u].xyz * w;
-            let o = touches[s + 2u].xyz * w;
+            let d = supports[s + 1u].xyz * w;
+            let o = supports[s + 2u].xyz * w;
             sum += mat3x3(vec3(d.x, o.x, o.y), vec3(o.x, d.y, o.z), vec3(o.y, o.z, d.z));
         }
     }

@@ -2,13 +2,13 @@
 // use shared/grid
 // use shared/modes
 
-var<storage, read> members: array<Member>;
-var<storage, read> cells: array<Cell>;
-var<storage, read> elements: array<f32>;
+var<batch> members: array<Member>;
+var<body> cells: array<Cell>;
+var<matrices> elements: array<f32>;
 var<storage, read> tangents: array<vec4<f32>>;
 var<storage, read> law_modes: array<vec4<f32>>;
-var<storage, read> place_rows: array<u32>;
-var<storage, read> places: array<u32>;
+var<body> place_rows: array<u32>;
+var<body> places: array<u32>;
 var<storage, read_write> values: array<f32>;
 
 // a bᵀ.

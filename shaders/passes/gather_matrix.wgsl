@@ -6,16 +6,16 @@
 // use shared/tangents
 // use shared/patches
 
-var<storage, read> cells: array<Cell>;
-var<storage, read> elements: array<f32>;
-var<storage, read> touches: array<vec4<f32>>;
-var<storage, read> holds: array<vec2<u32>>;
-var<storage, read> hold_elements: array<f32>;
-var<storage, read> poses: array<ClampPose>;
-var<storage, read> place_rows: array<u32>;
+var<body> cells: array<Cell>;
+var<matrices> elements: array<f32>;
+var<storage, read> supports: array<vec4<f32>>;
+var<body> holds: array<vec2<u32>>;
+var<matrices> hold_elements: array<f32>;
+var<batch> poses: array<ClampPose>;
+var<body> place_rows: array<u32>;
 // 64 · cell + 8 · i + j.
-var<storage, read> places: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> places: array<u32>;
+var<body> ghosts: array<f32>;
 var<storage, read_write> values: array<f32>;
 
 // Column by column, as (column, row) of a symmetric matrix.
@@ -86,8 +86,8 @@ fn gather_matrix(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             for (var t = cells[e].patch_start; t < cells[e].patch_end; t++) {
                 let w = corner_weight(t, i) * corner_weight(t, j);
                 let s = 3u * (p.member * shape.patches + t);
-                let d = touches[s + 1u].xyz * w;
-                let o = touches[s + 2u].xyz * w;
+                let d = supports[s + 1u].xyz * w;
+                let o = supports[s + 2u].xyz * w;
                 sum += mat3x3(vec3(d.x, o.x, o.y), vec3(o.x, d.y, o.z), vec3(o.y, o.z, d.z));
             }
         }

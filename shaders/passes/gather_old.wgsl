@@ -3,11 +3,11 @@
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
 var<storage, read_write> old_force: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

@@ -4,42 +4,42 @@
 // use shared/iteration
 // use shared/product
 
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> cg_along: array<vec4<f32>>;
-var<storage, read_write> cg_image: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn gather_product(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, local, shape.nodes, WIDE);
-    if !p.runs || cg_scalars[4u * p.member + parity()].z != 0.0 {
+    let share = find_share(group, groups, shape.nodes, WIDE);
+    if !share.runs || scalars_of(local, scalars_at(share.member) + parity()).z != 0.0 {
         return;
     }
+    let p = place_in(share, local, shape.nodes);
     let m = members[p.member];
     let mix = mix_of(m);
     var curvature = vec4(0.0);
     if p.live {
         let a = at_node(p.member, p.item);
-        var q = heavy_row(m, mix.inertia, p) + (mix.drag * node_mass(m, p.member, p.item)) * cg_along[a].xyz;
+        var q = heavy_row(m, mix.inertia, p) + (mix.drag * node_mass(m, p.member, p.item)) * along_way(a);
         for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
             q += cell_force[p.member * shape.cells * 8u + node_list[k]].xyz;
         }
         if shape.ghosts != 0u {
             let scale = m.young * m.ghost.x * mix.on_ghost;
             for (var k = block_rows[p.item]; k < block_rows[p.item + 1u]; k++) {
-                q += (scale * ghosts[k]) * cg_along[at_node(p.member, columns[k])].xyz;
+                q += (scale * ghosts[k]) * along_way(at_node(p.member, columns[k]));
             }
         }
-        cg_image[a] = vec4(q, 0.0);
-        curvature.x = dot(cg_along[a].xyz, q);
+        solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
+        curvature.x = dot(along_way(a), q);
     }
     let bend = total(local, curvature).x;
     if local == 0u {
-        cg_parts[parts_at(p.member, 0u) + p.item / WIDE] = bend;
+        cg_sums[parts_at(p.member, 0u) + p.item / WIDE] = vec4(bend, 0.0, 0.0, 0.0);
     }
 }

@@ -8,17 +8,15 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> trial: array<vec4<f32>>;
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> cell_support: array<vec4<f32>>;
 var<storage, read> old_force: array<vec4<f32>>;
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
+// [3][B][N]: the residual; elastic and support forces by themselves, for the size that it is compared with. In the fourth components the
+// potential, its shares, and the node's mass with that of the points that it carries.
 var<storage, read_write> residual: array<vec4<f32>>;
-// [2][B][N]: elastic and support forces by themselves, for the size that a residual is compared with; in their fourth components the shares
-// of the potential, and the node's mass with that of the points that it carries.
-var<storage, read_write> sizes: array<vec4<f32>>;
 
 fn trial_at(member: u32, stencil: u32) -> vec3<f32> {
     var sum = vec3(0.0);
@@ -49,7 +47,7 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     for (var k = node_rows[p.item]; k < node_rows[p.item + 1u]; k++) {
         let c = p.member * shape.cells * 8u + node_list[k];
         elastic += cell_force[c];
-        support += cell_support[c];
+        support += cell_force[support_part() + c];
     }
     let mass = node_mass(m, p.member, p.item);
     var body = vec4(0.0);
@@ -107,6 +105,6 @@ fn gather_residual(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
         }
     }
     residual[a] = elastic + support + body;
-    sizes[a] = vec4(elastic.xyz, abs(elastic.w) + abs(support.w) + abs(body.w));
-    sizes[part(1u) + a] = vec4(support.xyz, carried);
+    residual[part(1u) + a] = vec4(elastic.xyz, abs(elastic.w) + abs(support.w) + abs(body.w));
+    residual[part(2u) + a] = vec4(support.xyz, carried);
 }

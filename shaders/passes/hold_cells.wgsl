@@ -3,7 +3,7 @@
 // use shared/asks
 
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read_write> hold_forces: array<vec4<f32>>;
+var<storage, read_write> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -42,6 +42,6 @@ fn hold_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
     }
     if p.live {
-        hold_forces[(p.member * shape.holds + hold) * 8u + corner] = vec4(total, energy);
+        supports[hold_part() + (p.member * shape.holds + hold) * 8u + corner] = vec4(total, energy);
     }
 }

@@ -4,7 +4,7 @@
 // use shared/inertia
 
 var<storage, read> values: array<f32>;
-var<storage, read> diagonals: array<u32>;
+var<body> diagonals: array<u32>;
 var<storage, read_write> inverses: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

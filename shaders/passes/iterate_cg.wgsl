@@ -8,27 +8,26 @@
 // use shared/precondition
 // use shared/leave_cg
 
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
 var<storage, read> values: array<f32>;
-var<storage, read_write> cg_rest: array<vec4<f32>>;
-var<storage, read_write> cg_along: array<vec4<f32>>;
-var<storage, read_write> cg_image: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, 0u, 1u, 1u);
+    let p = find_share(group, groups, 1u, 1u);
     if !p.runs {
         return;
     }
     let m = members[p.home];
     let mix = mix_of(m);
-    var n = newton[p.member];
-    workgroupBarrier();
+    var n = newton_of(local, p.member);
     if n.stage != WANTS_SOLVE {
         return;
     }
+    let rest = solving_part(REST);
+    let way = solving_part(ALONG_WAY);
+    let image = solving_part(IMAGE);
     var ended = false;
     var negative = false;
     for (var iteration = 0u; iteration < shape.chunk; iteration++) {
@@ -37,10 +36,10 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         for (var i = local; i < shape.nodes; i += 256u) {
             var q = vec3(0.0);
             if !has_mass_matrix() {
-                q = (mix.inertia * node_mass(m, p.home, i)) * cg_along[at_node(p.member, i)].xyz;
+                q = (mix.inertia * node_mass(m, p.home, i)) * along_way(at_node(p.member, i));
             }
             for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
-                let x = cg_along[at_node(p.member, columns[k])].xyz;
+                let x = along_way(at_node(p.member, columns[k]));
                 let v = (p.home * shape.blocks + k) * 9u;
                 q += vec3(
                     values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
@@ -53,8 +52,8 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
             }
             q = with_masses(q, mix.inertia, p.member, p.home, i);
             let a = at_node(p.member, i);
-            cg_image[a] = vec4(q, 0.0);
-            curvature.x += dot(cg_along[a].xyz, q);
+            solving[image + a] = vec4(q, 0.0);
+            curvature.x += dot(solving[way + a].xyz, q);
         }
         let bend = total(local, curvature).x;
         n.cg += 1u;
@@ -66,9 +65,9 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         var left = vec4(0.0);
         for (var i = local; i < shape.nodes; i += 256u) {
             let a = at_node(p.member, i);
-            direction[a] += alpha * cg_along[a];
-            let r = cg_rest[a].xyz - alpha * cg_image[a].xyz;
-            cg_rest[a] = vec4(r, 0.0);
+            solving[a] += alpha * solving[way + a];
+            let r = solving[rest + a].xyz - alpha * solving[image + a].xyz;
+            solving[rest + a] = vec4(r, 0.0);
             left.x += dot(r, scaled(at_node(p.home, i), r));
         }
         let rz = total(local, left).x;
@@ -80,7 +79,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
         for (var i = local; i < shape.nodes; i += 256u) {
             let a = at_node(p.member, i);
-            cg_along[a] = vec4(scaled(at_node(p.home, i), cg_rest[a].xyz), 0.0) + beta * cg_along[a];
+            solving[way + a] = vec4(scaled(at_node(p.home, i), solving[rest + a].xyz), 0.0) + beta * solving[way + a];
         }
     }
     leave_cg(local, p.member, n, negative, ended, call.extra == FOR_DERIVATIVE);

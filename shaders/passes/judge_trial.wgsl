@@ -9,9 +9,9 @@
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
-var<storage, read> sizes: array<vec4<f32>>;
 var<storage, read> trial: array<vec4<f32>>;
-var<storage, read> direction: array<vec4<f32>>;
+// The solution of a solve comes first.
+var<storage, read> solving: array<vec4<f32>>;
 var<storage, read_write> increment: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 
@@ -46,9 +46,9 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         var slope = 0.0;
         if !first {
             squared = dot(r.xyz, scaled(a, r.xyz));
-            slope = dot(r.xyz, direction[a].xyz);
+            slope = dot(r.xyz, solving[a].xyz);
         }
-        state += vec4(squared, r.w, sizes[a].w, slope);
+        state += vec4(squared, r.w, residual[part(1u) + a].w, slope);
     }
     let s = total(local, state);
     let after = sqrt(max(s.x, 0.0));

@@ -2,7 +2,8 @@
 // use shared/grid
 
 var<storage, read> tangent: array<vec4<f32>>;
-var<storage, read> direction: array<vec4<f32>>;
+// The solution of a solve comes first.
+var<storage, read> solving: array<vec4<f32>>;
 var<storage, read_write> tangent_next: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
@@ -14,7 +15,7 @@ fn land_tangent(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     }
     let a = at_node(p.member, p.item);
     let v = part(1u) + a;
-    let solved = direction[at_node(call.extra * shape.members + p.member, p.item)];
+    let solved = solving[at_node(call.extra * shape.members + p.member, p.item)];
     tangent_next[a] = tangent[a] + shape.dt * tangent[v] + solved;
     tangent_next[v] = tangent[v] + solved / (shape.theta * shape.dt);
 }

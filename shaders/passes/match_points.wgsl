@@ -17,10 +17,11 @@ fn key_of(found: Pulled, line: vec3<f32>) -> u32 {
 @compute @workgroup_size(64)
 fn match_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
-    let lane = s.item & 7u;
-    let stripe = (s.item >> 3u) % sight.stripes;
-    let cell = (s.item >> 3u) / sight.stripes;
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
+    let lane = index & 7u;
+    let stripe = (index >> 3u) % sight.stripes;
+    let cell = (index >> 3u) / sight.stripes;
     if !s.runs || cell >= sight.cells {
         return;
     }

@@ -4,13 +4,14 @@
 // use shared/tangents
 // use shared/patches
 // use shared/asks
+// use shared/solving
 
-var<storage, read> touches: array<vec4<f32>>;
-var<storage, read> holds: array<vec2<u32>>;
-var<storage, read> hold_elements: array<f32>;
-var<storage, read> poses: array<ClampPose>;
-var<storage, read> cg_scalars: array<vec4<f32>>;
-var<storage, read> cg_along: array<vec4<f32>>;
+var<storage, read> supports: array<vec4<f32>>;
+var<body> holds: array<vec2<u32>>;
+var<matrices> hold_elements: array<f32>;
+var<batch> poses: array<ClampPose>;
+var<storage, read> cg_sums: array<vec4<f32>>;
+var<storage, read> solving: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
 fn hold_block(start: u32, i: u32, j: u32) -> mat3x3<f32> {
@@ -26,10 +27,11 @@ fn hold_block(start: u32, i: u32, j: u32) -> mat3x3<f32> {
 fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
     lanes_start(local);
-    let p = find_place(group, groups, local / 8u, shape.cells, 8u);
-    if !p.runs || cg_scalars[4u * p.member + (call.extra & ODD)].z != 0.0 {
+    let share = find_share(group, groups, shape.cells, 8u);
+    if !share.runs || cg_sums[scalars_at(share.member) + (call.extra & ODD)].z != 0.0 {
         return;
     }
+    let p = place_in(share, local / 8u, shape.cells);
     let e = min(p.item, shape.cells - 1u);
     let corner = local % 8u;
     let cell = cells[e];
@@ -41,7 +43,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let d = three(at + 6u + 3u * corner);
     // R Ω_i = −R [b_i]× G⁻¹.
     let omega = r * (cross_matrix(sign_of(corner) * (-0.25 / shape.h)) * three(at + 3u));
-    let x = cg_along[at_node(p.member, cell.nodes[corner])].xyz;
+    let x = along_way(at_node(p.member, cell.nodes[corner]));
     var y = (mix.on_new * young) * (r * stiff(matrix_at(m.slot, 0u, cell.kind), corner, transpose(r) * x));
     let along_d = sum8(transpose(d) * x);
     let along_omega = sum8(transpose(omega) * x);
@@ -49,7 +51,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if has_guard(at) {
         var a = mat3x3<f32>();
         for (var j = 0u; j < 8u; j++) {
-            a += dyad(transpose(r) * cg_along[at_node(p.member, cell.nodes[j])].xyz, slope_of(sign_of(j)));
+            a += dyad(transpose(r) * along_way(at_node(p.member, cell.nodes[j])), slope_of(sign_of(j)));
         }
         y += r * (guard_rate(at, a) * slope_of(sign_of(corner)));
     }
@@ -62,7 +64,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         var f = vec3(0.0);
         for (var j = 0u; j < 8u; j++) {
             f += hold_block(grip_at(m, p.member, 0u, k), corner, j)
-                * (transpose(turn) * cg_along[at_node(p.member, cell.nodes[j])].xyz);
+                * (transpose(turn) * along_way(at_node(p.member, cell.nodes[j])));
         }
         y += (mix.fresh * young) * (turn * f);
     }
@@ -70,11 +72,11 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         for (var k = cell.patch_start; k < cell.patch_end; k++) {
             var there = vec3(0.0);
             for (var j = 0u; j < 8u; j++) {
-                there += corner_weight(k, j) * cg_along[at_node(p.member, cell.nodes[j])].xyz;
+                there += corner_weight(k, j) * along_way(at_node(p.member, cell.nodes[j]));
             }
             let s = 3u * (p.member * shape.patches + k);
-            let g = touches[s + 1u].xyz;
-            let o = touches[s + 2u].xyz;
+            let g = supports[s + 1u].xyz;
+            let o = supports[s + 2u].xyz;
             y += corner_weight(k, corner) * (mat3x3(vec3(g.x, o.x, o.y), vec3(o.x, g.y, o.z), vec3(o.y, o.z, g.z)) * there);
         }
     }

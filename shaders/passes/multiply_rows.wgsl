@@ -4,26 +4,26 @@
 // use shared/iteration
 // use shared/product
 
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
 var<storage, read> values: array<f32>;
-var<storage, read> cg_along: array<vec4<f32>>;
-var<storage, read_write> cg_image: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, local / 8u, shape.nodes, NARROW);
-    if !p.runs || cg_scalars[4u * p.member + parity()].z != 0.0 {
+    let share = find_share(group, groups, shape.nodes, NARROW);
+    if !share.runs || scalars_of(local, scalars_at(share.member) + parity()).z != 0.0 {
         return;
     }
+    let p = place_in(share, local / 8u, shape.nodes);
     let m = members[p.home];
     let inertia = mix_of(m).inertia;
     var q = vec3(0.0);
     if p.live {
         let end = block_rows[p.item + 1u];
         for (var k = block_rows[p.item] + local % 8u; k < end; k += 8u) {
-            let x = cg_along[at_node(p.member, columns[k])].xyz;
+            let x = along_way(at_node(p.member, columns[k]));
             let v = (p.home * shape.blocks + k) * 9u;
             q += vec3(
                 values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
@@ -44,11 +44,11 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             q += shares[local + i].xyz;
         }
         let a = at_node(p.member, p.item);
-        cg_image[a] = vec4(q, 0.0);
-        curvature.x = dot(cg_along[a].xyz, q);
+        solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
+        curvature.x = dot(along_way(a), q);
     }
     let bend = total(local, curvature).x;
     if local == 0u {
-        cg_parts[parts_at(p.member, 0u) + p.item / NARROW] = bend;
+        cg_sums[parts_at(p.member, 0u) + p.item / NARROW] = vec4(bend, 0.0, 0.0, 0.0);
     }
 }

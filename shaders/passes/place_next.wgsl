@@ -5,7 +5,8 @@
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read_write> next: array<vec4<f32>>;
 var<storage, read> increment: array<vec4<f32>>;
-var<storage, read> direction: array<vec4<f32>>;
+// The solution of a solve comes first.
+var<storage, read> solving: array<vec4<f32>>;
 var<storage, read_write> trial: array<vec4<f32>>;
 var<storage, read> newton: array<Newton>;
 
@@ -17,7 +18,7 @@ fn place_next(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let a = at_node(p.member, p.item);
-    let w = increment[a].xyz + newton[p.member].length * direction[a].xyz;
+    let w = increment[a].xyz + newton[p.member].length * solving[a].xyz;
     trial[a] = vec4(w, 0.0);
     var whole = vec3(0.0);
     var rest = w;

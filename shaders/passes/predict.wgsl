@@ -2,7 +2,7 @@
 // use shared/grid
 
 var<storage, read_write> increment: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 
 @compute @workgroup_size(64)
@@ -14,7 +14,7 @@ fn predict(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     }
     let a = at_node(p.member, p.item);
     increment[a] = vec4(0.0);
-    direction[a] = vec4(0.0);
+    solving[a] = vec4(0.0);
     if p.item == 0u {
         var n: Newton;
         n.stage = WANTS_TRIAL;

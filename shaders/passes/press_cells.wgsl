@@ -7,7 +7,6 @@
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> old_stress: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
-var<storage, read_write> cell_support: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -30,6 +29,6 @@ fn press_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let support = support_of(cells[c.cell], c.member, c.number);
     if c.live {
         cell_force[c.at] = f;
-        cell_support[c.at] = support;
+        cell_force[support_part() + c.at] = support;
     }
 }

@@ -2,9 +2,8 @@
 // use shared/wanted
 
 var<storage, read> next: array<vec4<f32>>;
-var<storage, read_write> residual: array<vec4<f32>>;
 // As gather_residual has it.
-var<storage, read_write> sizes: array<vec4<f32>>;
+var<storage, read_write> residual: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn press_held(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -22,5 +21,5 @@ fn press_held(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         sum += stiffness * vec4(away, 0.5 * dot(away, away));
     }
     residual[a] += sum;
-    sizes[a].w += sum.w;
+    residual[part(1u) + a].w += sum.w;
 }

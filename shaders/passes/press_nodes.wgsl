@@ -4,16 +4,15 @@
 // use effects/nodes
 
 // [B][rows][N]: volumes of the nodes, or their shares of the effect's load, and the shares' derivatives.
-var<storage, read> effect_measures: array<f32>;
-var<storage, read> rest: array<vec4<f32>>;
+var<batch> effect_measures: array<f32>;
+var<body> rest: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 var<storage, read> newton: array<Newton>;
-var<storage, read> diagonals: array<u32>;
+var<body> diagonals: array<u32>;
+// A residual is as gather_residual has it.
 var<storage, read_write> forces: array<vec4<f32>>;
-// As gather_residual has it.
-var<storage, read_write> sizes: array<vec4<f32>>;
 var<storage, read_write> values: array<f32>;
 
 @compute @workgroup_size(64)
@@ -55,8 +54,8 @@ fn press_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     switch what {
         case FORCE: {
             forces[a] += r.a;
-            sizes[a].w += abs(r.a.w);
-            sizes[part(1u) + a] += vec4(r.a.xyz, 0.0);
+            forces[part(1u) + a].w += abs(r.a.w);
+            forces[part(2u) + a] += vec4(r.a.xyz, 0.0);
         }
         case STIFFNESS: {
             if newton[p.member].convex == 0u || positive(r) {

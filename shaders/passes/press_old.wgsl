@@ -4,7 +4,7 @@
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read_write> old_stress: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
-var<storage, read> hold_forces: array<vec4<f32>>;
+var<storage, read> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn press_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -15,7 +15,7 @@ fn press_old(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let y = c.young * stiff(matrix_at(c.m.slot, 0u, cells[c.cell].kind), c.number, pose.q);
     var f = force(pose, c.mix.old * y, c.sign);
     for (var k = cells[c.cell].hold_start; k < cells[c.cell].hold_end; k++) {
-        f += hold_forces[(c.member * shape.holds + k) * 8u + c.number].xyz;
+        f += supports[hold_part() + (c.member * shape.holds + k) * 8u + c.number].xyz;
     }
     if c.live {
         old_stress[c.at] = vec4(y, 0.0);

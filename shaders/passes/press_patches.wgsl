@@ -1,12 +1,12 @@
-//! What an effect does to every surface patch, at every plane where it is one of contact, added to `touches` of touch_patches.
+//! What an effect does to every surface patch, at every plane where it is one of contact, added to what touch_patches left.
 //! call.extra as of press_nodes. No effect of patches reads the old velocity, so that BACK has nothing to say of it.
 // use effects/patches
 // use shared/patch_way
 // use shared/probed
 
-var<storage, read> planes: array<Plane>;
+var<batch> planes: array<Plane>;
 var<storage, read> newton: array<Newton>;
-var<storage, read_write> touches: array<vec4<f32>>;
+var<storage, read_write> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -73,9 +73,9 @@ fn press_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
     }
     // Corner forces take the vector with the minus sign.
-    touches[at] += vec4(-force.xyz, select(0.0, force.w, what == FORCE));
+    supports[at] += vec4(-force.xyz, select(0.0, force.w, what == FORCE));
     if what == STIFFNESS {
-        touches[at + 1u] += vec4(diagonal, 0.0);
-        touches[at + 2u] += vec4(mixed, 0.0);
+        supports[at + 1u] += vec4(diagonal, 0.0);
+        supports[at + 2u] += vec4(mixed, 0.0);
     }
 }

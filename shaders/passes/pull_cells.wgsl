@@ -8,7 +8,6 @@ var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 // [B][cells]: by the factor on the cell's modulus.
-var<storage, read_write> cell_pulls: array<f32>;
 // [CELL_ROWS + rows of aging …][B][workgroups]: by Poisson's ratio and stiffness damping first; two of the viscosity follow.
 var<storage, read_write> cell_sums: array<f32>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
@@ -46,16 +45,16 @@ fn pull_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let first = c.live && c.number == 0u;
     let total = sum64(local, select(vec4(0.0), vec4(c.young * s, 0.0), first));
     if first {
-        cell_pulls[c.member * shape.cells + c.cell] -= unvaried(c.m, c.member) * s.x;
+        cell_sums[c.member * shape.cells + c.cell] -= unvaried(c.m, c.member) * s.x;
     }
     if local == 0u && c.live {
-        cell_sums[row_at(0u, c.member, c.cell, shape.cells, 8u)] -= total.y;
+        cell_sums[shape.members * shape.cells + row_at(0u, c.member, c.cell, shape.cells, 8u)] -= total.y;
         if call.mode != 0u {
-            cell_sums[row_at(1u, c.member, c.cell, shape.cells, 8u)] -= total.z;
+            cell_sums[shape.members * shape.cells + row_at(1u, c.member, c.cell, shape.cells, 8u)] -= total.z;
         }
         for (var row = 0u; row < shape.aging_rows; row++) {
             let slope = aging_at(c.member, 1u + row) / aging_at(c.member, 0u);
-            cell_sums[row_at(CELL_ROWS + row, c.member, c.cell, shape.cells, 8u)] -= slope * total.x;
+            cell_sums[shape.members * shape.cells + row_at(CELL_ROWS + row, c.member, c.cell, shape.cells, 8u)] -= slope * total.x;
         }
     }
     if seeks(SEEK_REST) {

@@ -4,9 +4,9 @@
 // use shared/motion
 
 // [m³]
-var<storage, read> elastic_volumes: array<f32>;
+var<body> elastic_volumes: array<f32>;
 // [n][n]: entries of an element's mass matrix over its mass.
-var<storage, read> mass_shares: array<f32>;
+var<body> mass_shares: array<f32>;
 var<storage, read> probe: array<vec4<f32>>;
 // [B][points]; zero but for means.
 var<storage, read_write> density_pulls: array<f32>;

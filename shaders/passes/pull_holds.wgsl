@@ -4,9 +4,9 @@
 // use shared/pulls
 
 // [rows][B][steps + 1][clamps].
-var<storage, read> hold_slopes: array<HoldSlope>;
+var<batch> hold_slopes: array<HoldSlope>;
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read_write> hold_forces: array<vec4<f32>>;
+var<storage, read_write> supports: array<vec4<f32>>;
 // [B][clamp cells]: by the factor on the cell's modulus.
 var<storage, read_write> hold_pulls: array<f32>;
 // [HOLD_ROWS + aging + poses + matrices][B][workgroups]: by Poisson's ratio and the start first.
@@ -85,6 +85,6 @@ fn pull_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
     }
     if p.live && seeks(SEEK_REST) {
-        hold_forces[(p.member * shape.holds + hold) * 8u + corner] = vec4(corners, 0.0);
+        supports[hold_part() + (p.member * shape.holds + hold) * 8u + corner] = vec4(corners, 0.0);
     }
 }

@@ -4,7 +4,6 @@
 // use shared/pulls
 
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read_write> cell_pulls: array<f32>;
 // Behind the rows of pull_cells: CELL_SLOTS of each law.
 var<storage, read_write> cell_sums: array<f32>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
@@ -86,15 +85,15 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     let first = c.live && c.number == 0u;
     let total = sum64(local, select(vec4(0.0), vec4(unit * vec2(own, poisson), by_flow), first));
     if first {
-        cell_pulls[c.member * shape.cells + c.cell] -= unvaried(c.m, c.member) * volume_of(c) * own;
+        cell_sums[c.member * shape.cells + c.cell] -= unvaried(c.m, c.member) * volume_of(c) * own;
     }
     if local == 0u && c.live {
-        cell_sums[row_at(0u, c.member, c.cell, shape.cells, 8u)] -= total.y;
-        cell_sums[row_at(2u, c.member, c.cell, shape.cells, 8u)] -= total.z;
-        cell_sums[row_at(3u, c.member, c.cell, shape.cells, 8u)] -= total.w;
+        cell_sums[shape.members * shape.cells + row_at(0u, c.member, c.cell, shape.cells, 8u)] -= total.y;
+        cell_sums[shape.members * shape.cells + row_at(2u, c.member, c.cell, shape.cells, 8u)] -= total.z;
+        cell_sums[shape.members * shape.cells + row_at(3u, c.member, c.cell, shape.cells, 8u)] -= total.w;
         for (var row = 0u; row < shape.aging_rows; row++) {
             let slope = aging_at(c.member, 1u + row) / aging_at(c.member, 0u);
-            cell_sums[row_at(CELL_ROWS + row, c.member, c.cell, shape.cells, 8u)] -= slope * total.x;
+            cell_sums[shape.members * shape.cells + row_at(CELL_ROWS + row, c.member, c.cell, shape.cells, 8u)] -= slope * total.x;
         }
     }
     var increment = nowhere();
@@ -112,7 +111,7 @@ fn pull_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         }
         let sum = sum_cells(local, select(0.0, unit * by, c.live));
         if local < 8u && c.live {
-            cell_sums[row_at(CELL_ROWS + shape.aging_rows + CELL_SLOTS * k + local, c.member, c.cell, shape.cells, 8u)] -= sum;
+            cell_sums[shape.members * shape.cells + row_at(CELL_ROWS + shape.aging_rows + CELL_SLOTS * k + local, c.member, c.cell, shape.cells, 8u)] -= sum;
         }
     }
     if seeks(SEEK_REST) {

@@ -2,7 +2,7 @@
 // use effects/nodes
 // use shared/pull_point
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;

@@ -6,9 +6,9 @@
 // use shared/pulls
 
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
 // [B][N]: by the density at the node, or a node's part of that by the density of the whole.
 var<storage, read_write> node_pulls: array<f32>;
 // [2][B][workgroups]: by Young's modulus, Poisson's ratio and stiffness damping through the ghost penalty, by mass damping; by gravity.

@@ -3,16 +3,16 @@
 // use shared/reduce
 
 // 3 · marker + axis of every such parameter, and its place in θ.
-var<storage, read> offset_places: array<vec2<u32>>;
+var<body> offset_places: array<vec2<u32>>;
 // Markers of a frame by site: [F][sites + 1].
-var<storage, read> mark_rows: array<u32>;
+var<body> mark_rows: array<u32>;
 // [B][P]
 var<storage, read_write> gradient: array<f32>;
 
 @compute @workgroup_size(64)
 fn pull_offsets(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
     if !s.runs {
         return;
     }

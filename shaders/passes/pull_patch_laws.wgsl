@@ -4,7 +4,7 @@
 // use shared/patch_way
 // use shared/probed
 
-var<storage, read> planes: array<Plane>;
+var<batch> planes: array<Plane>;
 
 @compute @workgroup_size(64)
 fn pull_patch_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,

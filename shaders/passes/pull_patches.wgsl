@@ -5,7 +5,7 @@
 // use shared/probed
 // use shared/pulls
 
-var<storage, read> planes: array<Plane>;
+var<batch> planes: array<Plane>;
 // [planes][B][workgroups]: by Young's modulus, height and angles.
 var<storage, read_write> patch_sums: array<vec4<f32>>;
 

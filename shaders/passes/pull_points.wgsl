@@ -9,10 +9,11 @@ var<storage, read_write> corner_pulls: array<vec4<f32>>;
 @compute @workgroup_size(64)
 fn pull_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
-    let corner = s.item & 7u;
-    let stripe = (s.item >> 3u) % sight.stripes;
-    let cell = (s.item >> 3u) / sight.stripes;
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
+    let corner = index & 7u;
+    let stripe = (index >> 3u) % sight.stripes;
+    let cell = (index >> 3u) / sight.stripes;
     if !s.runs || cell >= sight.cells {
         return;
     }

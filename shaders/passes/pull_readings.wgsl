@@ -4,16 +4,16 @@
 // use shared/reduce
 
 // Places of the numbers in θ.
-var<storage, read> reading_places: array<u32>;
+var<body> reading_places: array<u32>;
 // [points][readings]: derivatives of the true points.
-var<storage, read> reading_slopes: array<vec4<f32>>;
+var<shots> reading_slopes: array<vec4<f32>>;
 // [B][P]
 var<storage, read_write> gradient: array<f32>;
 
 @compute @workgroup_size(64)
 fn pull_readings(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
     if !s.runs {
         return;
     }

@@ -3,14 +3,14 @@
 // use shared/pulls
 
 var<storage, read> probe: array<vec4<f32>>;
-var<storage, read> cells: array<Cell>;
+var<body> cells: array<Cell>;
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> hold_forces: array<vec4<f32>>;
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<storage, read> supports: array<vec4<f32>>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
 // [B][N]
 var<storage, read_write> rest_pulls: array<vec4<f32>>;
 
@@ -29,7 +29,7 @@ fn pull_rest(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         f += cell_force[p.member * shape.cells * 8u + node_list[k]].xyz;
         let cell = cells[node_list[k] / 8u];
         for (var h = cell.hold_start; h < cell.hold_end; h++) {
-            f += hold_forces[(p.member * shape.holds + h) * 8u + node_list[k] % 8u].xyz;
+            f += supports[hold_part() + (p.member * shape.holds + h) * 8u + node_list[k] % 8u].xyz;
         }
     }
     if shape.ghosts != 0u {

@@ -4,7 +4,7 @@
 // use shared/unstrained
 // use shared/pulls
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
 // [2][B][workgroups]: by velocity and by spin.
 var<storage, read_write> velocity_sums: array<vec4<f32>>;

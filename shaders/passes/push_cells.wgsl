@@ -8,7 +8,7 @@
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 // [B][N]
-var<storage, read> rate_rests: array<vec4<f32>>;
+var<rates> rate_rests: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

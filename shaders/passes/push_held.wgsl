@@ -4,7 +4,7 @@
 // use shared/rates
 
 // [B][N]: of the stress-free shape.
-var<storage, read> rate_rests: array<vec4<f32>>;
+var<rates> rate_rests: array<vec4<f32>>;
 var<storage, read_write> column: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

@@ -5,10 +5,10 @@
 // use shared/pulls
 
 // [rows][B][steps + 1][clamps].
-var<storage, read> hold_slopes: array<HoldSlope>;
+var<batch> hold_slopes: array<HoldSlope>;
 // [B][N]
-var<storage, read> rate_rests: array<vec4<f32>>;
-var<storage, read_write> hold_forces: array<vec4<f32>>;
+var<rates> rate_rests: array<vec4<f32>>;
+var<storage, read_write> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn push_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -59,6 +59,6 @@ fn push_holds(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
     }
     if p.live {
-        hold_forces[(p.member * shape.holds + hold) * 8u + corner] = vec4(total, 0.0);
+        supports[hold_part() + (p.member * shape.holds + hold) * 8u + corner] = vec4(total, 0.0);
     }
 }

@@ -3,7 +3,7 @@
 // use shared/rates
 
 // [B][N]
-var<storage, read> rate_rests: array<vec4<f32>>;
+var<rates> rate_rests: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
 // As `ask`, with numbers of the laws that change as well.

@@ -7,14 +7,14 @@
 // use shared/unstrained
 
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
+var<body> ghosts: array<f32>;
 // Of the factors on densities, as shared/inertia has them; and [B][N] of the stress-free shape.
-var<storage, read> rate_densities: array<f32>;
-var<storage, read> rate_rests: array<vec4<f32>>;
+var<rates> rate_densities: array<f32>;
+var<rates> rate_rests: array<vec4<f32>>;
 var<storage, read_write> column: array<vec4<f32>>;
 
 // By what multiplies the ghost penalty, and by the stress-free shape.

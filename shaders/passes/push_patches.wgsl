@@ -5,8 +5,8 @@
 // use shared/patch_way
 // use shared/rates
 
-var<storage, read> planes: array<Plane>;
-var<storage, read_write> touches: array<vec4<f32>>;
+var<batch> planes: array<Plane>;
+var<storage, read_write> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -44,5 +44,5 @@ fn push_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             vector += (stiffer * plane.scales * pressure + slope * (dot(turned, place) - rate.x)) * n + pressure * turned;
         }
     }
-    touches[3u * (p.member * shape.patches + p.item)] = vec4(vector, 0.0);
+    supports[3u * (p.member * shape.patches + p.item)] = vec4(vector, 0.0);
 }

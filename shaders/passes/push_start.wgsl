@@ -3,9 +3,9 @@
 // use shared/rates
 // use shared/unstrained
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 // [B][N]
-var<storage, read> rate_rests: array<vec4<f32>>;
+var<rates> rate_rests: array<vec4<f32>>;
 var<storage, read_write> tangent: array<vec4<f32>>;
 
 @compute @workgroup_size(64)

@@ -14,8 +14,9 @@ var<storage, read_write> changes: array<vec4<f32>>;
 @compute @workgroup_size(64)
 fn see_tangents(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                 @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
-    let node = s.item;
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
+    let node = index;
     if !s.runs || node >= sight.nodes {
         return;
     }

@@ -7,15 +7,14 @@
 // use shared/unstrained
 
 // Elastic points, then patches, that have the node: stencil and entry.
-var<storage, read> elastic_rows: array<u32>;
-var<storage, read> elastic_list: array<vec2<u32>>;
+var<body> elastic_rows: array<u32>;
+var<body> elastic_list: array<vec2<u32>>;
 var<storage, read> elastic_stress: array<vec4<f32>>;
-var<storage, read> touches: array<vec4<f32>>;
+var<storage, read> supports: array<vec4<f32>>;
+// A residual is as gather_residual has it.
 var<storage, read_write> forces: array<vec4<f32>>;
 // [B][N]: force of the clamps on nodes that they hold, where effects act on clamps.
 var<storage, read_write> reactions: array<vec4<f32>>;
-// As gather_residual has it.
-var<storage, read_write> sizes: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn spread_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -36,7 +35,7 @@ fn spread_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             let f = elastic_stress[s].xyz * g.x + elastic_stress[s + 1u].xyz * g.y + elastic_stress[s + 2u].xyz * g.z;
             elastic += vec4(f, w * elastic_stress[s].w);
         } else if (call.extra & SPREAD_PATCHES) != 0u {
-            let t = touches[3u * (p.member * shape.patches + at.x - shape.first_patch)];
+            let t = supports[3u * (p.member * shape.patches + at.x - shape.first_patch)];
             support += vec4(-w * t.xyz, w * t.w);
         }
     }
@@ -52,6 +51,6 @@ fn spread_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         reactions[a] = vec4(-r.xyz, 0.0);
     }
     forces[a] = vec4(select(r.xyz, vec3(0.0), held), r.w);
-    sizes[a] += vec4(elastic.xyz, abs(elastic.w) + abs(support.w));
-    sizes[part(1u) + a] += vec4(support.xyz, 0.0);
+    forces[part(1u) + a] += vec4(elastic.xyz, abs(elastic.w) + abs(support.w));
+    forces[part(2u) + a] += vec4(support.xyz, 0.0);
 }

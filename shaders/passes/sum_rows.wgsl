@@ -7,13 +7,14 @@
 @compute @workgroup_size(64)
 fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
             @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
     if !s.runs {
         return;
     }
     let shot = shots[s.look.shot];
     var sum = vec4(0.0);
-    for (var i = s.item; i < rows_of(shot); i += 64u * call.roster) {
+    for (var i = index; i < rows_of(shot); i += 64u * call.roster) {
         let row = rows[s.slot * sight.rows + i];
         let r = row.x;
         if i >= shot.point_count {

@@ -6,8 +6,8 @@
 // use shared/probed
 // use shared/asks
 
-var<storage, read> planes: array<Plane>;
-var<storage, read_write> touches: array<vec4<f32>>;
+var<batch> planes: array<Plane>;
+var<storage, read_write> supports: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -63,9 +63,9 @@ fn touch_patches(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
     }
     let at = 3u * (p.member * shape.patches + p.item);
-    touches[at] = vec4(vector, energy);
+    supports[at] = vec4(vector, energy);
     if what == TOUCH_FORCE {
-        touches[at + 1u] = vec4(diagonal, 0.0);
-        touches[at + 2u] = vec4(mixed, 0.0);
+        supports[at + 1u] = vec4(diagonal, 0.0);
+        supports[at + 2u] = vec4(mixed, 0.0);
     }
 }

@@ -5,19 +5,19 @@
 // use shared/iteration
 
 var<storage, read> newton: array<Newton>;
-var<storage, read> cg_rest: array<vec4<f32>>;
-var<storage, read_write> cg_along: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn turn_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
            @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, local, shape.nodes, WIDE);
-    if !p.runs {
+    let share = find_share(group, groups, shape.nodes, WIDE);
+    if !share.runs {
         return;
     }
-    let rz = sum_parts(local, p.member, 1u, WIDE);
-    let before = cg_scalars[4u * p.member + 1u - parity()];
-    let bad = cg_scalars[4u * p.member + 3u - parity()].x;
+    let p = place_in(share, local, shape.nodes);
+    let rz = sum_parts(local, share.member, 1u, WIDE);
+    let before = cg_sums[scalars_at(p.member) + 1u - parity()];
+    let bad = cg_sums[scalars_at(p.member) + 3u - parity()].x;
     var state = before.z;
     if state == 0.0 {
         if bad != 0.0 {
@@ -28,7 +28,7 @@ fn turn_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     }
     // The first of the member's workgroups speaks for all.
     if p.item == 0u {
-        cg_scalars[4u * p.member + parity()] = vec4(rz, before.y + select(0.0, 1.0, state == 0.0), state, 0.0);
+        cg_sums[scalars_at(p.member) + parity()] = vec4(rz, before.y + select(0.0, 1.0, state == 0.0), state, 0.0);
     }
     if state != 0.0 || !p.live {
         return;
@@ -39,5 +39,7 @@ fn turn_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
         beta = rz / before.x;
     }
     let a = at_node(p.member, p.item);
-    cg_along[a] = vec4(scaled(at_node(p.home, p.item), cg_rest[a].xyz), 0.0) + beta * cg_along[a];
+    let way = solving_part(ALONG_WAY) + a;
+    let rest = solving[solving_part(REST) + a].xyz;
+    solving[way] = vec4(scaled(at_node(p.home, p.item), rest), 0.0) + beta * solving[way];
 }

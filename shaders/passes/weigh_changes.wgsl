@@ -9,17 +9,18 @@ var<storage, read> slopes: array<f32>;
 @compute @workgroup_size(64)
 fn weigh_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
-    let s = find_seat(group, groups, local, 64u);
+    let s = find_seat(group, groups, 64u);
+    let index = s.first + local;
     let shot = shots[s.look.shot];
-    if !s.runs || s.item >= shot.point_count + shot.marker_count + shot.node_count {
+    if !s.runs || index >= shot.point_count + shot.marker_count + shot.node_count {
         return;
     }
     let base = s.slot * sight.rows;
-    if s.item < shot.point_count {
-        rows[base + s.item].x = slopes[base + s.item];
+    if index < shot.point_count {
+        rows[base + index].x = slopes[base + index];
         return;
     }
-    let vector = s.item - shot.point_count;
+    let vector = index - shot.point_count;
     let row = base + shot.point_count + 3u * vector;
     for (var k = 0u; k < 3u; k++) {
         rows[row + k].x = slopes[row + k];

@@ -3,9 +3,9 @@
 // use shared/hexahedron
 
 // Frame's points in the order of their cubes: position from the frame's origin [m], camera.
-var<storage, read> points: array<vec4<f32>>;
-var<storage, read> cube_starts: array<u32>;
-var<storage, read> cameras: array<vec4<f32>>;
+var<shots> points: array<vec4<f32>>;
+var<shots> cube_starts: array<u32>;
+var<shots> cameras: array<vec4<f32>>;
 
 // In keys of matches: the side is one that the camera cannot see.
 const HIDDEN = 0x80000000u;

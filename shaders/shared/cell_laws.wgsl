@@ -7,7 +7,7 @@
 // use shared/flow
 
 // Gradient weights of the corners in the mean strain of what deforms in a cell of each class.
-var<storage, read> mean_gradients: array<vec4<f32>>;
+var<body> mean_gradients: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 

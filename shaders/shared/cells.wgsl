@@ -2,8 +2,8 @@
 // use shared/pose
 // use shared/fields
 
-var<storage, read> cells: array<Cell>;
-var<storage, read> elements: array<f32>;
+var<body> cells: array<Cell>;
+var<matrices> elements: array<f32>;
 
 // Where the matrix of a cell starts: [slot][K, dK/dν][class][24 · 24], for Young's modulus 1.
 fn matrix_at(slot: u32, which: u32, kind: u32) -> u32 {

@@ -16,4 +16,4 @@ struct EffectSite { // mirrored
 }
 
 // [B][stride].
-var<storage, read> effect_values: array<f32>;
+var<batch> effect_values: array<f32>;

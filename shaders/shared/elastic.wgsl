@@ -8,7 +8,7 @@
 // use materials/all
 
 // [m³]
-var<storage, read> elastic_volumes: array<f32>;
+var<body> elastic_volumes: array<f32>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;

@@ -1,9 +1,9 @@
 //! Stiffness of a cell where effects vary it over the body or in time; without such effects the factors are not read.
 
 // [B][elements], times Young's modulus.
-var<storage, read> moduli: array<f32>;
+var<batch> moduli: array<f32>;
 // [1 + rows][B][steps + 1]: factor on the whole body's modulus at the start and in every step, then its derivatives.
-var<storage, read> agings: array<f32>;
+var<batch> agings: array<f32>;
 
 // Where a matrix of a clamp cell starts in `hold_elements`: [slot][K, dK/dν][clamp cell][24 · 24]; where effects act on clamps
 // every member has its own, and [rows][B][clamp cell] derivatives of K by their parameters follow.

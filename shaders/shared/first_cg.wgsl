@@ -3,10 +3,10 @@
 
 fn first_cg(local: u32, member: u32, rz: f32) {
     if local < 4u {
-        cg_scalars[4u * member + local] = vec4(0.0);
+        cg_sums[scalars_at(member) + local] = vec4(0.0);
     }
     let start = parts_at(member, 1u);
     for (var i = local; i < groups_of_nodes(WIDE); i += 256u) {
-        cg_parts[start + i] = select(0.0, rz, i == 0u);
+        cg_sums[start + i] = vec4(select(0.0, rz, i == 0u), 0.0, 0.0, 0.0);
     }
 }

@@ -3,7 +3,7 @@
 // use shared/hexahedron
 
 // Numbers of the band cells by lattice place.
-var<storage, read> band_lookup: array<u32>;
+var<body> band_lookup: array<u32>;
 
 // Steps of the march per cell, most of them, and most of the root's.
 override front_per_cell: f32;

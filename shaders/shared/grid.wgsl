@@ -6,29 +6,47 @@
 var<uniform> shape: Shape;
 var<storage, read> roster: array<u32>;
 
-struct Place {
+// A workgroup's share, the same for all its invocations, which is what barriers after a look at it need.
+struct Share {
     member: u32,
     // The member whose matrix and parameters these are.
     home: u32,
+    // Item of the first invocation.
+    first: u32,
+    runs: bool,
+}
+
+fn find_share(group: vec3<u32>, groups: vec3<u32>, items: u32, width: u32) -> Share {
+    let each = max((items + width - 1u) / width, 1u);
+    let flat = group.x + group.y * groups.x;
+    let slot = flat / each;
+    var s: Share;
+    s.runs = slot < roster[call.roster];
+    if s.runs {
+        s.member = roster[call.roster + 1u + slot];
+    }
+    s.home = s.member % shape.members;
+    s.first = (flat % each) * width;
+    return s;
+}
+
+// An invocation's own item of the share. One beyond the end is not live and must not write.
+struct Place {
+    member: u32,
+    home: u32,
     item: u32,
-    // Whole workgroups run or not; an item beyond the end is not live and must not write.
+    // Whole workgroups run or not.
     runs: bool,
     live: bool,
 }
 
+fn place_in(s: Share, local: u32, items: u32) -> Place {
+    let item = s.first + local;
+    return Place(s.member, s.home, item, s.runs, s.runs && item < items);
+}
+
 fn find_place(group: vec3<u32>, groups: vec3<u32>, local: u32, items: u32, width: u32) -> Place {
-    let each = max((items + width - 1u) / width, 1u);
-    let flat = group.x + group.y * groups.x;
-    let slot = flat / each;
-    var p: Place;
-    p.runs = slot < roster[call.roster];
-    if p.runs {
-        p.member = roster[call.roster + 1u + slot];
-    }
-    p.home = p.member % shape.members;
-    p.item = (flat % each) * width + local;
-    p.live = p.runs && p.item < items;
-    return p;
+    return place_in(find_share(group, groups, items, width), local, items);
 }
 
 // States hold three vectors per node, [3][B][N]: a multiple of the quantum, the rest of the displacement, the velocity.
@@ -38,4 +56,14 @@ fn at_node(member: u32, node: u32) -> u32 {
 
 fn part(which: u32) -> u32 {
     return which * shape.members * shape.nodes;
+}
+
+// Where `cell_force` has what supports give to the corners, after what cells do.
+fn support_part() -> u32 {
+    return 8u * shape.members * shape.cells;
+}
+
+// Where `supports` has what clamps do to corners, after what planes do to patches.
+fn hold_part() -> u32 {
+    return 3u * shape.members * shape.patches;
 }

@@ -13,10 +13,10 @@ struct Holder { // mirrored
 }
 
 // Holders of each node.
-var<storage, read> held_rows: array<u32>;
-var<storage, read> holders: array<Holder>;
+var<body> held_rows: array<u32>;
+var<body> holders: array<Holder>;
 // [1 + rows][B]: thickness of the layer [m], and its derivatives by numbers of effects; only where effects act on clamps.
-var<storage, read> layers: array<f32>;
+var<batch> layers: array<f32>;
 
 fn layer_of(member: u32) -> f32 {
     if (shape.fields & FIELD_GRIPS) == 0u {

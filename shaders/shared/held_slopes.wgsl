@@ -3,7 +3,7 @@
 // use shared/pulls
 
 // As in push_holds.
-var<storage, read> hold_slopes: array<HoldSlope>;
+var<batch> hold_slopes: array<HoldSlope>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> reactions: array<vec4<f32>>;
 

@@ -10,8 +10,8 @@ struct BandCell { // mirrored
     corner: vec4<f32>,
 }
 
-var<storage, read> band_cells: array<BandCell>;
-var<storage, read> band_sdf: array<f32>;
+var<body> band_cells: array<BandCell>;
+var<body> band_sdf: array<f32>;
 
 // Quadratic pieces per axis of a cell's distances, and samples: every piece has three, neighbours share one.
 override sdf_pieces: u32;

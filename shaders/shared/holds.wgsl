@@ -4,14 +4,14 @@
 // use shared/fields
 // use shared/unstrained
 
-var<storage, read> cells: array<Cell>;
+var<body> cells: array<Cell>;
 // (cell, clamp) of each clamp cell, ordered by cell.
-var<storage, read> holds: array<vec2<u32>>;
+var<body> holds: array<vec2<u32>>;
 // As `grip_at` says.
-var<storage, read> hold_elements: array<f32>;
+var<matrices> hold_elements: array<f32>;
 // [B][steps + 1][clamps]: poses at the start and at the end of every step.
-var<storage, read> poses: array<ClampPose>;
-var<storage, read> rest: array<vec4<f32>>;
+var<batch> poses: array<ClampPose>;
+var<body> rest: array<vec4<f32>>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 

@@ -2,12 +2,12 @@
 //! the pattern of blocks.
 // use shared/stencil
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 // [B][masses] in kg.
-var<storage, read> mass_values: array<f32>;
+var<batch> mass_values: array<f32>;
 // Of cells [B][N], times the density; read only where effects vary it over the body. Of tetrahedra [B][blocks]: entries of the mass matrix over
 // the density.
-var<storage, read> densities: array<f32>;
+var<batch> densities: array<f32>;
 
 fn has_mass_matrix() -> bool {
     return shape.elastic != 0u;

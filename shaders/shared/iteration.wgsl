@@ -1,21 +1,21 @@
 //! Scalars of conjugate gradients that many workgroups of a member share. Every workgroup sums the parts again in the same order, so
 //! all of them see the same numbers and take the same decisions. call.extra: ODD and WIDE_PARTS.
 // use shared/asks
-// use shared/roster
+// use shared/solving
 
-// Of each column of a solve [4]: of even and of odd iterations (rᵀ M⁻¹ r, iterations so far, 0 going on | 1 ended | 2 negative curvature, 0), then of even
-// and odd updates (1 if the curvature was not positive, 0, 0, 0).
-var<storage, read_write> cg_scalars: array<vec4<f32>>;
-// Of each column [2][groups of NARROW nodes]: parts of pᵀ A p, parts of rᵀ M⁻¹ r.
-var<storage, read_write> cg_parts: array<f32>;
+// Of each column of a solve, in the first component but where four are told:
+// - four scalars of even and of odd iterations (rᵀ M⁻¹ r, iterations so far, 0 going on | 1 ended | 2 negative curvature, 0), then of even and odd
+//   updates (1 if the curvature was not positive, 0, 0, 0);
+// - by groups of NARROW nodes: parts of pᵀ A p, parts of rᵀ M⁻¹ r.
+var<storage, read_write> cg_sums: array<vec4<f32>>;
+var<workgroup> common_scalars: vec4<f32>;
 
-fn groups_of_nodes(width: u32) -> u32 {
-    return (shape.nodes + width - 1u) / width;
-}
-
-// Where the parts of a member start: 0 = pᵀ A p, 1 = rᵀ M⁻¹ r.
-fn parts_at(member: u32, which: u32) -> u32 {
-    return (2u * member + which) * groups_of_nodes(NARROW);
+// Scalars at a place, read once for a workgroup: who reads what others may write does not know that all of it sees the same.
+fn scalars_of(local: u32, place: u32) -> vec4<f32> {
+    if local == 0u {
+        common_scalars = cg_sums[place];
+    }
+    return workgroupUniformLoad(&common_scalars);
 }
 
 // Width of the groups that products were made in.
@@ -33,7 +33,7 @@ fn sum_parts(local: u32, member: u32, which: u32, width: u32) -> f32 {
     let count = groups_of_nodes(width);
     var sum = vec4(0.0);
     for (var i = local; i < count; i += 256u) {
-        sum.x += cg_parts[start + i];
+        sum.x += cg_sums[start + i].x;
     }
     return total(local, sum).x;
 }

@@ -10,7 +10,7 @@ const LOSS_PART = 1u;
 // The host lets no more into a plan.
 const MOST_LAWS = 16u;
 
-var<storage, read> cell_effects: array<EffectSite>;
+var<body> cell_effects: array<EffectSite>;
 
 // The input, and 1/Δt.
 var<private> input: array<vec4<f32>, CELL_INPUTS>;

@@ -3,9 +3,19 @@
 //! Program. 26, 1983). Where that is nothing the convex tangent is asked for.
 
 var<storage, read> residual: array<vec4<f32>>;
-var<storage, read_write> direction: array<vec4<f32>>;
+var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
+
+var<workgroup> common_newton: Newton;
+
+// A member's state, read once for a workgroup.
+fn newton_of(local: u32, member: u32) -> Newton {
+    if local == 0u {
+        common_newton = newton[member];
+    }
+    return workgroupUniformLoad(&common_newton);
+}
 
 // What rounding may leave of a derivative's right-hand side when the iterations run out.
 const ACCEPTABLE = 1e-4;
@@ -39,7 +49,7 @@ fn leave_cg(local: u32, member: u32, found: Newton, bent: bool, over: bool, exac
             var slope = vec4(0.0);
             for (var i = local; i < shape.nodes; i += 256u) {
                 let a = at_node(member, i);
-                slope.x += dot(residual[a].xyz, direction[a].xyz);
+                slope.x += dot(residual[a].xyz, solving[a].xyz);
             }
             n.slope = total(local, slope).x;
         }

@@ -21,10 +21,11 @@ struct Sight { // mirrored
     // Marker sites.
     sites: u32,
     frames: u32,
-    // Lattice nodes.
-    lattice: array<u32, 3>,
-    // Parameters P, and those of them that are offsets of markers.
+    // Parameters P.
     parameters: u32,
+    // Lattice nodes.
+    lattice: vec3<u32>,
+    // Parameters that are offsets of markers.
     offsets: u32,
     // Edge of a cell [m].
     h: f32,
@@ -39,6 +40,7 @@ struct Sight { // mirrored
     displacement: f32,
     // Numbers that move depth readings.
     readings: u32,
+    pad: u32,
 }
 
 struct Look { // mirrored
@@ -71,27 +73,28 @@ struct Shot { // mirrored
     shift_rest: vec4<f32>,
 }
 
-var<storage, read> sight: Sight;
+var<uniform> sight: Sight;
 var<storage, read> looks: array<Look>;
-var<storage, read> shots: array<Shot>;
+var<shots> shots: array<Shot>;
 var<storage, read> health: array<Health>;
 
+// The same for all invocations of a workgroup, which is what barriers after a look at it need.
 struct Seat {
     slot: u32,
     group: u32,
-    item: u32,
+    // Item of the first invocation.
+    first: u32,
     look: Look,
-    // Whole workgroups run or not.
     runs: bool,
 }
 
 // Arguments of the call: `step` looks from number `extra` on, `roster` workgroups each.
-fn find_seat(group: vec3<u32>, groups: vec3<u32>, local: u32, width: u32) -> Seat {
+fn find_seat(group: vec3<u32>, groups: vec3<u32>, width: u32) -> Seat {
     let flat = group.x + group.y * groups.x;
     var s: Seat;
     s.slot = flat / call.roster;
     s.group = flat % call.roster;
-    s.item = s.group * width + local;
+    s.first = s.group * width;
     s.look = looks[call.extra + min(s.slot, call.step - 1u)];
     s.runs = s.slot < call.step && health[s.look.member].code == WELL;
     return s;

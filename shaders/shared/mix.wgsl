@@ -1,7 +1,7 @@
 //! Weights of the θ-scheme: how the two states and inertia enter a balance. Twin of `Mix` and `Inertia` of the CPU backend.
 // use shared/grid
 
-var<storage, read> members: array<Member>;
+var<batch> members: array<Member>;
 
 struct Mix {
     // Weights of the new and old state's elastic force, and β/Δt.

@@ -5,9 +5,9 @@
 // use shared/stiffness
 
 var<storage, read> cell_force: array<vec4<f32>>;
-var<storage, read> node_rows: array<u32>;
-var<storage, read> node_list: array<u32>;
-var<storage, read> ghosts: array<f32>;
+var<body> node_rows: array<u32>;
+var<body> node_list: array<u32>;
+var<body> ghosts: array<f32>;
 
 fn old_row(member: u32, node: u32, m: Member, mix: Mix) -> vec3<f32> {
     var f = vec3(0.0);

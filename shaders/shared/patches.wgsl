@@ -2,7 +2,7 @@
 // use shared/stencil
 
 // Rest position [m] and area [m²].
-var<storage, read> patches: array<vec4<f32>>;
+var<body> patches: array<vec4<f32>>;
 
 fn patch_stencil(which: u32) -> u32 {
     return shape.first_patch + which;

@@ -33,7 +33,7 @@ fn asked_question() -> u32 {
     return call.extra >> QUESTION_AT;
 }
 
-var<storage, read> effects: array<EffectSite>;
+var<body> effects: array<EffectSite>;
 
 // The point, the same for all number types. Displacements are given as states have them: a large part and the rest.
 struct Spot {

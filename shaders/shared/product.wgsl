@@ -1,10 +1,11 @@
 //! What products add to the elastic part of q = A p at a node: inertia, point masses.
 // use shared/inertia
+// use shared/solving
 
 fn along_at(member: u32, stencil: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var k = stencil_rows[stencil]; k < stencil_rows[stencil + 1u]; k++) {
-        sum += stencil_entries[k].weight * cg_along[at_node(member, stencil_entries[k].node)].xyz;
+        sum += stencil_entries[k].weight * along_way(at_node(member, stencil_entries[k].node));
     }
     return sum;
 }
@@ -26,7 +27,7 @@ fn heavy_row(m: Member, inertia: f32, p: Place) -> vec3<f32> {
     var own = vec3(0.0);
     // Of a mass matrix, what multiplies blocks has added it.
     if !has_mass_matrix() {
-        own = (inertia * node_mass(m, p.home, p.item)) * cg_along[at_node(p.member, p.item)].xyz;
+        own = (inertia * node_mass(m, p.home, p.item)) * along_way(at_node(p.member, p.item));
     }
     return with_masses(own, inertia, p.member, p.home, p.item);
 }

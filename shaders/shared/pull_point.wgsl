@@ -7,7 +7,7 @@
 var<storage, read_write> point_sums: array<f32>;
 
 // As press_nodes has them.
-var<storage, read> effect_measures: array<f32>;
+var<batch> effect_measures: array<f32>;
 
 fn is_sought(what: u32) -> bool {
     return (call.extra & (what << SEEK_AT)) != 0u;

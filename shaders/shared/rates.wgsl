@@ -24,11 +24,11 @@ const WITH_CELLS = 16u;
 const PLANE_NUMBERS = 4u;
 
 // [B]
-var<storage, read> rates: array<Rate>;
+var<rates> rates: array<Rate>;
 // [B]: of planes, point masses, changes in time, clamps (poses, then matrices), effects.
-var<storage, read> rate_numbers: array<f32>;
+var<rates> rate_numbers: array<f32>;
 // [B][elements]: of the factors on their moduli.
-var<storage, read> rate_moduli: array<f32>;
+var<rates> rate_moduli: array<f32>;
 
 fn with_rate(what: u32) -> bool {
     return (call.extra & what) != 0u;

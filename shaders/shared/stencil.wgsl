@@ -11,10 +11,10 @@ struct Entry { // mirrored
 }
 
 // Start of each stencil's entries.
-var<storage, read> stencil_rows: array<u32>;
-var<storage, read> stencil_entries: array<Entry>;
+var<body> stencil_rows: array<u32>;
+var<body> stencil_entries: array<Entry>;
 // Weights of the gradient [1/m], entry by entry.
-var<storage, read> stencil_gradients: array<vec4<f32>>;
+var<body> stencil_gradients: array<vec4<f32>>;
 
 // Number of an entry of a stencil at a node, or NONE.
 fn entry_of(stencil: u32, node: u32) -> u32 {

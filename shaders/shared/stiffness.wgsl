@@ -1,7 +1,7 @@
 //! Product of the assembled matrix (inertia left out) with the vector `probe` at one node.
 
-var<storage, read> block_rows: array<u32>;
-var<storage, read> columns: array<u32>;
+var<body> block_rows: array<u32>;
+var<body> columns: array<u32>;
 var<storage, read> values: array<f32>;
 var<storage, read> probe: array<vec4<f32>>;
 

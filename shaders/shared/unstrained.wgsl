@@ -2,10 +2,10 @@
 // use shared/grid
 
 // [B][N]: displacement W of that shape.
-var<storage, read> rests: array<vec4<f32>>;
+var<batch> rests: array<vec4<f32>>;
 // [B][cells · 8]: deformation of every cell in that shape. Of a body of elastic points [B][points · 3]: columns of I − G⁻¹ with G = I + ∇W, the
 // first with det G.
-var<storage, read> rest_shapes: array<vec4<f32>>;
+var<batch> rest_shapes: array<vec4<f32>>;
 
 fn has_rest() -> bool {
     return (shape.fields & FIELD_REST) != 0u;

@@ -2,9 +2,9 @@
 // use shared/springs
 // use shared/unstrained
 
-var<storage, read> rest: array<vec4<f32>>;
+var<body> rest: array<vec4<f32>>;
 // As in shared/holds.
-var<storage, read> poses: array<ClampPose>;
+var<batch> poses: array<ClampPose>;
 
 fn instant_now() -> u32 {
     return select(0u, call.step + 1u, call.mode != 0u);

@@ -2,10 +2,10 @@
 
 use crate::costs;
 use crate::device::pipelines::shared::structs::FIELD_MIXES;
-use crate::device::{GpuError, Maker, whole};
+use crate::device::{Arena, GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::world::rates;
-use crate::world::{COLUMN_VECTORS, Geometry, MANY, Sums, VECTOR, columns, tally_sizes, work};
+use crate::world::{Geometry, MANY, SOLVING_VECTORS, Sums, VECTOR, columns, tally_sizes, work};
 use palpate_engine::{Request, Wanted};
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
@@ -91,18 +91,22 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     let ratios = load.ratios.clamp(1, members) as u64 + u64::from(plan.layout.is_viscous());
     let matrices = |sets: u64, count: u32| sets * 2 * u64::from(count) * 576 * 4;
     let mut constants: Vec<u64> = buffers.into_values().collect();
-    constants.extend([
+    let effects = geometry.effects.sizes(members, &plan.body, geometry.mass.entries(), shape.clamps as usize);
+    let of_batch = [
         b * size_of::<Member>() as u64,
         b * u64::from(shape.planes) * size_of::<Plane>() as u64,
         b * u64::from(shape.steps + 1) * u64::from(shape.clamps) * size_of::<ClampPose>() as u64,
         b * u64::from(shape.masses) * 4,
+        effects.iter().map(|s| 4 * s.1 as u64).sum(),
+    ];
+    let of_matrices = [
         matrices(ratios, shape.classes),
         // Effects on clamps make other matrices for each member.
         matrices(if geometry.effects.on_clamps() { b } else { ratios }, shape.holds),
         b * 4 * geometry.effects.matrix_floats(shape.holds as usize) as u64,
-    ]);
-    let effects = geometry.effects.sizes(members, &plan.body, geometry.mass.entries(), shape.clamps as usize);
-    constants.extend(effects.iter().map(|s| 4 * s.1 as u64));
+    ];
+    constants
+        .extend([Arena::bytes("batch_tables", of_batch.iter().sum()), Arena::bytes("matrices_tables", of_matrices.iter().sum())]);
     constants.extend(costs::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();
     space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
@@ -113,7 +117,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     let several = u64::from(shape.fields & FIELD_MIXES != 0);
     let kept = if request.gradient.any() { u64::from(shape.steps) + 1 } else { 2 + several };
     let all = |sizes: &[u64]| sizes.iter().map(|s| whole(*s)).sum();
-    let of_rates: u64 = request.sensitivities.iter().map(|p| all(&rates::sizes(&geometry, plan, *p, b))).sum();
+    let of_rates: u64 = request.sensitivities.iter().map(|p| rates::bytes(&geometry, plan, *p, b)).sum();
     // Each state is a buffer of three vectors.
     let largest = constants.iter().chain(&space).fold(vectors(3), |most, s| most.max(*s));
     Ok(Memory {
@@ -125,7 +129,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
             + vectors(
                 (4 + 2 * several) * q as u64
                     + 4 * several * q.min(1) as u64
-                    + if q > 1 { COLUMN_VECTORS.len() as u64 * columns(b).min(q as u64) } else { 0 },
+                    + if q > 1 { SOLVING_VECTORS * columns(b).min(q as u64) } else { 0 },
             ),
         largest,
     })

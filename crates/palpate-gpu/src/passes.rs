@@ -3,7 +3,7 @@
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::{roster, structs};
 use crate::device::recorder::{Args, Named, Recorder, Size};
-use crate::world::{KINDS, State, Tally, World};
+use crate::world::{KINDS, SOLVING, State, Tally, World};
 use palpate_model::plan::scheme::Stage;
 
 /// Sections of the roster: all, or those at one stage.
@@ -58,7 +58,7 @@ impl<'a, 'r> Passes<'a, 'r> {
             ("health", tally.get("health")),
             ("gradient", tally.get("gradient")),
             // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
-            ("probe", &world.buffers["direction"]),
+            ("probe", &world.buffers[SOLVING]),
         ];
         Passes { world, recorder, step, past: Vec::new(), own, columns: 1 }
     }

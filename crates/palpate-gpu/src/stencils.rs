@@ -1,9 +1,8 @@
 //! Stencils as the device has them (`shaders/shared/stencil.wgsl`): compressed rows of entries, with gradients where there are any.
 
-use crate::device::{GpuError, Maker};
+use crate::device::Arena;
 use crate::layout::Entry;
 use palpate_model::space::stencil::Stencil;
-use std::collections::HashMap;
 
 /// Stencils in compressed rows.
 #[derive(Clone, Debug)]
@@ -43,14 +42,10 @@ impl StencilTable {
         self.rows.windows(2).map(|w| (w[1] - w[0]) as usize).max().unwrap_or(0)
     }
 
-    /// Uploads them under the names that passes know stencils by.
-    ///
-    /// # Errors
-    /// More than the device has.
-    pub(crate) fn upload<M: Maker>(&self, gpu: &M, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
-        to.insert("stencil_rows", gpu.upload("stencil_rows", &self.rows)?);
-        to.insert("stencil_entries", gpu.upload("stencil_entries", &self.entries)?);
-        to.insert("stencil_gradients", gpu.upload("stencil_gradients", &self.gradients)?);
-        Ok(())
+    /// Adds them to an arena, under the names that passes know stencils by.
+    pub(crate) fn put(&self, tables: &mut Arena) {
+        tables.put("stencil_rows", &self.rows);
+        tables.put("stencil_entries", &self.entries);
+        tables.put("stencil_gradients", &self.gradients);
     }
 }

@@ -70,7 +70,7 @@ impl Seen {
     }
 
     /// Bounds by kernel, for those that have long loops; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 8] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 9] {
         let (rows, stripes) = (self.rows_of_cubes, self.stripes);
         // A lane visits its share of every row of cubes, rounded up; a visit is one iteration and those of Newton's method.
         let matching = self.layers + rows + (rows + self.points.div_ceil(8 * stripes)) * (1 + ITERATIONS as u64);
@@ -81,7 +81,8 @@ impl Seen {
             ("extend_band", self.extension),
             ("gather_pulls", self.corners * (1 + stripes)),
             // A node meets every marker of the frame at most once per entry of its sites. 8: the sum over the workgroup.
-            ("fold_pulls", self.share() * (1 + self.fold + self.sites + self.markers) + 8),
+            ("join_pulls", self.fold + self.sites + self.markers),
+            ("fold_pulls", self.share() + 8),
             // 700: rotations of Jacobi's method.
             ("carry_markers", self.site + 700),
             // Corners of a cell, and axes of an offset.

@@ -4,15 +4,14 @@ use super::looks::Round;
 use super::results::{Downloaded, places};
 use super::tables::BandTables;
 use super::{Cost, FOUND, VECTOR, groups_of, run};
+use crate::device::Arena;
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::structs::NONE;
 use crate::device::recorder::{Named, Recorder};
-use crate::device::{GpuError, Maker};
 use crate::layout::Sight;
 use glam::DVec3;
 use palpate_engine::{Misfit, ReadingResidual, ResidualRow, Source};
 use palpate_model::observation::{ReadingKind, Sensor, kernel};
-use std::collections::HashMap;
 
 /// The cost.
 pub(super) struct Depth;
@@ -23,15 +22,9 @@ impl Cost for Depth {
     }
 
     fn scratch(&self, s: &Sight) -> Vec<(&'static str, u64)> {
-        let (points, extended) = (u64::from(s.points), u64::from(s.extended));
+        let points = u64::from(s.points);
         let corners = if points == 0 { 0 } else { 8 * u64::from(s.stripes) * u64::from(s.cells) };
-        vec![
-            ("keys", 4 * points),
-            ("owners", 4 * points),
-            ("found", FOUND * points),
-            ("corner_pulls", VECTOR * corners),
-            ("pulls", VECTOR * extended),
-        ]
+        vec![("keys", 4 * points), ("owners", 4 * points), ("found", FOUND * points), ("corner_pulls", VECTOR * corners)]
     }
 
     fn compare(&self, r: &mut Recorder, own: &Named, sight: &Sight, round: Round) {
@@ -110,21 +103,17 @@ fn cell_groups(s: &Sight) -> usize {
     groups_of(8 * s.cells as usize * s.stripes as usize)
 }
 
-/// Uploads the band.
-///
-/// # Errors
-/// More than the device has.
-pub(super) fn upload<M: Maker>(gpu: &M, band: &BandTables, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
-    to.insert("band_cells", gpu.upload("band_cells", &band.cells)?);
-    to.insert("band_sdf", gpu.upload("band_sdf", &band.sdf)?);
-    to.insert("band_lookup", gpu.upload("band_lookup", &band.lookup)?);
-    to.insert("band_rows", gpu.upload("band_rows", &band.extend.starts)?);
-    to.insert("band_columns", gpu.upload("band_columns", &band.extend.columns)?);
-    to.insert("band_values", gpu.upload("band_values", &band.extend.values)?);
-    to.insert("fold_rows", gpu.upload("fold_rows", &band.fold.starts)?);
-    to.insert("fold_columns", gpu.upload("fold_columns", &band.fold.columns)?);
-    to.insert("fold_values", gpu.upload("fold_values", &band.fold.values)?);
-    to.insert("band_node_rows", gpu.upload("band_node_rows", &band.corners.starts)?);
-    to.insert("band_node_list", gpu.upload("band_node_list", &band.corners.columns)?);
-    Ok(())
+/// Adds the band to an arena.
+pub(super) fn put(band: &BandTables, tables: &mut Arena) {
+    tables.put("band_cells", &band.cells);
+    tables.put("band_sdf", &band.sdf);
+    tables.put("band_lookup", &band.lookup);
+    tables.put("band_rows", &band.extend.starts);
+    tables.put("band_columns", &band.extend.columns);
+    tables.put("band_values", &band.extend.values);
+    tables.put("fold_rows", &band.fold.starts);
+    tables.put("fold_columns", &band.fold.columns);
+    tables.put("fold_values", &band.fold.values);
+    tables.put("band_node_rows", &band.corners.starts);
+    tables.put("band_node_list", &band.corners.columns);
 }

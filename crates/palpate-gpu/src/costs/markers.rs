@@ -4,14 +4,13 @@ use super::looks::Round;
 use super::results::{Downloaded, places};
 use super::shots::Shots;
 use super::tables::SiteTables;
-use super::{CARRIED, Cost, VECTOR, groups_of, readings, run};
+use super::{CARRIED, Cost, groups_of, readings, run};
+use crate::device::Arena;
 use crate::device::pipelines::pass;
 use crate::device::recorder::{Named, Recorder};
-use crate::device::{GpuError, Maker};
 use crate::layout::Sight;
 use palpate_engine::{ReadingResidual, ResidualRow};
 use palpate_model::plan::Plan;
-use std::collections::HashMap;
 
 /// The cost.
 pub(super) struct Markers;
@@ -59,25 +58,14 @@ fn order(d: &Downloaded) -> Vec<usize> {
     places(&d.shots.mark_order[d.shot.marker_start as usize..][..d.shot.marker_count as usize])
 }
 
-/// Uploads sites, and what was seen of them.
-///
-/// # Errors
-/// More than the device has.
-pub(super) fn upload<M: Maker>(
-    gpu: &M,
-    plan: &Plan,
-    members: usize,
-    (shots, sites): (&Shots, &SiteTables),
-    to: &mut HashMap<&'static str, M::Buffer>,
-) -> Result<(), GpuError> {
+/// Adds sites, and what was seen of them, to an arena.
+pub(super) fn put(plan: &Plan, (shots, sites): (&Shots, &SiteTables), tables: &mut Arena) {
     let node_sites: Vec<[u32; 2]> = sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
-    to.insert("marks", gpu.upload("marks", &shots.marks)?);
-    to.insert("mark_rows", gpu.upload("mark_rows", &shots.mark_rows)?);
-    to.insert("sites", gpu.upload("sites", &sites.sites)?);
-    to.insert("offsets", gpu.buffer("offsets", VECTOR * (members.max(1) * sites.sites.len()) as u64)?);
-    to.insert("offset_places", gpu.upload("offset_places", &readings::offset_places(plan))?);
-    sites.stencils.upload(gpu, to)?;
-    to.insert("node_site_rows", gpu.upload("node_site_rows", &sites.of_node.starts)?);
-    to.insert("node_site_list", gpu.upload("node_site_list", &node_sites)?);
-    Ok(())
+    tables.put("marks", &shots.marks);
+    tables.put("mark_rows", &shots.mark_rows);
+    tables.put("sites", &sites.sites);
+    tables.put("offset_places", &readings::offset_places(plan));
+    sites.stencils.put(tables);
+    tables.put("node_site_rows", &sites.of_node.starts);
+    tables.put("node_site_list", &node_sites);
 }

@@ -33,7 +33,7 @@ mod tests;
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::{directions::DIRECTION, reduce};
 use crate::device::recorder::{Args, Buffers, Named, Recorder, Size};
-use crate::device::{Gpu, GpuError, Maker};
+use crate::device::{Arena, Gpu, GpuError, Maker};
 use crate::layout::{Carried, Found, Look, Sight};
 #[cfg(test)]
 pub(crate) use bounds::MOST_DIRECTIONS;
@@ -66,7 +66,7 @@ const CARRIED: u64 = size_of::<Carried>() as u64;
 /// Every cost, in the order in which residuals stand in a frame.
 const COSTS: [&dyn Cost; 3] = [&depth::Depth, &markers::Markers, &displacements::Displacements];
 
-/// What one kind of readings takes beside the passes that serve all (`see_nodes`, `sum_rows`, `fold_pulls`, `see_tangents`,
+/// What one kind of readings takes beside the passes that serve all (`see_nodes`, `sum_rows`, `join_pulls`, `fold_pulls`, `see_tangents`,
 /// `differentiate_rows`, `weigh_rows`, `weigh_changes`).
 trait Cost: Sync {
     /// Most readings of a look in a round.
@@ -242,8 +242,10 @@ impl Observer {
     /// Adds what the residuals of a round pull at both ends of the step and at the start.
     fn pull(&self, r: &mut Recorder, own: &Named, round: Round) {
         COSTS.iter().for_each(|cost| cost.pull(r, own, &self.sight, round));
-        let parts = groups_of(self.sight.nodes as usize).min(PARTS);
-        run(r, pass::FOLD_PULLS, own, round, parts, usize::from(round.points > 0));
+        let groups = groups_of(self.sight.nodes as usize);
+        run(r, pass::JOIN_PULLS, own, round, groups, usize::from(round.points > 0));
+        let parts = groups.min(PARTS);
+        run(r, pass::FOLD_PULLS, own, round, parts, 0);
         run(r, pass::ADD_PARTS, own, round, 1, parts);
     }
 
@@ -390,18 +392,27 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
         buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
         readings::upload(gpu, plan, &sensors, &shots, &mut buffers)?;
-        buffers.insert("reading_places", gpu.upload("reading_places", &readings::places(plan))?);
         buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
-        depth::upload(gpu, &band, &mut buffers)?;
-        markers::upload(gpu, plan, members, (&shots, &sites), &mut buffers)?;
+        let offsets = VECTOR * (members.max(1) * sites.sites.len()) as u64;
+        buffers.insert("offsets", gpu.buffer("offsets", offsets)?);
+        let mut body = Arena::new("body_tables");
+        body.put("reading_places", &readings::places(plan));
+        depth::put(&band, &mut body);
+        markers::put(plan, (&shots, &sites), &mut body);
+        body.upload(gpu, &mut buffers)?;
     }
     Ok((shots, sight, buffers))
 }
 
 /// Bytes of every scratch buffer for one look.
 fn scratch(s: &Sight) -> Vec<(&'static str, u64)> {
-    let shared =
-        [("seen", 2 * VECTOR * u64::from(s.extended)), ("rows", 8 * u64::from(s.rows)), ("partials", VECTOR * PARTS as u64)];
+    let extended = u64::from(s.extended);
+    let shared = [
+        ("seen", 2 * VECTOR * extended),
+        ("pulls", VECTOR * extended),
+        ("rows", 8 * u64::from(s.rows)),
+        ("partials", VECTOR * PARTS as u64),
+    ];
     shared.into_iter().chain(COSTS.iter().flat_map(|cost| cost.scratch(s))).collect()
 }
 

@@ -3,8 +3,7 @@
 //! Fronts are looked for along lines of sight as the recording has them (`shared/front.wgsl`), which effects do not move.
 
 use super::shots::{Shots, split};
-use crate::device::GpuError;
-use crate::device::Maker;
+use crate::device::{Arena, GpuError, Maker};
 use palpate_engine::Direction;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::effects::{Site, Unstated};
@@ -73,13 +72,14 @@ pub(super) fn upload<M: Maker>(
     let obs = &plan.observation;
     let cameras = sensors.iter().flat_map(|s| s.cameras(&obs.cameras));
     let cameras: Vec<[f32; 4]> = cameras.map(|c| split(c.center - plan.body.center)[0]).collect();
-    buffers.insert("cameras", gpu.upload("cameras", &cameras)?);
-    buffers.insert("shots", gpu.upload("shots", &shots.shots)?);
-    buffers.insert("points", gpu.upload("points", &shots.points)?);
-    buffers.insert("cube_starts", gpu.upload("cube_starts", &shots.cube_starts)?);
-    buffers.insert("reading_slopes", gpu.upload("reading_slopes", &slopes(plan, sensors, shots))?);
-    buffers.insert("recorded_lines", gpu.upload("recorded_lines", &recorded_lines(plan, shots))?);
-    Ok(())
+    let mut tables = Arena::new("shots_tables");
+    tables.put("cameras", &cameras);
+    tables.put("shots", &shots.shots);
+    tables.put("points", &shots.points);
+    tables.put("cube_starts", &shots.cube_starts);
+    tables.put("reading_slopes", &slopes(plan, sensors, shots));
+    tables.put("recorded_lines", &recorded_lines(plan, shots));
+    tables.upload(gpu, buffers)
 }
 
 /// Directions from cameras to points as the recording has them, in the device's order; none where no reading is moved.

@@ -27,8 +27,8 @@ impl Choice {
 pub(super) const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 /// Features that are used where they are.
 pub(super) const WELCOME: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
-/// Storage buffers that the widest kernel binds.
-pub(crate) const STORAGE_BUFFERS: u32 = 21;
+/// Storage buffers that the widest kernel binds: as many as browsers give.
+pub(crate) const STORAGE_BUFFERS: u32 = 10;
 /// Invocations of the widest workgroup.
 pub(crate) const WIDTH: u32 = 256;
 /// Workgroup memory of the hungriest kernel [B], and some to spare.

@@ -2,6 +2,7 @@
 
 use super::error::GpuError;
 use super::pipelines::Pipelines;
+use super::trace::Trace;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -25,6 +26,8 @@ pub struct Gpu {
     pub(crate) waits: AtomicU64,
     pub(super) trouble: Arc<Mutex<Option<GpuError>>>,
     pub(super) lost: Arc<AtomicBool>,
+    /// What is handed over, where somebody wants to know.
+    pub(super) trace: Mutex<Option<Trace>>,
 }
 
 impl Gpu {
@@ -59,6 +62,11 @@ impl Gpu {
     /// Ends the device as a driver's reset would; whoever still computes on it gets an error.
     pub fn destroy(&self) {
         self.device.destroy();
+    }
+
+    /// How the eight lanes of a cell talk to each other.
+    pub fn lanes(&self) -> super::pipelines::Lanes {
+        self.pipelines.lanes
     }
 
     /// True for software adapters, which cap the loop iterations of an invocation.

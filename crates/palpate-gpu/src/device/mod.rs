@@ -1,6 +1,7 @@
 //! A graphics device: adapters, errors, buffers, kernels, and lists of dispatches. Nothing here knows what is simulated.
 
 mod adapters;
+mod arena;
 mod buffers;
 mod error;
 mod gpu;
@@ -8,8 +9,10 @@ mod open;
 pub mod pipelines;
 mod probe;
 pub mod recorder;
+pub mod trace;
 
 pub use adapters::{AdapterReport, Choice, adapters};
+pub(crate) use arena::Arena;
 pub(crate) use buffers::{Maker, whole};
 pub use error::GpuError;
 pub use gpu::Gpu;

@@ -90,6 +90,7 @@ impl Gpu {
             waits: AtomicU64::new(0),
             trouble: trouble.clone(),
             lost: lost.clone(),
+            trace: Mutex::default(),
         };
         let gpu = match lanes {
             Some(Lanes::Subgroup) if !subgroups => {

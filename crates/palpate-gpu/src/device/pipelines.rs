@@ -57,7 +57,7 @@ pub struct Pipelines {
 pub const CALL_BYTES: u32 = size_of::<crate::layout::Call>() as u32;
 
 /// Value of an override: every constant that host and kernels share has its one source in `palpate-model`.
-pub(crate) fn constant(name: &str) -> Option<f64> {
+pub fn constant(name: &str) -> Option<f64> {
     Some(match name {
         "contact_damped" => palpate_model::mechanics::contact::DAMPED,
         "instant_count" => palpate_model::mechanics::contact::INSTANTS as f64,

@@ -3,6 +3,7 @@
 use super::error::GpuError;
 use super::gpu::Gpu;
 use super::pipelines::{PASSES, shared::roster};
+use super::trace::{self, Submission, Work};
 use crate::layout::Call;
 use std::collections::HashMap;
 
@@ -14,6 +15,12 @@ pub type Buffers = HashMap<&'static str, wgpu::Buffer>;
 
 /// Most workgroups along one axis of a dispatch (the WebGPU limit; every device has at least this).
 pub const MOST_GROUPS: u64 = roster::WIDEST as u64;
+
+/// Beyond the limit of one axis a grid becomes two-dimensional; kernels flatten it again.
+fn grid(members: usize, groups: usize) -> [u32; 2] {
+    let total = (members * groups) as u64;
+    [total.min(MOST_GROUPS) as u32, total.div_ceil(MOST_GROUPS) as u32]
+}
 
 /// How many workgroups a dispatch has.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +36,13 @@ pub enum Size {
     Indirect(u64),
     /// As the device wrote it in the buffer `gate`.
     Gate,
+}
+
+impl Size {
+    /// Buffer and byte where the device wrote it.
+    fn place(self) -> (&'static str, u64) {
+        if let Size::Indirect(offset) = self { ("arguments", offset) } else { ("gate", 0) }
+    }
 }
 
 /// Queries of one set, two a dispatch; a submission has as many sets as it needs. (WebGPU allows 4096.)
@@ -52,6 +66,8 @@ pub struct Recorder<'a> {
     timer: Option<Timer>,
     // Dispatches share a compute pass unless they are timed one by one: opening one costs as much as ten dispatches.
     open: Option<wgpu::ComputePass<'static>>,
+    // Of a device that is traced.
+    work: Vec<Work>,
 }
 
 /// Bind groups that were made before, by pass and buffers.
@@ -98,7 +114,7 @@ impl<'a> Recorder<'a> {
     pub fn new(gpu: &'a Gpu, world: &'a Buffers, groups: &'a mut Groups, timed: bool) -> Recorder<'a> {
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("palpate") });
         let timer = (timed && gpu.tick().is_some()).then(|| Timer { sets: Vec::new(), passes: Vec::new() });
-        Recorder { gpu, world, encoder, groups, timer, open: None }
+        Recorder { gpu, world, encoder, groups, timer, open: None, work: Vec::new() }
     }
 
     /// Records one dispatch of `pass`. Buffers are looked up in `own` first, then in the world.
@@ -118,6 +134,8 @@ impl<'a> Recorder<'a> {
                 message: format!("the pass {} was given no buffer called {name}", source.name),
             })?);
         }
+        let call = Call { step: args.step, mode: args.mode, roster: args.roster, extra: args.extra };
+        self.trace(pass, &buffers, call, size);
         let device = &self.gpu.device;
         let group = self.groups.entry((pass, buffers)).or_insert_with_key(|(_, buffers)| {
             let entries: Vec<wgpu::BindGroupEntry> = source
@@ -141,17 +159,14 @@ impl<'a> Recorder<'a> {
         });
         compute.set_pipeline(&kernel.pipeline);
         compute.set_bind_group(0, &*group, &[]);
-        let call = Call { step: args.step, mode: args.mode, roster: args.roster, extra: args.extra };
         compute.set_immediates(0, bytemuck::bytes_of(&call));
         match size {
             Size::All { members, groups } => {
-                let total = (members * groups) as u64;
-                // Beyond the limit of one axis the grid becomes two-dimensional; kernels flatten it again.
-                let (x, y) = (total.min(MOST_GROUPS), total.div_ceil(MOST_GROUPS));
-                compute.dispatch_workgroups(x as u32, y as u32, 1);
+                let [x, y] = grid(members, groups);
+                compute.dispatch_workgroups(x, y, 1);
             }
             Size::Indirect(_) | Size::Gate => {
-                let (name, offset) = if let Size::Indirect(offset) = size { ("arguments", offset) } else { ("gate", 0) };
+                let (name, offset) = size.place();
                 let Some(sizes) = self.world.get(name) else {
                     return Err(GpuError::Refused { message: format!("no buffer called {name}") });
                 };
@@ -161,21 +176,41 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
+    /// Writes a dispatch down where the device is traced.
+    fn trace(&mut self, pass: usize, buffers: &[wgpu::Buffer], call: Call, size: Size) {
+        let Some(buffers) = buffers.iter().map(|b| self.gpu.traced(b)).collect::<Option<Vec<usize>>>() else { return };
+        let groups = match size {
+            Size::All { members, groups } => Some(trace::Groups::All(grid(members, groups))),
+            Size::Indirect(_) | Size::Gate => {
+                let (name, offset) = size.place();
+                self.world.get(name).and_then(|sizes| Some(trace::Groups::At(self.gpu.traced(sizes)?, offset)))
+            }
+        };
+        let call = [call.step, call.mode, call.roster, call.extra];
+        self.work.extend(groups.map(|groups| Work::Dispatch { pass, buffers, call, groups }));
+    }
+
     /// Copies `bytes` from a place in a buffer to a place in another.
     pub fn copy_part(&mut self, [from, to]: [(&wgpu::Buffer, u64); 2], bytes: u64) {
         self.open = None;
+        let places = self.gpu.traced(from.0).zip(self.gpu.traced(to.0));
+        self.work.extend(places.map(|(a, b)| Work::Copy([(a, from.1), (b, to.1)], bytes)));
         self.encoder.copy_buffer_to_buffer(from.0, from.1, to.0, to.1, bytes);
     }
 
     /// Sets a buffer to zero.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.open = None;
+        self.work.extend(self.gpu.traced(buffer).map(Work::Clear));
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
     /// Hands the work to the device, and says which it is; does not wait, unless passes are timed: then adds their times.
     pub fn submit(mut self, times: &mut HashMap<&'static str, PassTime>) -> wgpu::SubmissionIndex {
         self.open = None;
+        if !self.work.is_empty() {
+            return self.submit_traced();
+        }
         let Some(timer) = self.timer.take().filter(|t| !t.passes.is_empty()) else {
             return self.gpu.queue.submit([self.encoder.finish()]);
         };
@@ -200,6 +235,30 @@ impl<'a> Recorder<'a> {
                     t.nanoseconds += pair[1].saturating_sub(pair[0]) as f64 * tick;
                 }
             }
+            Err(e) => self.gpu.keep(e),
+        }
+        submitted
+    }
+
+    /// The same of a device that is traced: waits for it before and after.
+    fn submit_traced(self) -> wgpu::SubmissionIndex {
+        let mut buffers = Vec::new();
+        for work in &self.work {
+            match work {
+                Work::Dispatch { buffers: all, groups, .. } => {
+                    buffers.extend(all);
+                    buffers.extend(if let trace::Groups::At(sizes, _) = groups { Some(*sizes) } else { None });
+                }
+                Work::Copy([from, to], _) => buffers.extend([from.0, to.0]),
+                Work::Clear(buffer) => buffers.push(*buffer),
+            }
+        }
+        buffers.sort_unstable();
+        buffers.dedup();
+        let before = self.gpu.contents(&buffers);
+        let submitted = self.gpu.queue.submit([self.encoder.finish()]);
+        match before.and_then(|before| Ok((before, self.gpu.contents(&buffers)?))) {
+            Ok((before, after)) => self.gpu.add_traced(Submission { buffers, before, after, work: self.work }),
             Err(e) => self.gpu.keep(e),
         }
         submitted

@@ -28,10 +28,10 @@ pub struct Sight {
     pub sites: u32,
     /// Frames F.
     pub frames: u32,
-    /// Lattice nodes along each axis.
-    pub lattice: [u32; 3],
     /// Parameters P.
     pub parameters: u32,
+    /// Lattice nodes along each axis.
+    pub lattice: [u32; 3],
     /// Parameters that are offsets of markers.
     pub offsets: u32,
     /// Edge of a cell [m].
@@ -48,6 +48,8 @@ pub struct Sight {
     pub displacement: f32,
     /// Numbers that move depth readings.
     pub readings: u32,
+    /// Nothing.
+    pub pad: u32,
 }
 
 /// One frame, seen by one member.

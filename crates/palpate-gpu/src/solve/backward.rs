@@ -3,7 +3,7 @@
 use crate::device::pipelines::pass;
 use crate::passes::{ALL, Passes, Per};
 use crate::world::columns;
-use crate::world::{Adjoint, COLUMN_VECTORS, Loan, State, Tally, Tangent, VECTOR, World};
+use crate::world::{Adjoint, Loan, SOLVING, SOLVING_VECTORS, State, Tally, Tangent, VECTOR, World};
 use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::InitialShape;
 
@@ -157,23 +157,22 @@ pub(crate) fn step_tangent(
 struct ColumnRoom {
     /// How many columns there is room for.
     columns: usize,
-    /// Those of [`COLUMN_VECTORS`], unless it is a single column.
-    loans: Vec<Loan>,
+    /// Theirs, unless it is a single column.
+    loan: Option<Loan>,
 }
 
 impl ColumnRoom {
     fn new(world: &World, wanted: usize) -> ColumnRoom {
         let columns = wanted.clamp(1, columns(world.members() as u64) as usize);
-        let count = if columns > 1 { COLUMN_VECTORS.len() } else { 0 };
-        ColumnRoom { columns, loans: (0..count).map(|_| world.lend(columns as u64)).collect() }
+        ColumnRoom { columns, loan: (columns > 1).then(|| world.lend(SOLVING_VECTORS * columns as u64)) }
     }
 
     fn lend_to<'a>(&'a self, s: &mut Passes<'a, '_>) {
-        s.own.extend(COLUMN_VECTORS.iter().zip(&self.loans).map(|(name, loan)| (*name, &loan.buffer)));
+        s.own.extend(self.loan.iter().map(|loan| (SOLVING, &loan.buffer)));
     }
 
     /// Where the solutions lie, one column after another.
     fn solved<'a>(&'a self, world: &'a World) -> &'a wgpu::Buffer {
-        self.loans.first().map_or(&world.buffers[COLUMN_VECTORS[0]], |loan| &loan.buffer)
+        self.loan.as_ref().map_or(&world.buffers[SOLVING], |loan| &loan.buffer)
     }
 }

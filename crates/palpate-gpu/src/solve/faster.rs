@@ -120,14 +120,14 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
         let clock = Instant::now();
         world.record(|r| {
             // Solves that have ended, as an earlier one may have, multiply nothing.
-            r.clear(&world.buffers["cg_scalars"]);
+            r.clear(&world.buffers["cg_sums"]);
             let mut s = Passes::new(world, r, Some(0), &blank, &blank, &tally);
             s.list();
             for _ in 0..repeats {
                 s.multiply(product, 0);
             }
         });
-        world.gpu.download::<f32>(&world.buffers["cg_parts"], 1).map(|_| clock.elapsed().as_secs_f64())
+        world.gpu.download::<f32>(&world.buffers["cg_sums"], 1).map(|_| clock.elapsed().as_secs_f64())
     };
     // The first run compiles the kernels.
     run(1)?;

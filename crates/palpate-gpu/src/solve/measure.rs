@@ -116,7 +116,7 @@ impl World {
                 s.list();
                 (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) });
             });
-            self.gpu.download::<f32>(&self.buffers["cg_parts"], 1).map(|_| clock.elapsed().as_secs_f64())
+            self.gpu.download::<f32>(&self.buffers["cg_sums"], 1).map(|_| clock.elapsed().as_secs_f64())
         };
         let repeats = if self.many { ITERATIONS } else { 1 };
         // The first run compiles the kernels.
@@ -156,7 +156,7 @@ impl World {
     /// Iterations that the first member's solve has made.
     fn iterations_done(&self) -> Result<usize, GpuError> {
         if self.many {
-            let scalars: Vec<[f32; 4]> = self.gpu.download(&self.buffers["cg_scalars"], 2)?;
+            let scalars: Vec<[f32; 4]> = self.gpu.download(&self.buffers["cg_sums"], 2)?;
             return Ok(scalars[0][1].max(scalars[1][1]) as usize);
         }
         Ok(self.gpu.download::<Newton>(&self.buffers["newton"], 1)?[0].cg as usize)

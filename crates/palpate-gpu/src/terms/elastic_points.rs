@@ -9,6 +9,8 @@ use crate::device::pipelines::shared::elastic_asks::{
 };
 use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
+use crate::world::SOLVING;
+use crate::world::rates::REST_CHANGE;
 use palpate_model::effects::Site;
 
 pub(super) struct ElasticPoints;
@@ -137,7 +139,7 @@ impl Term for ElasticPoints {
             }
             s.spread_elastic(ALL, 0, true, &s.world.buffers["column"]);
         }
-        let shape = along.named.iter().find(|b| b.0 == "rate_rests").filter(|_| along.moved.rest);
+        let shape = along.named.iter().find(|b| b.0 == REST_CHANGE).filter(|_| along.moved.rest);
         if let Some((_, change)) = shape.filter(|_| s.has_points()) {
             s.reshape(change, false);
             let named = [("forces", &s.world.buffers["column"]), ("elastic_stress", &s.world.buffers["shape_stress"])];
@@ -153,7 +155,7 @@ impl Term for ElasticPoints {
             s.element_laws(pass::PULL_TET_LAWS, ALL, 0, &pull.named);
         }
         if pull.sought().rest && s.has_points() {
-            s.reshape(&s.world.buffers["direction"], true);
+            s.reshape(&s.world.buffers[SOLVING], true);
             let pulls = pull.named.iter().find(|b| b.0 == "rest_pulls").map(|b| b.1);
             let named = [("elastic_stress", &s.world.buffers["shape_stress"])];
             if let Some(to) = pulls {

@@ -18,7 +18,7 @@ use crate::device::pipelines::shared::points::{BACK, BY_OLD};
 use crate::device::pipelines::shared::pulls::{SEEK_DAMPING, SEEK_MODULUS, SEEK_POISSON, SEEK_REST, SEEK_START, SEEK_VISCOSITY};
 use crate::device::recorder::Named;
 use crate::passes::{ALL, Passes, Per};
-use crate::world::{Rates, Sums, Tally, World};
+use crate::world::{Rates, SOLVING, Sums, Tally, World};
 use palpate_model::effects::Site;
 use palpate_model::params::coefficients::Sought;
 
@@ -201,7 +201,7 @@ impl Passes<'_, '_> {
 
     /// Adds dJ/d(past state) to `to`, from the solution of the adjoint's system and dJ/d(next).
     pub(crate) fn back(&mut self, state: &wgpu::Buffer, adjoint: &wgpu::Buffer, to: &wgpu::Buffer) {
-        let past = Past { way: Way::Back { adjoint }, state, probe: &self.world.buffers["direction"], to };
+        let past = Past { way: Way::Back { adjoint }, state, probe: &self.world.buffers[SOLVING], to };
         TERMS.iter().for_each(|t| t.by_past(self, &past));
     }
 

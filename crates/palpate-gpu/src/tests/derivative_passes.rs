@@ -6,6 +6,7 @@ use super::passes::{Exact, FORCES, flat, given, load, scene, single, stepwise, t
 use super::scenes::{device, plan};
 use crate::device::pipelines::pass;
 use crate::passes::{ALL, Passes, Per};
+use crate::world::SOLVING;
 use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::terms::{Context, Equation, PastChange, Rates, Weights};
@@ -80,7 +81,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Par
     run(&|s| s.push(&dense[0]));
     parts.push((DENSE.into(), three(&read(&world.buffers["column"], n))));
     let [u, v] = along(plan);
-    write(&world.buffers["direction"], &v);
+    write(&world.buffers[SOLVING], &v);
     run(&|s| s.pull(&tally));
     let gradient = backend.read(world, &tally).remove(0).gradient;
     parts.push((PULL.into(), gradient.iter().zip(sizes).map(|(g, size)| g / size).collect()));
@@ -106,7 +107,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Par
         s.iterate(1);
         s.iterate(0);
     });
-    parts.push(("turn_cg and advance_cg".into(), flat(&vectors(&read(&world.buffers["direction"], n)))));
+    parts.push(("turn_cg and advance_cg".into(), flat(&vectors(&read(&world.buffers[SOLVING], n)))));
     parts
 }
 

@@ -156,7 +156,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
 #[test]
 fn no_kernel_binds_more_buffers_than_adapters_are_asked_for() {
     let widest = PASSES.iter().map(|p| p.bindings.iter().filter(|b| !b.3).count()).max();
-    assert!(widest.is_some_and(|w| w <= STORAGE_BUFFERS as usize && w > 10), "{widest:?}");
+    assert_eq!(widest, Some(STORAGE_BUFFERS as usize));
     assert_eq!(PASSES.iter().map(|p| p.width).max(), Some(WIDTH));
     assert!(PASSES.iter().all(|p| p.memory <= WORKGROUP_BYTES));
 }

@@ -256,10 +256,19 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
     }
 }
 
+/// A kernel with its loops as they were written, where the linker put reads of arenas in their headers.
+fn as_written(source: &str) -> String {
+    let line = |line: &str| match line.split_once(" // ") {
+        Some((_, header)) if header.starts_with("for ") || header.starts_with("while ") => format!("{header}\n"),
+        _ => format!("{line}\n"),
+    };
+    source.lines().map(line).collect()
+}
+
 fn check(most: &Most, seen: &Seen) {
     for pass in &PASSES {
         for source in pass.sources {
-            let all = functions(source);
+            let all = functions(&as_written(source));
             let of = |header: &str| {
                 bound(header, most, seen).unwrap_or_else(|| panic!("{}: how long is the loop `{header}`?", pass.name))
             };

@@ -1,10 +1,11 @@
 //! The passes of a step one by one, at one given state, against the same quantities of the CPU; each comparison must see one percent.
 
 use super::products::crowded;
-use super::scenes::{device, plan};
+use super::scenes::{device, plan, solving_part};
 use crate::device::pipelines::pass;
+use crate::device::pipelines::shared::solving::{ALONG_WAY, IMAGE};
 use crate::passes::{ALL, Passes, Per};
-use crate::world::{State, World};
+use crate::world::{SOLVING, State, World};
 use crate::{GpuBackend, Product};
 use glam::{DMat3, DVec3};
 use palpate_cpu::linear::matrix::Matrix;
@@ -130,20 +131,20 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
         s.list();
         s.multiply(Product::Matrix, 0);
     });
-    let (along, image) = (vectors(&get("cg_along", n)), get("cg_image", n));
+    let (along, image) = (vectors(&solving_part(world, ALONG_WAY)), solving_part(world, IMAGE));
     // Without a matrix nothing knows of what effects add to it.
     let free = without_effects(plan).then(|| {
         step(world, &now, &next, &tally, |s| {
             s.multiply(Product::Free, 0);
         });
-        ("multiply_cells", right.off_product(&along, &vectors(&get("cg_image", n))), MATRIX)
+        ("multiply_cells", right.off_product(&along, &vectors(&solving_part(world, IMAGE))), MATRIX)
     });
     step(world, &now, &next, &tally, |s| s.solve());
-    let solution = vectors(&get("direction", n));
+    let solution = vectors(&get(SOLVING, n));
     let parts = vec![
         ("place_next", flat(&u1), PLACED),
         ("press_cells", forces, FORCES),
-        ("touch_patches and hold_cells", three(&get("sizes", 2 * n)[n..]), FORCES),
+        ("touch_patches and hold_cells", three(&get("residual", 3 * n)[2 * n..]), FORCES),
         ("gather_residual", three(&residual), FORCES),
         ("energies", vec![potential(&residual) - half], ENERGY),
         ("gather_matrix", values.iter().map(|v| f64::from(*v)).collect(), MATRIX),

@@ -2,8 +2,9 @@
 
 use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
-use super::scenes::{ball, device, held, plan, spread};
+use super::scenes::{ball, device, held, plan, solving_part, spread};
 use crate::costs::rollout_tests::{differences, seen, watched};
+use crate::device::pipelines::shared::solving::IMAGE;
 use crate::passes::Passes;
 use crate::solve;
 use crate::solve::Choices;
@@ -52,8 +53,7 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
         s.list();
         s.multiply(product, 0);
     });
-    let image: Vec<[f32; 4]> = world.gpu.download(&world.buffers["cg_image"], count).unwrap_or_else(|e| panic!("{e}"));
-    image.iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+    solving_part(world, IMAGE).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
 }
 
 /// Difference of two vectors over the size of the second.

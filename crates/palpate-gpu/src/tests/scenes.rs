@@ -2,6 +2,7 @@
 
 use crate::device::GpuError;
 use crate::device::{Choice, Gpu, Lanes};
+use crate::world::{SOLVING, SOLVING_VECTORS, World};
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::observation::Observation;
@@ -136,4 +137,11 @@ pub fn spread(plan: &Plan, members: usize) -> Vec<Vec<f64>> {
                 .collect()
         })
         .collect()
+}
+
+/// A part of the vectors of the latest solve, of every member.
+pub(crate) fn solving_part(world: &World, part: u32) -> Vec<[f32; 4]> {
+    let count = world.plan.body.nodes.len() * world.members();
+    let all = world.gpu.download(&world.buffers[SOLVING], SOLVING_VECTORS as usize * count).unwrap_or_else(|e| panic!("{e}"));
+    all[part as usize * count..][..count].to_vec()
 }

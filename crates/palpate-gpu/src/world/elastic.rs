@@ -1,11 +1,10 @@
 //! Tables of bodies without cells: which elastic points and patches have a node or make a block, in a fixed order, and which nodes clamps hold.
 
-use crate::device::{GpuError, Maker};
+use crate::device::Arena;
 use crate::layout::{Holder, Pair};
 use crate::stencils::StencilTable;
 use palpate_model::plan::Plan;
 use palpate_model::space::pattern::Pattern;
-use std::collections::HashMap;
 
 /// Lists in compressed rows.
 #[derive(Debug)]
@@ -78,18 +77,14 @@ impl ElasticTables {
         !self.holders.all.is_empty()
     }
 
-    /// Uploads them.
-    ///
-    /// # Errors
-    /// More than the device has.
-    pub(super) fn upload<M: Maker>(&self, gpu: &M, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
-        to.insert("elastic_volumes", gpu.upload("elastic_volumes", &self.volumes)?);
-        to.insert("elastic_rows", gpu.upload("elastic_rows", &self.of_node.rows)?);
-        to.insert("elastic_list", gpu.upload("elastic_list", &self.of_node.all)?);
-        to.insert("pair_rows", gpu.upload("pair_rows", &self.of_block.rows)?);
-        to.insert("pairs", gpu.upload("pairs", &self.of_block.all)?);
-        to.insert("held_rows", gpu.upload("held_rows", &self.holders.rows)?);
-        to.insert("holders", gpu.upload("holders", &self.holders.all)?);
-        Ok(())
+    /// Adds them to an arena.
+    pub(super) fn put(&self, tables: &mut Arena) {
+        tables.put("elastic_volumes", &self.volumes);
+        tables.put("elastic_rows", &self.of_node.rows);
+        tables.put("elastic_list", &self.of_node.all);
+        tables.put("pair_rows", &self.of_block.rows);
+        tables.put("pairs", &self.of_block.all);
+        tables.put("held_rows", &self.holders.rows);
+        tables.put("holders", &self.holders.all);
     }
 }

@@ -5,7 +5,7 @@ use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
 use super::mass::MassTable;
 use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
-use crate::device::{GpuError, Maker};
+use crate::device::{Arena, GpuError, Maker};
 use crate::layout::{Cell, Shape};
 use crate::stencils::StencilTable;
 use palpate_model::cutcells::elements::Classes;
@@ -179,25 +179,27 @@ impl Geometry {
             pad: 0,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
-        buffers.insert("cells", gpu.upload("cells", &cells)?);
+        let mut tables = Arena::new("body_tables");
+        tables.put("cells", &cells);
         let gradients: Vec<[f32; 4]> = classes.gradients.iter().flatten().map(|g| vec4(*g, 0.0)).collect();
-        buffers.insert("mean_gradients", gpu.upload("mean_gradients", &gradients)?);
-        buffers.insert("patches", gpu.upload("patches", &patches)?);
-        buffers.insert("rest", gpu.upload("rest", &rest)?);
-        stencils.upload(gpu, buffers)?;
-        elastic.upload(gpu, buffers)?;
-        mass.upload(gpu, buffers)?;
-        buffers.insert("node_rows", gpu.upload("node_rows", &node_rows)?);
-        buffers.insert("node_list", gpu.upload("node_list", &node_list)?);
-        buffers.insert("block_rows", gpu.upload("block_rows", &to_u32(&pattern.blocks.rows))?);
-        buffers.insert("columns", gpu.upload("columns", &pattern.blocks.columns)?);
-        buffers.insert("diagonals", gpu.upload("diagonals", &to_u32(&pattern.blocks.diagonal))?);
-        buffers.insert("place_rows", gpu.upload("place_rows", &place_rows)?);
-        buffers.insert("places", gpu.upload("places", &contributions.concat())?);
-        buffers.insert("ghosts", gpu.upload("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>())?);
-        buffers.insert("effects", gpu.upload("effects", &effects.sites())?);
-        buffers.insert("cell_effects", gpu.upload("cell_effects", &effects.cell_sites())?);
-        buffers.insert("holds", gpu.upload("holds", &hold_sites)?);
+        tables.put("mean_gradients", &gradients);
+        tables.put("patches", &patches);
+        tables.put("rest", &rest);
+        stencils.put(&mut tables);
+        elastic.put(&mut tables);
+        mass.put(&mut tables);
+        tables.put("node_rows", &node_rows);
+        tables.put("node_list", &node_list);
+        tables.put("block_rows", &to_u32(&pattern.blocks.rows));
+        tables.put("columns", &pattern.blocks.columns);
+        tables.put("diagonals", &to_u32(&pattern.blocks.diagonal));
+        tables.put("place_rows", &place_rows);
+        tables.put("places", &contributions.concat());
+        tables.put("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>());
+        tables.put("effects", &effects.sites());
+        tables.put("cell_effects", &effects.cell_sites());
+        tables.put("holds", &hold_sites);
+        tables.upload(gpu, buffers)?;
         Ok(Geometry { shape, classes, holds, effects, mass })
     }
 }

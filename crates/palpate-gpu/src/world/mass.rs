@@ -1,10 +1,9 @@
 //! The mass matrix of a body of tetrahedra, entry by entry of the pattern of blocks; densities may vary over the body from member to member.
 
-use crate::device::{GpuError, Maker};
+use crate::device::Arena;
 use palpate_model::plan::Plan;
 use palpate_model::space::pattern::Places;
 use palpate_model::space::tets::{lumped_mean, mass};
-use std::collections::HashMap;
 
 /// Where elements add to the matrix.
 #[derive(Debug)]
@@ -42,13 +41,9 @@ impl MassTable {
         out
     }
 
-    /// Uploads what all members share.
-    ///
-    /// # Errors
-    /// More than the device has.
-    pub(super) fn upload<M: Maker>(&self, gpu: &M, to: &mut HashMap<&'static str, M::Buffer>) -> Result<(), GpuError> {
+    /// Adds what all members share to an arena.
+    pub(super) fn put(&self, tables: &mut Arena) {
         let shares: Vec<f32> = self.shares.iter().map(|s| *s as f32).collect();
-        to.insert("mass_shares", gpu.upload("mass_shares", &shares)?);
-        Ok(())
+        tables.put("mass_shares", &shares);
     }
 }

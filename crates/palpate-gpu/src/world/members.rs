@@ -1,7 +1,7 @@
 //! What members differ in: θ decoded, planes, clamp poses over time, element matrices per Poisson's ratio.
 
 use super::geometry::Geometry;
-use crate::device::{Gpu, GpuError, Maker as _};
+use crate::device::{Arena, Gpu, GpuError};
 use crate::layout::{ClampPose, Member, Plane};
 use glam::DVec3;
 use palpate_engine::ParamBatch;
@@ -23,7 +23,7 @@ pub(crate) struct Batch {
     pub(crate) theta: Vec<Vec<f64>>,
     /// Poisson's ratio of each slot of element matrices that is on the device.
     slots: Vec<f64>,
-    /// The matrices themselves where effects make other clamps of them.
+    /// The matrices themselves, kept where effects make other clamps of them.
     elements: Vec<Elements>,
 }
 
@@ -86,52 +86,57 @@ impl Batch {
             geometry.effects.poses(plan, p, &mut poses);
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
-        geometry.effects.upload(gpu, plan, &geometry.mass, &self.physics, buffers)?;
-        buffers.insert("members", gpu.upload("members", &members)?);
-        buffers.insert("planes", gpu.upload("planes", &all_planes)?);
-        buffers.insert("poses", gpu.upload("poses", &poses)?);
-        buffers.insert("mass_values", gpu.upload("mass_values", &masses)?);
-        if self.slots != slots {
-            self.upload_elements(gpu, plan, geometry, &slots, buffers)?;
+        let mut tables = Arena::new("batch_tables");
+        geometry.effects.put(plan, &geometry.mass, &self.physics, &mut tables);
+        tables.put("members", &members);
+        tables.put("planes", &all_planes);
+        tables.put("poses", &poses);
+        tables.put("mass_values", &masses);
+        tables.upload(gpu, buffers)?;
+        let on_clamps = geometry.effects.on_clamps();
+        let others = self.slots != slots;
+        if others {
+            self.elements = slots.iter().map(|nu| Elements::new(plan, &geometry.classes, *nu)).collect();
             self.slots = slots;
         }
-        if geometry.effects.on_clamps() {
-            let own: Vec<&Elements> = members.iter().map(|m| &self.elements[m.slot as usize]).collect();
-            let grips = geometry.effects.grips(plan, &self.physics, &own, &geometry.holds)?;
-            buffers.insert("hold_elements", gpu.upload("hold_elements", &grips)?);
-        }
-        Ok(())
-    }
-
-    /// Element and clamp matrices of every Poisson's ratio in the batch: `[slot][K, dK/dν][class]`.
-    fn upload_elements(
-        &mut self,
-        gpu: &Gpu,
-        plan: &Plan,
-        geometry: &Geometry,
-        slots: &[f64],
-        buffers: &mut HashMap<&'static str, wgpu::Buffer>,
-    ) -> Result<(), GpuError> {
-        let (mut cells, mut holds) = (Vec::new(), Vec::new());
-        self.elements.clear();
-        let push = |out: &mut Vec<f32>, m: &M24| out.extend(m.iter().map(|x| *x as f32));
-        for nu in slots {
-            let e = Elements::new(plan, &geometry.classes, *nu);
-            e.matrices.iter().for_each(|m| push(&mut cells, &m.k));
-            e.matrices.iter().for_each(|m| push(&mut cells, &m.k_nu));
-            if geometry.effects.on_clamps() {
-                self.elements.push(e);
-                continue;
+        if others || on_clamps {
+            let mut tables = Arena::new("matrices_tables");
+            tables.put("elements", &cell_matrices(&self.elements));
+            if on_clamps {
+                let own: Vec<&Elements> = members.iter().map(|m| &self.elements[m.slot as usize]).collect();
+                tables.put("hold_elements", &geometry.effects.grips(plan, &self.physics, &own, &geometry.holds)?);
+            } else {
+                tables.put("hold_elements", &hold_matrices(plan, geometry, &self.elements));
+                self.elements.clear();
             }
-            let stated = |(i, cell): &(usize, u32)| &e.clamps[*i][plan.clamps[*i].cells.partition_point(|c| c.cell < *cell)];
-            let held: Vec<_> = geometry.holds.iter().map(stated).collect();
-            held.iter().for_each(|m| push(&mut holds, &m.k));
-            held.iter().for_each(|m| push(&mut holds, &m.k_nu));
-        }
-        buffers.insert("elements", gpu.upload("elements", &cells)?);
-        if !geometry.effects.on_clamps() {
-            buffers.insert("hold_elements", gpu.upload("hold_elements", &holds)?);
+            tables.upload(gpu, buffers)?;
         }
         Ok(())
     }
+}
+
+fn put(out: &mut Vec<f32>, m: &M24) {
+    out.extend(m.iter().map(|x| *x as f32));
+}
+
+/// Element matrices of every Poisson's ratio in the batch: `[slot][K, dK/dν][class]`.
+fn cell_matrices(elements: &[Elements]) -> Vec<f32> {
+    let mut out = Vec::new();
+    for e in elements {
+        e.matrices.iter().for_each(|m| put(&mut out, &m.k));
+        e.matrices.iter().for_each(|m| put(&mut out, &m.k_nu));
+    }
+    out
+}
+
+/// The same of cells that clamps hold.
+fn hold_matrices(plan: &Plan, geometry: &Geometry, elements: &[Elements]) -> Vec<f32> {
+    let mut out = Vec::new();
+    for e in elements {
+        let stated = |(i, cell): &(usize, u32)| &e.clamps[*i][plan.clamps[*i].cells.partition_point(|c| c.cell < *cell)];
+        let held: Vec<_> = geometry.holds.iter().map(stated).collect();
+        held.iter().for_each(|m| put(&mut out, &m.k));
+        held.iter().for_each(|m| put(&mut out, &m.k_nu));
+    }
+    out
 }

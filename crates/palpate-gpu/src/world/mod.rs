@@ -18,7 +18,7 @@ pub(crate) use effort::{Effort, FULL, Level};
 pub(crate) use geometry::Geometry;
 pub(crate) use limits::columns;
 pub(crate) use rates::Rates;
-pub(crate) use room::{COLUMN_VECTORS, KINDS, VECTOR, work};
+pub(crate) use room::{KINDS, SOLVING, SOLVING_VECTORS, VECTOR, work};
 pub(crate) use states::Loan;
 pub use states::{Adjoint, State, Tangent};
 pub(crate) use sums::{Found, Sums};

@@ -2,9 +2,9 @@
 
 use super::World;
 use super::geometry::Geometry;
-use crate::device::Maker as _;
 use crate::device::pipelines::shared::rates::{WITH_DENSITIES, WITH_MODULI, WITH_POISSON, WITH_RESTS};
 use crate::device::recorder::Buffers;
+use crate::device::{Arena, Maker as _, whole};
 use crate::layout::Rate;
 use glam::DVec3;
 use palpate_engine::Direction;
@@ -12,6 +12,11 @@ use palpate_model::effects::Site;
 use palpate_model::params::ParamKey;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
+
+/// The buffer of a direction's tables.
+const RATES: &str = "rates_tables";
+/// On a body of elastic points, the change of the stress-free shape as a vector a node, which passes take for the vector `probe`.
+pub(crate) const REST_CHANGE: &str = "rest_change";
 
 /// One direction, for all members.
 #[derive(Debug)]
@@ -48,8 +53,8 @@ fn numbers(geometry: &Geometry, plan: &Plan, p: &Physics, out: &mut Vec<f32>) {
     out.extend(p.effects.iter().flatten().map(|v| *v as f32));
 }
 
-/// Bytes of every buffer of a direction along one parameter, for `members`.
-pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64) -> Vec<u64> {
+/// Bytes of what a direction along one parameter changes, for `members`.
+pub(crate) fn bytes(geometry: &Geometry, plan: &Plan, place: usize, members: u64) -> u64 {
     let shape = &geometry.shape;
     let varies = |on: fn(&Site) -> bool, field: bool| match plan.layout.keys[place] {
         ParamKey::Effect { law, .. } => on(&palpate_model::effects::ALL[usize::from(law)].site),
@@ -59,13 +64,15 @@ pub(crate) fn sizes(geometry: &Geometry, plan: &Plan, place: usize, members: u64
     let sought = Sought::new(plan, &(0..plan.layout.len()).map(|p| p == place).collect::<Vec<_>>());
     let densities = if geometry.mass.entries() == 0 { shape.nodes } else { shape.blocks };
     let of = |moves: bool, bytes: u32| if moves { u64::from(bytes) * members } else { 0 };
-    vec![
+    let tables = [
         size_of::<Rate>() as u64 * members,
         4 * u64::from(shape.rate_numbers) * members,
         of(varies(|s| matches!(s, Site::Modulus(_)), sought.modulus), 4 * shape.elements),
         of(varies(|s| matches!(s, Site::Density(_)), sought.density), 4 * densities),
         of(sought.rest, 16 * shape.nodes),
-    ]
+    ];
+    let probed = if shape.elastic != 0 && sought.rest { whole(tables[4]) } else { 0 };
+    whole(Arena::bytes(RATES, tables.iter().sum())) + probed
 }
 
 /// What one direction makes of all members so far.
@@ -115,18 +122,24 @@ impl Gathered {
             | bit(self.rests.is_empty(), WITH_RESTS)
             | bit(!moved.poisson, WITH_POISSON);
         let mut buffers = Buffers::new();
-        let mut put = |name: &'static str, made: Result<wgpu::Buffer, crate::device::GpuError>| {
-            let buffer = made.unwrap_or_else(|e| {
-                world.gpu.keep(e);
-                world.gpu.small()
+        let mut tables = Arena::new(RATES);
+        tables.put("rates", &self.rates);
+        tables.put("rate_numbers", &self.numbers);
+        tables.put("rate_moduli", &self.moduli);
+        tables.put("rate_densities", &self.densities);
+        tables.put("rate_rests", &self.rests);
+        let mut made = tables.upload(&*world.gpu, &mut buffers);
+        if world.geometry.shape.elastic != 0 && !self.rests.is_empty() {
+            made = made.and_then(|()| {
+                buffers.insert(REST_CHANGE, world.gpu.upload(REST_CHANGE, &self.rests)?);
+                Ok(())
             });
-            buffers.insert(name, buffer);
-        };
-        put("rates", world.gpu.upload("rates", &self.rates));
-        put("rate_numbers", world.gpu.upload("rate_numbers", &self.numbers));
-        put("rate_moduli", world.gpu.upload("rate_moduli", &self.moduli));
-        put("rate_densities", world.gpu.upload("rate_densities", &self.densities));
-        put("rate_rests", world.gpu.upload("rate_rests", &self.rests));
+        }
+        if let Err(e) = made {
+            world.gpu.keep(e);
+            // Something to bind; the error is read before any number.
+            buffers.extend([RATES, REST_CHANGE].map(|name| (name, world.gpu.small())));
+        }
         Rates { direction: direction.clone(), buffers, flags, moved, flying }
     }
 }

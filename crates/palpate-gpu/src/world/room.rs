@@ -11,28 +11,22 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 27] = [
+const WORK: [Work; 21] = [
     ("increment", |s| s.nodes, VECTOR),
-    ("direction", |s| s.nodes, VECTOR),
+    ("solving", |s| 4 * s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
-    ("residual", |s| s.nodes, VECTOR),
-    ("sizes", |s| 2 * s.nodes, VECTOR),
+    ("residual", |s| 3 * s.nodes, VECTOR),
     ("old_force", |s| s.nodes, VECTOR),
     ("rhs", |s| s.nodes, VECTOR),
     ("column", |s| s.nodes, VECTOR),
-    ("cg_rest", |s| s.nodes, VECTOR),
-    ("cg_along", |s| s.nodes, VECTOR),
-    ("cg_image", |s| s.nodes, VECTOR),
     ("inverses", |s| 2 * s.nodes, VECTOR),
     ("values", |s| 9 * s.blocks, 4),
     ("tangents", |s| structs::TANGENT_VECTORS * s.cells, VECTOR),
-    ("cell_force", |s| 8 * s.cells, VECTOR),
+    ("cell_force", |s| 16 * s.cells, VECTOR),
     ("law_modes", |s| s.cells * modes(s.fields), VECTOR),
-    ("cell_support", |s| 8 * s.cells, VECTOR),
     ("old_stress", |s| 8 * s.cells, VECTOR),
     ("old_q", |s| if s.fields & structs::FIELD_MIXES == 0 { 0 } else { 8 * s.cells }, VECTOR),
-    ("touches", |s| 3 * s.patches, VECTOR),
-    ("hold_forces", |s| 8 * s.holds, VECTOR),
+    ("supports", |s| 3 * s.patches + 8 * s.holds, VECTOR),
     ("elastic_stress", |s| 3 * s.elastic, VECTOR),
     ("past_strains", |s| 2 * s.elastic, VECTOR),
     ("past_stretches", |s| if s.elastic == 0 || laws(s.fields) == 0 { 0 } else { 2 * s.elements }, VECTOR),
@@ -42,15 +36,16 @@ const WORK: [Work; 27] = [
 ];
 
 /// The same per column of a member that is solved for at the same time as others.
-const OF_COLUMN: [Work; 4] = [
-    ("cg_scalars", |_| 4, VECTOR),
-    ("cg_parts", |s| 2 * s.nodes.div_ceil(roster::NARROW), 4),
+const OF_COLUMN: [Work; 3] = [
+    ("cg_sums", |s| 4 + 2 * s.nodes.div_ceil(roster::NARROW), VECTOR),
     ("newton", |_| 1, size_of::<Newton>() as u64),
     ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
 
-/// Vectors that such a column has of its own while several are solved for; one alone uses those of the work space.
-pub(crate) const COLUMN_VECTORS: [&str; 4] = ["direction", "cg_rest", "cg_along", "cg_image"];
+/// Vectors of a solve (`shared/solving.wgsl`), the solution first. Columns that are solved for together have their own; one alone uses those of
+/// the work space.
+pub(crate) const SOLVING: &str = "solving";
+pub(crate) const SOLVING_VECTORS: u64 = 4;
 
 /// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
 fn modes(fields: u32) -> u32 {
@@ -74,7 +69,7 @@ pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
     let systems = columns(members as u64) * members as u64;
     let each = WORK.iter().map(|w| (w, members as u64)).chain(OF_COLUMN.iter().map(|w| (w, systems)));
     let own = each.map(|((name, items, bytes), count)| (*name, u64::from(items(shape)) * bytes * count));
-    let shared: [(&'static str, u64); 7] = [
+    let shared: [(&'static str, u64); 6] = [
         ("shape", size_of::<Shape>() as u64),
         ("roster", 4 * SECTIONS as u64 * (systems + 1)),
         ("arguments", 12 * (SECTIONS * KINDS) as u64),
@@ -82,8 +77,7 @@ pub(crate) fn work(shape: &Shape, members: usize) -> Vec<(&'static str, u64)> {
         // Where listings that may not change `gate` write instead.
         ("no_gate", 12),
         // What passes find that no direction concerns.
-        ("rates", 0),
-        ("rate_numbers", 0),
+        ("rates_tables", 0),
     ];
     own.chain(shared).collect()
 }

@@ -52,8 +52,8 @@ impl Sums {
         let own_rows = u64::from(shape.aging_rows) + effects.hold_numbers().iter().map(|n| u64::from(*n)).sum::<u64>();
         let hold_rows = u64::from(HOLD_ROWS) + own_rows;
         let floats = [
-            ("cell_pulls", cells),
-            ("cell_sums", cell_rows * each(shape.cells, 8)),
+            // By the modulus of every cell, then the rows of sums.
+            ("cell_sums", cells + cell_rows * each(shape.cells, 8)),
             ("elastic_pulls", shape.elastic.into()),
             ("elastic_sums", u64::from(CELL_ROWS + shape.aging_rows) * u64::from(shape.elastic)),
             ("density_pulls", shape.elastic.into()),
@@ -142,7 +142,8 @@ impl Member<'_> {
     fn sum(&self, name: &'static str, row: u32, groups: u32, width: usize) -> [f64; 4] {
         let mut out = [0.0; 4];
         let (groups, members) = (groups as usize, self.shape.members as usize);
-        let first = (row as usize * members + self.member) * groups * width;
+        let before = if name == "cell_sums" { members * self.shape.cells as usize } else { 0 };
+        let first = before + (row as usize * members + self.member) * groups * width;
         let all = self.found.get(name).and_then(|v| v.get(first..first + groups * width)).unwrap_or(&[]);
         for vector in all.chunks_exact(width) {
             vector.iter().zip(&mut out).for_each(|(v, o)| *o += f64::from(*v));
@@ -176,7 +177,7 @@ impl Member<'_> {
     /// What lies on cells and nodes, and the numbers of the material that it makes.
     fn add_material(&self, plan: &Plan, own: &Coefficients, geometry: &Geometry, g: &mut Coefficients) {
         let shape = self.shape;
-        let mut modulus = self.items("cell_pulls", shape.cells, 1);
+        let mut modulus = self.items("cell_sums", shape.cells, 1);
         let points = self.items("elastic_pulls", shape.elastic, 1);
         modulus.extend(points.chunks(shape.per_element as usize).map(|p| p.iter().sum::<f64>()));
         let holds = self.items("hold_pulls", shape.holds, 1);

@@ -12,7 +12,7 @@ use crate::device::pipelines::shared::structs::{
     FIELD_AGING, FIELD_DENSITY, FIELD_GRIPS, FIELD_MODULUS, FIELD_PATCHES, FIELD_REST, FIELD_STARTS, LAWS_AT, MATERIAL_AT, NONE,
     SCALARS_AT,
 };
-use crate::device::{GpuError, Maker};
+use crate::device::{Arena, GpuError};
 use crate::layout::EffectSite;
 use crate::world::mass::MassTable;
 use palpate_model::effects::cell::{ENERGY, Part};
@@ -22,7 +22,6 @@ use palpate_model::params::fields::Varied;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::InitialShape;
 use palpate_model::space::body::Body;
-use std::collections::HashMap;
 
 /// Most laws of cells of a plan.
 const MOST_LAWS: usize = laws::MOST_LAWS as usize;
@@ -196,18 +195,8 @@ impl Effects {
         all
     }
 
-    /// Uploads what members' parameters make of them.
-    ///
-    /// # Errors
-    /// More than the device has.
-    pub(crate) fn upload<M: Maker>(
-        &self,
-        gpu: &M,
-        plan: &Plan,
-        mass: &MassTable,
-        batch: &[Physics],
-        buffers: &mut HashMap<&'static str, M::Buffer>,
-    ) -> Result<(), GpuError> {
+    /// Adds what members' parameters make of them to an arena.
+    pub(crate) fn put(&self, plan: &Plan, mass: &MassTable, batch: &[Physics], tables: &mut Arena) {
         let body = &plan.body;
         let sizes = self.sizes(batch.len(), body, mass.entries(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
@@ -242,9 +231,8 @@ impl Effects {
         data[8] = self.layers(plan, batch);
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
-            buffers.insert(name, gpu.upload(name, values)?);
+            tables.put(name, values);
         }
-        Ok(())
     }
 
     /// Factor on the stiffness and its derivatives, `[1 + rows][B][steps + 1]`, at the start and at the instant that each step's forces
