@@ -6,6 +6,7 @@
 
 pub mod bench;
 pub mod coverage;
+pub mod dawn;
 pub mod paper;
 pub mod real;
 pub mod rows;

@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, coverage, paper, real, same, suite, table, test, tidy, verify};
+use studies::{bench, coverage, dawn, paper, real, same, suite, table, test, tidy, verify};
 
 /// Counts what the benchmarks allocate.
 #[global_allocator]
@@ -148,7 +148,7 @@ enum Verb {
     },
     /// Run the tests, installing Mesa's software graphics adapter first where there is none and it may be installed
     Test {
-        /// Also the slow ones: whole recoveries and cases of the suite
+        /// Also the slow ones: whole recoveries, cases of the suite, and unit tests with debug assertions and overflow checks
         #[arg(long)]
         full: bool,
         /// Only those of this package
@@ -165,6 +165,14 @@ enum Verb {
         /// Install Mesa's software adapter where there is none and it may be installed
         #[arg(long)]
         install: bool,
+    },
+    /// Ask Dawn, the WebGPU of Chromium, whether its compiler takes every kernel, and compare a step that it computes with the CPU's
+    ///
+    /// Needs Node.js with npm. Where Dawn does not take the system's Vulkan driver, a newer Mesa is fetched on Debian into target/dawn.
+    Dawn {
+        /// Only the compiler
+        #[arg(long)]
+        compile: bool,
     },
     /// Check rooms, imports, sizes of files
     Tidy,
@@ -224,6 +232,7 @@ fn run(verb: Verb) -> Result<(), String> {
             test::run(&table::root(), &test::Options { full, packages, names, checked })?;
         }
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
+        Verb::Dawn { compile } => dawn::run(dawn::Options { compile })?,
         Verb::Tidy => {
             let found = tidy::check(&table::root());
             found.iter().for_each(|f| println!("{f}"));
