@@ -37,9 +37,12 @@ enum Verb {
         /// With --gpu: leave out what would take longer than this [s], which on software adapters large bodies in batches do
         #[arg(long, requires = "gpu", value_name = "SECONDS", default_value_t = 180.0)]
         patience: f64,
-        /// Only bodies whose name begins so, e.g. dragon or "ball 30k"; nothing is written
+        /// Only bodies whose name begins so, e.g. dragon or "ball 30k"; nothing is written unless --save asks for it
         #[arg(long, value_name = "NAME")]
         only: Option<String>,
+        /// With --only: write what was measured to bench/
+        #[arg(long, requires = "only", conflicts_with = "gpu")]
+        save: bool,
         /// The GPU backend beside the CPU's, in batches, with times per pass
         #[arg(long)]
         gpu: bool,
@@ -204,7 +207,14 @@ fn run(verb: Verb) -> Result<(), String> {
                 println!("\nwritten to {}", table::save(&name, &report)?.display());
             }
         }
-        Verb::Bench { quick, only: Some(name), .. } => bench::all(quick, &name)?.print(),
+        Verb::Bench { quick, only: Some(name), save, .. } => {
+            let report = bench::all(quick, &name)?;
+            report.print();
+            if save {
+                let name = format!("bench-{}-{}", name.replace(' ', "-"), report.date);
+                println!("\nwritten to {}", table::save(&name, &report)?.display());
+            }
+        }
         Verb::Bench { quick, only: None, .. } => {
             let report = bench::all(quick, "")?;
             report.print();

@@ -45,7 +45,15 @@ pub enum Measured {
 
 impl Measured {
     fn paths(self) -> Vec<&'static str> {
-        const NEITHER: [&str; 4] = ["crates", ":!crates/palpate-gpu", ":!crates/palpate/src/report", ":!crates/*/src/tests"];
+        // Tests move no figure either: folders of them, and files whose name ends so.
+        const NEITHER: [&str; 6] = [
+            "crates",
+            ":!crates/palpate-gpu",
+            ":!crates/palpate/src/report",
+            ":!crates/*/src/tests",
+            ":!crates/*/tests/*",
+            ":!crates/*tests.rs",
+        ];
         let more: &[&str] = match self {
             Measured::Fits => &[":!crates/palpate-diagnose", ":!crates/palpate/src/diagnosing"],
             Measured::Diagnoses => &[],

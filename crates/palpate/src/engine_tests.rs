@@ -90,7 +90,7 @@ fn a_lost_device_is_opened_anew() {
     assert!(failure.to_string().contains("lost") && failure.to_string().contains("--backend cpu"), "{failure}");
     // Where one simulation runs there is no batch that could be smaller.
     let both = two.evaluate(&theta, &Request::default()).remove(0).failure.unwrap_or_else(|| panic!("the device is gone"));
-    assert!(!failure.to_string().contains("batch") && both.to_string().contains("--batch N"), "{failure} {both}");
+    assert!(!failure.to_string().contains("--batch") && both.to_string().contains("--batch N"), "{failure} {both}");
     // Whoever had the old device keeps its failure; the next one computes, and the same.
     let mut new = Backend::Gpu.evaluator(plan, 1).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(new.evaluate(&theta, &Request::default()), well);

@@ -292,8 +292,8 @@ impl Drop for Running {
 fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
     let folder = watched();
     let path = |name: &str| folder.path().join(name);
-    // Short evaluations, but minutes of them.
-    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"rprop\"\nstarts = 2000\niterations = 50\n\
+    // Short evaluations, a round of them in seconds, and minutes of rounds.
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\noptimizer = \"rprop\"\nstarts = 200\niterations = 50\n\
                [[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1.0e4, 4.0e4]\n";
     fs::write(path("fit.toml"), BLOCK.to_string() + fit).expect("writable");
     let journal = || fs::read_to_string(path("out/journal.jsonl")).unwrap_or_default();
