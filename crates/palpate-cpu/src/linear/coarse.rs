@@ -10,21 +10,14 @@ use super::jacobi::BlockJacobi;
 use super::matrix::Matrix;
 use glam::{DMat3, DVec3};
 use palpate_model::space::body::Body;
+use palpate_model::space::groups::Groups;
 use palpate_model::space::pattern::{BlockRows, Pattern};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
-/// A group of fewer nodes joins a neighbour: it may have no rotation of its own.
-const SMALLEST_GROUP: usize = 8;
-
-/// Groups of nodes; depends on the geometry only.
+/// Groups of nodes and the pattern of their matrix; depends on the geometry only.
 #[derive(Debug)]
 pub struct Coarsening {
-    group_of: Vec<u32>,
-    // Nodes of each group, and the centre and size that its rotation is measured with.
-    groups: Vec<Vec<u32>>,
-    centers: Vec<DVec3>,
-    size: f64,
+    groups: Groups,
     // Two 3 × 3 block rows per group: translation and rotation.
     blocks: BlockRows,
     analysis: Analysis,
@@ -33,52 +26,12 @@ pub struct Coarsening {
 impl Coarsening {
     /// Groups the nodes of a body into cubes of `across` nodes.
     pub fn new(body: &Body, pattern: &Pattern, across: i64) -> Result<Coarsening, String> {
-        let n = body.nodes.len();
-        let h = body.length;
-        let mut cubes: BTreeMap<[i64; 3], u32> = BTreeMap::new();
-        let mut group_of: Vec<u32> = body
-            .nodes
-            .iter()
-            .map(|x| {
-                let cube = (*x / h).round().as_i64vec3().to_array().map(|c| c.div_euclid(across));
-                let next = cubes.len() as u32;
-                *cubes.entry(cube).or_insert(next)
-            })
-            .collect();
-        let mut sizes = vec![0usize; cubes.len()];
-        group_of.iter().for_each(|&g| sizes[g as usize] += 1);
-        // Small groups, in order, join the biggest group that they touch.
-        for g in 0..sizes.len() as u32 {
-            if sizes[g as usize] >= SMALLEST_GROUP {
-                continue;
-            }
-            let touching = (0..n).filter(|&i| group_of[i] == g).flat_map(|i| {
-                pattern.blocks.columns[pattern.blocks.rows[i]..pattern.blocks.rows[i + 1]].iter().map(|&j| group_of[j as usize])
-            });
-            let best = touching.filter(|&o| o != g).max_by_key(|&o| (sizes[o as usize], std::cmp::Reverse(o)));
-            if let Some(o) = best {
-                group_of.iter_mut().filter(|x| **x == g).for_each(|x| *x = o);
-                sizes[o as usize] += sizes[g as usize];
-                sizes[g as usize] = 0;
-            }
-        }
-        let mut number = vec![u32::MAX; sizes.len()];
-        let mut groups: Vec<Vec<u32>> = Vec::new();
-        for (i, g) in group_of.iter_mut().enumerate() {
-            let slot = &mut number[*g as usize];
-            if *slot == u32::MAX {
-                *slot = groups.len() as u32;
-                groups.push(Vec::new());
-            }
-            *g = *slot;
-            groups[*slot as usize].push(i as u32);
-        }
-        let centers = groups.iter().map(|g| g.iter().map(|&i| body.nodes[i as usize]).sum::<DVec3>() / g.len() as f64).collect();
+        let groups = Groups::new(body, &pattern.blocks, across);
         let mut neighbours = vec![Vec::new(); 2 * groups.len()];
-        for i in 0..n {
-            let a = group_of[i];
+        for i in 0..body.nodes.len() {
+            let a = groups.of_node[i];
             for &j in &pattern.blocks.columns[pattern.blocks.rows[i]..pattern.blocks.rows[i + 1]] {
-                let b = group_of[j as usize];
+                let b = groups.of_node[j as usize];
                 for part in 0..2 {
                     neighbours[(2 * a + part) as usize].extend([2 * b, 2 * b + 1]);
                 }
@@ -94,20 +47,14 @@ impl Coarsening {
         }
         let blocks = BlockRows::new(neighbours);
         let analysis = Analysis::new(&blocks)?;
-        Ok(Coarsening { group_of, groups, centers, size: across as f64 * h, blocks, analysis })
-    }
-
-    /// Arm of node i from its group's centre at displacement u, in units of the group's size.
-    fn arms(&self, body: &Body, u: &[DVec3]) -> Vec<DVec3> {
-        let center = |g: &Vec<u32>| g.iter().map(|&i| u[i as usize]).sum::<DVec3>() / g.len() as f64;
-        let moved: Vec<DVec3> = self.groups.iter().zip(&self.centers).map(|(g, c)| *c + center(g)).collect();
-        (0..u.len()).map(|i| (body.nodes[i] + u[i] - moved[self.group_of[i] as usize]) / self.size).collect()
+        Ok(Coarsening { groups, blocks, analysis })
     }
 
     /// The groups' 6 × 6 blocks QᵀAQ, Q = [I, −[arm]×] per node.
     fn project(&self, rows: &BlockRows, matrix: &Matrix, arms: &[DVec3]) -> Matrix {
         let strips: Vec<Vec<DMat3>> = self
             .groups
+            .nodes
             .par_iter()
             .enumerate()
             .map(|(g, nodes)| {
@@ -122,8 +69,9 @@ impl Coarsening {
                         let j = rows.columns[k];
                         let a = matrix.values[k];
                         let b = a * -cross(arms[j as usize]);
-                        let at =
-                            columns.binary_search(&(2 * self.group_of[j as usize])).expect("groups of neighbours are neighbours");
+                        let at = columns
+                            .binary_search(&(2 * self.groups.of_node[j as usize]))
+                            .expect("groups of neighbours are neighbours");
                         strip[at] += a;
                         strip[at + 1] += b;
                         strip[length + at] += left * a;
@@ -138,7 +86,7 @@ impl Coarsening {
 
     /// The second level for a matrix at displacement u.
     pub fn level(&self, body: &Body, rows: &BlockRows, matrix: &Matrix, u: &[DVec3]) -> Result<Level, String> {
-        let arms = self.arms(body, u);
+        let arms = self.groups.arms(body, u);
         let factor = self.analysis.factor(&self.project(rows, matrix, &arms))?;
         Ok(Level { arms, factor })
     }
@@ -169,7 +117,7 @@ impl TwoLevel<'_> {
     /// Translation and rotation of every group that the coarse solve answers with.
     fn coarse(&self, r: &[DVec3]) -> Vec<DVec3> {
         let mut out = vec![DVec3::ZERO; 2 * self.coarsening.groups.len()];
-        for (g, nodes) in self.coarsening.groups.iter().enumerate() {
+        for (g, nodes) in self.coarsening.groups.nodes.iter().enumerate() {
             for &i in nodes {
                 out[2 * g] += r[i as usize];
                 out[2 * g + 1] += self.level.arms[i as usize].cross(r[i as usize]);
@@ -185,7 +133,7 @@ impl Precondition for TwoLevel<'_> {
         let c = self.coarsening;
         let ((), coarse) = rayon::join(|| self.jacobi.apply(r, z), || self.coarse(r));
         for (i, z) in z.iter_mut().enumerate() {
-            let g = c.group_of[i] as usize;
+            let g = c.groups.of_node[i] as usize;
             *z += coarse[2 * g] + coarse[2 * g + 1].cross(self.level.arms[i]);
         }
     }

@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod carrier;
+pub mod groups;
 pub mod kept_volume;
 pub mod neighbours;
 pub mod pattern;
