@@ -78,8 +78,20 @@ fn main() {
 }
 
 /// Shared files whose whole numbers Rust uses as well.
-const NUMBERED: [&str; 11] =
-    ["asks", "directions", "elastic_asks", "laws", "points", "pulls", "rates", "reduce", "roster", "solving", "structs"];
+const NUMBERED: [&str; 12] = [
+    "asks",
+    "directions",
+    "efforts",
+    "elastic_asks",
+    "laws",
+    "points",
+    "pulls",
+    "rates",
+    "reduce",
+    "roster",
+    "solving",
+    "structs",
+];
 
 /// Whole numbers by file and name, as naga computed them.
 type Numbers = BTreeMap<(String, String), u32>;

@@ -1,11 +1,9 @@
 //! Prepares conjugate gradients for a derivative: A x = rhs with the exact tangent at a converged state, as column call.extra of
 //! every member. What goes wrong with a column is kept for end_exact.
 // use shared/grid
-// use shared/totals
-// use shared/precondition
 // use shared/iteration
+// use shared/coarse_alone
 // use shared/first_cg
-// use shared/solving
 // use shared/held
 
 var<storage, read> rhs: array<vec4<f32>>;
@@ -22,7 +20,7 @@ override held_stiffness: f32;
 @compute @workgroup_size(256)
 fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, 0u, 1u, 1u);
+    let p = find_share(group, groups, 1u, 1u);
     if !p.runs {
         return;
     }
@@ -32,16 +30,15 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let a = at_node(system, i);
         let r = rhs[at_node(p.member, i)].xyz;
         let z = scaled(at_node(p.member, i), r);
-        solving[a] = vec4(0.0);
-        solving[solving_part(REST) + a] = vec4(r, 0.0);
-        solving[solving_part(ALONG_WAY) + a] = vec4(z, 0.0);
+        begin_at(a, r);
         state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
         if shape.held != 0u {
             state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(p.member, i));
         }
     }
     let s = total(local, state);
-    first_cg(local, system, s.x);
+    first_cg(local, system);
+    restrict_alone(local, system, p.member);
     var measured = s.x;
     if shape.held != 0u {
         // What stiff springs bear is settled at once. It counts by the load that it becomes on the rest of the body.
@@ -53,14 +50,15 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     var n = newton[system];
     n.rz = s.x;
     n.norm = sqrt(max(s.x, 0.0));
-    n.goal = FINEST * sqrt(max(measured, 0.0));
+    n.goal = 0.0;
+    n.forcing = FINEST * sqrt(max(measured, 0.0) / max(s.x, 1e-37));
     n.cg = 0u;
     n.stage = select(IDLE, WANTS_SOLVE, n.norm > 0.0);
     var broken = WELL;
     if s.y > 0.0 {
         broken = INDEFINITE;
     }
-    if !(n.norm <= 3e38) {
+    if !is_finite(s.x) {
         broken = NOT_FINITE;
     }
     if broken != WELL {

@@ -1,11 +1,9 @@
 //! Decides, for each member with a fresh matrix, whether its Newton solve is done, and prepares conjugate gradients otherwise.
 //! The residual is measured with the inverse diagonal blocks, against the sizes of the forces that it is the sum of.
 // use shared/mix
-// use shared/totals
-// use shared/precondition
 // use shared/iteration
+// use shared/coarse_alone
 // use shared/first_cg
-// use shared/solving
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
@@ -13,10 +11,19 @@ var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
 
+var<workgroup> common_newton: Newton;
+
+fn newton_of(local: u32, member: u32) -> Newton {
+    if local == 0u {
+        common_newton = newton[member];
+    }
+    return workgroupUniformLoad(&common_newton);
+}
+
 @compute @workgroup_size(256)
 fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, 0u, 1u, 1u);
+    let p = find_share(group, groups, 1u, 1u);
     if !p.runs {
         return;
     }
@@ -41,8 +48,7 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     let f = sqrt(max(total(local, forces), vec4(0.0)));
     let s = total(local, state);
-    var n = newton[p.member];
-    workgroupBarrier();
+    var n = newton_of(local, p.member);
     var broken = 0u;
     if s.y > 0.0 {
         broken = INDEFINITE;
@@ -56,14 +62,14 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         }
     }
     n.norm = sqrt(max(s.x, 0.0));
-    if !(n.norm <= 3e38) {
+    if !is_finite(s.x) {
         broken = NOT_FINITE;
     }
     if n.iteration == 0u {
         n.scale = f.x + f.y + f.z + f.w;
     }
-    // Rounding: differences of displacements across an element carry a few 6e-8 of its size; their errors add like a random walk.
-    n.floor = 2.4e-7 * shape.element_size * sqrt(s.z / 3.0);
+    // Rounding: differences of displacements across an element carry 6e-8 of its size or less; their errors add like a random walk.
+    n.floor = 4e-8 * shape.element_size * sqrt(s.z / 3.0);
     if broken == 0u && n.iteration >= shape.iterations {
         broken = STALLED;
     }
@@ -75,7 +81,8 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         }
         return;
     }
-    if n.norm <= max(shape.tolerance * n.scale, n.floor) {
+    // Later ones are judged with their trials.
+    if n.iteration == 0u && n.norm <= max(shape.tolerance * n.scale, n.floor) {
         n.stage = IDLE;
         if local == 0u {
             newton[p.member] = n;
@@ -90,12 +97,9 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if local == 0u {
         newton[p.member] = n;
     }
-    first_cg(local, p.member, n.rz);
     for (var i = local; i < shape.nodes; i += 256u) {
-        let a = at_node(p.member, i);
-        let r = -residual[a].xyz;
-        solving[a] = vec4(0.0);
-        solving[solving_part(REST) + a] = vec4(r, 0.0);
-        solving[solving_part(ALONG_WAY) + a] = vec4(scaled(a, r), 0.0);
+        begin_at(at_node(p.member, i), -residual[at_node(p.member, i)].xyz);
     }
+    first_cg(local, p.member);
+    restrict_alone(local, p.member, p.member);
 }

@@ -1,5 +1,6 @@
 //! Refuses members whose parameters make no sense, before anything is computed. call.extra: 1 = a static start, which needs a clamp.
 // use shared/structs
+// use shared/finite
 
 var<uniform> shape: Shape;
 var<batch> members: array<Member>;
@@ -12,8 +13,7 @@ fn check_members(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let m = members[id.x];
     var broken = WELL;
-    // False for NaN as well.
-    if !(m.young > 0.0 && m.density > 0.0) {
+    if m.young <= 0.0 || m.density <= 0.0 || !is_finite(m.young) || !is_finite(m.density) {
         broken = BAD_PARAMETER;
     } else if call.extra == 1u && shape.clamps == 0u {
         broken = NO_CLAMP;

@@ -1,6 +1,7 @@
 //! Looks at every member's new state once per step: all numbers, still in the world, solve finished? call.extra: 1 = it was given less than it is allowed.
 // use shared/grid
 // use shared/totals
+// use shared/finite
 
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> newton: array<Newton>;
@@ -21,8 +22,7 @@ fn check_state(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let a = at_node(p.member, i);
         let u = next[a].xyz + next[part(1u) + a].xyz;
         let v = next[part(2u) + a].xyz;
-        // False for NaN as well.
-        if !(dot(u, u) <= 3e38 && dot(v, v) <= 3e38) {
+        if !(is_finite(dot(u, u)) && is_finite(dot(v, v))) {
             bad.x += 1.0;
         } else {
             far = max(far, length(u));

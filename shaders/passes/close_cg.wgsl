@@ -15,11 +15,13 @@ fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     }
     var n = newton_of(local, p.member);
     let s = scalars_of(local, scalars_at(p.member) + 1u);
-    let bad = scalars_of(local, scalars_at(p.member) + 3u).x;
-    let rz = sum_parts(local, p.member, 1u, WIDE);
-    let negative = s.z == 2.0 || (s.z == 0.0 && bad != 0.0);
-    let ended = !negative && (s.z == 1.0 || !(sqrt(max(rz, 0.0)) > n.goal) || s.y >= f32(shape.most));
+    let update = scalars_of(local, scalars_at(p.member) + 3u);
+    let rz = sum_parts(local, rests_at(p.member), shape.groups);
+    let negative = s.z == 2.0 || (s.z == 0.0 && update.x != 0.0);
+    let ended = !negative && (s.z == 1.0 || is_small(rz, s.w, n) || s.y >= f32(shape.most));
+    // A solve that had ended before the last iteration left its sum with the update before.
+    let along_rhs = max(update.y, scalars_of(local, scalars_at(p.member) + 2u).y);
     n.rz = rz;
     n.cg = u32(s.y);
-    leave_cg(local, p.member, n, negative, ended, call.extra == FOR_DERIVATIVE);
+    leave_cg(local, p.member, n, s.w, along_rhs, negative, ended, call.extra == FOR_DERIVATIVE);
 }

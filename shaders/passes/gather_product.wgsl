@@ -16,9 +16,15 @@ var<storage, read_write> solving: array<vec4<f32>>;
 fn gather_product(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                   @builtin(local_invocation_index) local: u32) {
     let share = find_share(group, groups, shape.nodes, WIDE);
-    if !share.runs || scalars_of(local, scalars_at(share.member) + parity()).z != 0.0 {
+    if !share.runs {
         return;
     }
+    let s = scalars_of(local, scalars_at(share.member) + parity());
+    if s.z != 0.0 {
+        return;
+    }
+    let before = scalars_of(local, scalars_at(share.member) + 1u - parity());
+    set_way(parity(), way_factor_of(s, before));
     let p = place_in(share, local, shape.nodes);
     let m = members[p.member];
     let mix = mix_of(m);
@@ -35,11 +41,13 @@ fn gather_product(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
                 q += (scale * ghosts[k]) * along_way(at_node(p.member, columns[k]));
             }
         }
+        let way = along_way(a);
+        solving[way_now() + a] = vec4(way, 0.0);
         solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
-        curvature.x = dot(along_way(a), q);
+        curvature.x = dot(way, q);
     }
     let bend = total(local, curvature).x;
     if local == 0u {
-        cg_sums[parts_at(p.member, 0u) + p.item / WIDE] = vec4(bend, 0.0, 0.0, 0.0);
+        cg_sums[bends_at(p.member) + share.first / WIDE] = vec4(bend, 0.0, 0.0, 0.0);
     }
 }

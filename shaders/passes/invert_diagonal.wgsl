@@ -2,6 +2,7 @@
 //! Two vectors per node: (xx, xy, xz, yy), (yz, zz, trace without inertia, 1 if not positive definite).
 // use shared/mix
 // use shared/inertia
+// use shared/finite
 
 var<storage, read> values: array<f32>;
 var<body> diagonals: array<u32>;
@@ -43,8 +44,7 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let cz = xy * yz - xz * yy;
     let det = xx * cx + xy * cy + xz * cz;
     let a = 2u * at_node(p.member, p.item);
-    // Comparisons with a NaN are false: it counts as not positive.
-    if unit > 0.0 && xx > 0.0 && xx * yy - xy * xy > 0.0 && det > 0.0 {
+    if is_finite(det) && is_finite(unit) && unit > 0.0 && xx > 0.0 && xx * yy - xy * xy > 0.0 && det > 0.0 {
         let s = 1.0 / (det * unit);
         inverses[a] = vec4(cx, cy, cz, xx * zz - xz * xz) * s;
         inverses[a + 1u] = vec4((xy * xz - xx * yz) * s, (xx * yy - xy * xy) * s, trace, 0.0);

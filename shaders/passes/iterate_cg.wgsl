@@ -3,9 +3,9 @@
 //! FOR_DERIVATIVE.
 // use shared/asks
 // use shared/mix
+// use shared/iteration
 // use shared/product
-// use shared/totals
-// use shared/precondition
+// use shared/precondition_alone
 // use shared/leave_cg
 
 var<body> block_rows: array<u32>;
@@ -26,17 +26,33 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let rest = solving_part(REST);
-    let way = solving_part(ALONG_WAY);
     let image = solving_part(IMAGE);
-    var ended = false;
+    // Between chunks: rᵀ M⁻¹ r of the right-hand side, β of the next iteration, and xᵀ times the right-hand side.
+    let kept = scalars_of(local, scalars_at(p.member));
+    var of_rhs = kept.x;
+    var beta = kept.y;
+    var along_rhs = kept.z;
+    if n.cg == 0u {
+        n.rz = precondition_alone(local, p.member, p.home);
+        of_rhs = n.rz;
+        beta = 0.0;
+        along_rhs = 0.0;
+    }
+    var ended = is_small(n.rz, of_rhs, n);
     var negative = false;
     for (var iteration = 0u; iteration < shape.chunk; iteration++) {
+        if ended {
+            break;
+        }
         storageBarrier();
+        set_way(n.cg & 1u, beta);
         var curvature = vec4(0.0);
         for (var i = local; i < shape.nodes; i += 256u) {
+            let a = at_node(p.member, i);
+            let way = along_way(a);
             var q = vec3(0.0);
             if !has_mass_matrix() {
-                q = (mix.inertia * node_mass(m, p.home, i)) * along_way(at_node(p.member, i));
+                q = (mix.inertia * node_mass(m, p.home, i)) * way;
             }
             for (var k = block_rows[i]; k < block_rows[i + 1u]; k++) {
                 let x = along_way(at_node(p.member, columns[k]));
@@ -51,36 +67,31 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
                 }
             }
             q = with_masses(q, mix.inertia, p.member, p.home, i);
-            let a = at_node(p.member, i);
+            solving[way_now() + a] = vec4(way, 0.0);
             solving[image + a] = vec4(q, 0.0);
-            curvature.x += dot(solving[way + a].xyz, q);
+            curvature.x += dot(way, q);
         }
         let bend = total(local, curvature).x;
         n.cg += 1u;
-        if !(bend > 0.0) {
+        if bend <= 0.0 || !is_finite(bend) {
             negative = true;
             break;
         }
         let alpha = n.rz / bend;
-        var left = vec4(0.0);
+        along_rhs += alpha * n.rz;
         for (var i = local; i < shape.nodes; i += 256u) {
             let a = at_node(p.member, i);
-            solving[a] += alpha * solving[way + a];
-            let r = solving[rest + a].xyz - alpha * solving[image + a].xyz;
-            solving[rest + a] = vec4(r, 0.0);
-            left.x += dot(r, scaled(at_node(p.home, i), r));
+            solving[a] += alpha * solving[way_now() + a];
+            solving[rest + a] = vec4(solving[rest + a].xyz - alpha * solving[image + a].xyz, 0.0);
         }
-        let rz = total(local, left).x;
-        let beta = rz / n.rz;
+        restrict_alone(local, p.member, p.home);
+        let rz = precondition_alone(local, p.member, p.home);
+        beta = rz / n.rz;
         n.rz = rz;
-        if !(sqrt(max(rz, 0.0)) > n.goal) || n.cg >= shape.most {
-            ended = true;
-            break;
-        }
-        for (var i = local; i < shape.nodes; i += 256u) {
-            let a = at_node(p.member, i);
-            solving[way + a] = vec4(scaled(at_node(p.home, i), solving[rest + a].xyz), 0.0) + beta * solving[way + a];
-        }
+        ended = is_small(rz, of_rhs, n) || n.cg >= shape.most;
     }
-    leave_cg(local, p.member, n, negative, ended, call.extra == FOR_DERIVATIVE);
+    if local == 0u {
+        cg_sums[scalars_at(p.member)] = vec4(of_rhs, beta, along_rhs, 0.0);
+    }
+    leave_cg(local, p.member, n, of_rhs, along_rhs, negative, ended, call.extra == FOR_DERIVATIVE);
 }

@@ -1,11 +1,13 @@
 //! Judges a trial of the line search: takes it where it halves the residual or lowers the potential enough (Armijo 1966), else
 //! halves the step. A full step at whose end the potential still falls steeply is doubled as long as that lowers the potential: directions that
 //! conjugate gradients cut short at a negative curvature are far too short. A taken trial becomes the new increment. A trial where the material does not exist is never taken: the step is halved, and
-//! of a guess half the way from the old state that is left.
+//! of a guess half the way from the old state that is left. call.extra: the round of Newton's method.
 // use shared/mix
 // use shared/hyper
 // use shared/totals
+// use shared/finite
 // use shared/precondition
+// use shared/efforts
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
@@ -17,6 +19,8 @@ var<storage, read_write> newton: array<Newton>;
 
 // A step shorter than this is taken whatever it brings.
 const MOST_TRIALS = 12u;
+// Accuracy of a direction far from the solution.
+const COARSEST = 0.1;
 // Part of the slope at the beginning of a step that is left at its end where the step is too short: a direction that is right leaves none, one
 // from a solve that is as coarse as it may be a tenth.
 const STEEP = 0.5;
@@ -38,6 +42,13 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     var n = newton[p.member];
     workgroupBarrier();
     let first = n.length == 0.0;
+    if local == 0u && call.mode != 0u {
+        log_effort(call.step, ROUNDS_AT, call.extra + 1u);
+        // The trial that a solve has just made ready: so much it took.
+        if n.length == 1.0 && n.trial == 0u && call.extra <= MOST_ROUNDS {
+            log_effort(call.step, SOLVES_AT + call.extra - 1u, n.cg);
+        }
+    }
     var state = vec4(0.0);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
@@ -67,13 +78,16 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             taken = select(falls, taken, n.length == 1.0);
             farther = falls && s.w < STEEP * n.slope && n.length < FARTHEST;
         }
-        if !(s.x <= 3e38 && abs(s.y) <= 3e38) {
+        if !(is_finite(s.x) && is_finite(s.y)) {
             taken = n.trial >= MOST_TRIALS;
             farther = false;
         }
     }
-    taken = taken && !outside;
-    farther = farther && !outside;
+    // A full step that no longer halves a residual this small has met rounding: potentials tell nothing there.
+    let goal = max(shape.tolerance * n.scale, n.floor);
+    let stuck = !first && n.length == 1.0 && n.trial == 0u && after > 0.5 * n.norm && max(after, n.norm) <= 20.0 * goal;
+    taken = (taken || stuck) && !outside;
+    farther = farther && !outside && !stuck;
     if farther {
         // What was reached is what the next trial is compared with.
         n.potential = s.y;
@@ -93,11 +107,11 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             n.convex = 0u;
             let ratio = after / n.norm;
             // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
-            n.forcing = clamp(0.9 * ratio * ratio, 1e-3, 0.1);
-            let goal = max(shape.tolerance * n.scale, n.floor);
-            // A full step that no longer halves a residual this small has met rounding.
-            let stuck = n.length == 1.0 && after > 0.5 * n.norm && after <= 20.0 * goal;
-            if after <= goal || stuck {
+            n.forcing = clamp(0.9 * ratio * ratio, 1e-3, COARSEST);
+            // What a residual means is its energy, rᵀ A⁻¹ r. Of the residual before, the step tells it: minus the slope. Smooth residuals have many
+            // times what block-Jacobi sees of them. That of a small rest is taken to be as smooth.
+            let smoothness = max(sqrt(max(-n.slope, 0.0)) / n.norm, 1.0);
+            if smoothness * after <= goal || stuck {
                 n.stage = IDLE;
             }
             n.norm = after;

@@ -1,16 +1,15 @@
-//! Elastic part of q = A p without a matrix: every cell applies R (s K + …) Rᵀ of its class (see tangent_cells), its clamps and its
+//! First of an iteration where q = A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class (see tangent_cells), its clamps and its
 //! patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents
 // use shared/patches
-// use shared/asks
-// use shared/solving
+// use shared/totals_64
+// use shared/turn
 
 var<storage, read> supports: array<vec4<f32>>;
 var<body> holds: array<vec2<u32>>;
 var<matrices> hold_elements: array<f32>;
 var<batch> poses: array<ClampPose>;
-var<storage, read> cg_sums: array<vec4<f32>>;
 var<storage, read> solving: array<vec4<f32>>;
 var<storage, read_write> cell_force: array<vec4<f32>>;
 
@@ -28,7 +27,10 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
                   @builtin(local_invocation_index) local: u32) {
     lanes_start(local);
     let share = find_share(group, groups, shape.cells, 8u);
-    if !share.runs || cg_sums[scalars_at(share.member) + (call.extra & ODD)].z != 0.0 {
+    if !share.runs {
+        return;
+    }
+    if turn_cg(local, share.member, share.first == 0u).z != 0.0 {
         return;
     }
     let p = place_in(share, local / 8u, shape.cells);

@@ -1,7 +1,8 @@
-//! q = A p with the assembled matrix, eight lanes a row so that neighbouring lanes read neighbouring blocks; and parts of pᵀ q.
+//! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, p = z + β p and q = A p with the assembled matrix,
+//! eight lanes a row so that neighbouring lanes read neighbouring blocks; and parts of pᵀ q.
 // use shared/mix
 // use shared/totals
-// use shared/iteration
+// use shared/turn
 // use shared/product
 
 var<body> block_rows: array<u32>;
@@ -13,7 +14,10 @@ var<storage, read_write> solving: array<vec4<f32>>;
 fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
     let share = find_share(group, groups, shape.nodes, NARROW);
-    if !share.runs || scalars_of(local, scalars_at(share.member) + parity()).z != 0.0 {
+    if !share.runs {
+        return;
+    }
+    if turn_cg(local, share.member, share.first == 0u).z != 0.0 {
         return;
     }
     let p = place_in(share, local / 8u, shape.nodes);
@@ -44,11 +48,13 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             q += shares[local + i].xyz;
         }
         let a = at_node(p.member, p.item);
+        let way = along_way(a);
+        solving[way_now() + a] = vec4(way, 0.0);
         solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
-        curvature.x = dot(along_way(a), q);
+        curvature.x = dot(way, q);
     }
     let bend = total(local, curvature).x;
     if local == 0u {
-        cg_sums[parts_at(p.member, 0u) + p.item / NARROW] = vec4(bend, 0.0, 0.0, 0.0);
+        cg_sums[bends_at(p.member) + share.first / NARROW] = vec4(bend, 0.0, 0.0, 0.0);
     }
 }

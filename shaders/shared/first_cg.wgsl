@@ -1,12 +1,15 @@
-//! Before the first iteration of conjugate gradients by many workgroups: no iteration came before, and one part holds the whole
-//! of rᵀ M⁻¹ r.
+//! Before the first iteration of conjugate gradients.
 
-fn first_cg(local: u32, member: u32, rz: f32) {
+// The residual of a solve from zero, and no way that came before.
+fn begin_at(a: u32, rhs: vec3<f32>) {
+    solving[a] = vec4(0.0);
+    solving[solving_part(REST) + a] = vec4(rhs, 0.0);
+    solving[solving_part(ODD_WAY) + a] = vec4(0.0);
+}
+
+// No iteration came before.
+fn first_cg(local: u32, system: u32) {
     if local < 4u {
-        cg_sums[scalars_at(member) + local] = vec4(0.0);
-    }
-    let start = parts_at(member, 1u);
-    for (var i = local; i < groups_of_nodes(WIDE); i += 256u) {
-        cg_sums[start + i] = vec4(select(0.0, rz, i == 0u), 0.0, 0.0, 0.0);
+        cg_sums[scalars_at(system) + local] = vec4(0.0);
     }
 }

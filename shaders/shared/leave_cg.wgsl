@@ -2,7 +2,6 @@
 //! curvature that is not positive cuts a Newton direction short: what was gathered by then leads down (Dembo & Steihaug, Math.
 //! Program. 26, 1983). Where that is nothing the convex tangent is asked for.
 
-var<storage, read> residual: array<vec4<f32>>;
 var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
@@ -20,10 +19,13 @@ fn newton_of(local: u32, member: u32) -> Newton {
 // What rounding may leave of a derivative's right-hand side when the iterations run out.
 const ACCEPTABLE = 1e-4;
 
-// `exact`: the solve is for a derivative; then a negative curvature is an error, and no line search follows.
-fn leave_cg(local: u32, member: u32, found: Newton, bent: bool, over: bool, exact: bool) {
+// `of_rhs`: rᵀ M⁻¹ r of the right-hand side; `along_rhs`: xᵀ times it, which is Σ α rᵀ M⁻¹ r over the iterations. `exact`: the solve is for a derivative; then a negative curvature is an error, and no line search
+// follows.
+fn leave_cg(local: u32, member: u32, found: Newton, of_rhs: f32, along_rhs: f32, bent: bool, over: bool, exact: bool) {
     var n = found;
     var broken = 0u;
+    // Of nothing nothing is left.
+    let relative = sqrt(max(n.rz, 0.0) / max(of_rhs, 1e-37));
     let cut = bent && !exact && n.cg > 1u;
     let negative = bent && !cut;
     let ended = over || cut;
@@ -39,25 +41,20 @@ fn leave_cg(local: u32, member: u32, found: Newton, bent: bool, over: bool, exac
         n.total += n.cg;
         n.stage = select(WANTS_TRIAL, IDLE, exact);
         n.length = 1.0;
-        let relative = sqrt(max(n.rz, 0.0)) / n.norm;
         // A poor Newton direction is the line search's business.
         let enough = select(0.5, ACCEPTABLE, exact);
-        if !(relative <= enough) && !cut {
+        let poor = relative > enough && !is_small(n.rz, of_rhs, n);
+        if (poor || !is_finite(n.rz)) && !cut {
             broken = UNSOLVED;
         }
         if !exact {
-            var slope = vec4(0.0);
-            for (var i = local; i < shape.nodes; i += 256u) {
-                let a = at_node(member, i);
-                slope.x += dot(residual[a].xyz, solving[a].xyz);
-            }
-            n.slope = total(local, slope).x;
+            n.slope = -along_rhs;
         }
     }
     if local == 0u {
         if broken != 0u {
             n.stage = IDLE;
-            health[member] = Health(broken, call.step + call.mode, vec2(sqrt(max(n.rz, 0.0)) / n.norm, f32(n.cg)));
+            health[member] = Health(broken, call.step + call.mode, vec2(relative, f32(n.cg)));
         }
         newton[member] = n;
     }

@@ -4,7 +4,7 @@
 const SECTIONS = 4u;
 
 // Kinds of items: the member itself, nodes, cells, blocks, patches, clamp cells, nodes in wide workgroups, nodes with eight lanes
-// each, and elastic points. The host's `Per` has the same numbers.
+// each, elastic points, and groups of nodes. The host's `Per` has the same numbers.
 const PER_MEMBER = 0u;
 const PER_NODE = 1u;
 const PER_CELL = 2u;
@@ -14,9 +14,10 @@ const PER_HOLD = 5u;
 const PER_WIDE = 6u;
 const PER_ROW = 7u;
 const PER_ELASTIC = 8u;
-const KINDS = 9u;
+const PER_GROUP = 9u;
+const KINDS = 10u;
 
-// Nodes of a workgroup of the two kinds before the last.
+// Nodes of a workgroup of PER_WIDE and PER_ROW.
 const WIDE = 256u;
 const NARROW = 32u;
 

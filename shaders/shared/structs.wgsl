@@ -47,6 +47,10 @@ struct Shape { // mirrored
     // Elements, cells or tetrahedra, and elastic points of each tetrahedron.
     elements: u32,
     per_element: u32,
+    // Groups of nodes on the second level of the preconditioner, the stages' kind there, and the edge of groups [m].
+    groups: u32,
+    coarse_kind: u32,
+    group_size: f32,
 }
 
 struct Member { // mirrored

@@ -1,5 +1,7 @@
 //! Sums over a workgroup of 256, always in the same order.
 
+const TEAM = 256u;
+
 var<workgroup> shares: array<vec4<f32>, 256>;
 
 fn total(local: u32, v: vec4<f32>) -> vec4<f32> {

@@ -97,8 +97,14 @@ pub struct Shape {
     pub elements: u32,
     /// Elastic points of a tetrahedron; 1 where there are none.
     pub per_element: u32,
+    /// Groups of nodes on the second level of the preconditioner.
+    pub groups: u32,
+    /// Kind of the stage there: of one kind are those of the same length and weights, and the static problem.
+    pub coarse_kind: u32,
+    /// Edge of a group [m].
+    pub group_size: f32,
     /// Fills up.
-    pub pad: u32,
+    pub pad: [u32; 2],
 }
 
 /// Parameters of one member.

@@ -5,7 +5,7 @@ use crate::device::pipelines::shared::structs::FIELD_MIXES;
 use crate::device::{Arena, GpuError, Maker, whole};
 use crate::layout::{ClampPose, Member, Plane};
 use crate::world::rates;
-use crate::world::{Geometry, MANY, SOLVING_VECTORS, Sums, VECTOR, columns, tally_sizes, work};
+use crate::world::{Coarse, Geometry, MANY, SOLVING_VECTORS, Sums, VECTOR, coarse_vectors, columns, tally_sizes, work};
 use palpate_engine::{Request, Wanted};
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
@@ -87,6 +87,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     let mut buffers = HashMap::new();
     let geometry = Geometry::new(&counter, plan, members, plan.body.nodes.len() >= MANY, &mut buffers)?;
     let shape = &geometry.shape;
+    let coarse = Coarse::new(plan, &geometry);
     // A viscosity needs those at ν = 0 besides.
     let ratios = load.ratios.clamp(1, members) as u64 + u64::from(plan.layout.is_viscous());
     let matrices = |sets: u64, count: u32| sets * 2 * u64::from(count) * 576 * 4;
@@ -98,6 +99,7 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
         b * u64::from(shape.steps + 1) * u64::from(shape.clamps) * size_of::<ClampPose>() as u64,
         b * u64::from(shape.masses) * 4,
         effects.iter().map(|s| 4 * s.1 as u64).sum(),
+        8 * b * (1 + coarse.kinds() as u64),
     ];
     let of_matrices = [
         matrices(ratios, shape.classes),
@@ -107,9 +109,10 @@ pub fn memory(plan: &Plan, load: &Load) -> Result<Memory, GpuError> {
     ];
     constants
         .extend([Arena::bytes("batch_tables", of_batch.iter().sum()), Arena::bytes("matrices_tables", of_matrices.iter().sum())]);
+    constants.push(coarse.usual() as u64 * VECTOR * coarse_vectors(geometry.groups.len()) as u64);
     constants.extend(costs::memory(&counter, plan, members, q)?);
     let mut space: Vec<u64> = work(shape, members).iter().map(|w| w.1).collect();
-    space.extend(tally_sizes(b, plan.layout.len() as u64).iter().map(|t| t.1));
+    space.extend(tally_sizes(b, plan.layout.len() as u64, shape.steps.into()).iter().map(|t| t.1));
     let sums = Sums::new(plan, &geometry.effects, &request.gradient);
     space.extend(sums.iter().flat_map(|s| s.sizes(shape, &geometry.effects, b)).map(|s| s.1));
     let vectors = |count: u64| count * VECTOR * u64::from(shape.nodes) * b;

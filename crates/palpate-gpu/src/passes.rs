@@ -27,6 +27,8 @@ pub(crate) enum Per {
     /// Nodes with eight lanes each, in workgroups of 256.
     Row = roster::PER_ROW,
     Elastic = roster::PER_ELASTIC,
+    /// Groups of nodes, a workgroup each.
+    Group = roster::PER_GROUP,
 }
 
 /// One balance on the way to the device: a step, or the static problem.
@@ -57,6 +59,7 @@ impl<'a, 'r> Passes<'a, 'r> {
             ("next", &next.0.buffer),
             ("health", tally.get("health")),
             ("gradient", tally.get("gradient")),
+            ("efforts", tally.get("efforts")),
             // Products ask for a vector; unless a caller says otherwise it is the solution of the last solve.
             ("probe", &world.buffers[SOLVING]),
         ];

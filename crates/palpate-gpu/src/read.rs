@@ -74,7 +74,9 @@ pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
 
 fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> {
     let (b, p, q) = (world.members(), world.plan.layout.len(), tally.directions.len());
-    let own = [(tally.get("health"), b * size_of::<Health>()), (tally.get("gradient"), 4 * b * p)];
+    let efforts = tally.get("efforts");
+    let own =
+        [(tally.get("health"), b * size_of::<Health>()), (tally.get("gradient"), 4 * b * p), (efforts, efforts.size() as usize)];
     let observed = world.observer.results(&tally.buffers, b, q);
     let summed = summed(world, tally);
     let parts: Vec<_> = summed.iter().map(|(_, buffer, bytes)| (*buffer, *bytes)).collect();
@@ -97,6 +99,7 @@ fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> 
             }
         })
         .collect();
+    world.effort.learn(&bytemuck::pod_collect_to_vec::<u8, u32>(&own[2]));
     world.observer.add_to(observed, q, &mut all);
     if let Some(own) = &tally.sums {
         for (m, e) in all.iter_mut().enumerate().filter(|(_, e)| e.failure.is_none()) {

@@ -91,9 +91,14 @@ impl Gpu {
         self.device.generate_allocator_report().map(|r| r.total_allocated_bytes)
     }
 
-    /// Bytes of all buffers made so far, those included that are gone since.
+    /// Bytes of all buffers made so far, those included that are gone since, but for what looking at a body at rest takes in passing.
     pub fn made(&self) -> u64 {
         self.made.load(Ordering::Relaxed)
+    }
+
+    /// Counts from an earlier number on: what was made since is gone.
+    pub(crate) fn forget_made(&self, earlier: u64) {
+        self.made.store(earlier, Ordering::Relaxed);
     }
 }
 

@@ -3,6 +3,7 @@
 mod adapters;
 mod arena;
 mod buffers;
+mod count;
 mod error;
 mod gpu;
 mod open;
@@ -14,6 +15,8 @@ pub mod trace;
 pub use adapters::{AdapterReport, Choice, adapters};
 pub(crate) use arena::Arena;
 pub(crate) use buffers::{Maker, whole};
+pub(crate) use count::Counter;
+pub use count::Dispatches;
 pub use error::GpuError;
 pub use gpu::Gpu;
 pub use pipelines::Lanes;

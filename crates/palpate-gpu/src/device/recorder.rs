@@ -1,5 +1,6 @@
 //! Records dispatches: a pass by its number, buffers by their names, sizes in members and items.
 
+use super::count::{Count, Counter};
 use super::error::GpuError;
 use super::gpu::Gpu;
 use super::pipelines::{PASSES, shared::roster};
@@ -66,8 +67,9 @@ pub struct Recorder<'a> {
     timer: Option<Timer>,
     // Dispatches share a compute pass unless they are timed one by one: opening one costs as much as ten dispatches.
     open: Option<wgpu::ComputePass<'static>>,
-    // Of a device that is traced.
-    work: Vec<Work>,
+    // Of a device that is traced, and of one whose dispatches are counted.
+    work: Option<Vec<Work>>,
+    count: Option<Count<'a>>,
 }
 
 /// Bind groups that were made before, by pass and buffers.
@@ -114,7 +116,13 @@ impl<'a> Recorder<'a> {
     pub fn new(gpu: &'a Gpu, world: &'a Buffers, groups: &'a mut Groups, timed: bool) -> Recorder<'a> {
         let encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("palpate") });
         let timer = (timed && gpu.tick().is_some()).then(|| Timer { sets: Vec::new(), passes: Vec::new() });
-        Recorder { gpu, world, encoder, groups, timer, open: None, work: Vec::new() }
+        let work = gpu.is_traced().then(Vec::new);
+        Recorder { gpu, world, encoder, groups, timer, open: None, work, count: None }
+    }
+
+    /// The same, with its dispatches counted where there is a counter.
+    pub(crate) fn counted(self, counter: Option<&'a Counter>) -> Recorder<'a> {
+        Recorder { count: counter.map(Counter::begin), ..self }
     }
 
     /// Records one dispatch of `pass`. Buffers are looked up in `own` first, then in the world.
@@ -147,6 +155,18 @@ impl<'a> Recorder<'a> {
             let label = Some(source.name);
             device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout: &kernel.layout, entries: &entries })
         });
+        if let Some(count) = &mut self.count {
+            match size {
+                Size::All { members, groups } => count.add(grid(members, groups)),
+                Size::Indirect(_) | Size::Gate => {
+                    let (name, offset) = size.place();
+                    if let Some(sizes) = self.world.get(name) {
+                        self.open = None;
+                        count.add_written(&mut self.encoder, sizes, offset);
+                    }
+                }
+            }
+        }
         let timestamp_writes = self.timer.as_mut().map(|t| t.place(device, pass));
         if timestamp_writes.is_some() {
             self.open = None;
@@ -178,6 +198,7 @@ impl<'a> Recorder<'a> {
 
     /// Writes a dispatch down where the device is traced.
     fn trace(&mut self, pass: usize, buffers: &[wgpu::Buffer], call: Call, size: Size) {
+        let Some(work) = &mut self.work else { return };
         let Some(buffers) = buffers.iter().map(|b| self.gpu.traced(b)).collect::<Option<Vec<usize>>>() else { return };
         let groups = match size {
             Size::All { members, groups } => Some(trace::Groups::All(grid(members, groups))),
@@ -187,29 +208,38 @@ impl<'a> Recorder<'a> {
             }
         };
         let call = [call.step, call.mode, call.roster, call.extra];
-        self.work.extend(groups.map(|groups| Work::Dispatch { pass, buffers, call, groups }));
+        work.extend(groups.map(|groups| Work::Dispatch { pass, buffers, call, groups }));
     }
 
     /// Copies `bytes` from a place in a buffer to a place in another.
     pub fn copy_part(&mut self, [from, to]: [(&wgpu::Buffer, u64); 2], bytes: u64) {
         self.open = None;
-        let places = self.gpu.traced(from.0).zip(self.gpu.traced(to.0));
-        self.work.extend(places.map(|(a, b)| Work::Copy([(a, from.1), (b, to.1)], bytes)));
+        if let Some(work) = &mut self.work {
+            let places = self.gpu.traced(from.0).zip(self.gpu.traced(to.0));
+            work.extend(places.map(|(a, b)| Work::Copy([(a, from.1), (b, to.1)], bytes)));
+        }
         self.encoder.copy_buffer_to_buffer(from.0, from.1, to.0, to.1, bytes);
     }
 
     /// Sets a buffer to zero.
     pub fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.open = None;
-        self.work.extend(self.gpu.traced(buffer).map(Work::Clear));
+        if let Some(work) = &mut self.work {
+            work.extend(self.gpu.traced(buffer).map(Work::Clear));
+        }
         self.encoder.clear_buffer(buffer, 0, None);
     }
 
     /// Hands the work to the device, and says which it is; does not wait, unless passes are timed: then adds their times.
     pub fn submit(mut self, times: &mut HashMap<&'static str, PassTime>) -> wgpu::SubmissionIndex {
         self.open = None;
-        if !self.work.is_empty() {
-            return self.submit_traced();
+        if let Some(work) = self.work.take().filter(|w| !w.is_empty()) {
+            return self.submit_traced(work);
+        }
+        if let Some(count) = self.count.take() {
+            let submitted = self.gpu.queue.submit([self.encoder.finish()]);
+            count.end(self.gpu);
+            return submitted;
         }
         let Some(timer) = self.timer.take().filter(|t| !t.passes.is_empty()) else {
             return self.gpu.queue.submit([self.encoder.finish()]);
@@ -241,12 +271,12 @@ impl<'a> Recorder<'a> {
     }
 
     /// The same of a device that is traced: waits for it before and after.
-    fn submit_traced(self) -> wgpu::SubmissionIndex {
+    fn submit_traced(self, all: Vec<Work>) -> wgpu::SubmissionIndex {
         let mut buffers = Vec::new();
-        for work in &self.work {
+        for work in &all {
             match work {
-                Work::Dispatch { buffers: all, groups, .. } => {
-                    buffers.extend(all);
+                Work::Dispatch { buffers: own, groups, .. } => {
+                    buffers.extend(own);
                     buffers.extend(if let trace::Groups::At(sizes, _) = groups { Some(*sizes) } else { None });
                 }
                 Work::Copy([from, to], _) => buffers.extend([from.0, to.0]),
@@ -258,7 +288,7 @@ impl<'a> Recorder<'a> {
         let before = self.gpu.contents(&buffers);
         let submitted = self.gpu.queue.submit([self.encoder.finish()]);
         match before.and_then(|before| Ok((before, self.gpu.contents(&buffers)?))) {
-            Ok((before, after)) => self.gpu.add_traced(Submission { buffers, before, after, work: self.work }),
+            Ok((before, after)) => self.gpu.add_traced(Submission { buffers, before, after, work: all }),
             Err(e) => self.gpu.keep(e),
         }
         submitted

@@ -78,6 +78,11 @@ impl Gpu {
         self.trace.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
+    /// True between [`Gpu::trace`] and [`Gpu::take_trace`].
+    pub(super) fn is_traced(&self) -> bool {
+        self.trace.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
+
     /// Number of a buffer in the trace that is being made.
     pub(crate) fn traced(&self, buffer: &wgpu::Buffer) -> Option<usize> {
         Some(self.trace.lock().unwrap_or_else(PoisonError::into_inner).as_mut()?.number(buffer))

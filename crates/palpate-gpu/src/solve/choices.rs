@@ -1,21 +1,21 @@
-//! Choices that a measurement made, kept in the user's cache folder: a later process on the same device makes the same choice, and so
-//! computes the same bits. A file that cannot be read or written does no harm: then each process measures for itself.
+//! What was measured once, kept in the user's cache folder: a later process on the same device makes the same choice, and so computes the same
+//! bits. A file that cannot be read or written does no harm: then each process measures for itself.
 
 use std::io::Write as _;
 use std::path::PathBuf;
 
-/// Name of the file in the cache folder: one choice a line, name and key with a tab between; the first of a key counts.
+/// Name of the file in the cache folder: one choice a line, what was chosen and the key with a tab between; the first of a key counts.
 const FILE: &str = "palpate/choices.txt";
 
 /// Where choices are kept.
 #[derive(Clone, Debug)]
-pub(crate) struct Choices {
+pub struct Choices {
     file: Option<PathBuf>,
 }
 
 impl Choices {
     /// Those of this user.
-    pub(crate) fn of_user() -> Choices {
+    pub fn of_user() -> Choices {
         Choices { file: cache_folder(|name| std::env::var_os(name).map(PathBuf::from)).map(|f| f.join(FILE)) }
     }
 
@@ -25,19 +25,31 @@ impl Choices {
         Choices { file: Some(file) }
     }
 
-    /// Which of these names was chosen for a key.
-    pub(crate) fn get(&self, key: &str, names: [&str; 2]) -> Option<usize> {
+    /// What was written down for a key; neither holds a tab or the end of a line.
+    pub fn written(&self, key: &str) -> Option<String> {
         let text = std::fs::read_to_string(self.file.as_ref()?).ok()?;
         let line = text.lines().filter_map(|l| l.split_once('\t')).find(|l| l.1 == key)?;
-        names.iter().position(|name| *name == line.0)
+        Some(line.0.to_string())
     }
 
-    /// Keeps a choice unless there is one for the key, and returns what counts from now on: another process may have been faster.
-    pub(crate) fn keep(&self, key: &str, names: [&str; 2], chosen: usize) -> usize {
-        self.get(key, names).unwrap_or_else(|| {
-            self.append(&format!("{}\t{key}\n", names[chosen]));
-            self.get(key, names).unwrap_or(chosen)
+    /// Writes something down unless there is something for the key, and returns what counts from now on: another process may have been faster.
+    pub fn write(&self, key: &str, what: &str) -> String {
+        self.written(key).unwrap_or_else(|| {
+            self.append(&format!("{what}\t{key}\n"));
+            self.written(key).unwrap_or_else(|| what.to_string())
         })
+    }
+
+    /// Which of these names was chosen for a key.
+    pub(crate) fn get(&self, key: &str, names: [&str; 2]) -> Option<usize> {
+        let written = self.written(key)?;
+        names.iter().position(|name| *name == written)
+    }
+
+    /// Keeps a choice unless there is one for the key, and returns what counts from now on.
+    pub(crate) fn keep(&self, key: &str, names: [&str; 2], chosen: usize) -> usize {
+        let written = self.write(key, names[chosen]);
+        names.iter().position(|name| *name == written).unwrap_or(chosen)
     }
 
     fn append(&self, line: &str) {

@@ -3,12 +3,13 @@
 use super::faster;
 use crate::device::Maker as _;
 use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::structs::TANGENT_VECTORS;
 use crate::device::recorder::PassTime;
-use crate::device::{Gpu, GpuError};
+use crate::device::{Counter, Dispatches, Gpu, GpuError};
 use crate::layout::Newton;
 use crate::passes::Passes;
 use crate::world::Product;
-use crate::world::{State, Tally, VECTOR, World};
+use crate::world::{State, Tally, VECTOR, World, coarse_vectors};
 use palpate_engine::Request;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -92,6 +93,57 @@ impl World {
         all
     }
 
+    /// Counts dispatches from here on; every list of work then waits for the device.
+    ///
+    /// # Errors
+    /// No room for their sizes.
+    pub fn count_dispatches(&mut self, on: bool) -> Result<(), GpuError> {
+        self.counter = if on { Some(Counter::new(&self.gpu)?) } else { None };
+        Ok(())
+    }
+
+    /// Dispatches since [`World::count_dispatches`].
+    pub fn dispatches(&self) -> Dispatches {
+        self.counter.as_ref().map_or_else(Dispatches::default, Counter::dispatches)
+    }
+
+    /// Iterations of Newton's method and of conjugate gradients that every member took for the latest stage.
+    ///
+    /// # Errors
+    /// The device is gone.
+    pub fn iterations(&self) -> Result<Vec<[u32; 2]>, GpuError> {
+        let all: Vec<Newton> = self.gpu.download(&self.buffers["newton"], self.members())?;
+        Ok(all.iter().map(|n| [n.iteration, n.total]).collect())
+    }
+
+    /// Iterations of conjugate gradients that every member took for the latest derivative.
+    ///
+    /// # Errors
+    /// The device is gone.
+    pub fn derivative_iterations(&self) -> Result<Vec<u32>, GpuError> {
+        let all: Vec<Newton> = self.gpu.download(&self.buffers["newton"], self.members())?;
+        Ok(all.iter().map(|n| n.cg).collect())
+    }
+
+    /// What an iteration of conjugate gradients of all members moves, and a round of Newton's method without them [B]: every number once.
+    pub fn bytes_of_iteration_and_round(&self) -> [f64; 2] {
+        let s = &self.geometry.shape;
+        let [nodes, cells, blocks, patches] = [s.nodes, s.cells, s.blocks, s.patches].map(f64::from);
+        // Forces and tangents of cells, written and read again by nodes and blocks; the matrix; states, residuals, inverses and solutions.
+        let tangents = VECTOR as f64 * f64::from(TANGENT_VECTORS);
+        let of_cells = 2.0 * 16.0 * VECTOR as f64 + 2.0 * tangents + 64.0;
+        let round = cells * of_cells + 36.0 * blocks + 48.0 * 2.0 * patches + 40.0 * VECTOR as f64 * nodes;
+        [self.bytes_of_iteration(), self.members() as f64 * round]
+    }
+
+    fn bytes_of_iteration(&self) -> f64 {
+        // Ways, solutions and residuals are turned, advanced and preconditioned: 12 vectors a node beside those of the product, and the second
+        // level, which members share.
+        let shape = &self.geometry.shape;
+        let vectors = 12.0 * self.members() as f64 * f64::from(shape.nodes) + coarse_vectors(shape.groups as usize) as f64;
+        self.bytes_of(self.product) + VECTOR as f64 * vectors
+    }
+
     /// Time and traffic of conjugate gradients with the current batch: the body at rest, under a load in all directions.
     ///
     /// # Errors
@@ -114,6 +166,9 @@ impl World {
             let clock = Instant::now();
             self.work(&rest, |s| {
                 s.list();
+                if self.many {
+                    s.precondition(asks::ODD);
+                }
                 (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) });
             });
             self.gpu.download::<f32>(&self.buffers["cg_sums"], 1).map(|_| clock.elapsed().as_secs_f64())
@@ -124,9 +179,7 @@ impl World {
         let seconds = (faster::shortest(|| run(repeats))? - faster::shortest(|| run(0))?).max(1e-6);
         run(repeats)?;
         let iterations = self.iterations_done()?;
-        // Directions and rests are turned and advanced: 13 vectors a node.
-        let bytes =
-            self.bytes_of(self.product) + 13.0 * VECTOR as f64 * self.members() as f64 * f64::from(self.geometry.shape.nodes);
+        let bytes = self.bytes_of_iteration();
         let iteration = Traffic { seconds: seconds / iterations.max(1) as f64, bytes };
         Ok(CgSpeed { many: self.many, product: self.product, iteration, iterations, products })
     }
@@ -148,7 +201,7 @@ impl World {
         let newton = &self.buffers["newton"];
         let mut state: Vec<Newton> = self.gpu.download(newton, self.members())?;
         // A norm that nothing is below.
-        state.iter_mut().for_each(|n| n.goal = -1.0);
+        state.iter_mut().for_each(|n| (n.goal, n.forcing) = (-1.0, -1.0));
         self.gpu.queue.write_buffer(newton, 0, bytemuck::cast_slice(&state));
         self.gpu.wait()
     }

@@ -11,15 +11,15 @@ use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks;
 use crate::device::recorder::{Args, Size};
 use crate::passes::{ALL, MATRIX, Passes, Per, SOLVE, TRIAL};
-use crate::world::{Effort, FULL, Product};
-#[cfg(test)]
-pub(crate) use choices::Choices;
+use crate::world::{Effort, Product};
+pub use choices::Choices;
 #[cfg(test)]
 pub(crate) use faster::faster;
 pub(crate) use faster::world;
 pub use measure::{CgSpeed, Traffic};
 
-/// Rounds beyond the allowed Newton iterations, for convex retries and halved steps.
+/// Rounds for each allowed Newton iteration, as a step may be halved, and beyond: friction halves two of three.
+const ROUNDS: usize = 2;
 const SPARE_ROUNDS: usize = 8;
 
 /// CG iterations between two looks at who has converged (an even number: scalars alternate between two places).
@@ -35,7 +35,7 @@ const EARLY: usize = 8;
 impl<'a> Passes<'a, '_> {
     /// What solves are given: a static problem, which is solved once and may take long, everything.
     fn effort(&self) -> Effort {
-        if self.step.is_some() { self.world.effort.effort() } else { FULL }
+        self.step.map_or_else(Effort::full, |stage| self.world.effort.effort(stage))
     }
 
     /// Newton's method from free flight.
@@ -45,24 +45,31 @@ impl<'a> Passes<'a, '_> {
         self.prepare();
         self.run(pass::PREDICT, ALL, Per::Node, 0);
         self.list();
-        let full = iterations + SPARE_ROUNDS;
+        // Groups hardly turn in a step. On the way to a balance they do.
+        if self.step.is_some() {
+            self.turn_groups(ALL, self.state("now"));
+        }
+        let full = ROUNDS * iterations + SPARE_ROUNDS;
         let effort = self.effort();
         for round in 0..effort.rounds.min(full) {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
             self.place_held(TRIAL);
             self.residual(TRIAL);
-            self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, 0);
+            self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, round as u32);
             self.list();
             self.assemble(MATRIX);
+            if self.step.is_none() {
+                self.turn_groups(MATRIX, self.state("next"));
+            }
             self.run(pass::BEGIN_SOLVE, MATRIX, Per::Member, 0);
             self.relist();
             let budget = if round < EARLY { ROUND } else { LATE_ROUND };
             // One workgroup alone has all it is allowed in every round.
             let budget = if self.world.many { budget } else { self.world.geometry.shape.most };
-            self.conjugate_gradients(asks::FOR_DIRECTION, effort.iterations.min(budget));
+            self.conjugate_gradients(asks::FOR_DIRECTION, effort.of_round(round).min(budget));
         }
         self.run(pass::FINISH_STEP, ALL, Per::Node, 0);
-        self.run(pass::CHECK_STATE, ALL, Per::Member, u32::from(effort != FULL));
+        self.run(pass::CHECK_STATE, ALL, Per::Member, u32::from(effort != Effort::full()));
     }
 
     /// At least so many iterations of the solves of all members that want one: the rest comes in the next round.
@@ -74,22 +81,42 @@ impl<'a> Passes<'a, '_> {
             }
             return;
         }
-        for block in 1..=budget.div_ceil(BLOCK) {
-            for i in 0..BLOCK {
-                self.iterate(i % 2);
+        self.precondition(asks::ODD);
+        let mut left = budget.next_multiple_of(2);
+        for block in 1.. {
+            if left == 0 {
+                break;
             }
+            let now = left.min(BLOCK);
+            (0..now).for_each(|i| self.iterate(i % 2));
+            left -= now;
             self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
             if block % GATED == 0 { self.list() } else { self.relist() }
         }
     }
 
-    /// One iteration by many workgroups a member, of this parity.
+    /// One iteration by many workgroups a member, of this parity, from the preconditioned residual to the next one.
     pub(crate) fn iterate(&mut self, parity: u32) {
-        self.run(pass::TURN_CG, SOLVE, Per::Wide, parity);
         // Columns of a member find its matrix in the caches; without a matrix each would need corner forces of its own.
         let product = if self.columns > 1 { Product::Matrix } else { self.world.product };
         let width = self.multiply(product, parity);
-        self.run(pass::ADVANCE_CG, SOLVE, Per::Wide, parity + width);
+        self.run(pass::ADVANCE_CG, SOLVE, Per::Group, parity + width);
+        self.precondition(parity);
+    }
+
+    /// The preconditioned residual after an iteration of this parity; of an odd one before the first.
+    pub(crate) fn precondition(&mut self, parity: u32) {
+        self.run(pass::PRECONDITION_CG, SOLVE, Per::Group, parity);
+    }
+
+    /// How far the groups of the preconditioner's second level have turned in a state.
+    pub(crate) fn turn_groups(&mut self, section: u32, state: &wgpu::Buffer) {
+        self.run_with(pass::TURN_GROUPS, section, Per::Group, 0, &[("turning", state)]);
+    }
+
+    /// The buffer of this balance's old or new state.
+    fn state(&self, name: &str) -> &'a wgpu::Buffer {
+        self.own.iter().find(|b| b.0 == name).map(|b| b.1).expect("a balance has both")
     }
 
     /// A chunk of iterations by one workgroup a member, for this purpose.
@@ -102,7 +129,7 @@ impl<'a> Passes<'a, '_> {
         (purpose == asks::FOR_DERIVATIVE).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
     }
 
-    /// A times `cg_along` → `cg_image`; returns how the parts of pᵀ A p lie, for `advance_cg`.
+    /// Turns the way of the iteration and multiplies it with A; returns how the parts of pᵀ A p lie, for `advance_cg`.
     pub(crate) fn multiply(&mut self, product: Product, parity: u32) -> u32 {
         match product {
             Product::Matrix => {
@@ -126,6 +153,7 @@ impl<'a> Passes<'a, '_> {
         self.react();
         self.touch(ALL);
         self.assemble(ALL);
+        self.turn_groups(ALL, self.state("next"));
     }
 
     /// Solves with the tangent of [`Passes::linearise`]: `rhs` → `direction`.
@@ -147,7 +175,8 @@ impl<'a> Passes<'a, '_> {
         self.conjugate_gradients(asks::FOR_DERIVATIVE, self.effort().derivative.min(most));
         self.columns = 1;
         let groups = self.world.members().div_ceil(64);
-        let args = Args { extra: count as u32, ..Args::default() };
+        let (step, mode) = (self.step.unwrap_or(0) as u32, u32::from(self.step.is_some()));
+        let args = Args { step, mode, extra: count as u32, ..Args::default() };
         self.recorder.run(pass::END_EXACT, &self.own, Size::All { members: 1, groups }, args);
         self.list();
     }

@@ -7,7 +7,6 @@ use crate::costs::rollout_tests::{seen, watched};
 use crate::device::Maker as _;
 use crate::device::pipelines::{PASSES, pass};
 use crate::device::recorder::{Args, QUERIES, Recorder, Size};
-use crate::world::FULL;
 use crate::{GpuBackend, Product, Tuning};
 use palpate_engine::{Backend, Direction, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::scene::Scene;
@@ -59,7 +58,7 @@ fn conjugate_gradients_are_timed_by_whole_iterations_of_the_kernels_that_run() {
         assert!(count.contains(&speed.iterations), "{} of {chunk} iterations ran", speed.iterations);
         assert_eq!(speed.products.len(), if speed.many { 2 } else { 0 });
         if gpu.tick().is_some() {
-            assert_eq!([ran.contains_key("iterate_cg"), ran.contains_key("turn_cg")], [!speed.many, speed.many], "{ran:?}");
+            assert_eq!([ran.contains_key("iterate_cg"), ran.contains_key("advance_cg")], [!speed.many, speed.many], "{ran:?}");
         }
         // The values of the blocks are read, and at most ten times as much moves in all.
         let values = 2.0 * 36.0 * f64::from(world.geometry.shape.blocks);
@@ -85,7 +84,7 @@ fn an_evaluation_waits_once() {
     scene.time.steps = 2;
     scene.observation = watched();
     let plan = seen(&scene);
-    let backend = GpuBackend::on(gpu.clone()).levels(&[FULL]);
+    let backend = GpuBackend::on(gpu.clone()).levels(&[]);
     let mut rollout = Rollout::new(backend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
     let request = Request { gradient: Wanted::All, sensitivities: vec![0, 1] };
     let before = gpu.waits.load(Ordering::Relaxed);

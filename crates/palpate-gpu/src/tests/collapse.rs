@@ -170,7 +170,7 @@ fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
     s
 }
 
-// Newton's 2e-6 of the forces, which here strain the body of 0.1 m by several hundred per cent, and rounding of u: some 3e-7 m a step,
+// Newton's 2e-7 of the forces, which here strain the body of 0.1 m by several hundred per cent, and rounding of u: some 1e-7 m a step,
 // which a body that folds does not forget; eight steps.
 const CRUSHED: f64 = 5e-6;
 

@@ -3,7 +3,7 @@
 use super::products::crowded;
 use super::scenes::{device, own_device, plan, spread};
 use crate::device::Maker as _;
-use crate::device::pipelines::{pass, shared::structs};
+use crate::device::pipelines::{pass, shared::efforts::LOGGED, shared::structs};
 use crate::device::recorder::{Args, Recorder, Size};
 use crate::layout::{Health, Newton, Shape};
 use crate::world::columns;
@@ -97,6 +97,7 @@ fn the_first_column_that_fails_is_the_failure_of_its_member() {
         ("shape", gpu.upload("shape", &[shape]).unwrap_or_else(|e| panic!("{e}"))),
         ("newton", gpu.upload("newton", &newton).unwrap_or_else(|e| panic!("{e}"))),
         ("column_health", upload("column_health", &columns)),
+        ("efforts", gpu.upload("efforts", &[0u32; LOGGED as usize]).unwrap_or_else(|e| panic!("{e}"))),
         ("health", upload("health", &[well, well, well, before, well])),
     ]);
     let (mut groups, mut times) = (HashMap::new(), HashMap::new());

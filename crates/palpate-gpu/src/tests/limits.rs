@@ -11,7 +11,7 @@ use crate::device::{Lanes, STORAGE_BUFFERS, WIDTH, WORKGROUP_BYTES, fits, no_roo
 use crate::layout::{Health, Newton, Shape};
 use crate::passes::{ALL, MATRIX, Passes, Per, SOLVE, TRIAL};
 use crate::solve;
-use crate::world::LOOPS;
+use crate::world::MOST_SYSTEMS;
 use crate::world::Tuning;
 use crate::world::{KINDS, SECTIONS};
 use crate::{GpuBackend, device::Gpu};
@@ -118,8 +118,8 @@ fn listed(gpu: &Gpu, shape: Shape) -> [Vec<u32>; 2] {
 #[test]
 fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
     let Some(gpu) = device(None) else { return };
-    // One invocation goes through all members: the most that a build accepts.
-    let most = LOOPS - 64;
+    // A lane goes through every 64th member: the most that a build accepts.
+    let most = MOST_SYSTEMS;
     let shape = Shape { members: most as u32, nodes: 1, cells: 1, blocks: 1, ..Shape::default() };
     let [roster, _] = listed(&gpu, shape);
     assert_eq!(u64::from(roster[TRIAL as usize * (most as usize + 1)]), most);
@@ -128,8 +128,17 @@ fn a_kernel_at_the_bound_of_its_loops_ends_them_all() {
 #[test]
 fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through() {
     let Some(gpu) = device(None) else { return };
-    let shape =
-        Shape { members: 3, nodes: 1000, cells: 333, blocks: 9001, patches: 777, holds: 55, elastic: 4321, ..Shape::default() };
+    let shape = Shape {
+        members: 3,
+        nodes: 1000,
+        cells: 333,
+        blocks: 9001,
+        patches: 777,
+        holds: 55,
+        elastic: 4321,
+        groups: 17,
+        ..Shape::default()
+    };
     let [_, sizes] = listed(&gpu, shape);
     // A pass of each kind, how many of its lanes share an item, and the items.
     let kinds = [
@@ -139,9 +148,10 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         (Per::Block, pass::GATHER_MATRIX, 1, shape.blocks),
         (Per::Patch, pass::TOUCH_PATCHES, 1, shape.patches),
         (Per::Hold, pass::HOLD_CELLS, 8, shape.holds),
-        (Per::Wide, pass::TURN_CG, 1, shape.nodes),
+        (Per::Wide, pass::GATHER_PRODUCT, 1, shape.nodes),
         (Per::Row, pass::MULTIPLY_ROWS, 8, shape.nodes),
         (Per::Elastic, pass::PRESS_ELASTIC, 1, shape.elastic),
+        (Per::Group, pass::ADVANCE_CG, PASSES[pass::ADVANCE_CG].width, shape.groups),
     ];
     assert_eq!(kinds.len(), KINDS);
     for (per, pass, lanes, items) in kinds {
@@ -231,10 +241,10 @@ fn a_kernel_that_does_not_compile_is_named() {
 #[test]
 fn an_evaluation_that_needs_a_kernel_that_does_not_compile_names_it_and_the_way_out() {
     let Some(mut gpu) = own_device() else { return };
-    // Nobody says where the barrier begins.
-    let missing = "guard_start";
+    // Nobody says how stiff springs are, which derivatives alone ask.
+    let missing = "held_stiffness";
     let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
-    own.pipelines.constant = |name| constant(name).filter(|_| name != "guard_start");
+    own.pipelines.constant = |name| constant(name).filter(|_| name != "held_stiffness");
     let mut scene = ball(0.05);
     scene.time.steps = 1;
     let plan = plan(&scene);
@@ -244,10 +254,24 @@ fn an_evaluation_that_needs_a_kernel_that_does_not_compile_names_it_and_the_way_
         let found = evaluate(&mut rollout, &plan.theta);
         let failure = found.failure.unwrap_or_else(|| panic!("no kernel is missed, and the cost is {}", found.cost));
         assert!(failure.kind == FailureKind::Device && found.cost.is_infinite(), "{failure}");
-        let needs = |p: &&PassSource| p.overrides.contains(&missing);
-        let named = |p: &PassSource| failure.detail.contains(&format!("the kernel {} does not compile", p.name));
-        assert!(PASSES.iter().filter(needs).any(named) && failure.hint.contains("--backend cpu"), "{failure}");
+        assert!(names_a_kernel(&failure.detail, missing) && failure.hint.contains("--backend cpu"), "{failure}");
     }
+}
+
+/// Whether words say of one of the kernels that need a constant that it does not compile.
+fn names_a_kernel(words: &str, missing: &str) -> bool {
+    let needs = |p: &&PassSource| p.overrides.contains(&missing);
+    PASSES.iter().filter(needs).any(|p| words.contains(&format!("the kernel {} does not compile", p.name)))
+}
+
+#[test]
+fn a_kernel_of_every_step_that_does_not_compile_is_named_where_the_plan_is_made_ready() {
+    let Some(mut gpu) = own_device() else { return };
+    // Nobody says where the barrier begins.
+    let Some(own) = Arc::get_mut(&mut gpu) else { panic!("the device is not alone") };
+    own.pipelines.constant = |name| constant(name).filter(|_| name != "guard_start");
+    let e = GpuBackend::on(gpu).build(&plan(&ball(0.05)), 1).map(|_| ()).unwrap_err();
+    assert!(names_a_kernel(&e.message, "guard_start") && e.hint.contains("--backend cpu"), "{e}");
 }
 
 #[test]
@@ -271,7 +295,7 @@ fn more_derivatives_than_an_invocation_may_look_through_are_refused() {
 #[test]
 fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
     let Some(gpu) = device(None) else { return };
-    // Held and without inertia: more iterations to convergence than a dispatch may have.
+    // Held, without inertia and by block-Jacobi alone: more iterations to convergence than a dispatch may have.
     let plan = plan(&held(0.014));
     let backend = GpuBackend::on(gpu.clone());
     let mut world = backend.build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
@@ -281,6 +305,8 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
     let (now, next) = (backend.new_state(&world), backend.new_state(&world));
     let wave: Vec<[f32; 4]> = (0..plan.body.nodes.len()).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), 1.0, 0.0]).collect();
     gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&wave));
+    let none = vec![0u8; world.buffers["coarse"].size() as usize];
+    gpu.queue.write_buffer(&world.buffers["coarse"], 0, &none);
     let world = &world;
     let run = |work: fn(&mut Passes)| world.record(|r| work(&mut Passes::new(world, r, None, &now, &next, &tally)));
     let newton = || gpu.download::<Newton>(&world.buffers["newton"], 1).unwrap_or_else(|e| panic!("{e}"))[0];
@@ -289,7 +315,7 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
         s.begin_column(0);
     });
     // An accuracy that cannot be reached: the dispatch ends at its bound, which the loops set and not the longest chunk.
-    let start = Newton { goal: 0.0, ..newton() };
+    let start = Newton { goal: 0.0, forcing: -1.0, ..newton() };
     gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::bytes_of(&start));
     run(|s| {
         s.list();
@@ -306,7 +332,7 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
 #[test]
 fn more_members_than_an_invocation_may_visit_are_refused() {
     let Some(gpu) = own_device() else { return };
-    let e = solve::world(gpu, &plan(&ball(0.05)), LOOPS as usize, Tuning::default()).map(|w| w.bytes()).unwrap_err();
+    let e = solve::world(gpu, &plan(&ball(0.05)), MOST_SYSTEMS as usize + 1, Tuning::default()).map(|w| w.bytes()).unwrap_err();
     let GpuError::Limit { limit, available, needed, what } = &e else { panic!("{e}") };
     assert!(limit.contains("loop iterations") && needed > available && what.contains("list_members"), "{e}");
 }

@@ -5,7 +5,7 @@ use crate::costs::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::device::pipelines::PASSES;
 use crate::device::pipelines::shared::{laws, pulls};
 use crate::world::KINDS;
-use crate::world::{LOOPS, Most, columns};
+use crate::world::{LOOPS, MOST_GROUPS, MOST_SYSTEMS, Most, columns};
 use palpate_model::cutcells::{front, pullback};
 use std::collections::HashMap;
 
@@ -53,11 +53,16 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("< effect.count") => palpate_model::effects::law::MOST as u64,
         // Second derivatives of a law: pairs of x.
         () if has("k < pairs") => 6,
-        () if has("call.extra * shape.members") => columns(most.members) * most.members,
+        () if has("first < call.extra * shape.members") => (columns(most.members) * most.members).div_ceil(64),
         () if has("q < call.extra") => columns(most.members),
         () if has("shape.members") => most.members,
-        () if has("i < count; i += 256u") => most.nodes.div_ceil(32 * 256),
-        () if has("groups_of_nodes(WIDE)") => most.nodes.div_ceil(256 * 256),
+        // Parts of a product, or of a residual.
+        () if has("i < count; i += TEAM") => most.nodes.div_ceil(32 * 64).max(most.groups.div_ceil(64)),
+        () if has("group_rows[") && has("k += 4u") => most.group.div_ceil(4),
+        () if has("group_rows[") => most.group.div_ceil(64),
+        () if has("g < shape.groups; g += 4u") => most.groups.div_ceil(4),
+        () if has("< shape.groups;") => most.groups.div_ceil(64),
+        () if has("< TURNS") => 30,
         () if has("< KINDS") => KINDS as u64,
         // H, λ and μ.
         () if has("< MATERIAL_INPUTS") => 11,
@@ -177,7 +182,7 @@ fn observed(seen: &Seen) -> bool {
 
 /// A large body with everything: 40 patches and clamp cells on a cell, ten planes, ten point masses.
 const BODY: Most = Most {
-    members: LOOPS - 16,
+    members: MOST_SYSTEMS,
     nodes: 1000,
     row: 60,
     supports: 40,
@@ -190,6 +195,8 @@ const BODY: Most = Most {
     holders: 2,
     grips: 20,
     aging: 4,
+    groups: MOST_GROUPS as u64,
+    group: 4096,
     chunk: 1,
     many: false,
 };
@@ -232,7 +239,7 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.aging = n, built),
         largest(Most { nodes: 512, masses: 0, ..BODY }, |m, n| m.chunk = n, built),
     ];
-    assert!(bodies[0].nodes > 30_000 && bodies[2].nodes > 1_000_000 && bodies[3].supports > 1000, "{bodies:?}");
+    assert!(bodies[0].nodes > 25_000 && bodies[2].nodes > 1_000_000 && bodies[3].supports > 1000, "{bodies:?}");
     let recordings = [
         largest(RECORDING, |s, n| (s.points, s.rows, s.stripes) = (n, n, n.div_ceil(POINTS_OF_STRIPE as u64)), observed),
         largest(RECORDING, |s, n| s.rows = n, observed),
@@ -309,6 +316,8 @@ fn a_nested_loop_is_counted_as_often_as_it_runs() {
                 holders: 0,
                 grips: 0,
                 aging: 0,
+                groups: 0,
+                group: 0,
                 chunk: 0,
                 many: false,
             },

@@ -2,6 +2,7 @@
 
 mod cell_laws;
 mod clocks;
+mod coarse;
 mod collapse;
 mod columns;
 mod derivative_passes;

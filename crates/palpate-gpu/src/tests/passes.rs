@@ -3,7 +3,8 @@
 use super::products::crowded;
 use super::scenes::{device, plan, solving_part};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::solving::{ALONG_WAY, IMAGE};
+use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::solving::{EVEN_WAY, IMAGE};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{SOLVING, State, World};
 use crate::{GpuBackend, Product};
@@ -126,12 +127,15 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
         world.gpu.download(&world.buffers["values"], 9 * right.pattern.blocks.columns.len()).unwrap_or_else(|e| panic!("{e}"));
     let rhs: Vec<[f32; 4]> = load(plan).iter().map(single).collect();
     world.gpu.queue.write_buffer(&world.buffers["rhs"], 0, bytemuck::cast_slice(&rhs));
+    let inverses = get("inverses", 2 * n);
+    let jacobi: Vec<DVec3> = inverses.chunks(2).zip(load(plan)).map(|(own, r)| scaled(own, r)).collect();
     step(world, &now, &next, &tally, |s| {
         s.begin_column(0);
         s.list();
+        s.precondition(asks::ODD);
         s.multiply(Product::Matrix, 0);
     });
-    let (along, image) = (vectors(&solving_part(world, ALONG_WAY)), solving_part(world, IMAGE));
+    let (along, image) = (vectors(&solving_part(world, EVEN_WAY)), solving_part(world, IMAGE));
     // Without a matrix nothing knows of what effects add to it.
     let free = without_effects(plan).then(|| {
         step(world, &now, &next, &tally, |s| {
@@ -148,11 +152,17 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
         ("gather_residual", three(&residual), FORCES),
         ("energies", vec![potential(&residual) - half], ENERGY),
         ("gather_matrix", values.iter().map(|v| f64::from(*v)).collect(), MATRIX),
-        ("invert_diagonal", flat(&along), FORCES),
+        ("invert_diagonal", flat(&jacobi), FORCES),
         ("multiply_rows", right.off_product(&along, &vectors(&image)), MATRIX),
         ("iterate_cg", flat(&right.scaled(&right.product(&solution))), SOLVED),
     ];
     parts.into_iter().chain(free).collect()
+}
+
+/// What a node's own inverse block makes of a force.
+fn scaled(inverse: &[[f32; 4]], r: DVec3) -> DVec3 {
+    let [a, b] = [inverse[0], inverse[1]].map(|v| v.map(f64::from));
+    glam::DMat3::from_cols_array(&[a[0], a[1], a[2], a[1], a[3], b[0], a[2], b[0], b[1]]) * r
 }
 
 fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: impl FnOnce(&mut Passes)) {

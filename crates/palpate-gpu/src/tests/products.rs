@@ -4,7 +4,7 @@ use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, solving_part, spread};
 use crate::costs::rollout_tests::{differences, seen, watched};
-use crate::device::pipelines::shared::solving::IMAGE;
+use crate::device::pipelines::shared::{asks, solving::IMAGE};
 use crate::passes::Passes;
 use crate::solve;
 use crate::solve::Choices;
@@ -51,6 +51,7 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
         s.linearise();
         s.begin_column(0);
         s.list();
+        s.precondition(asks::ODD);
         s.multiply(product, 0);
     });
     solving_part(world, IMAGE).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()

@@ -63,7 +63,7 @@ fn states_of_every_scheme_agree_and_one_percent_of_damping_or_another_scheme_sho
     let Some(gpu) = device(None) else { return };
     for scheme in schemes() {
         // As in `forward`; two solves a step, combinations of states and a blow make a few times the rounding.
-        for (make, close) in [(thrown as fn(&'static Scheme) -> Scene, 1e-6), (shaken, 4e-7)] {
+        for (make, close) in [(thrown as fn(&'static Scheme) -> Scene, 1e-6), (shaken, 1e-7)] {
             let plan = plan(&make(scheme));
             let right = moments(CpuBackend, &plan, &plan.theta);
             let differs = |plan: &Plan, theta: &[f64]| apart(plan, &moments(GpuBackend::on(gpu.clone()), plan, theta), &right);
@@ -73,6 +73,7 @@ fn states_of_every_scheme_agree_and_one_percent_of_damping_or_another_scheme_sho
             let mut wrong = plan.theta.clone();
             wrong[plan.layout.index(ParamKey::StiffnessDamping)] *= 1.01;
             let seen = differs(&plan, &wrong);
+            println!("{}: 1 % of damping {seen:?}", scheme.name);
             assert!(seen.iter().any(|d| *d > close), "{}: 1 % of damping is not seen: {seen:?}", scheme.name);
             for other in ALL.iter().filter(|s| *s != scheme) {
                 let seen = differs(&super::scenes::plan(&make(other)), &plan.theta);

@@ -1,5 +1,6 @@
 //! A plan's constant buffers: cells, lists for gathering, patches, clamps, masses.
 
+use super::coarse;
 use super::effects::Effects;
 use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
@@ -11,12 +12,13 @@ use crate::stencils::StencilTable;
 use palpate_model::cutcells::elements::Classes;
 use palpate_model::params::grips::within_reach;
 use palpate_model::plan::{Plan, WORLD_SIZE};
-use palpate_model::space::pattern::{Pattern, Places};
+use palpate_model::space::groups::Groups;
+use palpate_model::space::pattern::{BlockRows, Pattern, Places};
 use std::collections::HashMap;
 
 /// Best relative accuracy of a Newton solve in single precision: 30 roundings. Newton's method is quadratic there, so the
 /// solution is better than its last but one residual.
-const FINEST: f64 = 2e-6;
+const FINEST: f64 = 2e-7;
 /// Most CG iterations of one solve; a solve that needs more is a symptom.
 const MOST_ITERATIONS: usize = 2000;
 /// Most CG iterations of one dispatch: the rest of a long chunk is lost when a member converges early in it.
@@ -31,6 +33,9 @@ pub(crate) struct Geometry {
     pub(crate) holds: Vec<(usize, u32)>,
     pub(crate) effects: Effects,
     pub(crate) mass: MassTable,
+    /// Groups of nodes of the preconditioner's second level.
+    pub(crate) groups: Groups,
+    pub(crate) blocks: BlockRows,
 }
 
 fn vec4(v: glam::DVec3, w: f64) -> [f32; 4] {
@@ -96,6 +101,8 @@ impl Geometry {
         let mass = MassTable::new(plan, &places, blocks);
         let elastic = ElasticTables::new(plan, &pattern, &stencils, acting as usize);
 
+        let groups = coarse::groups(body, &pattern.blocks);
+
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
         let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();
         let node_list: Vec<u32> = pattern.cell_list.iter().map(|(e, i)| 8 * e + u32::from(*i)).collect();
@@ -133,6 +140,8 @@ impl Geometry {
             holders: elastic.holders.longest(),
             grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
             aging: effects.aging_rows.into(),
+            groups: groups.len() as u64,
+            group: groups.nodes.iter().map(Vec::len).max().unwrap_or(0) as u64,
             chunk: 1,
             many,
         };
@@ -176,7 +185,10 @@ impl Geometry {
             element_size: body.length as f32,
             elements: body.elements() as u32,
             per_element: body.points.per_element.max(1) as u32,
-            pad: 0,
+            groups: groups.len() as u32,
+            coarse_kind: 0,
+            group_size: groups.size as f32,
+            pad: [0; 2],
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         let mut tables = Arena::new("body_tables");
@@ -196,10 +208,11 @@ impl Geometry {
         tables.put("place_rows", &place_rows);
         tables.put("places", &contributions.concat());
         tables.put("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>());
+        coarse::put(&groups, body, &mut tables);
         tables.put("effects", &effects.sites());
         tables.put("cell_effects", &effects.cell_sites());
         tables.put("holds", &hold_sites);
         tables.upload(gpu, buffers)?;
-        Ok(Geometry { shape, classes, holds, effects, mass })
+        Ok(Geometry { shape, classes, holds, effects, mass, groups, blocks: pattern.blocks })
     }
 }

@@ -7,13 +7,15 @@ pub(crate) const LOOPS: u64 = 32_000;
 /// Most columns of a member (derivatives by so many parameters) that are solved for at the same time.
 const COLUMNS: u64 = 8;
 
-/// Columns that a batch of so many members is solved for at the same time: one invocation lists them all.
+/// Columns that a batch of so many members is solved for at the same time: one workgroup lists them all.
 pub(crate) fn columns(members: u64) -> u64 {
-    ((LOOPS - LISTING) / members.max(1)).clamp(1, COLUMNS)
+    (MOST_SYSTEMS / members.max(1)).clamp(1, COLUMNS)
 }
 
-/// Loop iterations of a listing beside those over members and columns.
-const LISTING: u64 = 16;
+/// Loop iterations of a listing for 64 systems, members and columns, and beside that.
+const LISTING: [u64; 2] = [7, 64];
+/// Systems that it can list.
+pub(crate) const MOST_SYSTEMS: u64 = (LOOPS - LISTING[1]) / LISTING[0] * 64;
 
 /// What the loops of the kernels of a step run over, at most.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +41,9 @@ pub(crate) struct Most {
     pub(crate) grips: u64,
     /// Numbers of effects that change the stiffness in time.
     pub(crate) aging: u64,
+    /// Groups of nodes of the preconditioner's second level, and nodes of the largest.
+    pub(crate) groups: u64,
+    pub(crate) group: u64,
     /// Iterations of conjugate gradients in one dispatch.
     pub(crate) chunk: u64,
     /// Many workgroups share the solve of a member.
@@ -51,17 +56,31 @@ impl Most {
         self.nodes.div_ceil(256)
     }
 
-    /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums.
+    /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums, and the second
+    /// level of the preconditioner, four lanes a group.
     pub(super) fn of_iteration(&self) -> u64 {
-        1 + self.share() * (self.row + 4 + (1 + 2 * self.stencil) * self.masses) + 20
+        1 + self.share() * (self.row + 4 + (1 + 2 * self.stencil) * self.masses) + 20 + self.restriction() + self.correction()
+    }
+
+    /// Of the groups' forces, by one workgroup.
+    fn restriction(&self) -> u64 {
+        self.groups.div_ceil(64) * (1 + self.group.div_ceil(4))
+    }
+
+    /// Of the groups' motions, by one workgroup.
+    fn correction(&self) -> u64 {
+        self.groups.div_ceil(64) * (1 + self.groups.div_ceil(4))
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
     pub(crate) fn loops(&self) -> [(&'static str, u64); 24] {
         [
-            ("list_members", columns(self.members) * self.members + LISTING),
-            ("iterate_cg", if self.many { 0 } else { self.chunk * self.of_iteration() + self.share() }),
-            ("begin_solve", 4 * self.share() + 300),
+            ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
+            (
+                "iterate_cg",
+                if self.many { 0 } else { self.chunk * self.of_iteration() + 2 * self.share() + self.correction() + 10 },
+            ),
+            ("begin_solve", 4 * self.share() + 300 + self.restriction()),
             ("step_back", 3 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),

@@ -1,5 +1,6 @@
 //! What members differ in: θ decoded, planes, clamp poses over time, element matrices per Poisson's ratio.
 
+use super::coarse::Coarse;
 use super::geometry::Geometry;
 use crate::device::{Arena, Gpu, GpuError};
 use crate::layout::{ClampPose, Member, Plane};
@@ -37,6 +38,7 @@ impl Batch {
         gpu: &Gpu,
         plan: &Plan,
         geometry: &Geometry,
+        coarse: &mut Coarse,
         theta: &ParamBatch,
         buffers: &mut HashMap<&'static str, wgpu::Buffer>,
     ) -> Result<(), GpuError> {
@@ -92,7 +94,9 @@ impl Batch {
         tables.put("planes", &all_planes);
         tables.put("poses", &poses);
         tables.put("mass_values", &masses);
+        tables.put("coarse_choices", &coarse.choices(&self.physics));
         tables.upload(gpu, buffers)?;
+        coarse.upload(gpu, buffers)?;
         let on_clamps = geometry.effects.on_clamps();
         let others = self.slots != slots;
         if others {

@@ -1,5 +1,6 @@
 //! What the backend holds: a plan's buffers and a batch's, states on loan from a pool, and what is read at the end.
 
+mod coarse;
 mod effects;
 mod effort;
 mod elastic;
@@ -14,7 +15,10 @@ mod sums;
 mod tally;
 mod tuning;
 
-pub(crate) use effort::{Effort, FULL, Level};
+#[cfg(test)]
+pub(crate) use coarse::MOST_GROUPS;
+pub(crate) use coarse::{Coarse, vectors as coarse_vectors};
+pub(crate) use effort::{Effort, Level};
 pub(crate) use geometry::Geometry;
 pub(crate) use limits::columns;
 pub(crate) use rates::Rates;
@@ -28,17 +32,18 @@ pub(crate) use tuning::MANY;
 pub use tuning::{Product, Tuning};
 #[cfg(test)]
 pub(crate) use {
-    limits::{LOOPS, Most},
+    limits::{LOOPS, MOST_SYSTEMS, Most},
     room::SECTIONS,
 };
 
 use crate::costs::Observer;
 use crate::device::pipelines::shared::structs::FIELD_SEVERAL;
 use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
-use crate::device::{Gpu, GpuError, Maker as _};
+use crate::device::{Counter, Gpu, GpuError, Maker as _};
 use crate::layout::Shape;
+use crate::passes::Passes;
 use members::Batch;
-use palpate_engine::{Direction, ParamBatch};
+use palpate_engine::{Direction, ParamBatch, Request};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
@@ -59,6 +64,7 @@ pub struct World {
     pub(crate) plan: Plan,
     pub(crate) geometry: Geometry,
     pub(crate) batch: Batch,
+    pub(crate) coarse: Coarse,
     pub(crate) observer: Observer,
     pub(crate) capacity: usize,
     pub(crate) buffers: Buffers,
@@ -69,6 +75,8 @@ pub struct World {
     /// Time on the device per pass, when asked for.
     pub(crate) times: RefCell<HashMap<&'static str, PassTime>>,
     pub(crate) timed: bool,
+    /// Counts dispatches, when asked for.
+    pub(crate) counter: Option<Counter>,
     /// The work handed over last, and the ends of the latest stages.
     last: RefCell<Option<wgpu::SubmissionIndex>>,
     ahead: VecDeque<wgpu::SubmissionIndex>,
@@ -90,12 +98,14 @@ impl World {
             buffers.insert(name, gpu.buffer(name, bytes)?);
         }
         let observer = Observer::new(&gpu, plan, capacity)?;
+        let coarse = Coarse::new(plan, &geometry);
         let effort = Level::new(!gpu.is_software());
         let mut world = World {
             gpu,
             plan: plan.clone(),
             geometry,
             batch: Batch::default(),
+            coarse,
             observer,
             capacity,
             buffers,
@@ -106,6 +116,7 @@ impl World {
             last: RefCell::default(),
             ahead: VecDeque::new(),
             timed: false,
+            counter: None,
             many,
             product: tuning.product.unwrap_or(Product::Matrix),
             effort,
@@ -114,7 +125,31 @@ impl World {
         if world.needs_matrix() {
             world.product = Product::Matrix;
         }
+        world.learn_stiffness()?;
         Ok(world)
+    }
+
+    /// Shows the body at rest to the second level of the preconditioner, as the plan itself has it.
+    fn learn_stiffness(&mut self) -> Result<(), GpuError> {
+        let Some(stage) = self.plan.clock.stages().first().cloned() else { return Ok(()) };
+        let made = self.gpu.made();
+        self.set_params(&ParamBatch::from_rows(std::slice::from_ref(&self.plan.theta.clone())));
+        self.enter(&stage);
+        let tally = Tally::new(self, &Request::default());
+        let rest = State(self.lend(3));
+        self.record(|r| {
+            r.clear(&rest.0.buffer);
+            Passes::new(self, r, Some(stage.number), &rest, &rest, &tally).linearise();
+        });
+        drop((tally, rest));
+        let count = 9 * self.geometry.shape.blocks as usize;
+        let values = self.gpu.download::<f32>(&self.buffers["values"], count)?;
+        self.coarse.learn(&self.plan, &self.geometry, &stage, &self.batch.physics[0], &values);
+        // Nothing of it is kept: the batches to come bring their own.
+        self.batch = Batch::default();
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        self.gpu.forget_made(made);
+        Ok(())
     }
 
     /// True where elastic points or effects add to blocks, which only the matrix holds.
@@ -152,7 +187,7 @@ impl World {
         // Buffers of the batch before are replaced: bind groups that hold them must go.
         self.groups.borrow_mut().clear();
         *self.rates.borrow_mut() = Known::default();
-        let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, theta, &mut self.buffers);
+        let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, &mut self.coarse, theta, &mut self.buffers);
         if let Err(e) = set {
             self.gpu.keep(e);
         }
@@ -187,6 +222,7 @@ impl World {
             dt: stage.length as f32,
             theta: stage.theta as f32,
             time: stage.time as f32,
+            coarse_kind: self.coarse.kind(stage),
             fields: base.fields | if stage.from.len() > 1 { FIELD_SEVERAL } else { 0 },
             ..base
         };
@@ -203,7 +239,8 @@ impl World {
     /// Runs `record` and hands what it recorded to the device.
     pub(crate) fn record(&self, record: impl FnOnce(&mut Recorder)) {
         let mut groups = self.groups.borrow_mut();
-        let mut recorder = Recorder::new(&self.gpu, &self.buffers, &mut groups, self.timed);
+        let recorder = Recorder::new(&self.gpu, &self.buffers, &mut groups, self.timed);
+        let mut recorder = recorder.counted(self.counter.as_ref());
         record(&mut recorder);
         self.last.replace(Some(recorder.submit(&mut self.times.borrow_mut())));
     }

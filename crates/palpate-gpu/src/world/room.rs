@@ -1,7 +1,7 @@
 //! Work space of the solves: which buffers there are, and how large they are.
 
 use super::limits::columns;
-use crate::device::pipelines::shared::{elastic_asks, roster, structs};
+use crate::device::pipelines::shared::{elastic_asks, roster, solving, structs};
 use crate::layout::{Health, Newton, Shape};
 
 /// Bytes of a node's vector.
@@ -13,13 +13,13 @@ type Work = (&'static str, fn(&Shape) -> u32, u64);
 /// Work space per member.
 const WORK: [Work; 21] = [
     ("increment", |s| s.nodes, VECTOR),
-    ("solving", |s| 4 * s.nodes, VECTOR),
+    ("solving", |s| SOLVING_VECTORS as u32 * s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
     ("residual", |s| 3 * s.nodes, VECTOR),
     ("old_force", |s| s.nodes, VECTOR),
     ("rhs", |s| s.nodes, VECTOR),
     ("column", |s| s.nodes, VECTOR),
-    ("inverses", |s| 2 * s.nodes, VECTOR),
+    ("inverses", |s| 2 * s.nodes + s.groups, VECTOR),
     ("values", |s| 9 * s.blocks, 4),
     ("tangents", |s| structs::TANGENT_VECTORS * s.cells, VECTOR),
     ("cell_force", |s| 16 * s.cells, VECTOR),
@@ -37,7 +37,7 @@ const WORK: [Work; 21] = [
 
 /// The same per column of a member that is solved for at the same time as others.
 const OF_COLUMN: [Work; 3] = [
-    ("cg_sums", |s| 4 + 2 * s.nodes.div_ceil(roster::NARROW), VECTOR),
+    ("cg_sums", |s| 4 + s.nodes.div_ceil(roster::NARROW) + 5 * s.groups, VECTOR),
     ("newton", |_| 1, size_of::<Newton>() as u64),
     ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
@@ -45,7 +45,7 @@ const OF_COLUMN: [Work; 3] = [
 /// Vectors of a solve (`shared/solving.wgsl`), the solution first. Columns that are solved for together have their own; one alone uses those of
 /// the work space.
 pub(crate) const SOLVING: &str = "solving";
-pub(crate) const SOLVING_VECTORS: u64 = 4;
+pub(crate) const SOLVING_VECTORS: u64 = solving::PARTS_OF_SOLVING as u64;
 
 /// Vectors that laws of cells need per cell for the matrix (`shared/modes.wgsl`).
 fn modes(fields: u32) -> u32 {

@@ -3,6 +3,7 @@
 use super::sums::Sums;
 use super::{Tangent, World};
 use crate::device::Maker as _;
+use crate::device::pipelines::shared::efforts::LOGGED;
 use crate::device::recorder::Buffers;
 use crate::layout::Health;
 use palpate_engine::{Direction, Request};
@@ -11,7 +12,7 @@ use palpate_engine::{Direction, Request};
 #[derive(Debug)]
 pub struct Tally {
     pub(crate) directions: Vec<usize>,
-    /// health `[B]`, derivatives by what observations depend on `[B, P]`, what observations add, and the sums of an adjoint.
+    /// health `[B]`, what solves took, derivatives by what observations depend on `[B, P]`, what observations add, and the sums of an adjoint.
     pub(crate) buffers: Buffers,
     /// What an adjoint sums up; `None` where no gradient is wanted.
     pub(crate) sums: Option<Sums>,
@@ -19,9 +20,9 @@ pub struct Tally {
     pointed: bool,
 }
 
-/// What a tally of B members and P parameters holds beside observations and the sums of an adjoint, in bytes.
-pub(crate) fn tally_sizes(b: u64, p: u64) -> [(&'static str, u64); 2] {
-    [("health", b * size_of::<Health>() as u64), ("gradient", 4 * b * p)]
+/// What a tally of B members, P parameters and so many stages holds beside observations and the sums of an adjoint, in bytes.
+pub(crate) fn tally_sizes(b: u64, p: u64, stages: u64) -> [(&'static str, u64); 3] {
+    [("health", b * size_of::<Health>() as u64), ("gradient", 4 * b * p), ("efforts", 4 * stages * u64::from(LOGGED))]
 }
 
 impl Tally {
@@ -31,7 +32,7 @@ impl Tally {
         let sums = Sums::new(&world.plan, &geometry.effects, &request.gradient);
         let of_sums = sums.as_ref().map_or_else(Vec::new, |s| s.sizes(&geometry.shape, &geometry.effects, b));
         let mut buffers = Buffers::new();
-        for (name, bytes) in tally_sizes(b, p).into_iter().chain(of_sums) {
+        for (name, bytes) in tally_sizes(b, p, geometry.shape.steps.into()).into_iter().chain(of_sums) {
             let buffer = world.gpu.buffer(name, bytes).unwrap_or_else(|e| {
                 world.gpu.keep(e);
                 world.gpu.small()

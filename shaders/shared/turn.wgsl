@@ -1,0 +1,26 @@
+//! Beginning of an iteration by many workgroups: has the solve converged? If not, which way does it go on?
+// use shared/iteration
+
+var<storage, read> newton: array<Newton>;
+
+// Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them. Sets the way.
+fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
+    let rz = sum_parts(local, rests_at(system), shape.groups);
+    let before = scalars_of(local, scalars_at(system) + 1u - parity());
+    let bad = scalars_of(local, scalars_at(system) + 3u - parity()).x;
+    let of_rhs = select(before.w, rz, before.y == 0.0);
+    var state = before.z;
+    if state == 0.0 {
+        if bad != 0.0 {
+            state = 2.0;
+        } else if is_small(rz, of_rhs, newton[system]) || before.y >= f32(shape.most) {
+            state = 1.0;
+        }
+    }
+    let now = vec4(rz, before.y + select(0.0, 1.0, state == 0.0), state, of_rhs);
+    if speaks && local == 0u {
+        cg_sums[scalars_at(system) + parity()] = now;
+    }
+    set_way(parity(), way_factor_of(now, before));
+    return now;
+}
