@@ -1,11 +1,12 @@
 //! Time of a step of the GPU backend beside the CPU's: batches, passes by the device's own clock, traffic of conjugate gradients.
 
+use super::model::{Counts, H100, Modelled};
 use super::report::{Line, Report, Times};
-use super::{BAND, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
+use super::{BAND, Case, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
 use crate::table;
 use glam::DVec3;
 use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
-use palpate_gpu::{Choice, Gpu, GpuBackend, World};
+use palpate_gpu::{Choice, Dispatches, Gpu, GpuBackend, Product, Tuning, World};
 use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -19,8 +20,8 @@ use std::time::Instant;
 
 /// Simulations that run together.
 const BATCHES: [usize; 3] = [1, 8, 64];
-/// Most steps that are timed.
-const STEPS: usize = 4;
+/// Fewest steps that are timed where there is time for a whole one: the paper's bodies land in the fourth.
+const STEPS: usize = 5;
 /// How the time of a step grows with nodes: iterations of conjugate gradients grow as bodies do.
 const GROWTH: f64 = 4.0 / 3.0;
 /// Derivatives by parameters that are timed together.
@@ -55,8 +56,17 @@ impl Traffic {
 pub struct Device {
     /// Simulations that ran together.
     pub batch: usize,
-    /// Times faster than the CPU's step: forward, cost, adjoint; of one member.
+    /// Times faster than the CPU's, of the same steps of one member: forward, cost, adjoint.
     pub over_cpu: [f64; 3],
+    /// The CPU's times of the same steps. (Files of earlier versions compared with other steps.)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<[Times; 3]>,
+    /// What the same steps come to with many workgroups a member, as a graphics processor runs large bodies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts: Option<Counts>,
+    /// What the model of a graphics processor makes of that: an H100.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub modelled: Option<Modelled>,
     /// Seconds of a step's derivative by one parameter, of one member: by itself, and as one of eight that are computed together. (Files
     /// of earlier versions lack it.)
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -78,6 +88,27 @@ impl Device {
     pub fn print(&self, name: &str) {
         let [f, c, a] = self.over_cpu.map(|x| format!("{x:.2}"));
         println!("  {name}: times faster than the CPU: forward {f}, cost {c}, adjoint {a}");
+        if let (Some(c), Some(m)) = (&self.counts, &self.modelled) {
+            println!(
+                "    of {} steps, each: {:.1} Newton, {:.0} CG, {:.0} CG for the adjoint, {:.0} dispatches recorded, {:.0} live, {:.2} ms of the host, \
+                 {:.1} MB",
+                c.steps,
+                c.newton,
+                c.linear,
+                c.adjoint,
+                c.recorded,
+                c.live,
+                1e3 * c.host,
+                1e-6 * c.bytes
+            );
+            println!(
+                "    model of an {}: {:.2} ms a step on the device, {:.2} ms of its host; {:.3} ms a member",
+                H100.name,
+                1e3 * m.device,
+                1e3 * m.host,
+                1e3 * m.device.max(m.host) / self.batch as f64
+            );
+        }
         if let Some([alone, together]) = self.columns.map(|c| c.map(|s| 1e3 * s)) {
             println!("    derivative by a parameter: {alone:.2} ms alone, {together:.2} ms as one of {COLUMNS}");
         }
@@ -144,12 +175,11 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
     compile(&gpu)?;
     let mut longest: Option<Longest> = None;
     for s in subjects(quick)?.into_iter().filter(|s| s.name.starts_with(only)) {
-        let mut cpu = one(s.name, &*s.shape, s.h, &super::Case::default())?;
+        let mut cpu = one(s.name, &*s.shape, s.h, &Case::default())?;
         cpu.paper = s.paper;
         println!("{}: {} nodes, CPU forward {:.1} ms", s.name, cpu.nodes, 1e3 * cpu.forward.median);
         let body = Body::build(&*s.shape, s.h, BAND * s.h, SUBDIVISIONS).map_err(|e| format!("{}: {e}", s.name))?;
-        let mut plan = plan(body, &[]);
-        plan.clock.steps = plan.clock.steps.min(STEPS);
+        let plan = plan(body, &[]);
         report.lines.push(cpu.clone());
         for batch in BATCHES.into_iter().filter(|b| !quick || *b < 64) {
             // Software adapters take as many times longer as there are members.
@@ -160,7 +190,10 @@ pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
                 report.left_out.push(why);
                 continue;
             }
-            match on_device(&gpu, copy, &plan, batch, &cpu, patience) {
+            let same = |steps| {
+                if steps == cpu.steps { Ok(cpu.clone()) } else { one(s.name, &*s.shape, s.h, &Case { steps, ..Case::default() }) }
+            };
+            match on_device(&gpu, copy, &plan, batch, &same, patience) {
                 Ok((line, seconds)) => {
                     println!("  {}: forward {:.2} ms a member", line.name, 1e3 * line.forward.median);
                     longest = longest.filter(|l| l.seconds > seconds).or(Some(Longest { nodes: cpu.nodes, batch, seconds }));
@@ -209,12 +242,15 @@ struct Run {
     /// The same of derivatives, for every number of them that were computed together.
     columns: Vec<Vec<f64>>,
     failure: Option<String>,
+    /// Seconds in which the host recorded a step.
+    recording: Vec<f64>,
 }
 
 fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
     let steps = stages.len();
     let wait = || backend.gpu().wait().map_err(|e| e.to_string());
     let mut seconds = [Vec::new(), Vec::new(), Vec::new()];
+    let mut recording = Vec::new();
     let request = Request { gradient: Wanted::All, ..Request::default() };
     let mut tally = backend.new_tally(world, &request);
     let mut tape = vec![backend.new_state(world)];
@@ -224,6 +260,7 @@ fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[us
         let mut next = backend.new_state(world);
         let clock = Instant::now();
         backend.step(world, &stages[k], &[&tape[k]], &mut next, &mut tally);
+        recording.push(clock.elapsed().as_secs_f64());
         wait()?;
         seconds[0].push(clock.elapsed().as_secs_f64());
         let clock = Instant::now();
@@ -258,7 +295,7 @@ fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[us
         backend.clear_adjoint(&mut adj_now);
     }
     let failure = backend.read(world, &tally).into_iter().find_map(|e| e.failure).map(|f| f.to_string());
-    Ok(Run { seconds, columns, failure })
+    Ok(Run { seconds, columns, failure, recording })
 }
 
 /// The run that has what its members need.
@@ -267,7 +304,14 @@ fn settled(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: 
 }
 
 /// One line of the report, and the seconds of a step there and back.
-fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, patience: f64) -> Result<(Line, f64), String> {
+fn on_device(
+    gpu: &Arc<Gpu>,
+    copy: f64,
+    plan: &Plan,
+    batch: usize,
+    of_cpu: &dyn Fn(usize) -> Result<Line, String>,
+    patience: f64,
+) -> Result<(Line, f64), String> {
     let backend = GpuBackend::on(gpu.clone());
     let before = gpu.made();
     let clock = Instant::now();
@@ -300,8 +344,9 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
     let times = ((patience - clock.elapsed().as_secs_f64()) / step) as usize;
     // A derivative takes about as long as an adjoint.
     let both: &[usize] = if times > 2 * COLUMNS { &[1, COLUMNS] } else { &[] };
+    let mut steps = 1;
     if times > 0 {
-        let steps = (times / if both.is_empty() { 1 } else { 2 + COLUMNS }).clamp(1, plan.clock.steps);
+        steps = (times / if both.is_empty() { 1 } else { 2 + COLUMNS }).clamp(STEPS, plan.clock.steps);
         run = settled(&backend, &mut world, &plan.clock.stages()[..steps], both)?;
     }
     let speed = world.cg_speed().map_err(|e| e.to_string())?;
@@ -309,6 +354,8 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
     let [forward, cost, adjoint] = run.seconds.map(of_member);
     let columns: Vec<f64> = run.columns.into_iter().map(|s| of_member(s).median).collect();
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
+    let cpu = of_cpu(steps)?;
+    let counts = count(gpu, plan, &rows, steps)?;
     let line = Line {
         name: format!("gpu {} × {batch}", cpu.name),
         build,
@@ -317,13 +364,16 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
         adjoint,
         tape: 48 * plan.body.nodes.len(),
         matrix: 36 * blocks(&plan.body),
-        newton: 0.0,
-        linear: 0.0,
+        newton: counts.newton,
+        linear: counts.linear,
         peak: (gpu.made() - before) as usize,
         failure: run.failure,
         gpu: Some(Device {
             batch,
             over_cpu: [ratio(&cpu.forward, &forward), ratio(&cpu.cost, &cost), ratio(&cpu.adjoint, &adjoint)],
+            cpu: Some([cpu.forward, cpu.cost, cpu.adjoint]),
+            counts: Some(counts),
+            modelled: Some(H100.step(&counts)),
             columns: columns.try_into().ok(),
             product: format!("{}, {}", speed.product.name(), if speed.many { "many workgroups" } else { "one workgroup" }),
             iteration: Some(Traffic::new(speed.iteration, copy)),
@@ -333,6 +383,75 @@ fn on_device(gpu: &Arc<Gpu>, copy: f64, plan: &Plan, batch: usize, cpu: &Line, p
         ..cpu.clone()
     };
     Ok((line, step))
+}
+
+/// What the first steps come to where many workgroups share a solve and dispatches are recorded sparingly. The first rollout learns how many are
+/// needed; the second is counted, and its recording timed.
+fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize) -> Result<Counts, String> {
+    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix) };
+    let backend = GpuBackend::on(gpu.clone()).tuned(tuning).sparing();
+    let mut world = backend.build(plan, rows.len()).map_err(|e| e.to_string())?;
+    backend.set_params(&mut world, &ParamBatch::from_rows(rows));
+    let stages = &plan.clock.stages()[..steps];
+    settled(&backend, &mut world, stages, &[])?;
+    let run = settled(&backend, &mut world, stages, &[])?;
+    world.count_dispatches(true).map_err(|e| e.to_string())?;
+    let counted = backend.rollout(&mut world, false, |world| counted(&backend, world, stages))?;
+    let of_step = |x: f64| x / steps as f64;
+    let mean = |k: usize| of_step(counted.iterations.iter().map(|i| f64::from(i[k])).sum());
+    let [iteration, round] = world.bytes_of_iteration_and_round();
+    let [newton, linear, adjoint] = [mean(0), mean(1), mean(2)];
+    Ok(Counts {
+        steps,
+        newton,
+        linear,
+        adjoint,
+        recorded: of_step(counted.dispatches.recorded as f64),
+        live: of_step(counted.dispatches.live as f64),
+        host: Times::of(run.recording).median,
+        // A round more looks at the last trial.
+        bytes: (newton + 1.0) * round + linear * iteration,
+    })
+}
+
+/// Dispatches of steps forward, and iterations of each step and its adjoint: Newton's, those of conjugate gradients, and the derivative's.
+struct Counted {
+    dispatches: Dispatches,
+    iterations: Vec<[u32; 3]>,
+}
+
+fn counted(backend: &GpuBackend, world: &mut World, stages: &[Stage]) -> Result<Counted, String> {
+    let request = Request { gradient: Wanted::All, ..Request::default() };
+    let mut tally = backend.new_tally(world, &request);
+    let mut tape = vec![backend.new_state(world)];
+    backend.start(world, &mut tape[0], &mut tally);
+    let before = world.dispatches();
+    let mut iterations = Vec::new();
+    for (k, stage) in stages.iter().enumerate() {
+        let mut next = backend.new_state(world);
+        backend.step(world, stage, &[&tape[k]], &mut next, &mut tally);
+        let own = world.iterations().map_err(|e| e.to_string())?;
+        let most = |k: usize| own.iter().map(|n| n[k]).max().unwrap_or(0);
+        iterations.push([most(0), most(1), 0]);
+        tape.push(next);
+    }
+    let after = world.dispatches();
+    let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
+    for k in (0..stages.len()).rev() {
+        backend.observe_adjoint(world, k, &tape[k], &tape[k + 1], &mut adj, &mut adj_now, &mut tally);
+        let adj_past = std::slice::from_mut(&mut adj_now);
+        backend.step_adjoint(world, &stages[k], &[&tape[k]], &tape[k + 1], &adj, adj_past, &mut tally);
+        iterations[k][2] = world.derivative_iterations().map_err(|e| e.to_string())?.into_iter().max().unwrap_or(0);
+        std::mem::swap(&mut adj, &mut adj_now);
+        backend.clear_adjoint(&mut adj_now);
+    }
+    backend.read(world, &tally);
+    let dispatches = Dispatches {
+        recorded: after.recorded - before.recorded,
+        live: after.live - before.live,
+        workgroups: after.workgroups - before.workgroups,
+    };
+    Ok(Counted { dispatches, iterations })
 }
 
 #[cfg(test)]

@@ -3,12 +3,13 @@
 pub mod fields;
 pub mod fit;
 pub mod gpu;
+pub mod model;
 pub mod report;
 
 use crate::table;
 use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
-use palpate_engine::{Backend, ParamBatch, Request, Wanted};
+use palpate_engine::{Backend, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::{self, Effect, Family};
 use palpate_model::materials::{ALL, Model, find};
@@ -22,6 +23,7 @@ use palpate_model::space::stuffing::stuff;
 use peak_alloc::PeakAlloc;
 use report::{Line, Report, Times};
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -119,11 +121,13 @@ pub(super) struct Case {
     /// The gradient is wanted by the effects' numbers as well.
     free: bool,
     model: &'static Model,
+    /// Only so many steps.
+    steps: usize,
 }
 
 impl Default for Case {
     fn default() -> Case {
-        Case { laws: Vec::new(), free: false, model: &ALL[0] }
+        Case { laws: Vec::new(), free: false, model: &ALL[0], steps: usize::MAX }
     }
 }
 
@@ -224,7 +228,8 @@ pub(super) fn one(name: &str, shape: &dyn Shape, h: f64, case: &Case) -> Result<
 
 fn measured(name: &str, body: Body, Start(clock, before): Start, case: &Case) -> Result<Line, String> {
     let build = clock.elapsed().as_secs_f64();
-    let plan = Plan { model: case.model, ..plan(body, &case.laws) };
+    let mut plan = Plan { model: case.model, ..plan(body, &case.laws) };
+    plan.clock.steps = plan.clock.steps.min(case.steps);
     let own = |k: &ParamKey| case.free || !matches!(k, ParamKey::Effect { .. });
     let places = (0..plan.layout.len()).filter(|p| own(&plan.layout.keys[*p])).collect();
     let request = Request { gradient: Wanted::Places(places), ..Request::default() };
@@ -236,6 +241,7 @@ fn measured(name: &str, body: Body, Start(clock, before): Start, case: &Case) ->
         failure = there_and_back(&plan, &request, &mut world, &mut taken);
     }
     let (effort, steps) = (world.effort(0), plan.clock.steps as f64);
+    let landed = lands(&plan);
     Ok(Line {
         name: name.into(),
         nodes: body.nodes.len(),
@@ -245,6 +251,8 @@ fn measured(name: &str, body: Body, Start(clock, before): Start, case: &Case) ->
         forward: Times::of(taken.forward),
         cost: Times::of(taken.cost),
         adjoint: Times::of(taken.adjoint),
+        steps: plan.clock.steps,
+        landed,
         newton: effort.newton as f64 / steps,
         linear: effort.linear as f64 / steps,
         paper: None,
@@ -254,6 +262,23 @@ fn measured(name: &str, body: Body, Start(clock, before): Start, case: &Case) ->
         failure,
         gpu: None,
     })
+}
+
+/// The step in which the body, in free flight until then, has touched the ground; `None` where it does not.
+fn lands(plan: &Plan) -> Option<usize> {
+    let mut rollout = Rollout::new(CpuBackend, plan, 1).ok()?;
+    let mut found = None;
+    let flight = |k: usize| -9.81 * 0.5 * (plan.clock.step * k as f64).powi(2);
+    let end = rollout.visit(&plan.theta, |k, s, _| {
+        let lowest = s.displacement.iter().map(|u| u.z).fold(f64::INFINITY, f64::min);
+        let highest = s.displacement.iter().map(|u| u.z).fold(f64::NEG_INFINITY, f64::max);
+        // In free flight all nodes fall alike.
+        if found.is_none() && highest - lowest > 1e-3 * flight(k).abs() && k > 0 {
+            found = Some(k);
+        }
+        ControlFlow::Continue(())
+    });
+    end.is_ok().then_some(found)?
 }
 
 /// Products of dense matrices reserve a gigabyte of address space per thread when they are first asked for, of which next to nothing is

@@ -43,7 +43,13 @@ pub struct Line {
     pub cost: Times,
     /// Adjoint of comparison and step together.
     pub adjoint: Times,
-    /// Newton iterations of a step, on average; 0 where they were not counted, as on a device.
+    /// Steps that were timed, from the first on; 0 in files of earlier versions.
+    #[serde(default)]
+    pub steps: usize,
+    /// The first step in which the ground acts on the body, where one of them is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub landed: Option<usize>,
+    /// Newton iterations of a step, on average; of a batch those of the member that takes the most.
     #[serde(default)]
     pub newton: f64,
     /// Iterations of conjugate gradients for all of them together; 0 where the matrix was factorised.
@@ -91,9 +97,18 @@ pub struct Report {
     pub left_out: Vec<String>,
 }
 
-/// Iterations with so many digits after the point; nobody counts those of a device.
+/// Iterations with so many digits after the point; those of devices were not always counted.
 fn counted(l: &Line, iterations: f64, digits: usize) -> String {
-    if l.gpu.is_some() { "-".into() } else { format!("{iterations:.digits$}") }
+    if l.gpu.is_some() && l.newton == 0.0 { "-".into() } else { format!("{iterations:.digits$}") }
+}
+
+/// Steps that were timed, and whether the ground acted in one of them.
+fn steps(l: &Line) -> String {
+    match l.landed {
+        _ if l.steps == 0 => "-".into(),
+        Some(k) => format!("{} (lands in {k})", l.steps),
+        None => format!("{} (flight)", l.steps),
+    }
 }
 
 fn milliseconds(t: &Times) -> String {
@@ -116,6 +131,7 @@ impl Report {
             "body",
             "nodes",
             "cells",
+            "steps",
             "build s",
             "forward ms",
             "cost ms",
@@ -133,6 +149,7 @@ impl Report {
                 l.name.clone(),
                 l.nodes.to_string(),
                 l.cells.to_string(),
+                steps(l),
                 format!("{:.2}", l.build),
                 milliseconds(&l.forward),
                 milliseconds(&l.cost),
@@ -210,10 +227,10 @@ pub fn compare(before: &Path, after: &Path) -> Result<(), String> {
     let of = |r: &Report| format!("{} ({} threads, {})", r.date, r.threads, r.adapter.as_deref().unwrap_or("no adapter"));
     println!("before: {}\nafter: {}", of(&a), of(&b));
     table::print("after over before; below 1 is faster; shares of a copy's bandwidth before → after", &rows(&a, &b));
-    let sizes = |l: &&Line| find(&a, &l.name).is_some_and(|old| old.nodes != l.nodes);
-    let differ: Vec<&str> = b.lines.iter().filter(sizes).map(|l| l.name.as_str()).collect();
-    if !differ.is_empty() {
-        println!("  no ratio, because sizes differ: {}", differ.join(", "));
+    for l in &b.lines {
+        if let Some(why) = find(&a, &l.name).and_then(|old| unlike(old, l)) {
+            println!("  no ratio of {}: {why}", l.name);
+        }
     }
     for (report, other, which) in [(&a, &b, "before"), (&b, &a, "after")] {
         let alone: Vec<&str> = report.lines.iter().map(|l| l.name.as_str()).filter(|n| find(other, n).is_none()).collect();
@@ -236,6 +253,17 @@ fn find<'a>(report: &'a Report, name: &str) -> Option<&'a Line> {
     report.lines.iter().find(|l| l.name == name)
 }
 
+/// Why two lines are not of the same work.
+fn unlike(old: &Line, new: &Line) -> Option<String> {
+    if old.nodes != new.nodes {
+        return Some(format!("{} and {} nodes", old.nodes, new.nodes));
+    }
+    (old.steps != new.steps).then(|| match [old.steps, new.steps] {
+        [0, n] | [n, 0] => format!("one of the files does not say which steps were timed, the other {n}"),
+        [a, b] => format!("{a} and {b} steps were timed"),
+    })
+}
+
 /// The table of [`compare`].
 fn rows(a: &Report, b: &Report) -> Vec<Vec<String>> {
     let head = ["body", "nodes", "forward", "cost", "adjoint", "memory", "product", "share of CG"];
@@ -243,7 +271,7 @@ fn rows(a: &Report, b: &Report) -> Vec<Vec<String>> {
     for l in &b.lines {
         let Some(old) = find(a, &l.name) else { continue };
         // A ratio of different bodies says nothing.
-        let same = l.nodes == old.nodes;
+        let same = unlike(old, l).is_none();
         let ratio = |new: f64, old: f64| if same && old > 0.0 { format!("{:.2}", new / old) } else { "-".into() };
         let time = |new: &Times, old: &Times| ratio(new.median, old.median);
         // What is the same in both is said once.
@@ -277,6 +305,9 @@ mod tests {
             batch: 8,
             over_cpu: [1.0; 3],
             columns: Some([2e-3, 1e-3]),
+            cpu: Some([times; 3]),
+            counts: Some(super::super::model::Counts { steps: 5, ..Default::default() }),
+            modelled: Some(super::super::model::H100.step(&super::super::model::Counts::default())),
             product: "csr, many workgroups".into(),
             iteration: Some(traffic),
             products: vec![("csr".into(), traffic), ("free".into(), traffic)],
@@ -294,6 +325,8 @@ mod tests {
             paper: Some([0.077, 0.199, 0.058]),
             tape: 1,
             matrix: 1,
+            steps: 5,
+            landed: Some(4),
             newton: 3.0,
             linear: 0.0,
             peak: 4,
@@ -339,10 +372,11 @@ mod tests {
         let coarse = report(vec![Line { nodes: 432, ..line("ball", 1e-3, 0.6) }]);
         let expected = ["ball", "770 → 432", "-", "-", "-", "-", "csr, many workgroups", "30 % → 60 %"];
         assert_eq!(super::rows(&before, &coarse)[1], expected, "no ratio of bodies of different sizes");
-        assert_eq!(
-            [counted(&before.lines[0], 3.0, 1), counted(&Line { gpu: None, ..line("ball", 1.0, 0.0) }, 3.0, 1)],
-            ["-", "3.0"]
-        );
+        let shorter = report(vec![Line { steps: 4, ..line("ball", 1e-3, 0.6) }]);
+        assert_eq!(super::rows(&before, &shorter)[1][2], "-", "no ratio of other steps");
+        let silent = Line { steps: 0, ..line("ball", 1.0, 0.0) };
+        assert!(unlike(&before.lines[0], &silent).is_some_and(|why| why.contains("does not say")));
+        assert_eq!([counted(&before.lines[0], 3.0, 1), counted(&Line { newton: 0.0, ..silent }, 0.0, 1)], ["3.0", "-"]);
         let none = file("none", &before);
         std::fs::write(&none, "{}").unwrap_or_else(|e| panic!("{e}"));
         assert!(compare(&none, &paths[1]).is_err_and(|e| e.contains("no result of a benchmark")));
