@@ -1,19 +1,15 @@
 //! Choice of a backend, and rollouts without its type.
 
+use crate::auto;
 use crate::error::Error;
 use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{
-    Backend as _, Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Stop, Wanted,
-};
-use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
-use palpate_model::observation::Frame;
-use palpate_model::params::ParamKey;
+use palpate_engine::{Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Stop, Wanted};
+use palpate_gpu::{Choice, Choices, Gpu, GpuBackend, GpuError};
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 /// What computes the physics.
 ///
@@ -52,11 +48,6 @@ pub enum Backend {
     #[default]
     Auto,
 }
-
-/// Steps that `auto` times on both backends.
-const TRIAL_STEPS: usize = 2;
-/// Most members that it times: more change nothing in what is faster.
-const TRIAL_MEMBERS: usize = 16;
 
 /// The device of this process: kernels are compiled once. A device that was lost is opened anew, for whoever comes next.
 fn gpu() -> Result<GpuBackend, GpuError> {
@@ -108,40 +99,6 @@ impl Evaluate for InTurn {
     }
 }
 
-/// The first steps of a plan, with as many frames a step as the whole has where they are compared; the first ones, in which the body is
-/// where it starts.
-fn trial(plan: &Plan, compared: bool) -> Plan {
-    let (start, dt, steps) = (plan.theta[plan.layout.index(ParamKey::TimeStart)], plan.clock.step, plan.clock.steps);
-    let mut short = plan.clone();
-    short.clock.steps = steps.min(TRIAL_STEPS);
-    let mut seen = plan.observation.without_frames();
-    if compared {
-        let all = &plan.observation.frames;
-        let count = (all.len() * short.clock.steps).div_ceil(steps.max(1));
-        let count = if steps == 0 { all.len() } else { count };
-        let time = |k: usize| start + (k as f64 + 0.5) / count as f64 * short.clock.steps as f64 * dt;
-        seen.frames = all.iter().take(count).enumerate().map(|(k, f)| Frame { time: time(k), ..f.clone() }).collect();
-    }
-    Plan { observation: Arc::new(seen), ..short }
-}
-
-/// Seconds of a step of such a trial with what is asked of it, for `members` simulations, so many at once, or why there are none; the
-/// first round warms up.
-fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Request, members: [usize; 2]) -> Result<f64, String> {
-    let [members, at_once] = members;
-    let rows = ParamBatch::from_rows(&vec![plan.theta.clone(); members]);
-    let mut rollout = Rollout::new(backend, plan, at_once).map_err(|e| e.message)?;
-    rollout.evaluate(&rows, request);
-    let clock = Instant::now();
-    let done = rollout.evaluate(&rows, request);
-    let seconds = clock.elapsed().as_secs_f64() / plan.clock.steps.max(1) as f64;
-    match done.into_iter().find_map(|e| e.failure) {
-        None => Ok(seconds),
-        // The way out is taken here.
-        Some(f) => Err(f.message()),
-    }
-}
-
 impl Backend {
     /// Name for result files and messages.
     pub fn name(self) -> &'static str {
@@ -153,7 +110,7 @@ impl Backend {
     }
 
     /// What `auto` means for a plan in batches of `members`, and the reason: a graphics processor is taken where a step of this body
-    /// takes less time on it than on the CPU, both measured here. Software adapters are never faster and not tried, unless
+    /// takes clearly less time on it than on the CPU, both measured here or before. Software adapters are never faster and not tried, unless
     /// `PALPATE_ADAPTER` names one.
     pub fn resolve(self, plan: &Plan, members: usize) -> (Backend, String) {
         self.resolve_for(plan, &Demand::forward(members))
@@ -168,26 +125,12 @@ impl Backend {
         if !named && (!may_have_processor() || !palpate_gpu::adapters().iter().any(|a| a.refusal.is_none() && !a.is_software())) {
             return (Backend::Cpu, "there is no graphics processor".into());
         }
-        let device = match gpu() {
-            Ok(g) => g,
-            Err(e) => return (Backend::Cpu, e.to_string()),
-        };
-        let name = device.name();
-        let (short, request, members) = (&trial(plan, demand.compared), demand.request(), demand.starts.min(TRIAL_MEMBERS));
-        let demand = Demand { starts: members, ..demand.clone() };
-        let cpu = time_step(CpuBackend, short, &request, [members, demand.on_cpu(plan, 0).0]);
-        let at_once = demand.on_device(plan, device.gpu().largest_buffer()).map_or(1, |d| d.0);
-        let gpu = {
-            let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-            time_step(device, short, &request, [members, at_once])
-        };
-        let what = demand.step();
-        let ms = |s: f64| format!("{:.2} ms", s * 1e3);
-        match (cpu, gpu) {
-            (Ok(c), Ok(g)) if g < c => (Backend::Gpu, format!("{what} takes {} on {name}, {} on the CPU", ms(g), ms(c))),
-            (Ok(c), Ok(g)) => (Backend::Cpu, format!("{what} takes {}, {} on {name}", ms(c), ms(g))),
-            (Ok(_), Err(why)) => (Backend::Cpu, format!("{name} cannot compute this body: {why}")),
-            (Err(why), _) => (Backend::Cpu, format!("the first steps fail on the CPU: {why}")),
+        match gpu() {
+            Ok(device) => {
+                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+                auto::choose(device, plan, demand, &Choices::of_user())
+            }
+            Err(e) => (Backend::Cpu, e.to_string()),
         }
     }
 

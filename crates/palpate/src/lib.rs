@@ -32,6 +32,7 @@
 //!
 //! Invariant: this room reads options, chooses a backend and talks to people. It computes no physics.
 
+mod auto;
 mod catalogue;
 mod choose;
 pub mod cli;

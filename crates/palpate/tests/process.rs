@@ -103,11 +103,18 @@ fn auto_takes_what_it_measured_to_be_faster_and_says_so() {
     let name = adapter.name.split(" (").next().unwrap_or_default().to_string();
     let (folder, scene) = scene();
     let path = |name: &str| folder.path().join(name);
-    let mut command = program();
-    command.arg("simulate").arg(&scene).args(["--backend", "auto", "--format", "obj", "--every", "6", "--out"]);
-    let (code, _, err) = run(command.arg(path("out")).env("PALPATE_ADAPTER", &name));
-    assert_eq!(code, 0, "{err}");
-    check_choice(&err, "a step", &name);
+    let simulated = |out: &str| {
+        let mut command = program();
+        command.arg("simulate").arg(&scene).args(["--backend", "auto", "--format", "obj", "--every", "6", "--out"]);
+        let (code, _, err) = run(command.arg(path(out)).env("PALPATE_ADAPTER", &name).env("XDG_CACHE_HOME", path("cache")));
+        assert_eq!(code, 0, "{err}");
+        check_choice(&err, "a step", &name);
+        err.lines().find(|l| l.starts_with("backend: ")).map(str::to_string).unwrap_or_default()
+    };
+    let told = simulated("out");
+    assert_eq!(told.contains(", a software adapter and "), adapter.is_software(), "{told}");
+    // Whoever asks again gets the same answer, without a measurement.
+    assert_eq!(simulated("again"), told.strip_suffix(')').unwrap_or_default().to_string() + ", as measured before)");
     // A fit is timed by what its optimiser asks of a step.
     let camera = ["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=40x30", "--backend", "cpu", "--out"];
     assert_eq!(run(program().arg("observe").arg(&scene).args(camera).arg(path("seen"))).0, 0);
