@@ -1,12 +1,13 @@
 //! Time of a step of the GPU backend beside the CPU's: batches, passes by the device's own clock, traffic of conjugate gradients.
 
+use super::counting;
 use super::model::{Counts, H100, Modelled};
 use super::report::{Line, Report, Times};
 use super::{BAND, Case, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
 use crate::table;
 use glam::DVec3;
 use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
-use palpate_gpu::{Choice, Dispatches, Gpu, GpuBackend, Product, Tuning, World};
+use palpate_gpu::{Choice, Gpu, GpuBackend, World};
 use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -237,13 +238,13 @@ impl Longest {
 }
 
 /// Seconds of forward, cost and adjoint of every step, and bytes of the device.
-struct Run {
+pub(super) struct Run {
     seconds: [Vec<f64>; 3],
     /// The same of derivatives, for every number of them that were computed together.
     columns: Vec<Vec<f64>>,
     failure: Option<String>,
     /// Seconds in which the host recorded a step.
-    recording: Vec<f64>,
+    pub(super) recording: Vec<f64>,
 }
 
 fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
@@ -299,7 +300,7 @@ fn run(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[us
 }
 
 /// The run that has what its members need.
-fn settled(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
+pub(super) fn settled(backend: &GpuBackend, world: &mut World, stages: &[Stage], together: &[usize]) -> Result<Run, String> {
     backend.rollout(world, false, |world| run(backend, world, stages, together))
 }
 
@@ -355,7 +356,7 @@ fn on_device(
     let columns: Vec<f64> = run.columns.into_iter().map(|s| of_member(s).median).collect();
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
     let cpu = of_cpu(steps)?;
-    let counts = count(gpu, plan, &rows, steps)?;
+    let counts = counting::count(gpu, plan, &rows, steps)?;
     let line = Line {
         name: format!("gpu {} × {batch}", cpu.name),
         build,
@@ -383,75 +384,6 @@ fn on_device(
         ..cpu.clone()
     };
     Ok((line, step))
-}
-
-/// What the first steps come to where many workgroups share a solve and dispatches are recorded sparingly. The first rollout learns how many are
-/// needed; the second is counted, and its recording timed.
-fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize) -> Result<Counts, String> {
-    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix) };
-    let backend = GpuBackend::on(gpu.clone()).tuned(tuning).sparing();
-    let mut world = backend.build(plan, rows.len()).map_err(|e| e.to_string())?;
-    backend.set_params(&mut world, &ParamBatch::from_rows(rows));
-    let stages = &plan.clock.stages()[..steps];
-    settled(&backend, &mut world, stages, &[])?;
-    let run = settled(&backend, &mut world, stages, &[])?;
-    world.count_dispatches(true).map_err(|e| e.to_string())?;
-    let counted = backend.rollout(&mut world, false, |world| counted(&backend, world, stages))?;
-    let of_step = |x: f64| x / steps as f64;
-    let mean = |k: usize| of_step(counted.iterations.iter().map(|i| f64::from(i[k])).sum());
-    let [iteration, round] = world.bytes_of_iteration_and_round();
-    let [newton, linear, adjoint] = [mean(0), mean(1), mean(2)];
-    Ok(Counts {
-        steps,
-        newton,
-        linear,
-        adjoint,
-        recorded: of_step(counted.dispatches.recorded as f64),
-        live: of_step(counted.dispatches.live as f64),
-        host: Times::of(run.recording).median,
-        // A round more looks at the last trial.
-        bytes: (newton + 1.0) * round + linear * iteration,
-    })
-}
-
-/// Dispatches of steps forward, and iterations of each step and its adjoint: Newton's, those of conjugate gradients, and the derivative's.
-struct Counted {
-    dispatches: Dispatches,
-    iterations: Vec<[u32; 3]>,
-}
-
-fn counted(backend: &GpuBackend, world: &mut World, stages: &[Stage]) -> Result<Counted, String> {
-    let request = Request { gradient: Wanted::All, ..Request::default() };
-    let mut tally = backend.new_tally(world, &request);
-    let mut tape = vec![backend.new_state(world)];
-    backend.start(world, &mut tape[0], &mut tally);
-    let before = world.dispatches();
-    let mut iterations = Vec::new();
-    for (k, stage) in stages.iter().enumerate() {
-        let mut next = backend.new_state(world);
-        backend.step(world, stage, &[&tape[k]], &mut next, &mut tally);
-        let own = world.iterations().map_err(|e| e.to_string())?;
-        let most = |k: usize| own.iter().map(|n| n[k]).max().unwrap_or(0);
-        iterations.push([most(0), most(1), 0]);
-        tape.push(next);
-    }
-    let after = world.dispatches();
-    let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
-    for k in (0..stages.len()).rev() {
-        backend.observe_adjoint(world, k, &tape[k], &tape[k + 1], &mut adj, &mut adj_now, &mut tally);
-        let adj_past = std::slice::from_mut(&mut adj_now);
-        backend.step_adjoint(world, &stages[k], &[&tape[k]], &tape[k + 1], &adj, adj_past, &mut tally);
-        iterations[k][2] = world.derivative_iterations().map_err(|e| e.to_string())?.into_iter().max().unwrap_or(0);
-        std::mem::swap(&mut adj, &mut adj_now);
-        backend.clear_adjoint(&mut adj_now);
-    }
-    backend.read(world, &tally);
-    let dispatches = Dispatches {
-        recorded: after.recorded - before.recorded,
-        live: after.live - before.live,
-        workgroups: after.workgroups - before.workgroups,
-    };
-    Ok(Counted { dispatches, iterations })
 }
 
 #[cfg(test)]

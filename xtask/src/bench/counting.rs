@@ -1,0 +1,79 @@
+//! Counts what steps come to on a graphics processor: iterations, dispatches, bytes. A software adapter counts as well as any.
+
+use super::gpu::settled;
+use super::model::Counts;
+use super::report::Times;
+use palpate_engine::{Backend, ParamBatch, Request, Wanted};
+use palpate_gpu::{Dispatches, Gpu, GpuBackend, Product, Tuning, World};
+use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
+use std::sync::Arc;
+
+/// What the first steps come to where many workgroups share a solve and dispatches are recorded sparingly. The first rollout learns how many are
+/// needed; the second is counted, and its recording timed.
+pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize) -> Result<Counts, String> {
+    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix) };
+    let backend = GpuBackend::on(gpu.clone()).tuned(tuning).sparing();
+    let mut world = backend.build(plan, rows.len()).map_err(|e| e.to_string())?;
+    backend.set_params(&mut world, &ParamBatch::from_rows(rows));
+    let stages = &plan.clock.stages()[..steps];
+    settled(&backend, &mut world, stages, &[])?;
+    let run = settled(&backend, &mut world, stages, &[])?;
+    world.count_dispatches(true).map_err(|e| e.to_string())?;
+    let counted = backend.rollout(&mut world, false, |world| counted(&backend, world, stages))?;
+    let of_step = |x: f64| x / steps as f64;
+    let mean = |k: usize| of_step(counted.iterations.iter().map(|i| f64::from(i[k])).sum());
+    let [iteration, round] = world.bytes_of_iteration_and_round();
+    let [newton, linear, adjoint] = [mean(0), mean(1), mean(2)];
+    Ok(Counts {
+        steps,
+        newton,
+        linear,
+        adjoint,
+        recorded: of_step(counted.dispatches.recorded as f64),
+        live: of_step(counted.dispatches.live as f64),
+        host: Times::of(run.recording).median,
+        // A round more looks at the last trial.
+        bytes: (newton + 1.0) * round + linear * iteration,
+    })
+}
+
+/// Dispatches of steps forward, and iterations of each step and its adjoint: Newton's, those of conjugate gradients, and the derivative's.
+struct Counted {
+    dispatches: Dispatches,
+    iterations: Vec<[u32; 3]>,
+}
+
+fn counted(backend: &GpuBackend, world: &mut World, stages: &[Stage]) -> Result<Counted, String> {
+    let request = Request { gradient: Wanted::All, ..Request::default() };
+    let mut tally = backend.new_tally(world, &request);
+    let mut tape = vec![backend.new_state(world)];
+    backend.start(world, &mut tape[0], &mut tally);
+    let before = world.dispatches();
+    let mut iterations = Vec::new();
+    for (k, stage) in stages.iter().enumerate() {
+        let mut next = backend.new_state(world);
+        backend.step(world, stage, &[&tape[k]], &mut next, &mut tally);
+        let own = world.iterations().map_err(|e| e.to_string())?;
+        let most = |k: usize| own.iter().map(|n| n[k]).max().unwrap_or(0);
+        iterations.push([most(0), most(1), 0]);
+        tape.push(next);
+    }
+    let after = world.dispatches();
+    let (mut adj, mut adj_now) = (backend.new_adjoint(world), backend.new_adjoint(world));
+    for k in (0..stages.len()).rev() {
+        backend.observe_adjoint(world, k, &tape[k], &tape[k + 1], &mut adj, &mut adj_now, &mut tally);
+        let adj_past = std::slice::from_mut(&mut adj_now);
+        backend.step_adjoint(world, &stages[k], &[&tape[k]], &tape[k + 1], &adj, adj_past, &mut tally);
+        iterations[k][2] = world.derivative_iterations().map_err(|e| e.to_string())?.into_iter().max().unwrap_or(0);
+        std::mem::swap(&mut adj, &mut adj_now);
+        backend.clear_adjoint(&mut adj_now);
+    }
+    backend.read(world, &tally);
+    let dispatches = Dispatches {
+        recorded: after.recorded - before.recorded,
+        live: after.live - before.live,
+        workgroups: after.workgroups - before.workgroups,
+    };
+    Ok(Counted { dispatches, iterations })
+}
