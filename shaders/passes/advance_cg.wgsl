@@ -1,7 +1,8 @@
 //! Conjugate gradients by many workgroups, after the product: x ← x + α p, r ← r − α q; and force and torque that r is to each group, which is
 //! what a workgroup works on.
 // use shared/grid
-// use shared/totals_64
+// use shared/team_64
+// use shared/totals
 // use shared/precondition
 // use shared/iteration
 // use shared/coarse
@@ -29,14 +30,14 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if bad {
         return;
     }
-    let way = solving_part(select(EVEN_WAY, ODD_WAY, parity() == 1u));
+    set_way(parity(), 0.0);
     let turn = turn_of_group(share.home, share.first);
     var force = vec4(0.0);
     var torque = vec4(0.0);
     for (var k = group_rows[share.first] + local; k < group_rows[share.first + 1u]; k += 64u) {
         let node = group_nodes[k];
         let a = at_node(share.member, node);
-        solving[a] += alpha * solving[way + a];
+        solving[a] += alpha * solving[way_now() + a];
         let r = solving[solving_part(REST) + a].xyz - alpha * solving[solving_part(IMAGE) + a].xyz;
         solving[solving_part(REST) + a] = vec4(r, 0.0);
         let w = wrench_of(turn, arms[node].xyz, r);

@@ -4,21 +4,12 @@
 // use shared/iteration
 // use shared/coarse_alone
 // use shared/first_cg
+// use shared/newton_of
 
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> residual: array<vec4<f32>>;
 var<storage, read_write> solving: array<vec4<f32>>;
-var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
-
-var<workgroup> common_newton: Newton;
-
-fn newton_of(local: u32, member: u32) -> Newton {
-    if local == 0u {
-        common_newton = newton[member];
-    }
-    return workgroupUniformLoad(&common_newton);
-}
 
 @compute @workgroup_size(256)
 fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,

@@ -1,5 +1,6 @@
 //! Looks at every member's new state once per step: all numbers, still in the world, solve finished? call.extra: 1 = it was given less than it is allowed.
 // use shared/grid
+// use shared/team_256
 // use shared/totals
 // use shared/finite
 

@@ -2,6 +2,7 @@
 //! FOR_DIRECTION or FOR_DERIVATIVE.
 // use shared/asks
 // use shared/grid
+// use shared/team_256
 // use shared/totals
 // use shared/iteration
 // use shared/leave_cg

@@ -1,5 +1,6 @@
 //! q = A p at every node from what multiply_cells left on the corners, with mass damping, ghost penalty, inertia; parts of pᵀ q.
 // use shared/mix
+// use shared/team_256
 // use shared/totals
 // use shared/iteration
 // use shared/product

@@ -4,6 +4,7 @@
 //! of a guess half the way from the old state that is left. call.extra: the round of Newton's method.
 // use shared/mix
 // use shared/hyper
+// use shared/team_256
 // use shared/totals
 // use shared/finite
 // use shared/precondition

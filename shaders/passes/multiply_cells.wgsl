@@ -1,9 +1,10 @@
-//! First of an iteration where q = A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class (see tangent_cells), its clamps and its
-//! patches to its corners, for gather_product.
+//! First of an iteration where q = A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
+//! (see tangent_cells), its clamps and its patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents
 // use shared/patches
-// use shared/totals_64
+// use shared/team_64
+// use shared/totals
 // use shared/turn
 
 var<storage, read> supports: array<vec4<f32>>;

@@ -1,6 +1,7 @@
 //! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, p = z + β p and q = A p with the assembled matrix,
 //! eight lanes a row so that neighbouring lanes read neighbouring blocks; and parts of pᵀ q.
 // use shared/mix
+// use shared/team_256
 // use shared/totals
 // use shared/turn
 // use shared/product

@@ -1,7 +1,8 @@
 //! z = M⁻¹ r, a workgroup a group of nodes: their own blocks, and the group's motion from force and torque on all groups; and parts of rᵀ z.
 //! call.extra: ODD after an odd iteration, and before the first one.
 // use shared/grid
-// use shared/totals_64
+// use shared/team_64
+// use shared/totals
 // use shared/precondition
 // use shared/iteration
 // use shared/correction

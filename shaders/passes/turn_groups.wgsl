@@ -2,11 +2,10 @@
 //! centre, by Müller, Bender, Chentanez & Macklin (MIG 2016), which any shape of a group serves, flat ones too.
 // use shared/grid
 // use shared/finite
-// use shared/totals_64
+// use shared/team_64
+// use shared/totals
+// use shared/coarse
 
-var<body> group_rows: array<u32>;
-var<body> group_nodes: array<u32>;
-var<body> arms: array<vec4<f32>>;
 // The state: [3][B][N], of which the first two make the displacement.
 var<storage, read> turning: array<vec4<f32>>;
 // After the inverse blocks, as shared/precondition says.
@@ -45,9 +44,9 @@ fn turn_groups(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     var q = vec4(0.0, 0.0, 0.0, 1.0);
     for (var i = 0u; i < TURNS; i++) {
-        let rx = rotated(q, vec3(1.0, 0.0, 0.0));
-        let ry = rotated(q, vec3(0.0, 1.0, 0.0));
-        let rz = rotated(q, vec3(0.0, 0.0, 1.0));
+        let rx = turned(q, vec3(1.0, 0.0, 0.0));
+        let ry = turned(q, vec3(0.0, 1.0, 0.0));
+        let rz = turned(q, vec3(0.0, 0.0, 1.0));
         let along = abs(dot(rx, cx) + dot(ry, cy) + dot(rz, cz));
         let by = (cross(rx, cx) + cross(ry, cy) + cross(rz, cz)) / max(along, 1e-30);
         // Half of the turn, as quaternions have it.
@@ -60,8 +59,4 @@ fn turn_groups(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         q = vec4(0.0, 0.0, 0.0, 1.0);
     }
     inverses[2u * shape.members * shape.nodes + share.member * shape.groups + share.first] = q;
-}
-
-fn rotated(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
-    return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v);
 }

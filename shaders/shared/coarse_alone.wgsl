@@ -1,4 +1,5 @@
 //! The second level by one workgroup of 256: four lanes a group, 64 groups at a time.
+// use shared/team_256
 // use shared/totals
 // use shared/precondition
 // use shared/solving

@@ -1,6 +1,6 @@
 //! Scalars of conjugate gradients that many workgroups of a system share. Every workgroup sums the parts again in the same order, so
 //! all of them see the same numbers and take the same decisions. call.extra: ODD and WIDE_PARTS. Who asks has sums over a workgroup
-//! (`shared/totals` or `shared/totals_64`).
+//! (`shared/totals`).
 // use shared/asks
 // use shared/finite
 // use shared/solving

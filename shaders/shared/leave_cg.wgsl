@@ -1,26 +1,16 @@
 //! Where a member goes from conjugate gradients: to the line search, to the convex tangent, to an error, or on with iterations. A
 //! curvature that is not positive cuts a Newton direction short: what was gathered by then leads down (Dembo & Steihaug, Math.
 //! Program. 26, 1983). Where that is nothing the convex tangent is asked for.
+// use shared/newton_of
 
 var<storage, read_write> solving: array<vec4<f32>>;
-var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
-
-var<workgroup> common_newton: Newton;
-
-// A member's state, read once for a workgroup.
-fn newton_of(local: u32, member: u32) -> Newton {
-    if local == 0u {
-        common_newton = newton[member];
-    }
-    return workgroupUniformLoad(&common_newton);
-}
 
 // What rounding may leave of a derivative's right-hand side when the iterations run out.
 const ACCEPTABLE = 1e-4;
 
-// `of_rhs`: rᵀ M⁻¹ r of the right-hand side; `along_rhs`: xᵀ times it, which is Σ α rᵀ M⁻¹ r over the iterations. `exact`: the solve is for a derivative; then a negative curvature is an error, and no line search
-// follows.
+// `of_rhs`: rᵀ M⁻¹ r of the right-hand side; `along_rhs`: xᵀ times it, which is Σ α rᵀ M⁻¹ r over the iterations. `exact`: the solve is for a
+// derivative; then a negative curvature is an error, and no line search follows.
 fn leave_cg(local: u32, member: u32, found: Newton, of_rhs: f32, along_rhs: f32, bent: bool, over: bool, exact: bool) {
     var n = found;
     var broken = 0u;

@@ -2,7 +2,6 @@
 // use shared/coarse_alone
 // use shared/correction
 
-
 // Puts z in its part, from the residual and what restrict_alone left, and returns rᵀ z.
 fn precondition_alone(local: u32, system: u32, home: u32) -> f32 {
     let choice = coarse_choice(home);

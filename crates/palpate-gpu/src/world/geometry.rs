@@ -16,8 +16,8 @@ use palpate_model::space::groups::Groups;
 use palpate_model::space::pattern::{BlockRows, Pattern, Places};
 use std::collections::HashMap;
 
-/// Best relative accuracy of a Newton solve in single precision: 30 roundings. Newton's method is quadratic there, so the
-/// solution is better than its last but one residual.
+/// Best relative accuracy of a Newton solve in single precision: three roundings of the forces. Where rounding is more, a step that no longer halves
+/// the residual ends the solve.
 const FINEST: f64 = 2e-7;
 /// Most CG iterations of one solve; a solve that needs more is a symptom.
 const MOST_ITERATIONS: usize = 2000;
