@@ -2,7 +2,7 @@
 
 use crate::device::{Choice, Gpu, GpuError};
 use crate::solve::{backward, forward};
-use crate::world::{Adjoint, Level, State, Tally, Tangent, Tuning, World};
+use crate::world::{Adjoint, LEVELS, Level, State, Tally, Tangent, Tuning, World};
 use crate::{costs, read, solve};
 use glam::DVec3;
 use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
@@ -17,7 +17,6 @@ pub struct GpuBackend {
     tuning: Option<Tuning>,
     levels: Option<&'static [(usize, u32, u32)]>,
     alone: bool,
-    sparing: bool,
 }
 
 impl GpuBackend {
@@ -31,7 +30,7 @@ impl GpuBackend {
 
     /// On an open device.
     pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
-        GpuBackend { gpu, tuning: None, levels: None, alone: false, sparing: false }
+        GpuBackend { gpu, tuning: None, levels: None, alone: false }
     }
 
     /// The same with given ways to solve, instead of those that the environment or a measurement chooses.
@@ -41,7 +40,7 @@ impl GpuBackend {
 
     /// The same as on a graphics processor, where a dispatch that nobody wants costs something: solves are given what they took the time before.
     pub fn sparing(self) -> GpuBackend {
-        GpuBackend { sparing: true, ..self }
+        GpuBackend { levels: Some(LEVELS), ..self }
     }
 
     /// The same with other levels of effort than those of its device.
@@ -58,9 +57,6 @@ impl GpuBackend {
     fn world(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
         let mut world = solve::world(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
         world.alone = self.alone;
-        if self.sparing {
-            world.effort = Level::new(true);
-        }
         if let Some(levels) = self.levels {
             world.effort = Level::of(levels);
         }

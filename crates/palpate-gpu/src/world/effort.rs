@@ -56,7 +56,7 @@ const WIDEST: f64 = 1.0;
 
 /// What the first rollout is given: (rounds, iterations, iterations of a derivative), from little to much. A step of a soft body takes three to
 /// five rounds, and its solves go on from one round to the next. After the last comes everything.
-const LEVELS: &[(usize, u32, u32)] = &[(6, 32, 128), (10, 96, 512), (16, 256, 2048)];
+pub(crate) const LEVELS: &[(usize, u32, u32)] = &[(6, 32, 128), (10, 96, 512), (16, 256, 2048)];
 
 /// What a world gives its solves, and whether that was too little.
 #[derive(Debug)]

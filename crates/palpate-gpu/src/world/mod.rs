@@ -18,7 +18,7 @@ mod tuning;
 #[cfg(test)]
 pub(crate) use coarse::MOST_GROUPS;
 pub(crate) use coarse::{Coarse, vectors as coarse_vectors};
-pub(crate) use effort::{Effort, Level};
+pub(crate) use effort::{Effort, LEVELS, Level};
 pub(crate) use geometry::Geometry;
 pub(crate) use limits::columns;
 pub(crate) use rates::Rates;
