@@ -91,6 +91,8 @@ pub struct Effort {
     pub newton: usize,
     /// Iterations of conjugate gradients for their directions; none where solves are direct.
     pub linear: usize,
+    /// The same for adjoints of steps.
+    pub adjoint: usize,
 }
 
 /// Finds u₁ with r(u₁) = 0 from the guess in `u1`. Converged when the residual, scaled by the inverse diagonal blocks,
@@ -295,7 +297,8 @@ fn line_search(
     (residual, norm)
 }
 
-/// Solves A x = b with the exact tangent at a converged state, for derivatives. The residual has been computed there.
+/// Solves A x = b with the exact tangent at a converged state, for derivatives; the iterations that took. The residual has been computed
+/// there.
 pub fn solve_exact(
     equation: &Equation,
     solvers: &Solvers,
@@ -303,7 +306,7 @@ pub fn solve_exact(
     purpose: Purpose,
     u1: &[DVec3],
     columns: &mut [Vec<DVec3>],
-) -> Result<(), Reason> {
+) -> Result<usize, Reason> {
     equation.tangent(u1, Curvature::Exact, matrix);
     let diagonal = BlockJacobi::new(&equation.context.pattern.blocks, matrix).map_err(not_positive)?;
     let mut level = None;

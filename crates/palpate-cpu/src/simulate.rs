@@ -243,7 +243,7 @@ pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &
         let mut e = equation(shared, member, None, &still);
         e.residual(&s.u);
         t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&s.u, r))).collect();
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut t.du)
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut t.du).map(|_| ())
     })
 }
 
@@ -303,10 +303,10 @@ pub fn step_adjoint(
     let (a, c) = velocity_factors(stage.length, stage.theta);
     let from = Start::new(stage, past);
     let mut z = [adj.u.iter().zip(&adj.v).map(|(u, v)| *u + a * *v).collect::<Nodes>()];
-    with_matrix(member, |member, matrix| {
+    let iterations = with_matrix(member, |member, matrix| {
         let mut e = equation(shared, member, Some(stage), &from);
         e.residual(&next.u);
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Step(1), &next.u, &mut z)?;
+        let iterations = newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Step(1), &next.u, &mut z)?;
         let back = e.by_past_transposed(&next.u, &z[0]);
         for ((to, (_, weight)), each) in adj_past.iter_mut().zip(&stage.from).zip(&back.each) {
             for i in 0..next.u.len() {
@@ -315,8 +315,10 @@ pub fn step_adjoint(
             }
         }
         gradient.take(&e, &next.u, &z[0]);
-        if is_finite(&z[0]) { Ok(()) } else { Err((FailureKind::NotFinite, "adjoint of a step".into())) }
-    })
+        if is_finite(&z[0]) { Ok(iterations) } else { Err((FailureKind::NotFinite, "adjoint of a step".into())) }
+    })?;
+    member.effort.adjoint += iterations;
+    Ok(())
 }
 
 /// Tangent of a stage.

@@ -202,14 +202,14 @@ impl Prepared<'_> {
         }
     }
 
-    /// Solves for many right-hand sides in place, from zero guesses.
-    pub fn solve_many(&self, columns: &mut [Vec<DVec3>], relative: f64) -> Result<(), Trouble> {
+    /// Solves for many right-hand sides in place, from zero guesses; the iterations of all of them.
+    pub fn solve_many(&self, columns: &mut [Vec<DVec3>], relative: f64) -> Result<usize, Trouble> {
         match self {
             Prepared::Direct(factor) => {
                 factor.solve(&mut columns.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
-                Ok(())
+                Ok(0)
             }
-            Prepared::Iterative(..) => columns.iter_mut().try_for_each(|b| self.solve(b, relative, 0.0).map(|_| ())),
+            Prepared::Iterative(..) => columns.iter_mut().map(|b| self.solve(b, relative, 0.0)).sum(),
         }
     }
 }
