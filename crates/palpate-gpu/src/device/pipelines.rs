@@ -84,6 +84,18 @@ impl Pipelines {
         Pipelines { lanes, constant, kernels: PASSES.iter().map(|_| OnceLock::new()).collect() }
     }
 
+    /// Whether the kernel of a pass has been asked for.
+    #[cfg(test)]
+    pub(crate) fn is_compiled(&self, pass: usize) -> bool {
+        self.kernels[pass].get().is_some()
+    }
+
+    /// Puts another kernel in the place of a pass's, and returns what was there.
+    #[cfg(test)]
+    pub(crate) fn swap(&mut self, pass: usize, kernel: OnceLock<Result<Kernel, GpuError>>) -> OnceLock<Result<Kernel, GpuError>> {
+        std::mem::replace(&mut self.kernels[pass], kernel)
+    }
+
     /// The kernel of a pass.
     pub(crate) fn get(&self, device: &wgpu::Device, pass: usize) -> Result<&Kernel, &GpuError> {
         self.kernels[pass].get_or_init(|| compile(device, &PASSES[pass], self)).as_ref()

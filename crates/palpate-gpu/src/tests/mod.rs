@@ -20,6 +20,7 @@ mod loops;
 mod material_passes;
 mod materials;
 mod memory;
+mod mutations;
 mod passes;
 mod products;
 pub(crate) mod scenes;
