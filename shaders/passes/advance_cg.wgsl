@@ -1,13 +1,48 @@
-//! Conjugate gradients by many workgroups, after the product: x ← x + α p, r ← r − α q; and force and torque that r is to each group, which is
-//! what a workgroup works on.
+//! Conjugate gradients by many workgroups, second and last of an iteration, a workgroup a group of nodes: p = z + β p, A p = A z + β A p,
+//! x ← x + α p, r ← r − α A p; and of the residual z = M⁻¹ r: the nodes' own blocks, and the group's motion from force and torque on all groups,
+//! which follow from those before without waiting for the others. call.extra: ODD; or BEGINS, for z of the residual as it is.
 // use shared/grid
 // use shared/team_64
 // use shared/totals
 // use shared/precondition
 // use shared/iteration
-// use shared/coarse
+// use shared/correction
+
+// First slice of each group.
+var<body> group_slices: array<u32>;
 
 var<storage, read_write> solving: array<vec4<f32>>;
+
+fn wrench_at(place: u32) -> Wrench {
+    return Wrench(cg_sums[place].xyz, cg_sums[place + 1u].xyz);
+}
+
+fn added(a: Wrench, times: f32, b: Wrench) -> Wrench {
+    return Wrench(a.force + times * b.force, a.torque + times * b.torque);
+}
+
+// Force and torque that A p is to a group.
+fn image_wrench(system: u32, g: u32, beta: f32) -> Wrench {
+    var sum = Wrench(vec3(0.0), vec3(0.0));
+    for (var k = group_slices[g]; k < group_slices[g + 1u]; k++) {
+        sum = added(sum, 1.0, wrench_at(slices_at(system) + OF_SLICE * k));
+    }
+    return added(sum, beta, wrench_at(image_wrenches_at(system, 1u - parity()) + 2u * g));
+}
+
+fn keep_wrench(place: u32, w: Wrench) {
+    cg_sums[place] = vec4(w.force, 0.0);
+    cg_sums[place + 1u] = vec4(w.torque, 0.0);
+}
+
+// zᵀ A z from the slices' parts.
+fn sum_bends(local: u32, system: u32) -> f32 {
+    var sum = vec4(0.0);
+    for (var i = local; i < shape.slices; i += 64u) {
+        sum.x += cg_sums[slices_at(system) + OF_SLICE * i].w;
+    }
+    return total(local, sum).x;
+}
 
 @compute @workgroup_size(64)
 fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -16,38 +51,72 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if !share.runs {
         return;
     }
-    let s = scalars_of(local, scalars_at(share.member) + parity());
-    if s.z != 0.0 {
-        return;
+    let system = share.member;
+    let own = share.first;
+    let begins = (call.extra & BEGINS) != 0u;
+    var alpha = 0.0;
+    var beta = 0.0;
+    if !begins {
+        let now = scalars_of(local, scalars_at(system) + parity());
+        if now.z != 0.0 {
+            return;
+        }
+        beta = way_factor_of(now.x, scalars_of(local, scalars_at(system) + 1u - parity()).x);
+        let update = scalars_of(local, scalars_at(system) + 3u - parity());
+        let curvature = curvature_of(sum_bends(local, system), beta, now.x, update.z);
+        let curved = is_curved(curvature);
+        alpha = select(0.0, now.x / curvature, curved);
+        if own == 0u && local == 0u {
+            cg_sums[scalars_at(system) + 2u + parity()] = vec4(select(1.0, 0.0, curved), update.y + alpha * now.x, alpha, 0.0);
+        }
+        if !curved {
+            return;
+        }
     }
-    let bend = sum_parts(local, bends_at(share.member), groups_of_nodes(product_width()));
-    let bad = bend <= 0.0 || !is_finite(bend);
-    let alpha = select(s.x / bend, 0.0, bad);
-    if share.first == 0u && local == 0u {
-        let before = cg_sums[scalars_at(share.member) + 3u - parity()].y;
-        cg_sums[scalars_at(share.member) + 2u + parity()] = vec4(select(0.0, 1.0, bad), before + alpha * s.x, 0.0, 0.0);
+    let choice = coarse_choice(share.home);
+    let turn = turn_of_group(share.home, own);
+    var sum: Motion;
+    for (var g = local; g < shape.groups; g += 64u) {
+        var rest = wrench_at(wrenches_at(system, select(1u - parity(), parity(), begins)) + 2u * g);
+        if !begins {
+            let image = image_wrench(system, g, beta);
+            rest = added(rest, -alpha, image);
+            if g == own {
+                keep_wrench(image_wrenches_at(system, parity()) + 2u * g, image);
+            }
+        }
+        sum = add_motion(sum, u32(choice.x), g, own, rest);
     }
-    if bad {
-        return;
-    }
-    set_way(parity(), 0.0);
-    let turn = turn_of_group(share.home, share.first);
+    let motion = motion_of(Motion(total(local, sum.upper), total(local, sum.lower)), choice.y);
     var force = vec4(0.0);
     var torque = vec4(0.0);
-    for (var k = group_rows[share.first] + local; k < group_rows[share.first + 1u]; k += 64u) {
+    for (var k = group_rows[own] + local; k < group_rows[own + 1u]; k += 64u) {
         let node = group_nodes[k];
-        let a = at_node(share.member, node);
-        solving[a] += alpha * solving[way_now() + a];
-        let r = solving[solving_part(REST) + a].xyz - alpha * solving[solving_part(IMAGE) + a].xyz;
-        solving[solving_part(REST) + a] = vec4(r, 0.0);
-        let w = wrench_of(turn, arms[node].xyz, r);
-        force += vec4(w.force, 0.0);
-        torque += vec4(w.torque, 0.0);
+        let a = at_node(system, node);
+        var r = solving[solving_part(REST) + a].xyz;
+        if !begins {
+            let p = solving[solving_part(SCALED) + a].xyz + beta * solving[solving_part(WAY) + a].xyz;
+            let image = solving[solving_part(PRODUCT) + a].xyz + beta * solving[solving_part(IMAGE) + a].xyz;
+            solving[solving_part(WAY) + a] = vec4(p, 0.0);
+            solving[solving_part(IMAGE) + a] = vec4(image, 0.0);
+            solving[a] += vec4(alpha * p, 0.0);
+            r -= alpha * image;
+            solving[solving_part(REST) + a] = vec4(r, 0.0);
+            let w = wrench_of(turn, arms[node].xyz, r);
+            force += vec4(w.force, 0.0);
+            torque += vec4(w.torque, 0.0);
+        }
+        let z = scaled(at_node(share.home, node), r) + carried(turn, arms[node].xyz, motion);
+        solving[solving_part(SCALED) + a] = vec4(z, 0.0);
+        force.w += dot(r, z);
     }
-    let whole = Wrench(total(local, force).xyz, total(local, torque).xyz);
+    let whole_force = total(local, force);
+    let whole_torque = total(local, torque);
     if local == 0u {
-        let at = wrenches_at(share.member) + 2u * share.first;
-        cg_sums[at] = vec4(whole.force, 0.0);
-        cg_sums[at + 1u] = vec4(whole.torque, 0.0);
+        cg_sums[rests_at(system) + own] = vec4(whole_force.w, 0.0, 0.0, 0.0);
+        // Of the residual itself: what is added up iteration by iteration would drift from it.
+        if !begins {
+            keep_wrench(wrenches_at(system, parity()) + 2u * own, Wrench(whole_force.xyz, whole_torque.xyz));
+        }
     }
 }

@@ -1,13 +1,9 @@
 //! Prepares conjugate gradients for a derivative: A x = rhs with the exact tangent at a converged state, as column call.extra of
 //! every member. What goes wrong with a column is kept for end_exact.
 // use shared/grid
-// use shared/iteration
-// use shared/coarse_alone
-// use shared/first_cg
-// use shared/held
+// use shared/finite
+// use shared/sum_nodes
 
-var<storage, read> rhs: array<vec4<f32>>;
-var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
 
@@ -25,20 +21,7 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     let system = call.extra * shape.members + p.member;
-    var state = vec4(0.0);
-    for (var i = local; i < shape.nodes; i += 256u) {
-        let a = at_node(system, i);
-        let r = rhs[at_node(p.member, i)].xyz;
-        let z = scaled(at_node(p.member, i), r);
-        begin_at(a, r);
-        state += vec4(dot(r, z), inverses[2u * at_node(p.member, i) + 1u].w, 0.0, 0.0);
-        if shape.held != 0u {
-            state += dot(r, z) * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(p.member, i));
-        }
-    }
-    let s = total(local, state);
-    first_cg(local, system);
-    restrict_alone(local, system, p.member);
+    let s = sum_nodes(local, p.member, 0u);
     var measured = s.x;
     if shape.held != 0u {
         // What stiff springs bear is settled at once. It counts by the load that it becomes on the rest of the body.
@@ -53,6 +36,7 @@ fn begin_exact(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     n.goal = 0.0;
     n.forcing = FINEST * sqrt(max(measured, 0.0) / max(s.x, 1e-37));
     n.cg = 0u;
+    n.trial = 0u;
     n.stage = select(IDLE, WANTS_SOLVE, n.norm > 0.0);
     var broken = WELL;
     if s.y > 0.0 {

@@ -1,14 +1,10 @@
 //! Decides, for each member with a fresh matrix, whether its Newton solve is done, and prepares conjugate gradients otherwise.
 //! The residual is measured with the inverse diagonal blocks, against the sizes of the forces that it is the sum of.
-// use shared/mix
-// use shared/iteration
-// use shared/coarse_alone
-// use shared/first_cg
+// use shared/grid
+// use shared/finite
+// use shared/sum_nodes
 // use shared/newton_of
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> residual: array<vec4<f32>>;
-var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> health: array<Health>;
 
 @compute @workgroup_size(256)
@@ -18,27 +14,8 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if !p.runs {
         return;
     }
-    let m = members[p.member];
-    var forces = vec4(0.0);
-    var state = vec4(0.0);
-    for (var i = local; i < shape.nodes; i += 256u) {
-        let a = at_node(p.member, i);
-        let r = residual[a].xyz;
-        let mass = residual[part(2u) + a].w;
-        let weight = mass * m.gravity.xyz;
-        var momentum = vec3(0.0);
-        if call.mode != 0u {
-            momentum = mass * now[part(2u) + a].xyz / (shape.theta * shape.dt);
-        }
-        let elastic = residual[part(1u) + a].xyz;
-        let support = residual[part(2u) + a].xyz;
-        forces += vec4(dot(weight, scaled(a, weight)), dot(momentum, scaled(a, momentum)),
-                       dot(elastic, scaled(a, elastic)), dot(support, scaled(a, support)));
-        let extra = inverses[2u * a + 1u];
-        state += vec4(dot(r, scaled(a, r)), extra.w, abs(extra.z), 0.0);
-    }
-    let f = sqrt(max(total(local, forces), vec4(0.0)));
-    let s = total(local, state);
+    let f = sqrt(max(sum_nodes(local, p.member, 0u), vec4(0.0)));
+    let s = sum_nodes(local, p.member, 1u);
     var n = newton_of(local, p.member);
     var broken = 0u;
     if s.y > 0.0 {
@@ -88,9 +65,4 @@ fn begin_solve(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if local == 0u {
         newton[p.member] = n;
     }
-    for (var i = local; i < shape.nodes; i += 256u) {
-        begin_at(at_node(p.member, i), -residual[at_node(p.member, i)].xyz);
-    }
-    first_cg(local, p.member);
-    restrict_alone(local, p.member, p.member);
 }

@@ -1,10 +1,10 @@
-//! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next. call.extra:
-//! FOR_DIRECTION or FOR_DERIVATIVE.
+//! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next. A derivative whose
+//! residual was only said to be small goes on. call.extra: FOR_DIRECTION or FOR_DERIVATIVE.
 // use shared/asks
 // use shared/grid
 // use shared/team_256
 // use shared/totals
-// use shared/iteration
+// use shared/true_rest
 // use shared/leave_cg
 
 @compute @workgroup_size(256)
@@ -15,14 +15,22 @@ fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         return;
     }
     var n = newton_of(local, p.member);
+    let exact = call.extra == FOR_DERIVATIVE;
     let s = scalars_of(local, scalars_at(p.member) + 1u);
     let update = scalars_of(local, scalars_at(p.member) + 3u);
-    let rz = sum_parts(local, rests_at(p.member), shape.groups);
+    let rz = sum_rests(local, p.member);
     let negative = s.z == 2.0 || (s.z == 0.0 && update.x != 0.0);
-    let ended = !negative && (s.z == 1.0 || is_small(rz, s.w, n) || s.y >= f32(shape.most));
+    var ended = !negative && (s.z == 1.0 || is_small(rz, s.w, n) || s.y >= f32(shape.most));
     // A solve that had ended before the last iteration left its sum with the update before.
     let along_rhs = max(update.y, scalars_of(local, scalars_at(p.member) + 2u).y);
     n.rz = rz;
     n.cg = u32(s.y);
-    leave_cg(local, p.member, n, s.w, along_rhs, negative, ended, call.extra == FOR_DERIVATIVE);
+    if ended && exact && !is_true(rz, s.w, n) {
+        ended = false;
+        n.trial += 1u;
+        if local == 0u {
+            cg_sums[scalars_at(p.member) + 1u] = vec4(ANEW, s.y, 0.0, s.w);
+        }
+    }
+    leave_cg(local, p.member, n, s.w, along_rhs, negative, ended, exact);
 }

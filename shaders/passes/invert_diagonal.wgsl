@@ -1,20 +1,33 @@
-//! Inverts every node's own 3 × 3 block, inertia included: the preconditioner, and the norm in which residuals are measured.
-//! Two vectors per node: (xx, xy, xz, yy), (yz, zz, trace without inertia, 1 if not positive definite).
+//! Inverts every node's own 3 × 3 block, inertia included: the preconditioner, and the norm in which residuals are measured (`shared/inverse`). The
+//! trial that the matrix belongs to becomes the increment. And what begin_solve decides by, in parts: the sizes of the forces that the residual is
+//! the sum of; its own, blocks that are not positive definite, and traces.
 // use shared/mix
 // use shared/inertia
 // use shared/finite
+// use shared/inverse
+// use shared/team_64
+// use shared/totals
+// use shared/node_parts
 
 var<storage, read> values: array<f32>;
+var<storage, read> now: array<vec4<f32>>;
+var<storage, read> residual: array<vec4<f32>>;
+var<storage, read> trial: array<vec4<f32>>;
 var<body> diagonals: array<u32>;
+var<storage, read_write> increment: array<vec4<f32>>;
 var<storage, read_write> inverses: array<vec4<f32>>;
 
-@compute @workgroup_size(64)
-fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-                   @builtin(local_invocation_index) local: u32) {
-    let p = find_place(group, groups, local, shape.nodes, 64u);
-    if !p.live {
-        return;
-    }
+// The inverse of a node's block.
+struct Inverse {
+    upper: vec4<f32>,
+    lower: vec4<f32>,
+}
+
+fn size_of(own: Inverse, force: vec3<f32>) -> f32 {
+    return dot(force, by_inverse(own.upper, own.lower, force));
+}
+
+fn inverse_of(p: Place) -> Inverse {
     let m = members[p.member];
     let mix = mix_of(m);
     var mass = node_mass(m, p.member, p.item);
@@ -43,13 +56,44 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     let cy = xz * yz - xy * zz;
     let cz = xy * yz - xz * yy;
     let det = xx * cx + xy * cy + xz * cz;
-    let a = 2u * at_node(p.member, p.item);
     if is_finite(det) && is_finite(unit) && unit > 0.0 && xx > 0.0 && xx * yy - xy * xy > 0.0 && det > 0.0 {
         let s = 1.0 / (det * unit);
-        inverses[a] = vec4(cx, cy, cz, xx * zz - xz * xz) * s;
-        inverses[a + 1u] = vec4((xy * xz - xx * yz) * s, (xx * yy - xy * xy) * s, trace, 0.0);
-    } else {
-        inverses[a] = vec4(0.0);
-        inverses[a + 1u] = vec4(0.0, 0.0, trace, 1.0);
+        return Inverse(vec4(cx, cy, cz, xx * zz - xz * xz) * s,
+                       vec4((xy * xz - xx * yz) * s, (xx * yy - xy * xy) * s, trace, 0.0));
+    }
+    return Inverse(vec4(0.0), vec4(0.0, 0.0, trace, 1.0));
+}
+
+@compute @workgroup_size(64)
+fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+                   @builtin(local_invocation_index) local: u32) {
+    let share = find_share(group, groups, shape.nodes, 64u);
+    if !share.runs {
+        return;
+    }
+    let p = place_in(share, local, shape.nodes);
+    var forces = vec4(0.0);
+    var state = vec4(0.0);
+    if p.live {
+        let a = at_node(p.member, p.item);
+        let own = inverse_of(p);
+        inverses[2u * a] = own.upper;
+        inverses[2u * a + 1u] = own.lower;
+        increment[a] = trial[a];
+        let mass = residual[part(2u) + a].w;
+        let weight = mass * members[p.member].gravity.xyz;
+        var momentum = vec3(0.0);
+        if call.mode != 0u {
+            momentum = mass * now[part(2u) + a].xyz / (shape.theta * shape.dt);
+        }
+        forces = vec4(size_of(own, weight), size_of(own, momentum), size_of(own, residual[part(1u) + a].xyz),
+                      size_of(own, residual[part(2u) + a].xyz));
+        state = vec4(size_of(own, residual[a].xyz), own.lower.w, abs(own.lower.z), 0.0);
+    }
+    let whole_forces = total(local, forces);
+    let whole_state = total(local, state);
+    if local == 0u {
+        node_parts[own_parts(share)] = whole_forces;
+        node_parts[own_parts(share) + 1u] = whole_state;
     }
 }

@@ -1,21 +1,13 @@
 //! Judges a trial of the line search: takes it where it halves the residual or lowers the potential enough (Armijo 1966), else
 //! halves the step. A full step at whose end the potential still falls steeply is doubled as long as that lowers the potential: directions that
-//! conjugate gradients cut short at a negative curvature are far too short. A taken trial becomes the new increment. A trial where the material does not exist is never taken: the step is halved, and
+//! conjugate gradients cut short at a negative curvature are far too short. A trial where the material does not exist is never taken: the step is halved, and
 //! of a guess half the way from the old state that is left. call.extra: the round of Newton's method.
-// use shared/mix
+// use shared/grid
 // use shared/hyper
-// use shared/team_256
-// use shared/totals
 // use shared/finite
-// use shared/precondition
+// use shared/sum_nodes
 // use shared/efforts
 
-var<storage, read> now: array<vec4<f32>>;
-var<storage, read> residual: array<vec4<f32>>;
-var<storage, read> trial: array<vec4<f32>>;
-// The solution of a solve comes first.
-var<storage, read> solving: array<vec4<f32>>;
-var<storage, read_write> increment: array<vec4<f32>>;
 var<storage, read_write> newton: array<Newton>;
 
 // A step shorter than this is taken whatever it brings.
@@ -27,11 +19,6 @@ const COARSEST = 0.1;
 const STEEP = 0.5;
 // The longest step, over a full one.
 const FARTHEST = 1024.0;
-
-// Way of free flight.
-fn flight(a: u32, m: Member) -> vec3<f32> {
-    return select(vec3(0.0), shape.dt * now[part(2u) + a].xyz + shape.theta * shape.dt * shape.dt * m.gravity.xyz, call.mode != 0u);
-}
 
 @compute @workgroup_size(256)
 fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -50,19 +37,7 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             log_effort(call.step, SOLVES_AT + call.extra - 1u, n.cg);
         }
     }
-    var state = vec4(0.0);
-    for (var i = local; i < shape.nodes; i += 256u) {
-        let a = at_node(p.member, i);
-        let r = residual[a];
-        var squared = 0.0;
-        var slope = 0.0;
-        if !first {
-            squared = dot(r.xyz, scaled(a, r.xyz));
-            slope = dot(r.xyz, solving[a].xyz);
-        }
-        state += vec4(squared, r.w, residual[part(1u) + a].w, slope);
-    }
-    let s = total(local, state);
+    let s = sum_nodes(local, p.member, 0u);
     let after = sqrt(max(s.x, 0.0));
     let outside = s.z >= NOWHERE_FROM;
     var taken = first;
@@ -120,18 +95,5 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     if local == 0u {
         newton[p.member] = n;
-    }
-    if first && outside {
-        let way = exp2(-f32(n.trial)) - 1.0;
-        for (var i = local; i < shape.nodes; i += 256u) {
-            let a = at_node(p.member, i);
-            increment[a] = vec4(way * flight(a, members[p.member]), 0.0);
-        }
-    }
-    if taken {
-        for (var i = local; i < shape.nodes; i += 256u) {
-            let a = at_node(p.member, i);
-            increment[a] = trial[a];
-        }
     }
 }

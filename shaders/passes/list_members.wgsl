@@ -24,8 +24,7 @@ fn groups_of(kind: u32) -> u32 {
         case PER_BLOCK: { return (shape.blocks + 63u) / 64u; }
         case PER_PATCH: { return (shape.patches + 63u) / 64u; }
         case PER_HOLD: { return (shape.holds + 7u) / 8u; }
-        case PER_WIDE: { return (shape.nodes + WIDE - 1u) / WIDE; }
-        case PER_ROW: { return (shape.nodes + NARROW - 1u) / NARROW; }
+        case PER_SLICE: { return shape.slices; }
         case PER_ELASTIC: { return (shape.elastic + 63u) / 64u; }
         case PER_GROUP: { return shape.groups; }
         default: { return 1u; }

@@ -1,4 +1,4 @@
-//! First of an iteration where q = A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
+//! First of an iteration where A z is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
 //! (see tangent_cells), its clamps and its patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents
@@ -31,7 +31,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if !share.runs {
         return;
     }
-    if turn_cg(local, share.member, share.first == 0u).z != 0.0 {
+    if !multiplies(local, share) {
         return;
     }
     let p = place_in(share, local / 8u, shape.cells);
@@ -46,7 +46,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let d = three(at + 6u + 3u * corner);
     // R Ω_i = −R [b_i]× G⁻¹.
     let omega = r * (cross_matrix(sign_of(corner) * (-0.25 / shape.h)) * three(at + 3u));
-    let x = along_way(at_node(p.member, cell.nodes[corner]));
+    let x = operand_at(at_node(p.member, cell.nodes[corner]));
     var y = (mix.on_new * young) * (r * stiff(matrix_at(m.slot, 0u, cell.kind), corner, transpose(r) * x));
     let along_d = sum8(transpose(d) * x);
     let along_omega = sum8(transpose(omega) * x);
@@ -54,7 +54,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if has_guard(at) {
         var a = mat3x3<f32>();
         for (var j = 0u; j < 8u; j++) {
-            a += dyad(transpose(r) * along_way(at_node(p.member, cell.nodes[j])), slope_of(sign_of(j)));
+            a += dyad(transpose(r) * operand_at(at_node(p.member, cell.nodes[j])), slope_of(sign_of(j)));
         }
         y += r * (guard_rate(at, a) * slope_of(sign_of(corner)));
     }
@@ -67,7 +67,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         var f = vec3(0.0);
         for (var j = 0u; j < 8u; j++) {
             f += hold_block(grip_at(m, p.member, 0u, k), corner, j)
-                * (transpose(turn) * along_way(at_node(p.member, cell.nodes[j])));
+                * (transpose(turn) * operand_at(at_node(p.member, cell.nodes[j])));
         }
         y += (mix.fresh * young) * (turn * f);
     }
@@ -75,7 +75,7 @@ fn multiply_cells(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         for (var k = cell.patch_start; k < cell.patch_end; k++) {
             var there = vec3(0.0);
             for (var j = 0u; j < 8u; j++) {
-                there += corner_weight(k, j) * along_way(at_node(p.member, cell.nodes[j]));
+                there += corner_weight(k, j) * operand_at(at_node(p.member, cell.nodes[j]));
             }
             let s = 3u * (p.member * shape.patches + k);
             let g = supports[s + 1u].xyz;

@@ -1,10 +1,11 @@
-//! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, p = z + β p and q = A p with the assembled matrix,
-//! eight lanes a row so that neighbouring lanes read neighbouring blocks; and parts of pᵀ q.
+//! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, A z with the assembled matrix, eight lanes a row so
+//! that neighbouring lanes read neighbouring blocks. call.extra: ODD; or OF_SOLUTION, for A x.
 // use shared/mix
 // use shared/team_256
 // use shared/totals
 // use shared/turn
 // use shared/product
+// use shared/slices
 
 var<body> block_rows: array<u32>;
 var<body> columns: array<u32>;
@@ -14,21 +15,25 @@ var<storage, read_write> solving: array<vec4<f32>>;
 @compute @workgroup_size(256)
 fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                  @builtin(local_invocation_index) local: u32) {
-    let share = find_share(group, groups, shape.nodes, NARROW);
+    let share = find_share(group, groups, shape.slices, 1u);
     if !share.runs {
         return;
     }
-    if turn_cg(local, share.member, share.first == 0u).z != 0.0 {
+    if !multiplies(local, share) {
         return;
     }
-    let p = place_in(share, local / 8u, shape.nodes);
+    let p = node_of_slice(share, local);
     let m = members[p.home];
     let inertia = mix_of(m).inertia;
+    var own = vec3(0.0);
     var q = vec3(0.0);
     if p.live {
+        if local % 8u == 0u {
+            own = heavy_row(m, inertia, p);
+        }
         let end = block_rows[p.item + 1u];
         for (var k = block_rows[p.item] + local % 8u; k < end; k += 8u) {
-            let x = along_way(at_node(p.member, columns[k]));
+            let x = operand_at(at_node(p.member, columns[k]));
             let v = (p.home * shape.blocks + k) * 9u;
             q += vec3(
                 values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
@@ -40,22 +45,5 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             }
         }
     }
-    shares[local] = vec4(q, 0.0);
-    workgroupBarrier();
-    var curvature = vec4(0.0);
-    if p.live && local % 8u == 0u {
-        q = heavy_row(m, inertia, p);
-        for (var i = 0u; i < 8u; i++) {
-            q += shares[local + i].xyz;
-        }
-        let a = at_node(p.member, p.item);
-        let way = along_way(a);
-        solving[way_now() + a] = vec4(way, 0.0);
-        solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
-        curvature.x = dot(way, q);
-    }
-    let bend = total(local, curvature).x;
-    if local == 0u {
-        cg_sums[bends_at(p.member) + share.first / NARROW] = vec4(bend, 0.0, 0.0, 0.0);
-    }
+    keep_product(local, share, p, own, q);
 }

@@ -18,12 +18,15 @@ const TRANSPOSED = 1u;
 // it goes to nodes.
 const OF_SHAPE = 2u;
 
-// Bits that the passes of an iteration of conjugate gradients by many workgroups are told: its number is odd; products were made in groups
-// of WIDE nodes (else NARROW).
+// Bits that the passes of an iteration of conjugate gradients by many workgroups are told: its number is odd; a product is with the solution;
+// the first preconditioned residual is made, of the residual as it is.
 const ODD = 1u;
-const WIDE_PARTS = 2u;
+const OF_SOLUTION = 2u;
+const BEGINS = 4u;
 
 // What a solve by conjugate gradients is for: a direction of Newton's method, which a negative curvature cuts short, or a derivative, of which it
 // is an error.
 const FOR_DIRECTION = 0u;
 const FOR_DERIVATIVE = 1u;
+// So often a derivative's solve goes on after a residual that was only said to be small; then the true one is what rounding leaves.
+const MOST_CLAIMS = 2u;

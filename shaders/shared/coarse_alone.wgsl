@@ -18,7 +18,7 @@ fn total_of_four(local: u32, first: vec4<f32>, second: vec4<f32>) -> Motion {
                   more_shares[a] + more_shares[a + 1u] + more_shares[a + 2u] + more_shares[a + 3u]);
 }
 
-// Force and torque that the residual is to each group.
+// Force and torque that the residual is to each group, as before the first iteration.
 fn restrict_alone(local: u32, system: u32, home: u32) {
     storageBarrier();
     workgroupBarrier();
@@ -37,8 +37,8 @@ fn restrict_alone(local: u32, system: u32, home: u32) {
         }
         let sum = total_of_four(local, force, torque);
         if g < shape.groups && local % 4u == 0u {
-            cg_sums[wrenches_at(system) + 2u * g] = sum.upper;
-            cg_sums[wrenches_at(system) + 2u * g + 1u] = sum.lower;
+            cg_sums[wrenches_at(system, 1u) + 2u * g] = sum.upper;
+            cg_sums[wrenches_at(system, 1u) + 2u * g + 1u] = sum.lower;
         }
     }
     storageBarrier();

@@ -1,15 +1,15 @@
 //! Scalars of conjugate gradients that many workgroups of a system share. Every workgroup sums the parts again in the same order, so
-//! all of them see the same numbers and take the same decisions. call.extra: ODD and WIDE_PARTS. Who asks has sums over a workgroup
-//! (`shared/totals`).
+//! all of them see the same numbers and take the same decisions. call.extra: ODD. Who asks has sums over a workgroup (`shared/totals`).
+//!
+//! One reduction an iteration (Chronopoulos & Gear, J. Comput. Appl. Math. 25, 1989): rᵀ z and zᵀ A z are summed at once, and
+//! pᵀ A p = zᵀ A z − β rᵀ z / α follows, with α of the iteration before. A p = A z + β A p of the iteration before.
 // use shared/asks
 // use shared/finite
 // use shared/solving
 
-// Of each system, in the first component but where four are told:
-// - four scalars of even and of odd iterations (rᵀ M⁻¹ r, iterations so far, 0 going on | 1 ended | 2 negative curvature, rᵀ M⁻¹ r of the right-hand
-//   side), then of even and odd updates (1 if the curvature was not positive, xᵀ times the right-hand side, 0, 0);
-// - by groups of NARROW nodes: parts of pᵀ A p; by groups of the second level: parts of rᵀ M⁻¹ r, then force and torque, then shift
-//   and turn.
+// Of each system: four scalars of even and of odd iterations (rᵀ z, iterations so far, 0 going on | 1 ended | 2 negative curvature, rᵀ z of the
+// right-hand side), then of even and odd updates (1 if the curvature was not positive, xᵀ times the right-hand side, α, 0); what else there is says
+// `shared/solving`.
 var<storage, read_write> cg_sums: array<vec4<f32>>;
 var<workgroup> common_scalars: vec4<f32>;
 
@@ -21,20 +21,15 @@ fn scalars_of(local: u32, place: u32) -> vec4<f32> {
     return workgroupUniformLoad(&common_scalars);
 }
 
-// Width of the groups that products were made in.
-fn product_width() -> u32 {
-    return select(NARROW, WIDE, (call.extra & WIDE_PARTS) != 0u);
-}
-
 fn parity() -> u32 {
     return call.extra & ODD;
 }
 
-// Sum of so many parts.
-fn sum_parts(local: u32, start: u32, count: u32) -> f32 {
+// rᵀ z from the groups' parts.
+fn sum_rests(local: u32, system: u32) -> f32 {
     var sum = vec4(0.0);
-    for (var i = local; i < count; i += TEAM) {
-        sum.x += cg_sums[start + i].x;
+    for (var i = local; i < shape.groups; i += TEAM) {
+        sum.x += cg_sums[rests_at(system) + i].x;
     }
     return total(local, sum).x;
 }
@@ -42,14 +37,31 @@ fn sum_parts(local: u32, start: u32, count: u32) -> f32 {
 // Whether a residual is as small as a solve wants it, by itself or relative to the right-hand side's, or nothing that a solve could go on with.
 // A direction's has a goal by itself, told in the norm of block-Jacobi, which is the smaller one: what Newton's method sees falls as much.
 fn is_small(rz: f32, of_rhs: f32, n: Newton) -> bool {
-    let goal = select(n.forcing * sqrt(max(of_rhs, 0.0)), n.goal, n.goal > 0.0);
-    return !is_finite(rz) || sqrt(max(rz, 0.0)) <= goal;
+    return is_within(1.0, rz, of_rhs, n);
 }
 
-// β of an iteration from its scalars and those of the one before; before the first one nothing came.
-fn way_factor_of(now: vec4<f32>, before: vec4<f32>) -> f32 {
-    if before.y == 0.0 {
+// Whether it is so many times as large, or smaller.
+fn is_within(times: f32, rz: f32, of_rhs: f32, n: Newton) -> bool {
+    let goal = select(n.forcing * sqrt(max(of_rhs, 0.0)), n.goal, n.goal > 0.0);
+    return !is_finite(rz) || sqrt(max(rz, 0.0)) <= times * goal;
+}
+
+// β of an iteration from rᵀ z and that of the one before; before a first one stands nothing, or less.
+fn way_factor_of(rz: f32, before: f32) -> f32 {
+    if before <= 0.0 {
         return 0.0;
     }
-    return now.x / before.x;
+    return rz / before;
+}
+
+// pᵀ A p from zᵀ A z, β, rᵀ z and α of the iteration before.
+fn curvature_of(bend: f32, beta: f32, rz: f32, alpha: f32) -> f32 {
+    if beta == 0.0 {
+        return bend;
+    }
+    return bend - beta * rz / alpha;
+}
+
+fn is_curved(curvature: f32) -> bool {
+    return curvature > 0.0 && is_finite(curvature);
 }

@@ -5,7 +5,7 @@
 // Puts z in its part, from the residual and what restrict_alone left, and returns rᵀ z.
 fn precondition_alone(local: u32, system: u32, home: u32) -> f32 {
     let choice = coarse_choice(home);
-    let wrenches = wrenches_at(system);
+    let wrenches = wrenches_at(system, 1u);
     for (var first = 0u; first < shape.groups; first += 64u) {
         let own = first + local / 4u;
         var sum: Motion;

@@ -1,11 +1,11 @@
-//! What products add to the elastic part of q = A p at a node: inertia, point masses.
+//! What products add to the elastic part of a row of A: inertia, point masses.
 // use shared/inertia
-// use shared/solving
+// use shared/operand
 
 fn along_at(member: u32, stencil: u32) -> vec3<f32> {
     var sum = vec3(0.0);
     for (var k = stencil_rows[stencil]; k < stencil_rows[stencil + 1u]; k++) {
-        sum += stencil_entries[k].weight * along_way(at_node(member, stencil_entries[k].node));
+        sum += stencil_entries[k].weight * operand_at(at_node(member, stencil_entries[k].node));
     }
     return sum;
 }
@@ -27,7 +27,7 @@ fn heavy_row(m: Member, inertia: f32, p: Place) -> vec3<f32> {
     var own = vec3(0.0);
     // Of a mass matrix, what multiplies blocks has added it.
     if !has_mass_matrix() {
-        own = (inertia * node_mass(m, p.home, p.item)) * along_way(at_node(p.member, p.item));
+        own = (inertia * node_mass(m, p.home, p.item)) * operand_at(at_node(p.member, p.item));
     }
     return with_masses(own, inertia, p.member, p.home, p.item);
 }

@@ -1,68 +1,54 @@
-//! Vectors of a solve by conjugate gradients, in one buffer `solving`: six parts, each a vector a node of every system, which is a member or a
+//! Vectors of a solve by conjugate gradients, in one buffer `solving`: seven parts, each a vector a node of every system, which is a member or a
 //! column of one. The solution comes first. And where the sums of a solve lie in `cg_sums` (`shared/iteration`).
 // use shared/roster
 
-// The residual; the way p of even and of odd iterations; the image A p; the preconditioned residual z.
+// The solution x; the residual r; the way p and its image A p; the preconditioned residual z and its image A z, or in a look at the true residual
+// that of the solution; and the right-hand side, which only derivatives keep.
+const SOLUTION = 0u;
 const REST = 1u;
-const EVEN_WAY = 2u;
-const ODD_WAY = 3u;
-const IMAGE = 4u;
-const SCALED = 5u;
-const PARTS_OF_SOLVING = 6u;
+const WAY = 2u;
+const IMAGE = 3u;
+const SCALED = 4u;
+const PRODUCT = 5u;
+const RIGHT = 6u;
+const PARTS_OF_SOLVING = 7u;
 
-// What makes the way of an iteration of the one before: z + β p. Whoever asks for the way has set it, and where the one
-// before lies and this one goes.
-var<private> way_factor: f32;
-var<private> way_before: u32;
-var<private> way_at: u32;
+// Sums of a system: its scalars; two vectors a slice of nodes; and nine a group.
+const SCALARS = 4u;
+const OF_SLICE = 2u;
+const OF_GROUP = 9u;
 
 // Where a part starts.
 fn solving_part(which: u32) -> u32 {
     return which * (arrayLength(&solving) / PARTS_OF_SOLVING);
 }
 
-// Says which iteration is asked for its way.
-fn set_way(odd: u32, factor: f32) {
-    way_factor = factor;
-    way_before = solving_part(select(ODD_WAY, EVEN_WAY, odd == 1u));
-    way_at = solving_part(select(EVEN_WAY, ODD_WAY, odd == 1u));
-}
-
-// Where the way of the iteration is kept, for the next one.
-fn way_now() -> u32 {
-    return way_at;
-}
-
-// The way of the iteration, made where it is needed: so no dispatch has to come before a product.
-fn along_way(a: u32) -> vec3<f32> {
-    return solving[solving_part(SCALED) + a].xyz + way_factor * solving[way_before + a].xyz;
-}
-
-fn groups_of_nodes(width: u32) -> u32 {
-    return (shape.nodes + width - 1u) / width;
-}
-
 // Where the scalars of a system start.
 fn scalars_at(system: u32) -> u32 {
-    return system * (4u + groups_of_nodes(NARROW) + 5u * shape.groups);
+    return system * (SCALARS + OF_SLICE * shape.slices + OF_GROUP * shape.groups);
 }
 
-// Where parts of pᵀ A p start, one for some nodes.
-fn bends_at(system: u32) -> u32 {
-    return scalars_at(system) + 4u;
+// Where what a product left of each slice starts: the force of its rows on their group, with their part of zᵀ A z; and the torque.
+fn slices_at(system: u32) -> u32 {
+    return scalars_at(system) + SCALARS;
 }
 
 // Where parts of rᵀ M⁻¹ r start, one a group.
 fn rests_at(system: u32) -> u32 {
-    return bends_at(system) + groups_of_nodes(NARROW);
+    return slices_at(system) + OF_SLICE * shape.slices;
 }
 
-// Where force and torque of the residual on every group start.
-fn wrenches_at(system: u32) -> u32 {
-    return rests_at(system) + shape.groups;
+// Where force and torque on every group start that the residual is, after an even or an odd iteration.
+fn wrenches_at(system: u32, odd: u32) -> u32 {
+    return rests_at(system) + (1u + 2u * odd) * shape.groups;
 }
 
-// Where their motions start, where one workgroup makes them.
+// The same of A p.
+fn image_wrenches_at(system: u32, odd: u32) -> u32 {
+    return wrenches_at(system, 2u + odd);
+}
+
+// Where the groups' motions start, where one workgroup makes them; it has no need of A p's.
 fn motions_at(system: u32) -> u32 {
-    return wrenches_at(system) + 2u * shape.groups;
+    return image_wrenches_at(system, 0u);
 }

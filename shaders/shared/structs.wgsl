@@ -51,6 +51,8 @@ struct Shape { // mirrored
     groups: u32,
     coarse_kind: u32,
     group_size: f32,
+    // Slices of them that products are made in.
+    slices: u32,
 }
 
 struct Member { // mirrored

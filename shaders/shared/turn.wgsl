@@ -1,11 +1,11 @@
-//! Beginning of an iteration by many workgroups: has the solve converged? If not, which way does it go on?
-// use shared/iteration
+//! Beginning of an iteration by many workgroups: has the solve converged?
+// use shared/operand
 
 var<storage, read> newton: array<Newton>;
 
-// Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them. Sets the way.
+// Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them.
 fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
-    let rz = sum_parts(local, rests_at(system), shape.groups);
+    let rz = sum_rests(local, system);
     let before = scalars_of(local, scalars_at(system) + 1u - parity());
     let bad = scalars_of(local, scalars_at(system) + 3u - parity()).x;
     let of_rhs = select(before.w, rz, before.y == 0.0);
@@ -21,6 +21,15 @@ fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
     if speaks && local == 0u {
         cg_sums[scalars_at(system) + parity()] = now;
     }
-    set_way(parity(), way_factor_of(now, before));
     return now;
+}
+
+// Whether the first pass of a product takes part: one with the preconditioned residual where the solve goes on, one with the
+// solution where it claims to have ended.
+fn multiplies(local: u32, share: Share) -> bool {
+    choose_operand();
+    if (call.extra & OF_SOLUTION) != 0u {
+        return claims(local, share.member);
+    }
+    return turn_cg(local, share.member, share.first == 0u).z == 0.0;
 }

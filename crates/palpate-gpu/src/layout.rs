@@ -103,8 +103,10 @@ pub struct Shape {
     pub coarse_kind: u32,
     /// Edge of a group [m].
     pub group_size: f32,
+    /// Slices of them that products are made in.
+    pub slices: u32,
     /// Fills up.
-    pub pad: [u32; 2],
+    pub pad: u32,
 }
 
 /// Parameters of one member.

@@ -22,10 +22,8 @@ pub(crate) enum Per {
     Block = roster::PER_BLOCK,
     Patch = roster::PER_PATCH,
     Hold = roster::PER_HOLD,
-    /// Nodes, in workgroups of 256.
-    Wide = roster::PER_WIDE,
-    /// Nodes with eight lanes each, in workgroups of 256.
-    Row = roster::PER_ROW,
+    /// Slices of groups of nodes with eight lanes each node, a workgroup of 256 each.
+    Slice = roster::PER_SLICE,
     Elastic = roster::PER_ELASTIC,
     /// Groups of nodes, a workgroup each.
     Group = roster::PER_GROUP,

@@ -1,7 +1,7 @@
 //! Asks a device which of two ways to solve is faster.
 
 use super::choices::Choices;
-use crate::device::pipelines::shared::roster;
+use crate::device::pipelines::shared::solving;
 use crate::device::{Gpu, GpuError};
 use crate::layout::{Newton, Shape};
 use crate::passes::{Passes, SOLVE};
@@ -142,8 +142,8 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
 
 /// Sums of solves before their first iteration, whose residuals are not small.
 fn begun_sums(shape: &Shape, count: usize) -> Vec<[f32; 4]> {
-    let [head, groups] = [4 + shape.nodes.div_ceil(roster::NARROW), shape.groups].map(|n| n as usize);
-    let of_system = head + 5 * groups;
+    let [head, groups] = [solving::SCALARS + solving::OF_SLICE * shape.slices, shape.groups].map(|n| n as usize);
+    let of_system = head + solving::OF_GROUP as usize * groups;
     (0..count).map(|i| if (head..head + groups).contains(&(i % of_system)) { [1.0, 0.0, 0.0, 0.0] } else { [0.0; 4] }).collect()
 }
 

@@ -137,10 +137,10 @@ impl World {
     }
 
     fn bytes_of_iteration(&self) -> f64 {
-        // Ways, solutions and residuals are turned, advanced and preconditioned: 12 vectors a node beside those of the product, and the second
-        // level, which members share.
+        // Way, its image, solution and residuals are read and written: 11 vectors a node beside those of the product, and the second level, which
+        // members share.
         let shape = &self.geometry.shape;
-        let vectors = 12.0 * self.members() as f64 * f64::from(shape.nodes) + coarse_vectors(shape.groups as usize) as f64;
+        let vectors = 11.0 * self.members() as f64 * f64::from(shape.nodes) + coarse_vectors(shape.groups as usize) as f64;
         self.bytes_of(self.product) + VECTOR as f64 * vectors
     }
 
@@ -166,8 +166,9 @@ impl World {
             let clock = Instant::now();
             self.work(&rest, |s| {
                 s.list();
+                s.begin_cg(asks::FOR_DERIVATIVE);
                 if self.many {
-                    s.precondition(asks::ODD);
+                    s.precondition();
                 }
                 (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) });
             });

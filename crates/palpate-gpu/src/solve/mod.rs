@@ -24,6 +24,8 @@ const SPARE_ROUNDS: usize = 8;
 
 /// CG iterations between two looks at who has converged (an even number: scalars alternate between two places).
 const BLOCK: u32 = 16;
+/// Those of a derivative's, with a look at the true residual after each block.
+const EXACT_BLOCK: u32 = 32;
 /// Blocks between two listings that can close the gate.
 const GATED: u32 = 8;
 /// CG iterations of the first [`EARLY`] Newton rounds and of the later ones, which hardly anyone needs; a solve that wants more
@@ -55,6 +57,7 @@ impl<'a> Passes<'a, '_> {
             self.run(pass::PLACE_NEXT, TRIAL, Per::Node, 0);
             self.place_held(TRIAL);
             self.residual(TRIAL);
+            self.run(pass::WEIGH_TRIAL, TRIAL, Per::Node, 0);
             self.run(pass::JUDGE_TRIAL, TRIAL, Per::Member, round as u32);
             self.list();
             self.assemble(MATRIX);
@@ -74,22 +77,32 @@ impl<'a> Passes<'a, '_> {
 
     /// At least so many iterations of the solves of all members that want one: the rest comes in the next round.
     fn conjugate_gradients(&mut self, purpose: u32, budget: u32) {
+        self.begin_cg(purpose);
         if !self.world.many {
-            for _ in 0..budget.div_ceil(self.world.geometry.shape.chunk) {
+            // An end that was none cuts a chunk short.
+            let more = if purpose == asks::FOR_DERIVATIVE { asks::MOST_CLAIMS } else { 0 };
+            for _ in 0..budget.div_ceil(self.world.geometry.shape.chunk) + more {
                 self.iterate_chunk(purpose);
+                if purpose == asks::FOR_DERIVATIVE {
+                    self.run_with(pass::LOOK_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
+                }
                 self.relist();
             }
             return;
         }
-        self.precondition(asks::ODD);
+        self.precondition();
+        let exact = purpose == asks::FOR_DERIVATIVE;
         let mut left = budget.next_multiple_of(2);
         for block in 1.. {
             if left == 0 {
                 break;
             }
-            let now = left.min(BLOCK);
+            let now = left.min(if exact { EXACT_BLOCK } else { BLOCK });
             (0..now).for_each(|i| self.iterate(i % 2));
             left -= now;
+            if exact {
+                self.look_at_rest();
+            }
             self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
             if block % GATED == 0 { self.list() } else { self.relist() }
         }
@@ -97,16 +110,30 @@ impl<'a> Passes<'a, '_> {
 
     /// One iteration by many workgroups a member, of this parity, from the preconditioned residual to the next one.
     pub(crate) fn iterate(&mut self, parity: u32) {
-        // Columns of a member find its matrix in the caches; without a matrix each would need corner forces of its own.
-        let product = if self.columns > 1 { Product::Matrix } else { self.world.product };
-        let width = self.multiply(product, parity);
-        self.run(pass::ADVANCE_CG, SOLVE, Per::Group, parity + width);
-        self.precondition(parity);
+        self.multiply(self.product(), parity);
+        self.run(pass::ADVANCE_CG, SOLVE, Per::Group, parity);
     }
 
-    /// The preconditioned residual after an iteration of this parity; of an odd one before the first.
-    pub(crate) fn precondition(&mut self, parity: u32) {
-        self.run(pass::PRECONDITION_CG, SOLVE, Per::Group, parity);
+    /// Columns of a member find its matrix in the caches; without a matrix each would need corner forces of its own.
+    fn product(&self) -> Product {
+        if self.columns > 1 { Product::Matrix } else { self.world.product }
+    }
+
+    /// Makes solves ready that have not begun.
+    pub(crate) fn begin_cg(&mut self, purpose: u32) {
+        self.run(pass::BEGIN_CG, SOLVE, Per::Group, purpose);
+    }
+
+    /// The first preconditioned residual, or that of a residual that was replaced: after an odd iteration, or none.
+    pub(crate) fn precondition(&mut self) {
+        self.run(pass::ADVANCE_CG, SOLVE, Per::Group, asks::ODD | asks::BEGINS);
+    }
+
+    /// Replaces the residual that iterations carry along with the true one, after an odd iteration.
+    fn look_at_rest(&mut self) {
+        self.multiply(self.product(), asks::OF_SOLUTION);
+        self.run(pass::REPLACE_REST, SOLVE, Per::Group, 0);
+        self.precondition();
     }
 
     /// How far the groups of the preconditioner's second level have turned in a state.
@@ -129,17 +156,13 @@ impl<'a> Passes<'a, '_> {
         (purpose == asks::FOR_DERIVATIVE).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
     }
 
-    /// Turns the way of the iteration and multiplies it with A; returns how the parts of pᵀ A p lie, for `advance_cg`.
-    pub(crate) fn multiply(&mut self, product: Product, parity: u32) -> u32 {
+    /// Multiplies A with the preconditioned residual of an iteration of this parity, or with the solution (`asks`).
+    pub(crate) fn multiply(&mut self, product: Product, ask: u32) {
         match product {
-            Product::Matrix => {
-                self.run(pass::MULTIPLY_ROWS, SOLVE, Per::Row, parity);
-                0
-            }
+            Product::Matrix => self.run(pass::MULTIPLY_ROWS, SOLVE, Per::Slice, ask),
             Product::Free => {
-                self.run(pass::MULTIPLY_CELLS, SOLVE, Per::Cell, parity);
-                self.run(pass::GATHER_PRODUCT, SOLVE, Per::Wide, parity);
-                asks::WIDE_PARTS
+                self.run(pass::MULTIPLY_CELLS, SOLVE, Per::Cell, ask);
+                self.run(pass::GATHER_PRODUCT, SOLVE, Per::Slice, ask);
             }
         }
     }
@@ -164,6 +187,7 @@ impl<'a> Passes<'a, '_> {
 
     /// Makes `rhs` column q of the next [`Passes::solve_columns`].
     pub(crate) fn begin_column(&mut self, q: usize) {
+        self.run(pass::WEIGH_RHS, ALL, Per::Node, q as u32);
         self.run_with(pass::BEGIN_EXACT, ALL, Per::Member, q as u32, &self.failures(asks::FOR_DERIVATIVE));
     }
 
@@ -172,7 +196,9 @@ impl<'a> Passes<'a, '_> {
         self.columns = count as u32;
         self.list();
         let most = self.world.geometry.shape.most;
-        self.conjugate_gradients(asks::FOR_DERIVATIVE, self.effort().derivative.min(most));
+        // A look that finds too much left comes at the end of a block, and the next block begins anew.
+        let given = self.effort().derivative.saturating_add(EXACT_BLOCK).min(most);
+        self.conjugate_gradients(asks::FOR_DERIVATIVE, given);
         self.columns = 1;
         let groups = self.world.members().div_ceil(64);
         let (step, mode) = (self.step.unwrap_or(0) as u32, u32::from(self.step.is_some()));

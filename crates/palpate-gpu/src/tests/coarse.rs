@@ -107,7 +107,8 @@ fn many_and_one_workgroup_apply_what_the_formula_says() {
             s.linearise();
             s.begin_column(0);
             s.list();
-            if many { s.precondition(asks::ODD) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) }
+            s.begin_cg(asks::FOR_DERIVATIVE);
+            if many { s.precondition() } else { s.iterate_chunk(asks::FOR_DERIVATIVE) }
         });
         let [rest, z] = [REST, SCALED].map(|part| solving_part(&world, part).into_iter().map(vector).collect::<Vec<_>>());
         let mut differ = false;

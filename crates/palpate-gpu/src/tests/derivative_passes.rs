@@ -107,7 +107,8 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, sizes: &[f64]) -> Vec<Par
     run(&|s| {
         s.begin_column(0);
         s.list();
-        s.precondition(asks::ODD);
+        s.begin_cg(asks::FOR_DERIVATIVE);
+        s.precondition();
         s.iterate(0);
         s.iterate(1);
         s.iterate(0);

@@ -4,6 +4,7 @@ use super::scenes::{ball, device, held, own_device, plan, spread};
 use crate::costs::MOST_DIRECTIONS;
 use crate::device::GpuError;
 use crate::device::Maker as _;
+use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::structs;
 use crate::device::pipelines::{PASSES, PassSource, Pipelines, compile, constant, pass};
 use crate::device::recorder::{Args, Recorder, Size};
@@ -137,6 +138,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         holds: 55,
         elastic: 4321,
         groups: 17,
+        slices: 23,
         ..Shape::default()
     };
     let [_, sizes] = listed(&gpu, shape);
@@ -148,8 +150,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         (Per::Block, pass::GATHER_MATRIX, 1, shape.blocks),
         (Per::Patch, pass::TOUCH_PATCHES, 1, shape.patches),
         (Per::Hold, pass::HOLD_CELLS, 8, shape.holds),
-        (Per::Wide, pass::GATHER_PRODUCT, 1, shape.nodes),
-        (Per::Row, pass::MULTIPLY_ROWS, 8, shape.nodes),
+        (Per::Slice, pass::MULTIPLY_ROWS, PASSES[pass::MULTIPLY_ROWS].width, shape.slices),
         (Per::Elastic, pass::PRESS_ELASTIC, 1, shape.elastic),
         (Per::Group, pass::ADVANCE_CG, PASSES[pass::ADVANCE_CG].width, shape.groups),
     ];
@@ -319,7 +320,8 @@ fn conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations() {
     gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::bytes_of(&start));
     run(|s| {
         s.list();
-        s.run(pass::ITERATE_CG, SOLVE, Per::Member, 1);
+        s.begin_cg(asks::FOR_DERIVATIVE);
+        s.iterate_chunk(asks::FOR_DERIVATIVE);
     });
     let (end, chunk) = (newton(), world.geometry.shape.chunk);
     println!("{} nodes, {chunk} iterations, {:.1e} of the residual left", plan.body.nodes.len(), (end.rz / start.rz).sqrt());

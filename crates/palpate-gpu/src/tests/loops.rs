@@ -57,7 +57,10 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("q < call.extra") => columns(most.members),
         () if has("shape.members") => most.members,
         // Parts of a product, or of a residual.
-        () if has("i < count; i += TEAM") => most.nodes.div_ceil(32 * 64).max(most.groups.div_ceil(64)),
+        () if has("i < node_shares()") => most.nodes.div_ceil(64 * 256),
+        () if has("group_slices[") => most.group.div_ceil(32),
+        () if has("i < shape.slices; i += 64u") => (most.nodes.div_ceil(32) + most.groups).div_ceil(64),
+        () if has("2u * shape.groups; g += 256u") => (2 * most.groups).div_ceil(256),
         () if has("group_rows[") && has("k += 4u") => most.group.div_ceil(4),
         () if has("group_rows[") => most.group.div_ceil(64),
         () if has("g < shape.groups; g += 4u") => most.groups.div_ceil(4),
@@ -279,7 +282,7 @@ fn check(most: &Most, seen: &Seen) {
             let of = |header: &str| {
                 bound(header, most, seen).unwrap_or_else(|| panic!("{}: how long is the loop `{header}`?", pass.name))
             };
-            if most.many && pass.name == "iterate_cg" {
+            if most.many && ["iterate_cg", "look_cg"].contains(&pass.name) {
                 continue;
             }
             let longest = iterations(&all, pass.name, &of);

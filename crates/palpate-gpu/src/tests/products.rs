@@ -4,7 +4,8 @@ use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
 use super::scenes::{ball, device, held, plan, solving_part, spread};
 use crate::costs::rollout_tests::{differences, seen, watched};
-use crate::device::pipelines::shared::{asks, solving::IMAGE};
+use crate::device::pipelines::shared::asks;
+use crate::device::pipelines::shared::solving::PRODUCT;
 use crate::passes::Passes;
 use crate::solve;
 use crate::solve::Choices;
@@ -51,10 +52,11 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
         s.linearise();
         s.begin_column(0);
         s.list();
-        s.precondition(asks::ODD);
+        s.begin_cg(asks::FOR_DERIVATIVE);
+        s.precondition();
         s.multiply(product, 0);
     });
-    solving_part(world, IMAGE).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+    solving_part(world, PRODUCT).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
 }
 
 /// Difference of two vectors over the size of the second.

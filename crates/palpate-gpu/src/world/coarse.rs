@@ -8,6 +8,7 @@
 //! (`shaders/shared/coarse.wgsl`).
 
 use super::geometry::Geometry;
+use crate::device::pipelines::shared::roster;
 use crate::device::{Arena, GpuError, Maker};
 use faer::linalg::solvers::DenseSolveCore as _;
 use faer::{Mat, Side};
@@ -39,12 +40,28 @@ pub(crate) fn groups(body: &Body, blocks: &BlockRows) -> Groups {
     }
 }
 
+/// Slices of the groups that products are made in, a workgroup each: where each starts among the nodes of all groups, and the first one of
+/// each group. Slices of a group are as long as each other, and none reaches into another group.
+pub(crate) fn slices(groups: &Groups) -> [Vec<u32>; 2] {
+    let (mut starts, mut of_group, mut at) = (vec![0], vec![0], 0);
+    for nodes in &groups.nodes {
+        let count = nodes.len().div_ceil(roster::NARROW as usize);
+        starts.extend((1..=count).map(|k| (at + k * nodes.len() / count) as u32));
+        of_group.push(starts.len() as u32 - 1);
+        at += nodes.len();
+    }
+    [starts, of_group]
+}
+
 /// Adds the groups to the body's arena.
 pub(crate) fn put(groups: &Groups, body: &Body, tables: &mut Arena) {
     let mut rows = vec![0u32];
     groups.nodes.iter().for_each(|g| rows.push(rows[rows.len() - 1] + g.len() as u32));
     tables.put("group_rows", &rows);
     tables.put("group_nodes", &groups.nodes.concat());
+    let [starts, of_group] = slices(groups);
+    tables.put("slice_starts", &starts);
+    tables.put("group_slices", &of_group);
     let arms = groups.arms(body, &vec![DVec3::ZERO; body.nodes.len()]);
     let arms: Vec<[f32; 4]> =
         arms.iter().zip(&groups.of_node).map(|(a, g)| [a.x as f32, a.y as f32, a.z as f32, *g as f32]).collect();

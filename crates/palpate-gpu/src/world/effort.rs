@@ -39,8 +39,9 @@ impl Effort {
         let rounds = log[ROUNDS_AT as usize] as usize;
         let solves = &log[SOLVES_AT as usize..];
         let mut iterations: Vec<u32> = solves.iter().take(rounds).map(|n| more(*n)).collect();
-        // What is left over of a solve goes on in rounds that come on top.
-        iterations.push(more(solves.iter().copied().max().unwrap_or(0)));
+        // What is left over of a solve goes on in rounds that come on top, with as many as a round took in the middle.
+        let all: u32 = solves.iter().take(rounds).sum();
+        iterations.push(more(all.div_ceil(rounds.max(1) as u32)));
         let spare = 1 + (rounds as f64 * margin) as usize;
         Effort { rounds: rounds + spare, iterations, derivative: more(log[DERIVATIVE_AT as usize]) }
     }
@@ -172,7 +173,7 @@ mod tests {
         level.watch(false);
         assert_eq!(level.effort(0), Effort::full());
         level.learn(&log());
-        assert_eq!(level.effort(0), Effort { rounds: 5, iterations: vec![44, 84, 84], derivative: 204 });
+        assert_eq!(level.effort(0), Effort { rounds: 5, iterations: vec![44, 84, 64], derivative: 204 });
         level.fell_short();
         assert!(level.rise());
         assert_eq!(level.effort(0), Effort::full());
@@ -192,9 +193,9 @@ mod tests {
         let mut level = Level::new(true);
         level.watch(false);
         level.learn(&log());
-        assert_eq!(level.effort(0), Effort { rounds: 3, iterations: vec![27, 50, 50], derivative: 119 });
+        assert_eq!(level.effort(0), Effort { rounds: 3, iterations: vec![27, 50, 39], derivative: 119 });
         assert_eq!(level.effort(1).iterations, [13, 13]);
-        assert_eq!([0, 1, 2, 9].map(|r| level.effort(0).of_round(r)), [27, 50, 50, 50]);
+        assert_eq!([0, 1, 2, 9].map(|r| level.effort(0).of_round(r)), [27, 50, 39, 39]);
         // Too little twice: then everything, until it is known better.
         for expected in [68, u32::MAX] {
             level.fell_short();

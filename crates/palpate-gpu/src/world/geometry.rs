@@ -188,7 +188,8 @@ impl Geometry {
             groups: groups.len() as u32,
             coarse_kind: 0,
             group_size: groups.size as f32,
-            pad: [0; 2],
+            slices: coarse::slices(&groups)[0].len() as u32 - 1,
+            pad: 0,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         let mut tables = Arena::new("body_tables");

@@ -56,8 +56,8 @@ impl Most {
         self.nodes.div_ceil(256)
     }
 
-    /// Of one iteration of conjugate gradients in one workgroup: rows with their blocks and point masses, three sweeps, two sums, and the second
-    /// level of the preconditioner, four lanes a group.
+    /// Of one iteration of conjugate gradients in one workgroup, or of a look at the true residual: rows with their blocks and point masses, three
+    /// sweeps, two sums, and the second level of the preconditioner, four lanes a group.
     pub(super) fn of_iteration(&self) -> u64 {
         1 + self.share() * (self.row + 4 + (1 + 2 * self.stencil) * self.masses) + 20 + self.restriction() + self.correction()
     }
@@ -73,14 +73,24 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 24] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 26] {
         [
             ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
             (
                 "iterate_cg",
                 if self.many { 0 } else { self.chunk * self.of_iteration() + 2 * self.share() + self.correction() + 10 },
             ),
-            ("begin_solve", 4 * self.share() + 300 + self.restriction()),
+            ("look_cg", if self.many { 0 } else { self.of_iteration() + self.share() + 30 }),
+            // Parts of nodes in one workgroup.
+            ("begin_solve", 2 * self.nodes.div_ceil(64 * 256) + 30),
+            // Parts of slices, and for every group its own.
+            (
+                "advance_cg",
+                (self.nodes.div_ceil(32) + self.groups).div_ceil(64)
+                    + self.groups.div_ceil(64) * (1 + self.group.div_ceil(32))
+                    + self.group.div_ceil(64)
+                    + 60,
+            ),
             ("step_back", 3 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),

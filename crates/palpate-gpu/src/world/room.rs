@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 21] = [
+const WORK: [Work; 22] = [
     ("increment", |s| s.nodes, VECTOR),
     ("solving", |s| SOLVING_VECTORS as u32 * s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -19,6 +19,7 @@ const WORK: [Work; 21] = [
     ("old_force", |s| s.nodes, VECTOR),
     ("rhs", |s| s.nodes, VECTOR),
     ("column", |s| s.nodes, VECTOR),
+    ("node_parts", |s| 2 * s.nodes.div_ceil(64), VECTOR),
     ("inverses", |s| 2 * s.nodes + s.groups, VECTOR),
     ("values", |s| 9 * s.blocks, 4),
     ("tangents", |s| structs::TANGENT_VECTORS * s.cells, VECTOR),
@@ -37,7 +38,7 @@ const WORK: [Work; 21] = [
 
 /// The same per column of a member that is solved for at the same time as others.
 const OF_COLUMN: [Work; 3] = [
-    ("cg_sums", |s| 4 + s.nodes.div_ceil(roster::NARROW) + 5 * s.groups, VECTOR),
+    ("cg_sums", |s| solving::SCALARS + solving::OF_SLICE * s.slices + solving::OF_GROUP * s.groups, VECTOR),
     ("newton", |_| 1, size_of::<Newton>() as u64),
     ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
