@@ -52,6 +52,10 @@ enum Verb {
         /// With --gpu: instead of steps, a whole fit of the size of the paper's teddy; with --quick a tiny one
         #[arg(long, requires = "gpu")]
         fit: bool,
+        /// With --gpu: instead of times, what steps come to, beside the CPU's: iterations, dispatches, bytes, and a model of a graphics
+        /// processor; without --only all but "dragon × 64" and "ball 100k"; rows are kept in bench/counts.json
+        #[arg(long, requires = "gpu", conflicts_with = "fit")]
+        counts: bool,
         /// Only compare two results of earlier runs
         #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
         compare: Option<Vec<PathBuf>>,
@@ -193,6 +197,7 @@ fn run(verb: Verb) -> Result<(), String> {
             println!("\nwritten to {}", table::save(&name, &report)?.display());
         }
         Verb::Bench { compare: Some(files), .. } => bench::report::compare(&files[0], &files[1])?,
+        Verb::Bench { gpu: true, counts: true, only, .. } => bench::counts::run(only.as_deref())?,
         Verb::Bench { gpu: true, fit: true, quick, .. } => {
             let report = bench::fit::run(quick)?;
             report.print();

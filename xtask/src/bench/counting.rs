@@ -9,16 +9,30 @@ use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use std::sync::Arc;
 
-/// What the first steps come to where many workgroups share a solve and dispatches are recorded sparingly. The first rollout learns how many are
-/// needed; the second is counted, and its recording timed.
-pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize) -> Result<Counts, String> {
+/// Which rollout is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ways {
+    /// One whose dispatches are recorded sparingly, after one that learns how many are needed and one whose recording is timed.
+    Settled,
+    /// The first, which is given all that is allowed: how many dispatches are recorded and how long that takes says nothing, and is zero.
+    Once,
+}
+
+/// What the first steps come to where many workgroups share a solve.
+pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize, ways: Ways) -> Result<Counts, String> {
     let tuning = Tuning { many_from: 0, product: Some(Product::Matrix) };
-    let backend = GpuBackend::on(gpu.clone()).tuned(tuning).sparing();
+    let mut backend = GpuBackend::on(gpu.clone()).tuned(tuning);
+    if ways == Ways::Settled {
+        backend = backend.sparing();
+    }
     let mut world = backend.build(plan, rows.len()).map_err(|e| e.to_string())?;
     backend.set_params(&mut world, &ParamBatch::from_rows(rows));
     let stages = &plan.clock.stages()[..steps];
-    settled(&backend, &mut world, stages, &[])?;
-    let run = settled(&backend, &mut world, stages, &[])?;
+    let mut recording = Vec::new();
+    if ways == Ways::Settled {
+        settled(&backend, &mut world, stages, &[])?;
+        recording = settled(&backend, &mut world, stages, &[])?.recording;
+    }
     world.count_dispatches(true).map_err(|e| e.to_string())?;
     let counted = backend.rollout(&mut world, false, |world| counted(&backend, world, stages))?;
     let of_step = |x: f64| x / steps as f64;
@@ -30,9 +44,9 @@ pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize
         newton,
         linear,
         adjoint,
-        recorded: of_step(counted.dispatches.recorded as f64),
+        recorded: if ways == Ways::Settled { of_step(counted.dispatches.recorded as f64) } else { 0.0 },
         live: of_step(counted.dispatches.live as f64),
-        host: Times::of(run.recording).median,
+        host: if recording.is_empty() { 0.0 } else { Times::of(recording).median },
         // A round more looks at the last trial.
         bytes: (newton + 1.0) * round + linear * iteration,
     })

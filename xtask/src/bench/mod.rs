@@ -1,6 +1,7 @@
 //! Time and memory of one step, forward and back, of the CPU backend: the paper's dragon, and balls and blocks of growing size.
 
 mod counting;
+pub mod counts;
 pub mod fields;
 pub mod fit;
 pub mod gpu;

@@ -58,8 +58,8 @@ pub struct Modelled {
 impl Card {
     /// Time of a step.
     pub fn step(&self, c: &Counts) -> Modelled {
-        let device = c.live * self.launch + (c.recorded - c.live) * self.empty + c.bytes / self.bandwidth;
-        Modelled { device, host: c.recorded * self.record }
+        let device = c.live * self.launch + (c.recorded - c.live).max(0.0) * self.empty + c.bytes / self.bandwidth;
+        Modelled { device, host: c.recorded.max(c.live) * self.record }
     }
 }
 

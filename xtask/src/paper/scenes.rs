@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// A body under gravity above nothing, with the paper's Rayleigh damping.
-fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
+pub fn body(shape: Analytic, cell: f64, youngs_modulus: f64) -> Scene {
     let object = Object { source: BodySource::Analytic(shape), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(cell) };
     let material = Material {
         model: &palpate_model::materials::ALL[0],
