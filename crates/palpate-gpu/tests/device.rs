@@ -32,6 +32,23 @@ fn a_choice_is_an_index_a_place_on_the_bus_or_a_part_of_a_name() {
     assert_eq!(PciAddress::parse(&place.to_string()), Some(place));
 }
 
+/// Two equal cards differ in number and place alone.
+#[test]
+fn of_two_equal_cards_each_can_be_meant() {
+    let Some(first) = adapters().into_iter().next() else {
+        println!("skipped: no adapter to make twins of");
+        return;
+    };
+    let place = |bus| PciAddress { domain: 0, bus, device: 0, function: 0 };
+    let twins = [0, 1].map(|k| palpate_gpu::AdapterReport { index: k, pci: Some(place(k as u8)), ..first.clone() });
+    let meant = |text: &str| twins.each_ref().map(|t| t.is_meant(&Choice::parse(text)));
+    assert_eq!(meant("1"), [false, true]);
+    assert_eq!(meant("00000000:00:00.0"), [true, false]);
+    assert_eq!(meant("0000:01:00.0"), [false, true]);
+    assert_eq!(meant("0000:02:00.0"), [false, false]);
+    assert_eq!((meant(""), meant(&first.name)), ([true, true], [true, true]));
+}
+
 #[test]
 fn a_wrong_choice_lists_what_there_is() {
     let nowhere = PciAddress { domain: 0xffff, bus: 0xff, device: 0x1f, function: 7 };

@@ -42,7 +42,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum Backend {
     /// The reference in double precision.
     Cpu,
-    /// WGSL kernels on the graphics adapter that `PALPATE_ADAPTER` names (part of its name), else on the best one.
+    /// WGSL kernels on the graphics adapter that `PALPATE_ADAPTER` names (by index, PCI address or a part of its name), else on the best one.
     Gpu,
     /// The faster of the two for the body at hand.
     #[default]

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub enum BackendName {
     /// Reference in double precision
     Cpu,
-    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER=name chooses one)
+    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER chooses one by index, PCI address or name)
     Gpu,
     /// The faster one, as measured
     Auto,

@@ -52,11 +52,13 @@ fn an_adapter_that_does_not_exist_is_one_line_with_a_way_out() {
         if verb == "observe" {
             command.args(["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=8x6"]);
         }
-        let (code, out, err) = run(command.env("PALPATE_ADAPTER", "no such card"));
-        assert_eq!((code, out.as_str()), (1, ""), "{verb}: {err}");
-        assert_eq!(err.lines().count(), 1, "{verb}: {err}");
-        for word in ["error: --backend gpu: ", "\"no such card\"", "found: ", "hint: ", "--backend cpu"] {
-            assert!(err.contains(word), "{verb}: \"{word}\" is not in: {err}");
+        for (card, told) in [("no such card", "\"no such card\""), ("77", "index 77"), ("ff:1f.7", "PCI address 0000:ff:1f.7")] {
+            let (code, out, err) = run(command.env("PALPATE_ADAPTER", card));
+            assert_eq!((code, out.as_str()), (1, ""), "{verb}: {err}");
+            assert_eq!(err.lines().count(), 1, "{verb}: {err}");
+            for word in ["error: --backend gpu: ", told, "found: ", "hint: ", "--backend cpu"] {
+                assert!(err.contains(word), "{verb}: \"{word}\" is not in: {err}");
+            }
         }
     }
 }
@@ -155,7 +157,17 @@ fn devices_are_listed_with_limits_and_what_they_can_run() {
     let (code, text, _) = run(program().args(["inspect", "--devices"]));
     assert_eq!(code, 0);
     let binding = "max_storage_buffer_binding_size";
-    for word in [first.name.as_str(), "runs every kernel", binding, "max_buffer_size", "lanes of a cell talk by"] {
+    let place = first.pci.map_or("no PCI address".into(), |p| format!("PCI {p}"));
+    let listed = format!("{}  {}", first.index, first.name);
+    for word in [
+        listed.as_str(),
+        place.as_str(),
+        "PALPATE_ADAPTER chooses",
+        "runs every kernel",
+        binding,
+        "max_buffer_size",
+        "lanes of a cell talk by",
+    ] {
         assert!(text.contains(word), "\"{word}\" is not in:\n{text}");
     }
     let (_, json, _) = run(program().args(["inspect", "--devices", "--json"]));
@@ -166,6 +178,13 @@ fn devices_are_listed_with_limits_and_what_they_can_run() {
     assert_eq!((&device["usable"], &device["verdict"]), (&true.into(), &"runs every kernel".into()));
     assert_eq!(device["limits"][binding], first.limits.max_storage_buffer_binding_size);
     assert_eq!(device["subgroups"], first.subgroups);
+    assert_eq!((&device["index"], &device["pci"]), (&first.index.into(), &first.pci.map(|p| p.to_string()).into()));
+    // By its number it is found.
+    let (folder, scene) = scene();
+    let mut command = program();
+    command.arg("simulate").arg(&scene).args(["--backend", "gpu", "--every", "8", "--out"]).arg(folder.path().join("out"));
+    let (code, _, err) = run(command.env("PALPATE_ADAPTER", first.index.to_string()));
+    assert_eq!(code, 0, "{err}");
 }
 
 /// Largest resident memory of a command while it runs [B].
