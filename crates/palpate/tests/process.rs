@@ -3,6 +3,7 @@
 use palpate_gpu::AdapterReport;
 use serde_json::Value;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -356,6 +357,32 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
     assert!(journal().starts_with(&kept), "it has begun anew");
     assert!(second["cost"]["final"].as_f64() <= first["cost"]["final"].as_f64(), "{first} {second}");
     assert!(path("out/previous-1/result.json").exists(), "the first result is kept");
+}
+
+#[cfg(unix)]
+#[test]
+fn while_auto_measures_a_line_says_so_after_two_seconds() {
+    // Only a software adapter is sure to take that long.
+    if adapter("llvmpipe").is_none() {
+        return;
+    }
+    let folder = watched();
+    let path = |name: &str| folder.path().join(name);
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\n[[fit.parameter]]\n\
+               path = \"material.youngs_modulus\"\nstart = 1.0e4\n";
+    fs::write(path("fine.toml"), BLOCK.replace("cell_size = 0.02", "cell_size = 0.004") + fit).expect("writable");
+    for (verb, what) in [("fit", "fitting"), ("diagnose", "diagnosing"), ("batch", "1/1 fine")] {
+        let mut command = program();
+        command.arg(verb).arg(path("fine.toml")).args(["--backend", "auto", "--progress", "lines", "--out"]).arg(path(verb));
+        command.env("PALPATE_ADAPTER", "llvmpipe").env("XDG_CACHE_HOME", path("cache")).stdout(Stdio::null());
+        let mut running = Running(command.stderr(Stdio::piped()).spawn().expect("the program starts"));
+        let mut lines = BufReader::new(running.0.stderr.take().expect("a pipe")).lines().map(|l| l.expect("it speaks UTF-8"));
+        let first = lines.next().unwrap_or_default();
+        assert!(first.starts_with(&format!("{what}, 2 s: ")), "{first}");
+        // On a busy machine reading takes as long; then the next line is of the measurement, which takes minutes.
+        let told = if first.ends_with(": reading") { lines.next().unwrap_or_default() } else { first };
+        assert!(told.starts_with(&format!("{what}, ")) && told.contains(" s: auto: "), "{told}");
+    }
 }
 
 #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! `palpate batch`: many recordings, one after the other, none of which can stop the rest.
 
 use crate::cli::{Console, INTERRUPTED};
-use crate::commands::fit::{Choices, choose, rounds, run_in};
+use crate::commands::fit::{Choices, choose, run_in};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FNV_START, fingerprint, fnv1a};
@@ -163,6 +163,9 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
     let mut log = Vec::new();
     // A panic is a bug, but not a reason to lose the other scenes.
     let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<(String, FitDocument)>, Error> {
+        // Before anything that takes time.
+        let mut track = console.progress(0, label);
+        track.on(0, "reading");
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
@@ -170,9 +173,8 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
         if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint)? {
             return Ok(Some(done));
         }
-        let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment))?;
+        let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment), &mut track)?;
         row.backend = Some(backend.name().into());
-        let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
         // The journal of another problem is of no use; it is moved aside with the results.
