@@ -234,7 +234,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let (backend, note) = choose(&a.choices, &experiments, &mut track)?;
     track.aside(|| note.iter().for_each(|n| console.note(n)));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    let (fitted, result) = run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &mut track, console)?;
+    let may_write = || Ok(());
+    let (fitted, result) =
+        run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
     track.finish();
     console.warn(&fitted.warnings);
     if console.json() {
@@ -259,9 +261,9 @@ pub fn choose(a: &Choices, experiments: &[Experiment], track: &mut Track) -> Res
 }
 
 impl Choices {
-    /// What decides the result: a scene may be gone on with in smaller batches.
+    /// What decides the result: a scene may be gone on with in smaller batches, and by fewer threads.
     pub fn lasting(&self) -> Choices {
-        Choices { batch: None, ..self.clone() }
+        Choices { batch: None, threads: None, ..self.clone() }
     }
 }
 
@@ -272,7 +274,8 @@ fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
     iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
-/// Fits and writes everything into a folder; the progress goes to `track`. Returns the fit and its `result.json`.
+/// Fits and writes everything into a folder, unless `may_write` then says that it is another's by now; the progress goes to `track`. Returns
+/// the fit and its `result.json`.
 pub fn run_in(
     scenes: &[PathBuf],
     a: &Choices,
@@ -280,6 +283,7 @@ pub fn run_in(
     experiments: &[Experiment],
     folder: &Path,
     resume: bool,
+    may_write: &dyn Fn() -> Result<(), Error>,
     track: &mut Track,
     console: &mut Console,
 ) -> Result<(Fitted, FitDocument), Error> {
@@ -326,6 +330,7 @@ pub fn run_in(
             on_iteration: Some(&mut hear),
         },
     )?;
+    may_write()?;
     if resume {
         make_room(track, console)?;
     }
@@ -333,6 +338,7 @@ pub fn run_in(
         track.on(0, "looking at cells and step half as large");
         fitted.check_grid(experiments, backend, &console.interrupt);
     }
+    may_write()?;
     let result = write_all(scenes, a, folder, experiments, &fitted, backend)?;
     Ok((fitted, result))
 }
