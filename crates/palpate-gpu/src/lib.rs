@@ -22,7 +22,7 @@ mod trace;
 mod world;
 
 pub use backend::GpuBackend;
-pub use device::{AdapterReport, Choice, Dispatches, Gpu, GpuError, Lanes, adapters};
+pub use device::{AdapterReport, Choice, Dispatches, Gpu, GpuError, Lanes, PciAddress, adapters};
 pub use memory::{Load, Memory, memory, memory_of_product};
 pub use solve::{CgSpeed, Choices, Traffic};
 pub use trace::{TracedStep, trace_step};

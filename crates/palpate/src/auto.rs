@@ -57,13 +57,14 @@ fn time_step<B: palpate_engine::Backend>(backend: B, plan: &Plan, request: &Requ
 }
 
 /// Times of a step on the CPU and on the device [s].
-fn measure(device: &GpuBackend, plan: &Plan, demand: &Demand) -> Result<[f64; 2], String> {
+fn measure(device: &GpuBackend, plan: &Plan, demand: &Demand, hear: &mut dyn FnMut(&str)) -> Result<[f64; 2], String> {
     let (request, members) = (demand.request(), demand.starts);
     let of = |count: usize| Demand { starts: count, ..demand.clone() };
     // Beyond some members both take as many times longer.
     let few = members.min(PER_THREAD * rayon::current_num_threads());
     let failed = |why: String| format!("the first steps fail on the CPU: {why}");
     let on_cpu = |plan: &Plan| time_step(CpuBackend, plan, &request, [few, of(few).on_cpu(plan, 0).0]).map_err(failed);
+    hear("auto: timing the first steps on the CPU");
     let shortest = trial(plan, STEPS, demand.compared);
     let mut cpu = on_cpu(&shortest)?;
     let steps = ((TRIAL / cpu.max(1e-9)) as usize).clamp(STEPS, plan.clock.steps.max(STEPS));
@@ -72,6 +73,7 @@ fn measure(device: &GpuBackend, plan: &Plan, demand: &Demand) -> Result<[f64; 2]
         cpu = on_cpu(&short)?;
     }
     let some = if device.gpu().is_software() { members.min(ON_SOFTWARE) } else { members };
+    hear(&format!("auto: timing the first steps on {}", device.gpu().name));
     let at_once = of(some).on_device(plan, device.gpu().largest_buffer()).map_or(1, |d| d.0);
     let gpu = time_step(device.clone(), &short, &request, [some, at_once]);
     let gpu = gpu.map_err(|why| format!("{} cannot compute this body: {why}", device.name()))?;
@@ -89,15 +91,21 @@ fn key(device: &GpuBackend, plan: &Plan, demand: &Demand) -> String {
     format!("{} {}, {threads} threads: {body}, {time}, {asked}", gpu.name, gpu.driver).replace(char::is_control, " ")
 }
 
-/// The backend for a plan, and the reason.
-pub(crate) fn choose(device: GpuBackend, plan: &Plan, demand: &Demand, choices: &Choices) -> (Backend, String) {
+/// The backend for a plan, and the reason; `hear` is told what takes time.
+pub(crate) fn choose(
+    device: GpuBackend,
+    plan: &Plan,
+    demand: &Demand,
+    choices: &Choices,
+    hear: &mut dyn FnMut(&str),
+) -> (Backend, String) {
     let (key, name, what) = (key(&device, plan, demand), device.name(), demand.step());
     let read = |text: &str| -> Option<[f64; 2]> {
         let (cpu, gpu) = text.split_once(' ')?;
         Some([cpu.parse().ok()?, gpu.parse().ok()?])
     };
     let known = choices.written(&key).and_then(|text| read(&text));
-    let [cpu, gpu] = match known.map_or_else(|| measure(&device, plan, demand), Ok) {
+    let [cpu, gpu] = match known.map_or_else(|| measure(&device, plan, demand, hear), Ok) {
         Ok(times) if known.is_none() => read(&choices.write(&key, &format!("{} {}", times[0], times[1]))).unwrap_or(times),
         Ok(times) => times,
         Err(why) => return (Backend::Cpu, why),

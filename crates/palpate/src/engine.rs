@@ -42,7 +42,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum Backend {
     /// The reference in double precision.
     Cpu,
-    /// WGSL kernels on the graphics adapter that `PALPATE_ADAPTER` names (part of its name), else on the best one.
+    /// WGSL kernels on the graphics adapter that `PALPATE_ADAPTER` names (by index, PCI address or a part of its name), else on the best one.
     Gpu,
     /// The faster of the two for the body at hand.
     #[default]
@@ -113,22 +113,24 @@ impl Backend {
     /// takes clearly less time on it than on the CPU, both measured here or before. Software adapters are never faster and not tried, unless
     /// `PALPATE_ADAPTER` names one.
     pub fn resolve(self, plan: &Plan, members: usize) -> (Backend, String) {
-        self.resolve_for(plan, &Demand::forward(members))
+        self.resolve_for(plan, &Demand::forward(members), &mut |_| {})
     }
 
-    /// The same for a fit, whose steps are timed with what its optimiser asks of them: the cost, its gradient or derivatives.
-    pub(crate) fn resolve_for(self, plan: &Plan, demand: &Demand) -> (Backend, String) {
+    /// The same for a fit, whose steps are timed with what its optimiser asks of them: the cost, its gradient or derivatives. `hear` is told
+    /// what takes time.
+    pub(crate) fn resolve_for(self, plan: &Plan, demand: &Demand, hear: &mut dyn FnMut(&str)) -> (Backend, String) {
         if self != Backend::Auto {
             return (self, "asked for".into());
         }
         let named = Choice::from_env() != Choice::Auto;
+        hear("auto: opening the graphics device");
         if !named && (!may_have_processor() || !palpate_gpu::adapters().iter().any(|a| a.refusal.is_none() && !a.is_software())) {
             return (Backend::Cpu, "there is no graphics processor".into());
         }
         match gpu() {
             Ok(device) => {
                 let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                auto::choose(device, plan, demand, &Choices::of_user())
+                auto::choose(device, plan, demand, &Choices::of_user(), hear)
             }
             Err(e) => (Backend::Cpu, e.to_string()),
         }

@@ -211,7 +211,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
     let asked = options.optimizer.or(spec.optimizer);
     let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free)), settings.starts);
-    let backend = options.backend.resolve_for(first.plan(), &trial).0;
+    let backend = options.backend.resolve_for(first.plan(), &trial, &mut |_| {}).0;
     let (optimizer, chosen) = optimizer(asked, &free).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
     let settings = Settings { optimizer, ..settings };
     let threads = options.threads.unwrap_or(spec.threads);

@@ -3,7 +3,7 @@
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::memory::Demand;
-use crate::progress::Liveliness;
+use crate::progress::{Liveliness, Track};
 use clap::{Args, ValueEnum};
 use palpate_model::plan::Plan;
 use std::ops::RangeInclusive;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub enum BackendName {
     /// Reference in double precision
     Cpu,
-    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER=name chooses one)
+    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER chooses one by index, PCI address or name)
     Gpu,
     /// The faster one, as measured
     Auto,
@@ -30,22 +30,25 @@ impl BackendName {
         }
     }
 
-    /// The backend for a plan in batches of `members`, and a line about the choice where it was left open.
+    /// The backend for a plan in batches of `members`, and a line about the choice where it was left open; the track shows what takes time.
     ///
     /// # Errors
     /// The GPU was asked for and there is no usable adapter.
-    pub fn choose(self, plan: &Plan, members: usize) -> Result<(Backend, Option<String>), Error> {
-        self.choose_for(plan, &Demand::forward(members))
+    pub fn choose(self, plan: &Plan, members: usize, track: &mut Track) -> Result<(Backend, Option<String>), Error> {
+        self.choose_for(plan, &Demand::forward(members), track)
     }
 
     /// The same for a fit.
     ///
     /// # Errors
     /// As [`BackendName::choose`].
-    pub(crate) fn choose_for(self, plan: &Plan, demand: &Demand) -> Result<(Backend, Option<String>), Error> {
+    pub(crate) fn choose_for(self, plan: &Plan, demand: &Demand, track: &mut Track) -> Result<(Backend, Option<String>), Error> {
         let asked = self.backend();
+        if asked == Backend::Gpu {
+            track.on(0, "opening the graphics device");
+        }
         asked.check()?;
-        let (backend, reason) = asked.resolve_for(plan, demand);
+        let (backend, reason) = asked.resolve_for(plan, demand, &mut |what| track.on(0, what));
         Ok((backend, (asked == Backend::Auto).then(|| format!("backend: {} (auto: {reason})", backend.name()))))
     }
 }

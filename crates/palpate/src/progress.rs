@@ -27,7 +27,10 @@ const BETWEEN: Duration = Duration::from_secs(5);
 /// Longest time without a line, while nothing new happens.
 const QUIET: Duration = Duration::from_secs(60);
 
-/// The progress of one command.
+/// How often a bar shows that time goes on while nothing is heard.
+const TICK: Duration = Duration::from_millis(500);
+
+/// The progress of one command. It ends with its owner: the bar disappears, lines end.
 pub struct Track {
     bar: ProgressBar,
     lines: Option<Lines>,
@@ -103,19 +106,36 @@ impl Lines {
     }
 }
 
+/// What a bar looks like; one of unknown length is none.
+fn style(length: u64) -> ProgressStyle {
+    let template = match length {
+        0 => "{prefix} {elapsed} {wide_msg}",
+        _ => "{prefix} [{bar:30}] {percent:>3}% {elapsed}/{duration} {msg}",
+    };
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
 impl Track {
     /// Progress of `what` over `length` units; 0: unknown.
     pub fn new(how: Liveliness, length: u64, what: &str) -> Track {
         let bar = match how {
             Liveliness::Silent | Liveliness::Lines => ProgressBar::hidden(),
             Liveliness::Bars => {
-                let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3}% {elapsed}/{duration} {msg}");
                 let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-                bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())).with_prefix(what.to_string())
+                let bar = bar.with_style(style(length)).with_prefix(what.to_string());
+                bar.enable_steady_tick(TICK);
+                bar
             }
         };
         let lines = (how == Liveliness::Lines).then(|| Lines::new(what, std::io::stderr()));
         Track { bar, lines, length, position: 0 }
+    }
+
+    /// How many units there are, once it is known.
+    pub fn measure(&mut self, length: u64) {
+        self.length = length;
+        self.bar.set_length(length);
+        self.bar.set_style(style(length));
     }
 
     /// Moves to a unit, with what is to be said about it.
@@ -138,10 +158,21 @@ impl Track {
         self.at(self.position + by, message);
     }
 
-    /// Ends: the bar disappears, lines end.
+    /// Lets something else be written to the terminal, with the bar out of its way.
+    pub fn aside<T>(&self, write: impl FnOnce() -> T) -> T {
+        self.bar.suspend(write)
+    }
+
+    /// Ends.
     pub fn finish(self) {
+        drop(self);
+    }
+}
+
+impl Drop for Track {
+    fn drop(&mut self) {
         self.bar.finish_and_clear();
-        if let Some(Lines { news, writer }) = self.lines {
+        if let Some(Lines { news, writer }) = self.lines.take() {
             drop(news);
             // It only writes; that it may have failed to is of no interest.
             let _ = writer.join();

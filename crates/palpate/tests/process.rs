@@ -3,6 +3,7 @@
 use palpate_gpu::AdapterReport;
 use serde_json::Value;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -52,11 +53,13 @@ fn an_adapter_that_does_not_exist_is_one_line_with_a_way_out() {
         if verb == "observe" {
             command.args(["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=8x6"]);
         }
-        let (code, out, err) = run(command.env("PALPATE_ADAPTER", "no such card"));
-        assert_eq!((code, out.as_str()), (1, ""), "{verb}: {err}");
-        assert_eq!(err.lines().count(), 1, "{verb}: {err}");
-        for word in ["error: --backend gpu: ", "\"no such card\"", "found: ", "hint: ", "--backend cpu"] {
-            assert!(err.contains(word), "{verb}: \"{word}\" is not in: {err}");
+        for (card, told) in [("no such card", "\"no such card\""), ("77", "index 77"), ("ff:1f.7", "PCI address 0000:ff:1f.7")] {
+            let (code, out, err) = run(command.env("PALPATE_ADAPTER", card));
+            assert_eq!((code, out.as_str()), (1, ""), "{verb}: {err}");
+            assert_eq!(err.lines().count(), 1, "{verb}: {err}");
+            for word in ["error: --backend gpu: ", told, "found: ", "hint: ", "--backend cpu"] {
+                assert!(err.contains(word), "{verb}: \"{word}\" is not in: {err}");
+            }
         }
     }
 }
@@ -155,7 +158,17 @@ fn devices_are_listed_with_limits_and_what_they_can_run() {
     let (code, text, _) = run(program().args(["inspect", "--devices"]));
     assert_eq!(code, 0);
     let binding = "max_storage_buffer_binding_size";
-    for word in [first.name.as_str(), "runs every kernel", binding, "max_buffer_size", "lanes of a cell talk by"] {
+    let place = first.pci.map_or("no PCI address".into(), |p| format!("PCI {p}"));
+    let listed = format!("{}  {}", first.index, first.name);
+    for word in [
+        listed.as_str(),
+        place.as_str(),
+        "PALPATE_ADAPTER chooses",
+        "runs every kernel",
+        binding,
+        "max_buffer_size",
+        "lanes of a cell talk by",
+    ] {
         assert!(text.contains(word), "\"{word}\" is not in:\n{text}");
     }
     let (_, json, _) = run(program().args(["inspect", "--devices", "--json"]));
@@ -166,6 +179,13 @@ fn devices_are_listed_with_limits_and_what_they_can_run() {
     assert_eq!((&device["usable"], &device["verdict"]), (&true.into(), &"runs every kernel".into()));
     assert_eq!(device["limits"][binding], first.limits.max_storage_buffer_binding_size);
     assert_eq!(device["subgroups"], first.subgroups);
+    assert_eq!((&device["index"], &device["pci"]), (&first.index.into(), &first.pci.map(|p| p.to_string()).into()));
+    // By its number it is found.
+    let (folder, scene) = scene();
+    let mut command = program();
+    command.arg("simulate").arg(&scene).args(["--backend", "gpu", "--every", "8", "--out"]).arg(folder.path().join("out"));
+    let (code, _, err) = run(command.env("PALPATE_ADAPTER", first.index.to_string()));
+    assert_eq!(code, 0, "{err}");
 }
 
 /// Largest resident memory of a command while it runs [B].
@@ -337,6 +357,32 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
     assert!(journal().starts_with(&kept), "it has begun anew");
     assert!(second["cost"]["final"].as_f64() <= first["cost"]["final"].as_f64(), "{first} {second}");
     assert!(path("out/previous-1/result.json").exists(), "the first result is kept");
+}
+
+#[cfg(unix)]
+#[test]
+fn while_auto_measures_a_line_says_so_after_two_seconds() {
+    // Only a software adapter is sure to take that long.
+    if adapter("llvmpipe").is_none() {
+        return;
+    }
+    let folder = watched();
+    let path = |name: &str| folder.path().join(name);
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\n[[fit.parameter]]\n\
+               path = \"material.youngs_modulus\"\nstart = 1.0e4\n";
+    fs::write(path("fine.toml"), BLOCK.replace("cell_size = 0.02", "cell_size = 0.004") + fit).expect("writable");
+    for (verb, what) in [("fit", "fitting"), ("diagnose", "diagnosing"), ("batch", "1/1 fine")] {
+        let mut command = program();
+        command.arg(verb).arg(path("fine.toml")).args(["--backend", "auto", "--progress", "lines", "--out"]).arg(path(verb));
+        command.env("PALPATE_ADAPTER", "llvmpipe").env("XDG_CACHE_HOME", path("cache")).stdout(Stdio::null());
+        let mut running = Running(command.stderr(Stdio::piped()).spawn().expect("the program starts"));
+        let mut lines = BufReader::new(running.0.stderr.take().expect("a pipe")).lines().map(|l| l.expect("it speaks UTF-8"));
+        let first = lines.next().unwrap_or_default();
+        assert!(first.starts_with(&format!("{what}, 2 s: ")), "{first}");
+        // On a busy machine reading takes as long; then the next line is of the measurement, which takes minutes.
+        let told = if first.ends_with(": reading") { lines.next().unwrap_or_default() } else { first };
+        assert!(told.starts_with(&format!("{what}, ")) && told.contains(" s: auto: "), "{told}");
+    }
 }
 
 #[cfg(unix)]

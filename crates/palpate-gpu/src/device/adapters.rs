@@ -9,16 +9,88 @@ pub enum Choice {
     /// A discrete GPU before an integrated one before a software one.
     #[default]
     Auto,
+    /// The one with this number in the list of [`adapters`], from 0.
+    Index(usize),
+    /// The one at this place of the PCI bus.
+    Pci(PciAddress),
     /// The first whose name holds this text (case ignored).
     Named(String),
+}
+
+/// Place of a device on the PCI bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PciAddress {
+    /// Domain, or segment.
+    pub domain: u32,
+    /// Bus.
+    pub bus: u8,
+    /// Device.
+    pub device: u8,
+    /// Function.
+    pub function: u8,
+}
+
+impl PciAddress {
+    /// Reads `0000:01:00.0`, as wgpu and lspci write it, `00000000:01:00.0`, as nvidia-smi does, or `01:00.0`; `None` for other texts.
+    pub fn parse(text: &str) -> Option<PciAddress> {
+        let (place, function) = text.split_once('.')?;
+        let mut parts = place.rsplit(':');
+        let hex = |digits: &str, most: usize| {
+            let known = !digits.is_empty() && digits.len() <= most && digits.chars().all(|c| c.is_ascii_hexdigit());
+            known.then(|| u32::from_str_radix(digits, 16).ok())?
+        };
+        let byte = |digits: &str| u8::try_from(hex(digits, 2)?).ok();
+        let (device, bus) = (byte(parts.next()?)?, byte(parts.next()?)?);
+        let domain = parts.next().map_or(Some(0), |d| hex(d, 8))?;
+        let function = byte(function)?;
+        parts.next().is_none().then_some(PciAddress { domain, bus, device, function })
+    }
+}
+
+impl std::fmt::Display for PciAddress {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:04x}:{:02x}:{:02x}.{}", self.domain, self.bus, self.device, self.function)
+    }
 }
 
 impl Choice {
     /// The choice made by the environment variable `PALPATE_ADAPTER`, else [`Choice::Auto`].
     pub fn from_env() -> Choice {
-        match std::env::var("PALPATE_ADAPTER") {
-            Ok(name) if !name.is_empty() => Choice::Named(name),
-            _ => Choice::Auto,
+        std::env::var("PALPATE_ADAPTER").map_or(Choice::Auto, |text| Choice::parse(&text))
+    }
+
+    /// A number of one or two digits is an index (longer ones, as 4090, are parts of names), what looks like a PCI address is one, all else
+    /// is a part of a name.
+    pub fn parse(text: &str) -> Choice {
+        let text = text.trim();
+        let digits = text.len() <= 2 && text.chars().all(|c| c.is_ascii_digit());
+        match (text.parse(), PciAddress::parse(text)) {
+            _ if text.is_empty() => Choice::Auto,
+            (Ok(index), _) if digits => Choice::Index(index),
+            (_, Some(place)) => Choice::Pci(place),
+            _ => Choice::Named(text.into()),
+        }
+    }
+
+    /// True when it means this adapter.
+    pub(super) fn means(&self, index: usize, name: &str, pci: Option<PciAddress>) -> bool {
+        match self {
+            Choice::Auto => true,
+            Choice::Index(wanted) => *wanted == index,
+            Choice::Pci(wanted) => pci == Some(*wanted),
+            Choice::Named(part) => name.to_lowercase().contains(&part.to_lowercase()),
+        }
+    }
+}
+
+/// What is wanted, as a part of a sentence about an adapter: `with "A100" in its name`; nothing for [`Choice::Auto`].
+impl std::fmt::Display for Choice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Choice::Auto => Ok(()),
+            Choice::Index(index) => write!(f, "with the index {index}"),
+            Choice::Pci(place) => write!(f, "at the PCI address {place}"),
+            Choice::Named(part) => write!(f, "with {part:?} in its name"),
         }
     }
 }
@@ -41,9 +113,16 @@ pub(crate) fn instance() -> wgpu::Instance {
     wgpu::Instance::new(wgpu::InstanceDescriptor { flags, ..wgpu::InstanceDescriptor::new_without_display_handle() })
 }
 
-/// Every adapter.
+/// Every adapter in the order of lists, which an index counts in: usable ones first, and by kind.
 pub(crate) fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
-    pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    found.sort_by_key(|a| (refused(a).is_some(), rank(a.get_info().device_type)));
+    found
+}
+
+/// Where an adapter is on the PCI bus; software adapters are nowhere.
+pub(super) fn pci(info: &wgpu::AdapterInfo) -> Option<PciAddress> {
+    PciAddress::parse(&info.device_pci_bus_id)
 }
 
 /// Which kind is taken first.
@@ -79,6 +158,10 @@ pub(crate) fn refusal(name: &str, features: wgpu::Features, limits: &wgpu::Limit
 /// One adapter, for lists.
 #[derive(Clone, Debug)]
 pub struct AdapterReport {
+    /// Its number in the list, from 0.
+    pub index: usize,
+    /// Where it is on the PCI bus; `None` where the driver does not say so, as software adapters.
+    pub pci: Option<PciAddress>,
     /// Name and driver.
     pub name: String,
     /// Discrete, integrated, software.
@@ -118,10 +201,7 @@ impl AdapterReport {
 
     /// True when this is an adapter that the choice means.
     pub fn is_meant(&self, choice: &Choice) -> bool {
-        match choice {
-            Choice::Auto => true,
-            Choice::Named(name) => self.name.to_lowercase().contains(&name.to_lowercase()),
-        }
+        choice.means(self.index, &self.name, self.pci)
     }
 
     /// True for adapters that compute on the CPU.
@@ -132,21 +212,19 @@ impl AdapterReport {
 
 /// Every adapter of this machine, the one that [`Choice::Auto`] takes first.
 pub fn adapters() -> Vec<AdapterReport> {
-    let mut found: Vec<AdapterReport> = all(&instance())
-        .iter()
-        .map(|a| {
-            let info = a.get_info();
-            AdapterReport {
-                name: format!("{} ({})", info.name, info.driver_info),
-                kind: info.device_type,
-                api: info.backend,
-                limits: a.limits(),
-                subgroups: a.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
-                timestamps: a.features().contains(wgpu::Features::TIMESTAMP_QUERY),
-                refusal: refused(a),
-            }
-        })
-        .collect();
-    found.sort_by_key(|a| (a.refusal.is_some(), rank(a.kind)));
-    found
+    let report = |(index, a): (usize, &wgpu::Adapter)| {
+        let info = a.get_info();
+        AdapterReport {
+            index,
+            pci: pci(&info),
+            name: format!("{} ({})", info.name, info.driver_info),
+            kind: info.device_type,
+            api: info.backend,
+            limits: a.limits(),
+            subgroups: a.features().contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8,
+            timestamps: a.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+            refusal: refused(a),
+        }
+    };
+    all(&instance()).iter().enumerate().map(report).collect()
 }

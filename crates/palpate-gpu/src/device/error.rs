@@ -1,14 +1,16 @@
 //! What can go wrong with a device: one clear error each, with the way out.
 
+use super::adapters::Choice;
+
 /// A device that cannot be had, cannot do the work, or broke.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
-    /// No driver offers an adapter, or none of the wanted name.
-    #[error("no graphics adapter {}(found: {})", .wanted.as_ref().map_or(String::new(), |w| format!("with {w:?} in its name ")), list(.found))]
+    /// No driver offers an adapter, or none is what was asked for.
+    #[error("no graphics adapter {}(found: {})", asked(.wanted), list(.found))]
     NoAdapter {
-        /// Part of a name that was asked for.
-        wanted: Option<String>,
-        /// Names of what there is.
+        /// What was asked for.
+        wanted: Choice,
+        /// What there is: index, name and PCI address.
         found: Vec<String>,
     },
     /// The adapter lacks a feature.
@@ -99,6 +101,11 @@ fn unit(limit: &str) -> &'static str {
 const FULL: [&str; 5] =
     ["not enough memory", "out of memory", "out of device memory", "out of host memory", "memory allocation has failed"];
 
+/// What was asked for, with a blank behind it.
+fn asked(wanted: &Choice) -> String {
+    if *wanted == Choice::Auto { String::new() } else { format!("{wanted} ") }
+}
+
 fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
@@ -128,7 +135,7 @@ impl GpuError {
         let hint = match self {
             GpuError::NoAdapter { found, .. } if !found.is_empty() => {
                 return format!(
-                    "set PALPATE_ADAPTER to part of a name found ({}), unset it, or use --backend cpu",
+                    "set PALPATE_ADAPTER to an index, a PCI address or a part of a name found ({}), unset it, or use --backend cpu",
                     found.join(", ")
                 );
             }

@@ -12,7 +12,7 @@ mod probe;
 pub mod recorder;
 pub mod trace;
 
-pub use adapters::{AdapterReport, Choice, adapters};
+pub use adapters::{AdapterReport, Choice, PciAddress, adapters};
 pub(crate) use arena::Arena;
 pub(crate) use buffers::{Maker, whole};
 pub(crate) use count::Counter;

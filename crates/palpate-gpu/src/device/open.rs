@@ -1,6 +1,6 @@
 //! Opens an adapter: the device with the features that kernels need, and the way its lanes talk.
 
-use super::adapters::{Choice, NEEDED, WELCOME, all, instance, rank, refused};
+use super::adapters::{Choice, NEEDED, WELCOME, all, instance, pci, refused};
 use super::error::{GpuError, translate};
 use super::gpu::{Gpu, keep};
 use super::pipelines::{Lanes, Pipelines};
@@ -35,22 +35,23 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::open`].
     pub fn open_with(choice: &Choice, lanes: Option<Lanes>) -> Result<Arc<Gpu>, GpuError> {
-        let mut found = all(&instance());
-        found.sort_by_key(|a| rank(a.get_info().device_type));
-        let names: Vec<String> = found.iter().map(|a| a.get_info().name).collect();
-        let wanted = match choice {
-            Choice::Auto => None,
-            Choice::Named(name) => Some(name.clone()),
+        let found = all(&instance());
+        let told = |(index, a): (usize, &wgpu::Adapter)| {
+            let info = a.get_info();
+            let place = pci(&info).map_or(String::new(), |p| format!(" at {p}"));
+            format!("{index}: {}{place}", info.name)
         };
-        let fits =
-            |a: &wgpu::Adapter| wanted.as_ref().is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase()));
-        found.retain(fits);
-        let usable = found.iter().position(|a| refused(a).is_none());
-        let Some(first) = found.first() else { return Err(GpuError::NoAdapter { wanted, found: names }) };
-        let Some(place) = usable else {
-            return Err(refused(first).unwrap_or(GpuError::NoAdapter { wanted, found: names }));
+        let names: Vec<String> = found.iter().enumerate().map(told).collect();
+        let meant = |(index, a): &(usize, &wgpu::Adapter)| {
+            let info = a.get_info();
+            choice.means(*index, &info.name, pci(&info))
         };
-        let adapter = &found[place];
+        let mut meant = found.iter().enumerate().filter(meant).map(|(_, a)| a);
+        // Usable ones come first.
+        let Some(adapter) = meant.next() else { return Err(GpuError::NoAdapter { wanted: choice.clone(), found: names }) };
+        if let Some(refusal) = refused(adapter) {
+            return Err(refusal);
+        }
         let info = adapter.get_info();
         let features = NEEDED | (adapter.features() & WELCOME);
         let descriptor = wgpu::DeviceDescriptor {

@@ -1,18 +1,24 @@
-//! `palpate batch`: many recordings, one after the other, none of which can stop the rest.
+//! `palpate batch`: many recordings, one after the other, none of which can stop the rest; on many machines, each of which takes a part.
+
+mod lock;
+mod merge;
+mod scenes;
+mod shard;
+mod summary;
 
 use crate::cli::{Console, INTERRUPTED};
-use crate::commands::fit::{Choices, choose, rounds, run_in};
+use crate::commands::fit::{Choices, choose, run_in};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FNV_START, fingerprint, fnv1a};
-use crate::options::stem;
 use crate::results;
-use crate::results::batch::{BatchDocument, BatchRow, RowStatus};
+use crate::results::batch::{BatchDocument, BatchRow, RowStatus, Shard, ShardSummary};
 use crate::results::fit::{FitDocument, VerdictWord};
 use clap::Args;
-use palpate_io::InputError;
+use lock::{Held, Lock, PATIENCE, Taken};
 use palpate_io::output::{make_folder, write_file};
-use std::collections::BTreeSet;
+use shard::Asked;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,18 +28,26 @@ Examples:
   palpate batch scenes/ --out found             every scene (*.toml with format \"scene/1\") of a folder
   palpate batch a.toml b.toml --starts 8        some scenes
   palpate batch list.txt --out found --resume   the scenes a text file names, one a line; go on where it was interrupted
+  palpate batch scenes/ --out found --resume --shard 2/3      the second of three parts, each on a machine of its own
+  palpate batch scenes/ --out found --resume --shard auto/3   the part that a Slurm array (--array=1-3) or an indexed
+                                                              Kubernetes job (completions: 3) says
+  palpate batch --merge found                   one summary of all parts, and what is missing
 
 Every scene is fitted by itself into OUT/NAME/, as by `palpate fit`, with its messages in fit.log. summary.csv and summary.json
 (format batch/1) are written anew after every scene. A scene that cannot be read or computed is a row that says why; the others
-go on. With --resume, scenes that are complete and have not changed are taken over. Exit codes: 0 all succeeded, 1 some did
-not, 2 nothing to do, 130 interrupted.";
+go on. With --resume, scenes that are complete and have not changed are taken over.
+
+Shard K of N (K from 1 to N) has the K-th scene of the list and every N-th after it. Its summary is OUT/shards/K-of-N.csv and
+.json. A scene that another process fits at this time, on whichever machine, is left to it (docs/batch.md).
+
+Exit codes: 0 all succeeded, 1 some did not, 2 nothing to do, 130 interrupted.";
 
 /// Fit many recordings, one by one
 #[derive(Clone, Debug, Args)]
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Folders with scenes, scene files, or text files that name one scene a line
-    #[arg(required = true, value_name = "PATH")]
+    #[arg(required_unless_present = "merge", value_name = "PATH")]
     paths: Vec<PathBuf>,
     /// Output folder
     #[arg(long, value_name = "DIR", default_value = "out/batch")]
@@ -41,12 +55,16 @@ pub struct Arguments {
     /// Take over what an earlier run finished, and go on with what it began
     #[arg(long)]
     resume: bool,
+    /// Fit a part of the scenes: K/N with K from 1 to N; auto or auto/N: K, or both, are what the variables of a Slurm array
+    /// (SLURM_ARRAY_TASK_ID, …_COUNT) or of an indexed Kubernetes job (JOB_COMPLETION_INDEX) say [without a value: auto]
+    #[arg(long, value_name = "K/N", value_parser = shard::parse, num_args = 0..=1, default_missing_value = "auto")]
+    shard: Option<Asked>,
+    /// Fit nothing: write OUT/summary.csv and summary.json from what the shards left in OUT, and name what is missing
+    #[arg(long, value_name = "OUT", conflicts_with_all = ["paths", "resume", "shard"])]
+    merge: Option<PathBuf>,
     #[command(flatten)]
     choices: Choices,
 }
-
-/// File that says what became of every scene.
-const SUMMARY: &str = "summary.json";
 
 /// File in a scene's folder that says what its journal belongs to.
 const MARK: &str = "fit.fingerprint";
@@ -58,6 +76,22 @@ const TAKEN_OVER: &str = "taken over";
 const BEST_KEPT: &str = "the best so far is written; --resume goes on from there";
 
 impl BatchRow {
+    /// Of a scene with which nothing was done yet.
+    fn begun(name: &str, scene: &Path) -> BatchRow {
+        BatchRow {
+            name: name.to_string(),
+            scene: scene.display().to_string(),
+            status: RowStatus::Failed,
+            message: String::new(),
+            seconds: 0.0,
+            backend: None,
+            fingerprint: String::new(),
+            parameters: None,
+            cost: None,
+            residual: None,
+        }
+    }
+
     /// What computed it, in brackets behind the time that it took.
     fn by(&self) -> String {
         self.backend.as_ref().map_or(String::new(), |b| format!(" ({b})"))
@@ -71,119 +105,70 @@ impl BatchRow {
     }
 }
 
-fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))
-}
-
-fn unreadable(path: &Path, cause: &std::io::Error) -> Error {
-    InputError::file(path, format!("cannot be read: {cause}")).into()
-}
-
-/// The scenes that the arguments name: folders in the order of names, lists in the order of lines.
-fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
-    let mut out = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let list = std::fs::read_dir(path).map_err(|e| unreadable(path, &e))?;
-            let files: BTreeSet<PathBuf> = list.filter_map(|f| Some(f.ok()?.path())).collect();
-            let toml = files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "toml"));
-            // Other TOML files (recordings, settings) may lie beside the scenes; one that cannot be read is reported later.
-            let before = out.len();
-            out.extend(toml.filter(|f| std::fs::read_to_string(f).map_or(true, |t| t.contains("\"scene/1\""))));
-            if out.len() == before {
-                return Err(InputError::file(path, "holds no scene (*.toml with format = \"scene/1\")").into());
-            }
-        } else if path.extension().is_some_and(|e| e == "toml") {
-            out.push(path.clone());
-        } else {
-            let folder = path.parent().unwrap_or(Path::new(""));
-            let lines = read(path)?;
-            let named = lines.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#'));
-            let before = out.len();
-            out.extend(named.map(|l| folder.join(l)));
-            if out.len() == before {
-                return Err(InputError::file(path, "names no scene; one path a line is expected").into());
-            }
-        }
-    }
-    Ok(out)
-}
-
-/// A folder name per scene: its file's name, numbered where two are the same.
-fn names(scenes: &[PathBuf]) -> Vec<String> {
-    let mut taken = BTreeSet::new();
-    let free = |s: &PathBuf| {
-        let name = stem(s);
-        let numbered = |n: usize| if n == 1 { name.clone() } else { format!("{name}-{n}") };
-        (1..).map(numbered).find(|n| taken.insert(n.clone())).expect("some number is free")
-    };
-    scenes.iter().map(free).collect()
-}
-
-/// Rows of an earlier run's summary, of which this run is a continuation; none where there is no such summary.
-fn earlier(out: &Path) -> Result<Vec<BatchRow>, Error> {
-    let path = out.join(SUMMARY);
-    if !path.exists() {
-        return Ok(Vec::new());
-    }
-    Ok(results::read::<BatchDocument>(path)?.scenes)
-}
-
-/// A finished scene of an earlier run with the same fingerprint: what is said of it, with the warning that it ended with, and its result.
-fn finished(earlier: &[BatchRow], out: &Path, name: &str, fingerprint: &str) -> Result<Option<(String, FitDocument)>, Error> {
-    let Some(row) = earlier.iter().find(|r| r.name == name && r.fingerprint == fingerprint) else { return Ok(None) };
-    let result = out.join(name).join("result.json");
+/// A scene that was finished with this fingerprint: what is said of it, with the warning that it ended with, and its result.
+fn finished(earlier: Option<&BatchRow>, folder: &Path, fingerprint: &str) -> Result<Option<(String, FitDocument)>, Error> {
+    let Some(row) = earlier.filter(|r| r.fingerprint == fingerprint) else { return Ok(None) };
+    let result = folder.join("result.json");
     if row.status != RowStatus::Complete || !result.exists() {
         return Ok(None);
     }
-    let message = match row.message.as_str() {
-        "" => TAKEN_OVER.into(),
-        again if again.starts_with(TAKEN_OVER) => again.into(),
-        warning => format!("{TAKEN_OVER}: {warning}"),
-    };
+    let message = if row.message.is_empty() { TAKEN_OVER.into() } else { format!("{TAKEN_OVER}: {}", row.message) };
     Ok(Some((message, results::read(result)?)))
 }
 
-/// Fits one scene; whatever goes wrong ends up in the row.
-fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &str, console: &mut Console) -> BatchRow {
+/// The row of a scene's folder. One that cannot be read is of no use, and is replaced.
+fn row_in(folder: &Path, console: &mut Console) -> Option<BatchRow> {
+    summary::row(folder).unwrap_or_else(|e| {
+        console.warn(&[e.to_string()]);
+        None
+    })
+}
+
+/// Fits one scene under its lock; whatever goes wrong ends up in the row. Where another process has the lock, that is given back.
+fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Console) -> Result<BatchRow, Held> {
     let clock = Instant::now();
-    let mut row = BatchRow {
-        name: name.to_string(),
-        scene: scene.display().to_string(),
-        status: RowStatus::Failed,
-        message: String::new(),
-        seconds: 0.0,
-        backend: None,
-        fingerprint: String::new(),
-        parameters: None,
-        cost: None,
-        residual: None,
-    };
+    let mut row = BatchRow::begun(name, scene);
     let folder = a.out.join(name);
+    let taken = make_folder(&folder).map_err(Error::from).and_then(|()| Lock::take(&folder, PATIENCE));
+    let lock = match taken {
+        Ok(Taken::Mine(lock)) => lock,
+        Ok(Taken::Held(held)) => return Err(held),
+        Err(e) => {
+            row.message = e.to_string();
+            return Ok(row);
+        }
+    };
+    // Without --resume there was none when this run began: another process has finished the scene since.
+    let earlier = row_in(&folder, console);
     let mut log = Vec::new();
     // A panic is a bug, but not a reason to lose the other scenes.
     let done = catch_unwind(AssertUnwindSafe(|| -> Result<Option<(String, FitDocument)>, Error> {
+        // Before anything that takes time.
+        let mut track = console.progress(0, label);
+        track.on(0, "reading");
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
             format!("{} {:016x}", fingerprint(experiment.plan()), fnv1a(FNV_START, (asked + experiment.text()).as_bytes()));
-        if let Some(done) = finished(earlier, &a.out, name, &row.fingerprint)? {
+        if let Some(done) = finished(earlier.as_ref(), &folder, &row.fingerprint)? {
             return Ok(Some(done));
         }
-        let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment))?;
+        let (backend, note) = choose(&a.choices, std::slice::from_ref(&experiment), &mut track)?;
         row.backend = Some(backend.name().into());
-        let mut track = console.progress(rounds(&a.choices, &experiment), label);
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
+        quiet.interrupt = lock.guard(&console.interrupt);
         // The journal of another problem is of no use; it is moved aside with the results.
         let mark = folder.join(MARK);
         note.iter().for_each(|n| quiet.note(n));
         let resume = a.resume && std::fs::read_to_string(&mark).is_ok_and(|m| m == row.fingerprint);
-        make_folder(&folder)?;
+        // From here on the folder holds no finished scene, whatever happens.
+        summary::remove_row(&folder)?;
         write_file(&mark, |w| w.write_all(row.fingerprint.as_bytes()))?;
         let scenes = [scene.to_path_buf()];
-        let fitted =
-            run_in(&scenes, &a.choices, backend, std::slice::from_ref(&experiment), &folder, resume, &mut track, &mut quiet);
+        let experiments = std::slice::from_ref(&experiment);
+        let may_write = || lock.check();
+        let fitted = run_in(&scenes, &a.choices, backend, experiments, &folder, resume, &may_write, &mut track, &mut quiet);
         track.finish();
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);
@@ -202,7 +187,7 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
             (row.status, row.message, row.seconds) = (RowStatus::Complete, message, result.seconds);
             row.backend = Some(result.backend.clone());
             row.take(result);
-            return row;
+            return Ok(row);
         }
         Ok(Err(e)) => {
             row.status = if matches!(e, Error::Interrupted) {
@@ -220,88 +205,162 @@ fn one(a: &Arguments, earlier: &[BatchRow], scene: &Path, name: &str, label: &st
         }
     }
     row.seconds = clock.elapsed().as_secs_f64();
+    if lock.is_lost() {
+        (row.status, row.message) = (RowStatus::Busy, lock.loss());
+        return Ok(row);
+    }
     if row.status != RowStatus::Complete {
         log.extend_from_slice(format!("{}: {}\n", row.status.name(), row.message).as_bytes());
     }
-    if folder.is_dir()
-        && let Err(e) = std::fs::write(folder.join("fit.log"), &log)
-    {
+    if let Err(e) = std::fs::write(folder.join("fit.log"), &log) {
         console.warn(&[format!("{}: {e}", folder.join("fit.log").display())]);
     }
-    row
-}
-
-/// The rows of this run, and those of the earlier one for scenes that this one has not reached yet, so that a run that ends here can be
-/// gone on with.
-fn summary(rows: &[BatchRow], earlier: &[BatchRow], ahead: &[String]) -> BatchDocument {
-    let kept = ahead.iter().filter_map(|name| earlier.iter().find(|r| r.name == *name));
-    BatchDocument::of(rows.iter().chain(kept).cloned().collect())
-}
-
-/// `summary.csv`: one row a scene, two columns a parameter (value and standard error), over the parameters of all scenes.
-fn table(summary: &BatchDocument) -> String {
-    let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:?}"));
-    let parameters = |r: &BatchRow| r.parameters.clone().unwrap_or_default();
-    let mut paths: Vec<String> = Vec::new();
-    for p in summary.scenes.iter().flat_map(parameters) {
-        if !paths.contains(&p.path) {
-            paths.push(p.path);
-        }
+    if let Err(e) = summary::write_row(&folder, &row) {
+        console.warn(&[e.to_string()]);
     }
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    let mut head =
-        ["name", "scene", "status", "seconds", "backend", "cost", "rms", "noise", "points"].map(str::to_string).to_vec();
-    head.extend(paths.iter().flat_map(|p| [p.clone(), format!("{p} standard error")]));
-    head.push("message".into());
-    csv.write_record(&head).expect("writing to memory cannot fail");
-    for r in &summary.scenes {
-        let residual = r.residual.as_ref();
-        let mut row = vec![r.name.clone(), r.scene.clone(), r.status.name().into(), number(Some(r.seconds))];
-        row.extend([r.backend.clone().unwrap_or_default(), number(r.cost)]);
-        row.extend([number(residual.and_then(|r| r.rms)), number(residual.and_then(|r| r.noise))]);
-        row.push(residual.map_or(String::new(), |r| r.points.to_string()));
-        for path in &paths {
-            let found = parameters(r).into_iter().find(|p| p.path == *path).unwrap_or_default();
-            row.extend([number(found.value), number(found.standard_error)]);
-        }
-        row.push(r.message.clone());
-        csv.write_record(&row).expect("writing to memory cannot fail");
-    }
-    String::from_utf8(csv.into_inner().expect("writing to memory cannot fail")).expect("names and numbers are UTF-8")
+    Ok(row)
 }
 
-pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let scenes = scenes(&a.paths)?;
-    make_folder(&a.out)?;
-    let names = names(&scenes);
-    let earlier = if a.resume { earlier(&a.out)? } else { Vec::new() };
-    let mut rows: Vec<BatchRow> = Vec::new();
-    let mut all = BatchDocument::default();
-    for (i, (scene, name)) in scenes.iter().zip(&names).enumerate() {
-        if console.interrupt.is_raised() {
-            break;
+/// The scenes of this run, and what became of them so far.
+struct Batch<'a> {
+    a: &'a Arguments,
+    shard: Option<Shard>,
+    scenes: Vec<PathBuf>,
+    /// Names of all scenes, also of those that other shards have.
+    names: Vec<String>,
+    /// Places of this run's scenes in the list.
+    mine: Vec<usize>,
+    /// What their folders held when this run began, where it goes on with that.
+    before: BTreeMap<usize, BatchRow>,
+    rows: BTreeMap<usize, BatchRow>,
+}
+
+impl<'a> Batch<'a> {
+    fn begin(a: &'a Arguments, console: &mut Console) -> Result<Batch<'a>, Error> {
+        let shard = a.shard.map(|asked| asked.shard(&|name| std::env::var(name).ok())).transpose()?;
+        let scenes = scenes::scenes(&a.paths)?;
+        let names = scenes::names(&scenes);
+        let mine = shard.map_or_else(|| (0..scenes.len()).collect(), |s| s.part(scenes.len()));
+        if let (Some(s), false) = (shard, a.resume)
+            && let Some((file, other)) = summary::of_shards(&a.out)?.into_iter().find(|(_, other)| other.shard.of != s.of)
+        {
+            let message = format!(
+                "{} is of {} shards; with --resume another number of shards takes over what those finished, else give another --out",
+                file.display(),
+                other.shard.of
+            );
+            return Err(Error::option("shard", s, message));
         }
-        let label = format!("{}/{} {name}", i + 1, scenes.len());
-        let row = one(a, &earlier, scene, name, &label, console);
+        make_folder(&a.out)?;
+        let mut before = BTreeMap::new();
+        for &i in &mine {
+            let folder = a.out.join(&names[i]);
+            if a.resume {
+                before.extend(row_in(&folder, console).map(|row| (i, row)));
+            } else {
+                summary::remove_row(&folder)?;
+            }
+        }
+        Ok(Batch { a, shard, scenes, names, mine, before, rows: BTreeMap::new() })
+    }
+
+    /// The rows of this run, and those of an earlier one for scenes that this one has not reached yet, so that a run that ends here can be
+    /// gone on with.
+    fn summary(&self) -> BatchDocument {
+        let rows = self.mine.iter().filter_map(|i| self.rows.get(i).or_else(|| self.before.get(i))).cloned().collect();
+        let all = || self.names.clone();
+        BatchDocument { shard: self.shard.map(|shard| ShardSummary { shard, all: all() }), ..BatchDocument::of(rows) }
+    }
+
+    fn write(&self) -> Result<(), Error> {
+        let place = summary::place(&self.a.out, self.shard);
+        if let Some(folder) = place.parent() {
+            make_folder(folder)?;
+        }
+        summary::write(&place, &self.summary())
+    }
+
+    /// Number among this run's scenes, and name.
+    fn label(&self, turn: usize) -> String {
+        format!("{}/{} {}", turn + 1, self.mine.len(), self.names[self.mine[turn]])
+    }
+
+    fn one(&self, turn: usize, console: &mut Console) -> Result<BatchRow, Held> {
+        let i = self.mine[turn];
+        one(self.a, &self.scenes[i], &self.names[i], &self.label(turn), console)
+    }
+
+    /// Tells of a row, and writes the summary with it.
+    fn add(&mut self, turn: usize, row: BatchRow, console: &mut Console) -> Result<(), Error> {
+        let label = self.label(turn);
         console.note(&match row.status {
             RowStatus::Complete if row.message.starts_with(TAKEN_OVER) => format!("{label}: {TAKEN_OVER}"),
             RowStatus::Complete => format!("{label}: complete in {:.1} s{}", row.seconds, row.by()),
             other => format!("{label}: {} in {:.1} s{}: {}", other.name(), row.seconds, row.by(), row.message),
         });
-        rows.push(row);
-        all = summary(&rows, &earlier, &names[i + 1..]);
-        results::write(a.out.join(SUMMARY), &all)?;
-        write_file(a.out.join("summary.csv"), |w| w.write_all(table(&all).as_bytes()))?;
+        self.rows.insert(self.mine[turn], row);
+        self.write()
     }
+
+    /// A scene that another process had when it was its turn: until then it may have been finished, or its process have died.
+    fn again(&self, turn: usize, console: &mut Console) -> Result<BatchRow, Error> {
+        let (i, clock) = (self.mine[turn], Instant::now());
+        let mut found = self.one(turn, console);
+        if let Err(held) = &found {
+            console.note(&format!("{}: waiting for a sign of life of {held}", self.label(turn)));
+            if held.watch(&console.interrupt)? {
+                found = self.one(turn, console);
+            }
+        }
+        Ok(found.unwrap_or_else(|held| BatchRow {
+            status: RowStatus::Busy,
+            message: format!("{held} fits it"),
+            seconds: clock.elapsed().as_secs_f64(),
+            ..BatchRow::begun(&self.names[i], &self.scenes[i])
+        }))
+    }
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    if let Some(out) = &a.merge {
+        return merge::run(out, console);
+    }
+    let mut batch = Batch::begin(a, console)?;
+    if let Some(shard) = batch.shard {
+        console.note(&format!("shard {shard}: {} of {} scenes", batch.mine.len(), batch.scenes.len()));
+    }
+    // So that others know of this shard, whatever happens to it.
+    batch.write()?;
+    let mut later = Vec::new();
+    for turn in 0..batch.mine.len() {
+        if console.interrupt.is_raised() {
+            break;
+        }
+        match batch.one(turn, console) {
+            Ok(row) => batch.add(turn, row, console)?,
+            Err(held) => {
+                console.note(&format!("{}: left to {held}", batch.label(turn)));
+                later.push(turn);
+            }
+        }
+    }
+    for turn in later {
+        if console.interrupt.is_raised() {
+            break;
+        }
+        let row = batch.again(turn, console)?;
+        batch.add(turn, row, console)?;
+    }
+    let rows = &batch.rows;
     if console.json() {
-        console.print(&results::line(&all));
+        console.print(&results::line(&batch.summary()));
     } else {
-        let complete = rows.iter().filter(|r| r.status == RowStatus::Complete).count();
-        let place = a.out.join("summary.csv");
-        console.print(&format!("{complete} of {} scenes complete: {}", scenes.len(), place.display()));
+        let complete = rows.values().filter(|r| r.status == RowStatus::Complete).count();
+        let place = summary::place(&a.out, batch.shard).with_extension("csv");
+        console.print(&format!("{complete} of {} scenes complete: {}", batch.mine.len(), place.display()));
     }
-    let interrupted = console.interrupt.is_raised() || rows.iter().any(|r| r.status == RowStatus::Interrupted);
-    Ok(match rows.iter().all(|r| r.status == RowStatus::Complete) {
+    let interrupted = console.interrupt.is_raised() || rows.values().any(|r| r.status == RowStatus::Interrupted);
+    Ok(match rows.values().all(|r| r.status == RowStatus::Complete) {
         _ if interrupted => INTERRUPTED,
         true => 0,
         false => 1,

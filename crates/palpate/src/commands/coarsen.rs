@@ -68,11 +68,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         (None, Some(h), _) => Resolution::CellSize(length("cell-size", h)?),
         (None, None, h) => Resolution::Edge(length("edge-length", h.unwrap_or(f64::NAN))?),
     };
-    let (backend, note) = a.backend.choose(fine.plan(), 1)?;
-    note.iter().for_each(|n| console.note(n));
+    let mut track = console.progress(0, "coarsening");
+    let (backend, note) = a.backend.choose(fine.plan(), 1, &mut track)?;
+    track.aside(|| note.iter().for_each(|n| console.note(n)));
     let folder = out_folder(&a.out, &a.scene, "-coarse");
     let free = if a.free.is_empty() { usual_numbers(&fine) } else { a.free.clone() };
-    let mut track = console.progress(0, "coarsening");
     let mut hear = |what: &str| track.on(1, what);
     let options = CoarsenOptions {
         resolution,

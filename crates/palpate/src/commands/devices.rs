@@ -46,6 +46,8 @@ fn verdict(a: &AdapterReport) -> String {
 
 fn device(a: &AdapterReport) -> Device {
     Device {
+        index: a.index,
+        pci: a.pci.map(|p| p.to_string()),
         name: a.name.clone(),
         kind: kind(a).into(),
         api: format!("{:?}", a.api),
@@ -72,14 +74,17 @@ pub fn run(console: &mut Console) -> i32 {
         return 0;
     }
     let yes = |b: bool| if b { "yes" } else { "no" };
-    let text = found.iter().enumerate().map(|(i, a)| {
-        let mut lines = vec![format!("{i}  {}\n   {}, {:?}", a.name, kind(a), a.api), format!("   {}", verdict(a))];
+    let text = found.iter().map(|a| {
+        let place = a.pci.map_or_else(|| "no PCI address".into(), |p| format!("PCI {p}"));
+        let about = format!("{}  {}\n   {}, {:?}, {place}", a.index, a.name, kind(a), a.api);
+        let mut lines = vec![about, format!("   {}", verdict(a))];
         let lanes = if a.subgroups { "subgroups" } else { "workgroup memory (no subgroups of eight lanes)" };
         lines.push(format!("   lanes of a cell talk by {lanes}; passes can be timed: {}", yes(a.timestamps)));
         lines.extend(limits(a).into_iter().map(|(k, _, text)| format!("   {k:38} {text}")));
         lines.join("\n")
     });
-    let list: Vec<String> = text.collect();
+    let mut list: Vec<String> = text.collect();
+    list.push("PALPATE_ADAPTER chooses one by its number, its PCI address, or a part of its name".into());
     console.print(&list.join("\n"));
     0
 }

@@ -128,14 +128,18 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     // Opening the scenes counts as well.
     let clock = Clock::start();
     let budget = a.budget.map(|m| Duration::from_secs_f64(60.0 * m));
+    let mut track = console.progress(0, "diagnosing");
+    track.on(0, "reading");
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
-    let (backend, note) = a.backend.choose(experiments[0].plan(), 1)?;
+    let (backend, note) = a.backend.choose(experiments[0].plan(), 1, &mut track)?;
     let held_out = a.held_out.as_ref().map(Experiment::open).transpose()?;
-    experiments.iter().chain(&held_out).for_each(|e| console.warn(e.warnings()));
-    note.iter().for_each(|n| console.note(n));
+    track.aside(|| {
+        experiments.iter().chain(&held_out).for_each(|e| console.warn(e.warnings()));
+        note.iter().for_each(|n| console.note(n));
+    });
     let folder = out_folder(&a.out, &a.scenes[0], "-diagnosis");
     make_folder(&folder)?;
-    let mut track = console.progress(0, "diagnosing");
+    track.on(0, "the first evaluations");
     let mut hear = |what: &str| track.at(0, what);
     let done = diagnose(
         &experiments,

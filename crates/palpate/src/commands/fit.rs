@@ -226,13 +226,17 @@ fn warn_of_twins(paths: &[PathBuf], experiments: &mut [Experiment]) {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    // Before anything that takes time.
+    let mut track = console.progress(0, "fitting");
+    track.on(0, "reading");
     let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     warn_of_twins(&a.scenes, &mut experiments);
-    let (backend, note) = choose(&a.choices, &experiments)?;
-    note.iter().for_each(|n| console.note(n));
+    let (backend, note) = choose(&a.choices, &experiments, &mut track)?;
+    track.aside(|| note.iter().for_each(|n| console.note(n)));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    let mut track = console.progress(rounds(&a.choices, &experiments[0]), "fitting");
-    let (fitted, result) = run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &mut track, console)?;
+    let may_write = || Ok(());
+    let (fitted, result) =
+        run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
     track.finish();
     console.warn(&fitted.warnings);
     if console.json() {
@@ -246,31 +250,32 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     Ok(if fitted.interrupted { INTERRUPTED } else { 0 })
 }
 
-/// The backend for a fit of these experiments, which runs all starts at once: what is faster for the first.
-pub fn choose(a: &Choices, experiments: &[Experiment]) -> Result<(Backend, Option<String>), Error> {
+/// The backend for a fit of these experiments, which runs all starts at once: what is faster for the first. The track shows what takes time.
+pub fn choose(a: &Choices, experiments: &[Experiment], track: &mut Track) -> Result<(Backend, Option<String>), Error> {
     let (first, spec) = (&experiments[0], experiments[0].scene().fit.as_ref());
     let starts = a.starts.map_or(spec.map_or(1, |f| f.starts), |n| n as usize);
     let (_, free, _) = free_parameters(experiments)?;
     let asked = a.optimizer.map(Optimizer::from).or(spec.and_then(|f| f.optimizer));
     let optimizer = asked.unwrap_or_else(|| usual(&free));
-    a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts))
+    a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts), track)
 }
 
 impl Choices {
-    /// What decides the result: a scene may be gone on with in smaller batches.
+    /// What decides the result: a scene may be gone on with in smaller batches, and by fewer threads.
     pub fn lasting(&self) -> Choices {
-        Choices { batch: None, ..self.clone() }
+        Choices { batch: None, threads: None, ..self.clone() }
     }
 }
 
 /// Iterations that a fit may take in all.
-pub fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
+fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
     let spec = experiment.scene().fit.as_ref();
     let iterations = a.iterations.unwrap_or(spec.map_or(0, |f| f.iterations as u64));
     iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
-/// Fits and writes everything into a folder; the progress goes to `track`. Returns the fit and its `result.json`.
+/// Fits and writes everything into a folder, unless `may_write` then says that it is another's by now; the progress goes to `track`. Returns
+/// the fit and its `result.json`.
 pub fn run_in(
     scenes: &[PathBuf],
     a: &Choices,
@@ -278,25 +283,30 @@ pub fn run_in(
     experiments: &[Experiment],
     folder: &Path,
     resume: bool,
+    may_write: &dyn Fn() -> Result<(), Error>,
     track: &mut Track,
     console: &mut Console,
 ) -> Result<(Fitted, FitDocument), Error> {
     check(experiments)?;
     make_folder(folder)?;
+    track.measure(rounds(a, &experiments[0]));
+    track.on(0, "the first evaluations");
     let journal = folder.join(JOURNAL);
     if resume && !journal.exists() {
         // Not what was asked for: --quiet does not silence it.
-        console.warn(&[format!("{}: there is no journal to go on with; the fit begins anew", journal.display())]);
+        let warning = format!("{}: there is no journal to go on with; the fit begins anew", journal.display());
+        track.aside(|| console.warn(&[warning]));
     }
-    let make_room = |console: &mut Console| -> Result<(), Error> {
+    let make_room = |track: &Track, console: &mut Console| -> Result<(), Error> {
         if let Some(aside) = keep_previous(folder, experiments.len(), resume)? {
-            console.note(&format!("the results that were in {} are now in {}", folder.display(), aside.display()));
+            let note = format!("the results that were in {} are now in {}", folder.display(), aside.display());
+            track.aside(|| console.note(&note));
         }
         Ok(())
     };
     // A journal is begun at once. One that is gone on with may turn out to be of another fit, and then everything stays where it is.
     if !resume {
-        make_room(console)?;
+        make_room(track, console)?;
     }
     let mut best = f64::INFINITY;
     let mut hear = |p: &Progress| {
@@ -320,13 +330,15 @@ pub fn run_in(
             on_iteration: Some(&mut hear),
         },
     )?;
+    may_write()?;
     if resume {
-        make_room(console)?;
+        make_room(track, console)?;
     }
     if !a.no_grid_check {
         track.on(0, "looking at cells and step half as large");
         fitted.check_grid(experiments, backend, &console.interrupt);
     }
+    may_write()?;
     let result = write_all(scenes, a, folder, experiments, &fitted, backend)?;
     Ok((fitted, result))
 }

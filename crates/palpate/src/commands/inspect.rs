@@ -83,8 +83,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let e = Experiment::open(path)?;
         let (mut content, mut lines) = scene(&e);
         if a.identify {
-            let (backend, _) = a.backend.choose(e.plan(), 1)?;
-            let mut track = None;
+            let mut first = console.progress(0, "identifying");
+            let (backend, _) = a.backend.choose(e.plan(), 1, &mut first)?;
+            let mut track = Some(first);
             let found = crate::identify::identify(&e, backend, |what, [done, of]| {
                 if done == 0 {
                     track.replace(console.progress(of as u64, &format!("looking at {what}"))).into_iter().for_each(Track::finish);

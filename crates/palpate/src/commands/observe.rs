@@ -203,9 +203,12 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         return Err(Error::option("out", a.out.display(), "a recording is already there; add --force to replace it"));
     }
     let coarse = Experiment::open_without_recording(&a.scene)?;
-    let (backend, note) = a.backend.choose(coarse.plan(), 1)?;
-    console.warn(coarse.warnings());
-    note.iter().for_each(|n| console.note(n));
+    let mut track = console.progress(0, "observing");
+    let (backend, note) = a.backend.choose(coarse.plan(), 1, &mut track)?;
+    track.aside(|| {
+        console.warn(coarse.warnings());
+        note.iter().for_each(|n| console.note(n));
+    });
     let observers = Observers {
         cameras,
         markers: a.markers.as_deref().map_or(Ok(Vec::new()), |p| markers(p, &coarse))?,
@@ -218,7 +221,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
     // Whether the folder can be made is known before the simulation, not after it.
     make_folder(&a.out)?;
-    let mut track = console.progress(1000, "observing");
+    track.measure(1000);
     let interrupt = console.interrupt.clone();
     let recording = observe(&experiment, backend, &observers, |share| {
         track.at((share * 1000.0) as u64, "");

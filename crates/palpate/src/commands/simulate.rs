@@ -156,9 +156,12 @@ fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let experiment = Experiment::open_without_recording(&a.scene)?;
-    let (backend, note) = a.backend.choose(experiment.plan(), 1)?;
-    console.warn(experiment.warnings());
-    note.iter().for_each(|n| console.note(n));
+    let mut track = console.progress(0, "simulating");
+    let (backend, note) = a.backend.choose(experiment.plan(), 1, &mut track)?;
+    track.aside(|| {
+        console.warn(experiment.warnings());
+        note.iter().for_each(|n| console.note(n));
+    });
     let folder = out_folder(&a.out, &a.scene, "");
     make_folder(&folder)?;
     let clock = Instant::now();
@@ -168,7 +171,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
 
     // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
     // writing of what it has.
-    let mut track = console.progress(plan.clock.steps as u64, "simulating");
+    track.measure(plan.clock.steps as u64);
     let mut states: Vec<(usize, Snapshot)> = Vec::new();
     let (mut farthest, mut reached): (f64, usize) = (0.0, 0);
     let mut extent: Vec<(DVec3, DVec3)> = Vec::new();

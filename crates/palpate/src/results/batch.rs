@@ -1,4 +1,4 @@
-//! `summary.json` of a batch.
+//! `summary.json` of a batch, that of a shard, and the row of a scene.
 
 use super::Document;
 use super::fit::{Parameter, Residual};
@@ -17,6 +17,33 @@ pub struct BatchDocument {
     pub failed: usize,
     /// How many were interrupted.
     pub interrupted: usize,
+    /// How many were left to another process.
+    #[serde(default)]
+    pub busy: usize,
+    /// How many no shard has finished.
+    #[serde(default)]
+    pub lost: usize,
+    /// Which part of the scenes these are; `None` where they are all.
+    pub shard: Option<ShardSummary>,
+}
+
+/// One of several parts of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+/// What a shard knows of the whole.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ShardSummary {
+    /// Which one it is.
+    #[serde(flatten)]
+    pub shard: Shard,
+    /// Names of all scenes of the batch, in the order in which they were given: the shard has that at its own number, and every `of`-th after it.
+    pub all: Vec<String>,
 }
 
 impl Document for BatchDocument {
@@ -32,6 +59,9 @@ impl BatchDocument {
             bad_input: count(RowStatus::BadInput),
             failed: count(RowStatus::Failed),
             interrupted: count(RowStatus::Interrupted),
+            busy: count(RowStatus::Busy),
+            lost: count(RowStatus::Lost),
+            shard: None,
             scenes,
         }
     }
@@ -49,6 +79,10 @@ pub enum RowStatus {
     BadInput,
     /// It could not be computed.
     Failed,
+    /// Another process fits it.
+    Busy,
+    /// No shard has finished it.
+    Lost,
 }
 
 impl RowStatus {
@@ -59,11 +93,13 @@ impl RowStatus {
             RowStatus::Interrupted => "interrupted",
             RowStatus::BadInput => "bad-input",
             RowStatus::Failed => "failed",
+            RowStatus::Busy => "busy",
+            RowStatus::Lost => "lost",
         }
     }
 }
 
-/// One scene of a batch.
+/// One scene of a batch; by itself (`batch-row/1`) in the scene's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BatchRow {
     /// Name of its folder.
@@ -86,6 +122,10 @@ pub struct BatchRow {
     pub cost: Option<f64>,
     /// Distance between measurement and model.
     pub residual: Option<Residual>,
+}
+
+impl Document for BatchRow {
+    const FORMAT: &'static str = "batch-row/1";
 }
 
 #[cfg(test)]
@@ -115,10 +155,16 @@ mod tests {
             residual: Some(Residual { rms: Some(1e-3), noise: None, points: 5, unmatched: 1, scenes: Vec::new() }),
             ..failed.clone()
         };
+        round_trip(&complete);
+        let part = ShardSummary { shard: Shard { number: 2, of: 3 }, all: vec!["a".into(), "b".into()] };
+        let of_shard = round_trip(&BatchDocument { shard: Some(part), ..BatchDocument::of(vec![failed.clone()]) });
+        assert_eq!(of_shard["shard"], serde_json::json!({ "number": 2, "of": 3, "all": ["a", "b"] }));
         let file = round_trip(&BatchDocument::of(vec![complete, failed]));
-        assert_eq!(keys(&file), ["bad_input", "complete", "failed", "format", "interrupted", "scenes"]);
+        let all = ["bad_input", "busy", "complete", "failed", "format", "interrupted", "lost", "scenes", "shard"];
+        assert_eq!(keys(&file), all);
         assert_eq!((&file["complete"], &file["bad_input"], &file["failed"]), (&1.into(), &1.into(), &0.into()));
-        for status in [RowStatus::Complete, RowStatus::Interrupted, RowStatus::BadInput, RowStatus::Failed] {
+        let [complete, interrupted] = [RowStatus::Complete, RowStatus::Interrupted];
+        for status in [complete, interrupted, RowStatus::BadInput, RowStatus::Failed, RowStatus::Busy, RowStatus::Lost] {
             assert_eq!(serde_json::to_value(status).expect("it is a word"), status.name());
         }
         let row = &file["scenes"][1];

@@ -18,6 +18,10 @@ impl Document for DevicesDocument {
 /// An adapter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
+    /// Its number in the list, from 0, by which `PALPATE_ADAPTER` can choose it.
+    pub index: usize,
+    /// Its place on the PCI bus, likewise; `None` where the driver names none.
+    pub pci: Option<String>,
     /// The driver's name of it.
     pub name: String,
     /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `software` or `other`.
@@ -44,6 +48,8 @@ mod tests {
     #[test]
     fn a_list_of_devices_is_what_it_was_when_it_is_read_again() {
         let device = Device {
+            index: 0,
+            pci: Some("0000:01:00.0".into()),
             name: "llvmpipe".into(),
             kind: "software".into(),
             api: "Vulkan".into(),
@@ -54,7 +60,7 @@ mod tests {
             limits: [("max_buffer_size".to_string(), u64::from(u32::MAX))].into(),
         };
         let file = round_trip(&DevicesDocument { devices: vec![device] });
-        let all = ["api", "kind", "limits", "name", "subgroups", "timestamps", "usable", "verdict"];
+        let all = ["api", "index", "kind", "limits", "name", "pci", "subgroups", "timestamps", "usable", "verdict"];
         assert_eq!(keys(&file["devices"][0]), all);
     }
 }

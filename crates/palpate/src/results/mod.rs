@@ -14,6 +14,7 @@ pub mod diagnosis;
 pub mod effects;
 pub mod fit;
 pub mod inspection;
+pub mod lock;
 pub mod observation;
 pub mod simulation;
 
