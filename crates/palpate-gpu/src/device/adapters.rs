@@ -2,6 +2,7 @@
 
 use super::buffers::fits;
 use super::error::GpuError;
+use super::wait;
 
 /// Which adapter to use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -42,8 +43,8 @@ pub(crate) fn instance() -> wgpu::Instance {
 }
 
 /// Every adapter.
-pub(crate) fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
-    pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
+pub(crate) async fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    instance.enumerate_adapters(wgpu::Backends::all()).await
 }
 
 /// Which kind is taken first.
@@ -132,7 +133,13 @@ impl AdapterReport {
 
 /// Every adapter of this machine, the one that [`Choice::Auto`] takes first.
 pub fn adapters() -> Vec<AdapterReport> {
+    wait::for_system(adapters_async())
+}
+
+/// The same, for whoever may not wait.
+pub async fn adapters_async() -> Vec<AdapterReport> {
     let mut found: Vec<AdapterReport> = all(&instance())
+        .await
         .iter()
         .map(|a| {
             let info = a.get_info();
