@@ -28,6 +28,7 @@ mod schemes;
 mod sizes;
 mod tet_effects;
 mod threads;
+mod translations;
 mod twins;
 mod waits;
 mod wgsl;
