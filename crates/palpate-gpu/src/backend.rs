@@ -1,9 +1,9 @@
-//! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits.
+//! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits. Calls that wait are those of `asynchronous.rs`, driven here.
 
 use crate::device::{Choice, Gpu, GpuError};
 use crate::solve::{backward, forward};
 use crate::world::{Adjoint, LEVELS, Level, State, Tally, Tangent, Tuning, World};
-use crate::{costs, read, solve};
+use crate::{read, solve};
 use glam::DVec3;
 use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::plan::Plan;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The GPU backend.
 #[derive(Clone, Debug)]
 pub struct GpuBackend {
-    gpu: Arc<Gpu>,
+    pub(crate) gpu: Arc<Gpu>,
     tuning: Option<Tuning>,
     levels: Option<&'static [(usize, u32, u32)]>,
     alone: bool,
@@ -55,12 +55,33 @@ impl GpuBackend {
     }
 
     fn world(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
-        let mut world = solve::world(self.gpu.clone(), plan, members, self.tuning.map_or_else(Tuning::from_env, Ok)?)?;
+        let world = self.dressed(solve::world(self.gpu.clone(), plan, members, self.ways()?)?);
+        self.gpu.take_trouble().map_or(Ok(world), Err)
+    }
+
+    /// Ways to solve that are stated.
+    pub(crate) fn ways(&self) -> Result<Tuning, GpuError> {
+        self.tuning.map_or_else(Tuning::from_env, Ok)
+    }
+
+    /// A world as this backend wants it.
+    pub(crate) fn dressed(&self, mut world: World) -> World {
         world.alone = self.alone;
         if let Some(levels) = self.levels {
             world.effort = Level::of(levels);
         }
-        self.gpu.take_trouble().map_or(Ok(world), Err)
+        world
+    }
+
+    /// Why a world cannot be built, with the way out.
+    pub(crate) fn not_built(&self, e: &GpuError) -> BuildError {
+        let (message, hint) = (e.to_string(), e.hint_for(self.alone));
+        BuildError { message, hint, broken: matches!(e, GpuError::Lost { .. }) }
+    }
+
+    /// Waits for an answer; what went wrong is kept for the next evaluation.
+    fn or_keep<T>(&self, answer: impl Future<Output = Result<T, GpuError>>) -> Option<T> {
+        self.gpu.waited(answer).map_err(|e| self.gpu.keep(e)).ok()
     }
 
     /// The device.
@@ -81,11 +102,7 @@ impl Backend for GpuBackend {
     }
 
     fn build(&self, plan: &Plan, members: usize) -> Result<World, BuildError> {
-        self.world(plan, members).map_err(|e| BuildError {
-            message: e.to_string(),
-            hint: e.hint_for(self.alone),
-            broken: matches!(e, GpuError::Lost { .. }),
-        })
+        self.world(plan, members).map_err(|e| self.not_built(&e))
     }
 
     fn set_params(&self, world: &mut World, theta: &ParamBatch) {
@@ -233,14 +250,8 @@ impl Backend for GpuBackend {
         tally: &Tally,
         member: usize,
     ) -> Option<Rows> {
-        let pairs = tangents[0].parts.iter().zip(&tangents[1].parts);
-        let tangents: Vec<_> = pairs.map(|(a, b)| [&a.buffer, &b.buffer]).collect();
-        let ends = states.map(|s| &s.0.buffer);
         // What went wrong is read with the evaluation.
-        Some(costs::rows(world, k, ends, &tangents, &tally.buffers, member).unwrap_or_else(|e| {
-            self.gpu.keep(e);
-            Rows::default()
-        }))
+        Some(self.or_keep(self.rows_async(world, k, states, tangents, tally, member)).unwrap_or_default())
     }
 
     fn keep_pace(&self, world: &mut World) {
@@ -253,21 +264,17 @@ impl Backend for GpuBackend {
     }
 
     fn read(&self, world: &World, tally: &Tally) -> Vec<Evaluation> {
-        read::tally(world, tally)
+        self.gpu.wait_for(self.read_async(world, tally)).unwrap_or_else(|e| read::failed(world, &e))
     }
 
     fn read_state(&self, world: &World, state: &State, member: usize) -> (Vec<DVec3>, Vec<DVec3>) {
-        read::state(world, state, member).unwrap_or_else(|e| {
-            self.gpu.keep(e);
+        self.or_keep(self.read_state_async(world, state, member)).unwrap_or_else(|| {
             let n = world.plan.body.nodes.len();
             (vec![DVec3::NAN; n], vec![DVec3::NAN; n])
         })
     }
 
     fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
-        costs::residuals(world, k, [&now.0.buffer, &next.0.buffer], member).unwrap_or_else(|e| {
-            self.gpu.keep(e);
-            Vec::new()
-        })
+        self.or_keep(self.residuals_async(world, k, [now, next], member)).unwrap_or_default()
     }
 }

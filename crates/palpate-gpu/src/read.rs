@@ -8,10 +8,10 @@ use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, Failure, FailureKind, number};
 
 /// u [m] and v [m/s] of one member, `[N]` each.
-pub(crate) fn state(world: &World, state: &State, member: usize) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
+pub(crate) async fn state(world: &World, state: &State, member: usize) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
     let n = world.geometry.shape.nodes as usize;
     let all = world.members() * n;
-    let v: Vec<[f32; 4]> = world.gpu.download(&state.0.buffer, 3 * all)?;
+    let v: Vec<[f32; 4]> = world.gpu.items_of(&state.0.buffer, 3 * all).await?;
     let wide = |v: &[f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
     let of = |part: usize| v[part * all + member * n..part * all + (member + 1) * n].iter().map(wide);
     Ok((of(0).zip(of(1)).map(|(a, b)| a + b).collect(), of(2).collect()))
@@ -62,17 +62,17 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
 }
 
 /// Costs, gradients and health of every member.
-pub(crate) fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
-    match try_tally(world, tally) {
-        Ok(all) => all,
-        Err(e) => {
-            let failure = Failure::of_device(e.to_string(), e.hint_for(world.alone));
-            vec![Evaluation::failed(failure); world.members()]
-        }
-    }
+pub(crate) async fn tally(world: &World, tally: &Tally) -> Vec<Evaluation> {
+    try_tally(world, tally).await.unwrap_or_else(|e| failed(world, &e))
 }
 
-fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> {
+/// What is said of every member of a world whose device failed.
+pub(crate) fn failed(world: &World, e: &GpuError) -> Vec<Evaluation> {
+    let failure = Failure::of_device(e.to_string(), e.hint_for(world.alone));
+    vec![Evaluation::failed(failure); world.members()]
+}
+
+async fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> {
     let (b, p, q) = (world.members(), world.plan.layout.len(), tally.directions.len());
     let efforts = tally.get("efforts");
     let own =
@@ -80,7 +80,7 @@ fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuError> 
     let observed = world.observer.results(&tally.buffers, b, q);
     let summed = summed(world, tally);
     let parts: Vec<_> = summed.iter().map(|(_, buffer, bytes)| (*buffer, *bytes)).collect();
-    let found = world.gpu.download_all(&[&own[..], &observed, &parts].concat())?;
+    let found = world.gpu.contents_of(&[&own[..], &observed, &parts].concat()).await?;
     let (own, rest) = found.split_at(own.len());
     let (observed, sums) = rest.split_at(observed.len());
     let sums: Found = summed.iter().zip(sums).map(|(s, bytes)| (s.0, bytemuck::pod_collect_to_vec(bytes))).collect();

@@ -4,7 +4,7 @@ use crate::engine::Backend;
 use crate::memory::Demand;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend as _, Evaluate as _, ParamBatch, Request, Rollout};
-use palpate_gpu::{Choices, GpuBackend};
+use palpate_gpu::GpuBackend;
 use palpate_model::observation::Frame;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
@@ -92,21 +92,17 @@ fn key(device: &GpuBackend, plan: &Plan, demand: &Demand) -> String {
 }
 
 /// The backend for a plan, and the reason; `hear` is told what takes time.
-pub(crate) fn choose(
-    device: GpuBackend,
-    plan: &Plan,
-    demand: &Demand,
-    choices: &Choices,
-    hear: &mut dyn FnMut(&str),
-) -> (Backend, String) {
+pub(crate) fn choose(device: GpuBackend, plan: &Plan, demand: &Demand, hear: &mut dyn FnMut(&str)) -> (Backend, String) {
     let (key, name, what) = (key(&device, plan, demand), device.name(), demand.step());
     let read = |text: &str| -> Option<[f64; 2]> {
         let (cpu, gpu) = text.split_once(' ')?;
         Some([cpu.parse().ok()?, gpu.parse().ok()?])
     };
-    let known = choices.written(&key).and_then(|text| read(&text));
+    let known = device.gpu().host().written(&key).and_then(|text| read(&text));
     let [cpu, gpu] = match known.map_or_else(|| measure(&device, plan, demand, hear), Ok) {
-        Ok(times) if known.is_none() => read(&choices.write(&key, &format!("{} {}", times[0], times[1]))).unwrap_or(times),
+        Ok(times) if known.is_none() => {
+            read(&device.gpu().host().write(&key, &format!("{} {}", times[0], times[1]))).unwrap_or(times)
+        }
         Ok(times) => times,
         Err(why) => return (Backend::Cpu, why),
     };

@@ -2,11 +2,12 @@
 
 use crate::auto;
 use crate::error::Error;
+use crate::host::host;
 use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rollout, Snapshot, Stop, Wanted};
-use palpate_gpu::{Choice, Choices, Gpu, GpuBackend, GpuError};
+use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Rollout, Snapshot, Stop};
+use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::plan::Plan;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -54,7 +55,7 @@ fn gpu() -> Result<GpuBackend, GpuError> {
     static OPEN: Mutex<Option<Arc<Gpu>>> = Mutex::new(None);
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
     if open.as_ref().is_none_or(|gpu| gpu.is_lost()) {
-        *open = Some(Gpu::open(&Choice::from_env())?);
+        *open = Some(Gpu::open_for(&Choice::from_env(), None, host())?);
     }
     Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
 }
@@ -70,33 +71,6 @@ fn gpu_for(members: usize) -> Result<GpuBackend, Error> {
 fn may_have_processor() -> bool {
     !cfg!(target_os = "linux")
         || ["/dev/dri", "/dev/nvidia0", "/dev/kfd", "/dev/dxg"].iter().any(|f| std::path::Path::new(f).exists())
-}
-
-/// Held while the device works for one caller: two threads that submit to one device side by side were seen to get different last
-/// bits on a software adapter, and would only wait for each other on a real one.
-static TURN: Mutex<()> = Mutex::new(());
-
-/// A rollout on the shared device that takes turns with others.
-struct InTurn(Rollout<GpuBackend>);
-
-impl Evaluate for InTurn {
-    fn parameters(&self) -> usize {
-        self.0.parameters()
-    }
-
-    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
-        let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        self.0.evaluate(theta, request)
-    }
-
-    fn has_products(&self) -> bool {
-        self.0.has_products()
-    }
-
-    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-        self.0.product(theta, v, wanted)
-    }
 }
 
 impl Backend {
@@ -128,10 +102,7 @@ impl Backend {
             return (Backend::Cpu, "there is no graphics processor".into());
         }
         match gpu() {
-            Ok(device) => {
-                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                auto::choose(device, plan, demand, &Choices::of_user(), hear)
-            }
+            Ok(device) => auto::choose(device, plan, demand, hear),
             Err(e) => (Backend::Cpu, e.to_string()),
         }
     }
@@ -164,11 +135,7 @@ impl Backend {
     /// There is no usable adapter, or the backend refuses the plan.
     pub fn evaluator_until(self, plan: &Plan, members: usize, stop: Stop) -> Result<Box<dyn Evaluate>, Error> {
         match self.resolve(plan, members).0 {
-            Backend::Gpu => {
-                let device = gpu_for(members)?;
-                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                Ok(Box::new(InTurn(Rollout::new(device, plan, members)?.stopped_by(stop))))
-            }
+            Backend::Gpu => Ok(Box::new(Rollout::new(gpu_for(members)?, plan, members)?.stopped_by(stop))),
             _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?.stopped_by(stop))),
         }
     }
@@ -199,11 +166,7 @@ impl Backend {
         visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
-            Backend::Gpu => {
-                let device = gpu_for(1)?;
-                let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-                Ok(Rollout::new(device, plan, 1)?.stopped_by(stop).visit(theta, visit)?)
-            }
+            Backend::Gpu => Ok(Rollout::new(gpu_for(1)?, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
             _ => Ok(Rollout::new(CpuBackend, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
         }
     }

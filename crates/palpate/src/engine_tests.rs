@@ -3,6 +3,7 @@
 use super::*;
 use crate::Experiment;
 use crate::{Interrupt, Liveliness};
+use palpate_engine::{ParamBatch, Request};
 use serde_json::Value;
 use std::path::Path;
 use std::sync::MutexGuard;

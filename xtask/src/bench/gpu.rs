@@ -160,7 +160,7 @@ fn subjects(quick: bool) -> Result<Vec<Subject>, String> {
 /// # Errors
 /// There is no device, or a body cannot be built.
 pub fn all(quick: bool, only: &str, patience: f64) -> Result<Report, String> {
-    let gpu = Gpu::open(&Choice::from_env()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
+    let gpu = Gpu::open_for(&Choice::from_env(), None, palpate::host()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
     let copy = gpu.copy_bandwidth().map_err(|e| e.to_string())?;
     println!("{}: copies {:.1} GB/s", gpu.name, copy / 1e9);
     let mut report = Report {

@@ -88,7 +88,8 @@ fn single_residuals(backend: &GpuBackend, plan: &Plan, given: &Plan) -> (f64, us
     let (mut worst, mut compared) = (0.0f64, 0);
     for k in 0..plan.clock.steps {
         let (now, next) = (upload(&world, k), upload(&world, k + 1));
-        let found = residuals(&world, k, [&now.0.buffer, &next.0.buffer], 1).unwrap_or_else(|e| panic!("{e}"));
+        let residuals = residuals(&world, k, [&now.0.buffer, &next.0.buffer], 1);
+        let found = backend.gpu.waited(residuals).unwrap_or_else(|e| panic!("{e}"));
         let all = instants(plan, start, k);
         assert_eq!(found.iter().map(|f| f.frame).collect::<Vec<_>>(), all.iter().map(|i| i.frame).collect::<Vec<_>>());
         for (found, i) in found.iter().zip(&all) {

@@ -69,13 +69,17 @@ pub(super) struct Downloaded<'a> {
 
 impl<'a> Downloaded<'a> {
     /// Waits for what a look found, and for some more bytes.
-    fn new(world: &'a World, at: Look, more: &[(&wgpu::Buffer, usize)]) -> Result<(Downloaded<'a>, Vec<Vec<u8>>), GpuError> {
+    async fn new(
+        world: &'a World,
+        at: Look,
+        more: &[(&wgpu::Buffer, usize)],
+    ) -> Result<(Downloaded<'a>, Vec<Vec<u8>>), GpuError> {
         let o = &world.observer;
         let (frame, shot) = (at.frame as usize, &o.shots.shots[at.shot as usize]);
         let rows = row_count(&world.plan, &world.plan.observation.frames[frame]);
         let own = [("found", FOUND as usize * shot.point_count as usize), ("rows", 8 * rows)];
         let wanted: Vec<_> = own.iter().map(|(name, bytes)| (&o.buffers[name], *bytes)).chain(more.iter().copied()).collect();
-        let mut all = world.gpu.download_all(&wanted)?;
+        let mut all = world.gpu.contents_of(&wanted).await?;
         let more = all.split_off(2);
         let found = bytemuck::pod_collect_to_vec(&all[0]);
         let values = bytemuck::pod_collect_to_vec(&all[1]);
@@ -114,7 +118,7 @@ impl<'a> Downloaded<'a> {
 ///
 /// # Errors
 /// Whatever went wrong on the device.
-pub(crate) fn residuals(
+pub(crate) async fn residuals(
     world: &World,
     k: usize,
     ends: [&wgpu::Buffer; 2],
@@ -130,7 +134,7 @@ pub(crate) fn residuals(
         let at = o.agenda.looks[round.first];
         if at.member as usize == member {
             world.record(|r| look(r, &own, &o.sight, round));
-            let (found, _) = Downloaded::new(world, at, &[])?;
+            let (found, _) = Downloaded::new(world, at, &[]).await?;
             let readings = COSTS.iter().flat_map(|cost| cost.readings(&found)).collect();
             all.push(FrameResiduals { frame: found.frame, readings });
         }
@@ -149,7 +153,7 @@ pub(super) fn places(order: &[u32]) -> Vec<usize> {
 ///
 /// # Errors
 /// Whatever went wrong on the device.
-pub(crate) fn rows(
+pub(crate) async fn rows(
     world: &World,
     k: usize,
     ends: [&wgpu::Buffer; 2],
@@ -168,7 +172,7 @@ pub(crate) fn rows(
         world.record(|r| {
             o.differentiate(r, round, ends, tangents, tally);
         });
-        let (found, slopes) = Downloaded::new(world, at, &[(&tally["slopes"], 4 * q * most)])?;
+        let (found, slopes) = Downloaded::new(world, at, &[(&tally["slopes"], 4 * q * most)]).await?;
         let slopes: Vec<f32> = bytemuck::pod_collect_to_vec(&slopes[0]);
         for (row, place) in COSTS.iter().flat_map(|cost| cost.rows(&found)) {
             out.residuals.push(row);

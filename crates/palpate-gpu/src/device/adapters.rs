@@ -2,6 +2,7 @@
 
 use super::buffers::fits;
 use super::error::GpuError;
+use super::wait;
 
 /// Which adapter to use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -114,8 +115,8 @@ pub(crate) fn instance() -> wgpu::Instance {
 }
 
 /// Every adapter in the order of lists, which an index counts in: usable ones first, and by kind.
-pub(crate) fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+pub(crate) async fn all(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut found = instance.enumerate_adapters(wgpu::Backends::all()).await;
     found.sort_by_key(|a| (refused(a).is_some(), rank(a.get_info().device_type)));
     found
 }
@@ -212,6 +213,11 @@ impl AdapterReport {
 
 /// Every adapter of this machine, the one that [`Choice::Auto`] takes first.
 pub fn adapters() -> Vec<AdapterReport> {
+    wait::for_system(adapters_async())
+}
+
+/// The same, for whoever may not wait.
+pub async fn adapters_async() -> Vec<AdapterReport> {
     let report = |(index, a): (usize, &wgpu::Adapter)| {
         let info = a.get_info();
         AdapterReport {
@@ -226,5 +232,5 @@ pub fn adapters() -> Vec<AdapterReport> {
             refusal: refused(a),
         }
     };
-    all(&instance()).iter().enumerate().map(report).collect()
+    all(&instance()).await.iter().enumerate().map(report).collect()
 }

@@ -2,8 +2,8 @@
 
 use super::error::{GpuError, translate};
 use super::gpu::Gpu;
+use super::wait::answer;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Makes buffers, or counts them.
 pub(crate) trait Maker {
@@ -42,8 +42,9 @@ impl Gpu {
         let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let buffer =
             self.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
-        if let Some(e) = pollster::block_on(guard.pop()) {
-            return Err(no_room(label, size, e));
+        let (caught, what) = (guard.pop(), label.to_string());
+        if let Some(e) = self.caught(async move { caught.await.map(|e| no_room(&what, size, e)) }) {
+            return Err(e);
         }
         self.made.fetch_add(size, Ordering::Relaxed);
         Ok(buffer)
@@ -69,7 +70,24 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::download`].
     pub(crate) fn download_all(&self, parts: &[(&wgpu::Buffer, usize)]) -> Result<Vec<Vec<u8>>, GpuError> {
-        if let Some(e) = self.take_trouble() {
+        self.waited(self.contents_of(parts))
+    }
+
+    /// The first items of a buffer, once everything submitted is done, for whoever may not wait.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub(crate) async fn items_of<T: bytemuck::Pod>(&self, source: &wgpu::Buffer, items: usize) -> Result<Vec<T>, GpuError> {
+        let mut all = self.contents_of(&[(source, items * size_of::<T>())]).await?;
+        Ok(bytemuck::pod_collect_to_vec(&all.remove(0)))
+    }
+
+    /// The first bytes of each buffer, likewise.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub(crate) async fn contents_of(&self, parts: &[(&wgpu::Buffer, usize)]) -> Result<Vec<Vec<u8>>, GpuError> {
+        if let Some(e) = self.trouble().await {
             return Err(e);
         }
         let places: Vec<usize> =
@@ -84,27 +102,24 @@ impl Gpu {
             encoder.copy_buffer_to_buffer(source, 0, &staging, *at as u64, bytes);
         }
         self.queue.submit([encoder.finish()]);
-        let view = self.map(&staging)?;
+        let view = self.map(&staging).await?;
         Ok(parts.iter().zip(&places).map(|(part, at)| view[*at..at + part.1].to_vec()).collect())
     }
 
-    /// Waits for everything submitted, and then for the buffer.
-    fn map(&self, staging: &wgpu::Buffer) -> Result<wgpu::BufferView, GpuError> {
-        let done = Arc::new(Mutex::new(None));
-        let slot = done.clone();
-        staging.map_async(wgpu::MapMode::Read, .., move |r| *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(r));
+    /// A buffer's bytes, once everything submitted is done.
+    async fn map(&self, staging: &wgpu::Buffer) -> Result<wgpu::BufferView, GpuError> {
+        let (giver, mapped) = answer();
+        staging.map_async(wgpu::MapMode::Read, .., move |r| giver.give(r));
         self.waits.fetch_add(1, Ordering::Relaxed);
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
-        if let Some(e) = self.take_trouble() {
+        let mapped = mapped.await;
+        if let Some(e) = self.trouble().await {
             return Err(e);
         }
-        waited.map_err(|e| GpuError::Lost { reason: e.to_string() })?;
-        match done.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            Some(Ok(())) => {}
-            Some(Err(e)) => return Err(GpuError::Lost { reason: e.to_string() }),
-            None => return Err(GpuError::Lost { reason: "the device did not answer".into() }),
+        match mapped {
+            Some(Ok(())) => staging.get_mapped_range(..).map_err(|e| GpuError::Lost { reason: e.to_string() }),
+            Some(Err(e)) => Err(GpuError::Lost { reason: e.to_string() }),
+            None => Err(GpuError::Lost { reason: "the device did not answer".into() }),
         }
-        staging.get_mapped_range(..).map_err(|e| GpuError::Lost { reason: e.to_string() })
     }
 }
 

@@ -81,6 +81,9 @@ pub enum GpuError {
         /// What it may be.
         allowed: &'static str,
     },
+    /// Something is to be timed, and the device was opened by a host without a clock.
+    #[error("nothing can be timed: the device was opened without a clock")]
+    NoClock,
     /// The plan holds something that this backend cannot compute.
     #[error("the GPU backend does not support {what}")]
     Plan {
@@ -145,6 +148,7 @@ impl GpuError {
             | GpuError::Shader { .. }
             | GpuError::Refused { .. }
             | GpuError::Plan { .. } => "use --backend cpu, or another adapter",
+            GpuError::NoClock => "open the device for a host that has one",
             GpuError::Setting { .. } => "unset the variable, and what is faster is chosen",
             GpuError::Limit { .. } if alone => "use coarser cells, or --backend cpu",
             GpuError::Limit { .. } => "use coarser cells, a smaller batch (--batch N), or --backend cpu",

@@ -2,11 +2,13 @@
 
 use super::adapters::{Choice, NEEDED, WELCOME, all, instance, pci, refused};
 use super::error::{GpuError, translate};
-use super::gpu::{Gpu, keep};
+use super::gpu::{Gpu, Scopes, Troubles, keep};
+use super::host::{Bare, Host};
 use super::pipelines::{Lanes, Pipelines};
 use super::probe::lanes_work;
+use super::wait;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
 
 /// How lanes talk after what the probe of subgroups said. A driver that lists subgroups and cannot compile or run a kernel with them
 /// still has workgroup memory.
@@ -35,7 +37,45 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::open`].
     pub fn open_with(choice: &Choice, lanes: Option<Lanes>) -> Result<Arc<Gpu>, GpuError> {
-        let found = all(&instance());
+        Gpu::open_for(choice, lanes, Arc::new(Bare))
+    }
+
+    /// The same for a host that lends a clock, or remembers what was measured.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn open_for(choice: &Choice, lanes: Option<Lanes>, host: Arc<dyn Host>) -> Result<Arc<Gpu>, GpuError> {
+        let opened = wait::for_system(Opened::new(choice, host))?;
+        let first = opened.first(lanes)?;
+        let talk = first.waited(opened.talk(lanes, &first))?;
+        Ok(Arc::new(opened.last(first, talk)))
+    }
+
+    /// The same, for whoever may not wait.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub async fn open_async(choice: &Choice, lanes: Option<Lanes>, host: Arc<dyn Host>) -> Result<Arc<Gpu>, GpuError> {
+        let opened = Opened::new(choice, host).await?;
+        let first = opened.first(lanes)?;
+        let talk = opened.talk(lanes, &first).await?;
+        Ok(Arc::new(opened.last(first, talk)))
+    }
+}
+
+/// A device before it is known how its lanes talk.
+struct Opened {
+    host: Arc<dyn Host>,
+    info: wgpu::AdapterInfo,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    trouble: Arc<Troubles>,
+    lost: Arc<AtomicBool>,
+}
+
+impl Opened {
+    async fn new(choice: &Choice, host: Arc<dyn Host>) -> Result<Opened, GpuError> {
+        let found = all(&instance()).await;
         let told = |(index, a): (usize, &wgpu::Adapter)| {
             let info = a.get_info();
             let place = pci(&info).map_or(String::new(), |p| format!(" at {p}"));
@@ -60,9 +100,9 @@ impl Gpu {
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let opened = adapter.request_device(&descriptor).await;
         let (device, queue) = opened.map_err(|e| GpuError::refused(format!("while it is opened: {e}")))?;
-        let trouble = Arc::new(Mutex::new(None));
+        let trouble = Arc::new(Troubles::default());
         let lost = Arc::new(AtomicBool::new(false));
         let (slot, gone) = (trouble.clone(), lost.clone());
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
@@ -78,36 +118,52 @@ impl Gpu {
                 keep(&slot, GpuError::Lost { reason: text });
             }
         });
-        let subgroups = features.contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= 8;
-        let open = |lanes| Gpu {
-            name: info.name.clone(),
-            driver: format!("{} {}", info.driver, info.driver_info),
-            kind: info.device_type,
-            device: device.clone(),
-            queue: queue.clone(),
+        Ok(Opened { host, info, device, queue, trouble, lost })
+    }
+
+    /// True where the adapter lists subgroups that are wide enough.
+    fn lists_subgroups(&self) -> bool {
+        self.device.features().contains(wgpu::Features::SUBGROUP) && self.info.subgroup_min_size >= 8
+    }
+
+    fn gpu(&self, lanes: Lanes) -> Gpu {
+        Gpu {
+            name: self.info.name.clone(),
+            driver: format!("{} {}", self.info.driver, self.info.driver_info),
+            kind: self.info.device_type,
+            host: self.host.clone(),
+            device: self.device.clone(),
+            queue: self.queue.clone(),
             pipelines: Pipelines::new(lanes),
-            largest: device.limits().max_storage_buffer_binding_size,
+            largest: self.device.limits().max_storage_buffer_binding_size,
             made: AtomicU64::new(0),
             waits: AtomicU64::new(0),
-            trouble: trouble.clone(),
-            lost: lost.clone(),
-            trace: Mutex::default(),
-        };
-        let gpu = match lanes {
-            Some(Lanes::Subgroup) if !subgroups => {
-                return Err(GpuError::Unsupported { adapter: info.name, feature: "subgroups of eight lanes".into() });
-            }
-            Some(lanes) => open(lanes),
-            // Whether lanes lie in subgroups in their order is up to the driver: ask a kernel.
-            None if subgroups => {
-                let gpu = open(Lanes::Subgroup);
-                match lanes_for(lanes_work(&gpu))? {
-                    Lanes::Subgroup => gpu,
-                    Lanes::Memory => open(Lanes::Memory),
-                }
-            }
-            None => open(Lanes::Memory),
-        };
-        Ok(Arc::new(gpu))
+            trouble: self.trouble.clone(),
+            scopes: Scopes::default(),
+            lost: self.lost.clone(),
+            trace: Default::default(),
+        }
+    }
+
+    /// The device as it is wanted, or with subgroups where they are listed.
+    ///
+    /// # Errors
+    /// Subgroups are wanted where there are none.
+    fn first(&self, wanted: Option<Lanes>) -> Result<Gpu, GpuError> {
+        let listed = self.lists_subgroups();
+        if wanted == Some(Lanes::Subgroup) && !listed {
+            return Err(GpuError::Unsupported { adapter: self.info.name.clone(), feature: "subgroups of eight lanes".into() });
+        }
+        Ok(self.gpu(wanted.unwrap_or(if listed { Lanes::Subgroup } else { Lanes::Memory })))
+    }
+
+    /// How its lanes talk. Whether they lie in subgroups in their order is up to the driver: a kernel is asked.
+    async fn talk(&self, wanted: Option<Lanes>, first: &Gpu) -> Result<Lanes, GpuError> {
+        let asked = wanted.is_none() && first.lanes() == Lanes::Subgroup;
+        if asked { lanes_for(lanes_work(first).await) } else { Ok(first.lanes()) }
+    }
+
+    fn last(&self, first: Gpu, talk: Lanes) -> Gpu {
+        if first.lanes() == talk { first } else { self.gpu(talk) }
     }
 }

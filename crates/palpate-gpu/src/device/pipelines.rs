@@ -1,6 +1,7 @@
 //! Kernels as the build script found them, compiled when they are first used.
 
 use super::error::{GpuError, translate};
+use super::gpu::Gpu;
 use std::sync::OnceLock;
 
 /// How the eight lanes of a cell talk to each other.
@@ -97,8 +98,8 @@ impl Pipelines {
     }
 
     /// The kernel of a pass.
-    pub(crate) fn get(&self, device: &wgpu::Device, pass: usize) -> Result<&Kernel, &GpuError> {
-        self.kernels[pass].get_or_init(|| compile(device, &PASSES[pass], self)).as_ref()
+    pub(crate) fn get(&self, gpu: &Gpu, pass: usize) -> Result<&Kernel, &GpuError> {
+        self.kernels[pass].get_or_init(|| compile(gpu, &PASSES[pass], self)).as_ref()
     }
 }
 
@@ -106,7 +107,8 @@ impl Pipelines {
 ///
 /// # Errors
 /// It refuses.
-pub(crate) fn compile(device: &wgpu::Device, source: &PassSource, pipelines: &Pipelines) -> Result<Kernel, GpuError> {
+pub(crate) fn compile(gpu: &Gpu, source: &PassSource, pipelines: &Pipelines) -> Result<Kernel, GpuError> {
+    let device = &gpu.device;
     let entries: Vec<wgpu::BindGroupLayoutEntry> = source
         .bindings
         .iter()
@@ -148,13 +150,15 @@ pub(crate) fn compile(device: &wgpu::Device, source: &PassSource, pipelines: &Pi
         compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
         cache: None,
     });
-    let mut problem = None;
-    for guard in guards.into_iter().rev() {
-        problem = problem.or(pollster::block_on(guard.pop()));
-    }
-    match problem.map(translate) {
-        None => Ok(Kernel { pipeline, layout }),
-        Some(GpuError::Refused { message }) => Err(GpuError::Shader { pass: source.name.into(), message }),
-        Some(e) => Err(e),
-    }
+    let ([validation, internal, memory], name) = (guards, source.name);
+    // In the order in which they were pushed, from the last to the first.
+    let (memory, internal, validation) = (memory.pop(), internal.pop(), validation.pop());
+    let caught = gpu.caught(async move {
+        let all = [memory.await, internal.await, validation.await];
+        all.into_iter().flatten().next().map(|e| match translate(e) {
+            GpuError::Refused { message } => GpuError::Shader { pass: name.into(), message },
+            e => e,
+        })
+    });
+    caught.map_or(Ok(Kernel { pipeline, layout }), Err)
 }

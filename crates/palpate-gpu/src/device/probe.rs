@@ -8,7 +8,7 @@ use super::recorder::{Args, Recorder, Size};
 use std::collections::HashMap;
 
 /// True when sums over groups of eight lanes come out right.
-pub(crate) fn lanes_work(gpu: &Gpu) -> Result<bool, GpuError> {
+pub(crate) async fn lanes_work(gpu: &Gpu) -> Result<bool, GpuError> {
     let width = PASSES[pass::PROBE_LANES].width as usize;
     let groups = 3;
     let sums = gpu.buffer("sums", (16 * width * groups) as u64)?;
@@ -16,7 +16,7 @@ pub(crate) fn lanes_work(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut r = Recorder::new(gpu, &world, &mut made, false);
     r.run(pass::PROBE_LANES, &[("sums", &sums)], Size::All { members: 1, groups }, Args::default());
     r.submit(&mut times);
-    let found: Vec<[f32; 4]> = gpu.download(&sums, width * groups)?;
+    let found: Vec<[f32; 4]> = gpu.items_of(&sums, width * groups).await?;
     // Lane i of the dispatch offers (i, i², 1) to its group and asks for the next lane's i.
     Ok(found.iter().enumerate().all(|(i, v)| {
         let first = i - i % 8;

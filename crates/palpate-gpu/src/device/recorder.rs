@@ -134,7 +134,7 @@ impl<'a> Recorder<'a> {
 
     fn try_run(&mut self, pass: usize, own: &Named, size: Size, args: Args) -> Result<(), GpuError> {
         let source = &PASSES[pass];
-        let kernel = self.gpu.pipelines.get(&self.gpu.device, pass).map_err(Clone::clone)?;
+        let kernel = self.gpu.pipelines.get(self.gpu, pass).map_err(Clone::clone)?;
         let mut buffers = Vec::with_capacity(source.bindings.len());
         for (name, ..) in source.bindings {
             let found = own.iter().find(|b| b.0 == *name).map(|b| b.1).or_else(|| self.world.get(name));

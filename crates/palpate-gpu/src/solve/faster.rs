@@ -1,6 +1,5 @@
 //! Asks a device which of two ways to solve is faster.
 
-use super::choices::Choices;
 use crate::device::pipelines::shared::solving;
 use crate::device::{Gpu, GpuError};
 use crate::layout::{Newton, Shape};
@@ -9,8 +8,7 @@ use crate::world::{MANY, Product, State, Tally, Tuning, World};
 use palpate_engine::{ParamBatch, Request};
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 /// Bodies of fewer nodes are left to one workgroup.
 const FEW: usize = 256;
@@ -24,46 +22,77 @@ const REPEATS: usize = 8;
 const WORKGROUPS: [&str; 2] = ["one", "many"];
 
 impl Tuning {
-    /// With the choice between one and many workgroups made for a body of so many nodes, where a device is to be asked: for one member
+    /// True where a device is to be asked whether one workgroup or many solve for a member of a body of so many nodes.
+    fn asks(self, gpu: &Gpu, plan: &Plan) -> bool {
+        self == Tuning::default() && !gpu.is_software() && (FEW..MANY).contains(&plan.body.nodes.len())
+    }
+
+    /// With the choice between one and many workgroups made, where a device is to be asked and its host has a clock: for one member
     /// alone, because a member must get the same bits alone and in any batch.
     pub(crate) fn on_device(self, gpu: &Arc<Gpu>, plan: &Plan) -> Result<Tuning, GpuError> {
-        let asked = self == Tuning::default() && !gpu.is_software() && (FEW..MANY).contains(&plan.body.nodes.len());
-        if asked { Tuning::measured(gpu, plan, &Choices::of_user()) } else { Ok(self) }
+        if self.asks(gpu, plan) { Tuning::measured(gpu, plan) } else { Ok(self) }
     }
 
     /// The same, asked.
-    pub(crate) fn measured(gpu: &Arc<Gpu>, plan: &Plan, choices: &Choices) -> Result<Tuning, GpuError> {
-        static KNOWN: Known = Mutex::new(None);
-        let ways = [usize::MAX, 0].map(|many_from| Tuning { many_from, product: None });
-        let (nodes, cells, parameters) = (plan.body.nodes.len(), plan.body.cells().len(), plan.layout.len());
-        let key = format!("{}: {nodes} nodes, {cells} cells, {parameters} parameters", device(gpu));
-        let chosen = once(&key, WORKGROUPS, choices, &KNOWN, || {
+    pub(crate) fn measured(gpu: &Arc<Gpu>, plan: &Plan) -> Result<Tuning, GpuError> {
+        let chosen = once(gpu, &key_of_workgroups(gpu, plan), WORKGROUPS, || {
             let iteration = |way| {
                 let mut world = World::new(gpu.clone(), plan, 1, way)?;
                 world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
                 world.cg_speed().map(|speed| speed.iteration.seconds)
             };
-            Ok([iteration(ways[0])?, iteration(ways[1])?])
+            Ok([iteration(WAYS[0])?, iteration(WAYS[1])?])
         })?;
-        Ok(ways[chosen])
+        Ok(chosen.map_or_else(Tuning::default, |k| WAYS[k]))
     }
 }
 
-/// A plan made ready on a device, with the ways to solve that are stated, or else faster.
+/// One workgroup a member, and many.
+const WAYS: [Tuning; 2] = [Tuning { many_from: usize::MAX, product: None }, Tuning { many_from: 0, product: None }];
+
+/// A plan made ready on a device, with the ways to solve that are stated, or else faster; without a clock those that were faster before, or the
+/// plain ones.
 ///
 /// # Errors
 /// The plan needs something this backend lacks, or more than the device has.
 pub(crate) fn world(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
-    let tuning = tuning.on_device(&gpu, plan)?;
-    let mut world = World::new(gpu, plan, members, tuning)?;
-    if world.many && tuning.product.is_none() && !world.needs_matrix() {
-        world.product = faster(&mut world, &Choices::of_user())?;
+    let asked = tuning.on_device(&gpu, plan)?;
+    let mut world = World::new(gpu, plan, members, asked)?;
+    if has_choice(&world, tuning) {
+        world.product = faster(&mut world)?;
     }
     Ok(world)
 }
 
-/// Choices of this process.
-type Known = Mutex<Option<HashMap<String, usize>>>;
+/// The same for whoever may not wait, and so may not measure: as without a clock.
+///
+/// # Errors
+/// As [`world`].
+pub(crate) async fn world_async(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
+    let asked = tuning.asks(&gpu, plan).then(|| before(&gpu, &key_of_workgroups(&gpu, plan), WORKGROUPS, &known())).flatten();
+    let mut world = World::made(gpu, plan, members, asked.map_or(tuning, |k| WAYS[k])).await?;
+    if has_choice(&world, tuning) {
+        world.product = before(&world.gpu, &key(&world), NAMES, &known()).map_or(Product::Matrix, |k| PRODUCTS[k]);
+    }
+    Ok(world)
+}
+
+/// True where products can be made in either way, and none is stated.
+fn has_choice(world: &World, stated: Tuning) -> bool {
+    world.many && stated.product.is_none() && !world.needs_matrix()
+}
+
+const PRODUCTS: [Product; 2] = [Product::Matrix, Product::Free];
+const NAMES: [&str; 2] = [PRODUCTS[0].name(), PRODUCTS[1].name()];
+
+/// Choices of this process by their keys.
+type Known = HashMap<String, usize>;
+
+/// Held while a choice is measured: other measurements would disturb it.
+fn known() -> MutexGuard<'static, Known> {
+    static KNOWN: LazyLock<Mutex<Known>> = LazyLock::new(Mutex::default);
+    KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Adapter and driver that a choice holds for.
 fn device(gpu: &Gpu) -> String {
@@ -76,34 +105,46 @@ fn key(world: &World) -> String {
     format!("{}: {} nodes, {} cells of {} kinds", device(&world.gpu), s.nodes, s.cells, s.classes)
 }
 
-/// Which of two ways is faster: measured once [s], so that a user gets the same bits twice.
-fn once(
-    key: &str,
-    names: [&str; 2],
-    choices: &Choices,
-    known: &Known,
-    measure: impl FnOnce() -> Result<[f64; 2], GpuError>,
-) -> Result<usize, GpuError> {
-    // Where nothing can be kept a process gives the same bits twice in any case.
-    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(k) = choices.get(key, names).or_else(|| known.as_ref()?.get(key).copied()) {
-        return Ok(k);
-    }
-    let chosen = choices.keep(key, names, choose(measure()?));
-    known.get_or_insert_default().insert(key.to_string(), chosen);
-    Ok(chosen)
+/// What the choice between one and many workgroups holds for.
+fn key_of_workgroups(gpu: &Gpu, plan: &Plan) -> String {
+    let (nodes, cells, parameters) = (plan.body.nodes.len(), plan.body.cells().len(), plan.layout.len());
+    format!("{}: {nodes} nodes, {cells} cells, {parameters} parameters", device(gpu))
 }
 
-/// The faster product for a body on its device.
-pub(crate) fn faster(world: &mut World, choices: &Choices) -> Result<Product, GpuError> {
-    static KNOWN: Known = Mutex::new(None);
-    let both = [Product::Matrix, Product::Free];
-    let chosen = once(&key(world), both.map(Product::name), choices, &KNOWN, || {
+/// Which of two ways was faster when it was measured, which the host remembers, or else this process.
+fn before(gpu: &Gpu, key: &str, names: [&str; 2], known: &Known) -> Option<usize> {
+    let written = gpu.host().written(key);
+    written.and_then(|w| names.iter().position(|name| *name == w)).or_else(|| known.get(key).copied())
+}
+
+/// Which of two ways is faster: measured once [s], so that a user gets the same bits twice; `None` where there is no clock.
+fn once(
+    gpu: &Gpu,
+    key: &str,
+    names: [&str; 2],
+    measure: impl FnOnce() -> Result<[f64; 2], GpuError>,
+) -> Result<Option<usize>, GpuError> {
+    let mut known = known();
+    let found = before(gpu, key, names, &known);
+    if found.is_some() || gpu.seconds().is_err() {
+        return Ok(found);
+    }
+    let chosen = choose(measure()?);
+    let counts = gpu.host().write(key, names[chosen]);
+    let chosen = names.iter().position(|name| *name == counts).unwrap_or(chosen);
+    known.insert(key.to_string(), chosen);
+    Ok(Some(chosen))
+}
+
+/// The faster product for a body on its device; the plain one without a clock.
+pub(crate) fn faster(world: &mut World) -> Result<Product, GpuError> {
+    let gpu = world.gpu.clone();
+    let chosen = once(&gpu, &key(world), NAMES, || {
         world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&world.plan.theta.clone())));
         world.set_iterations(1);
-        Ok([time(world, both[0])?, time(world, both[1])?])
+        Ok([time(world, PRODUCTS[0])?, time(world, PRODUCTS[1])?])
     })?;
-    Ok(both[chosen])
+    Ok(PRODUCTS[chosen.unwrap_or(0)])
 }
 
 /// Which to take when the plain way and another one take so long [s].
@@ -118,11 +159,11 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
     let wanting = vec![Newton { stage: SOLVE, goal: -1.0, forcing: -1.0, ..Newton::default() }; world.members()];
     // Sums of solves that have just begun, with something left to do.
     let left = world.buffers["cg_sums"].size() as usize / size_of::<[f32; 4]>();
-    let begun = begun_sums(&world.geometry.shape, left);
+    let beginning = begun_sums(&world.geometry.shape, left);
     world.gpu.queue.write_buffer(&world.buffers["newton"], 0, bytemuck::cast_slice(&wanting));
     let run = |repeats: usize| {
-        let clock = Instant::now();
-        world.gpu.queue.write_buffer(&world.buffers["cg_sums"], 0, bytemuck::cast_slice(&begun));
+        let begun = world.gpu.seconds()?;
+        world.gpu.queue.write_buffer(&world.buffers["cg_sums"], 0, bytemuck::cast_slice(&beginning));
         world.record(|r| {
             let mut s = Passes::new(world, r, Some(0), &blank, &blank, &tally);
             s.list();
@@ -130,7 +171,8 @@ pub(crate) fn time(world: &World, product: Product) -> Result<f64, GpuError> {
                 s.multiply(product, 0);
             }
         });
-        world.gpu.download::<f32>(&world.buffers["cg_sums"], 1).map(|_| clock.elapsed().as_secs_f64())
+        world.gpu.download::<f32>(&world.buffers["cg_sums"], 1)?;
+        Ok(world.gpu.seconds()? - begun)
     };
     // The first run compiles the kernels.
     run(1)?;

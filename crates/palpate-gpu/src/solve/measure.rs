@@ -11,8 +11,6 @@ use crate::passes::Passes;
 use crate::world::Product;
 use crate::world::{State, Tally, VECTOR, World, coarse_vectors};
 use palpate_engine::Request;
-use std::sync::atomic::Ordering;
-use std::time::Instant;
 
 /// Time of some work of all members, and what it has to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,28 +46,20 @@ struct Rest {
 }
 
 impl Gpu {
-    /// Waits until everything handed to the device is done.
-    ///
-    /// # Errors
-    /// The device is gone.
-    pub fn wait(&self) -> Result<(), GpuError> {
-        self.waits.fetch_add(1, Ordering::Relaxed);
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ()).map_err(|e| GpuError::Lost { reason: e.to_string() })
-    }
-
     /// Measured bandwidth of a copy between buffers of the device, reading and writing counted [B/s].
     ///
     /// # Errors
-    /// No memory for it, or the device is gone.
+    /// No memory for it, the device is gone, or its host has no clock.
     pub fn copy_bandwidth(&self) -> Result<f64, GpuError> {
         let bytes = self.largest.min(64 << 20);
         let (from, to) = (self.buffer("copy from", bytes)?, self.buffer("copy to", bytes)?);
         let copy = |times: u32| {
-            let clock = Instant::now();
+            let begun = self.seconds()?;
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("copy") });
             (0..times).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes));
             self.queue.submit([encoder.finish()]);
-            self.wait().map(|()| clock.elapsed().as_secs_f64())
+            self.wait()?;
+            Ok(self.seconds()? - begun)
         };
         copy(1)?;
         let one = copy(1)?;
@@ -147,7 +137,7 @@ impl World {
     /// Time and traffic of conjugate gradients with the current batch: the body at rest, under a load in all directions.
     ///
     /// # Errors
-    /// The device is gone.
+    /// The device is gone, or its host has no clock.
     pub fn cg_speed(&mut self) -> Result<CgSpeed, GpuError> {
         // The shape goes to the device with this.
         self.set_iterations(self.plan.solver.newton_iterations);
@@ -163,7 +153,7 @@ impl World {
         self.work(&rest, |s| s.linearise());
         let run = |repeats: u32| {
             self.begin(&rest)?;
-            let clock = Instant::now();
+            let begun = self.gpu.seconds()?;
             self.work(&rest, |s| {
                 s.list();
                 s.begin_cg(asks::FOR_DERIVATIVE);
@@ -172,7 +162,8 @@ impl World {
                 }
                 (0..repeats).for_each(|k| if self.many { s.iterate(k % 2) } else { s.iterate_chunk(asks::FOR_DERIVATIVE) });
             });
-            self.gpu.download::<f32>(&self.buffers["cg_sums"], 1).map(|_| clock.elapsed().as_secs_f64())
+            self.gpu.download::<f32>(&self.buffers["cg_sums"], 1)?;
+            Ok(self.gpu.seconds()? - begun)
         };
         let repeats = if self.many { ITERATIONS } else { 1 };
         // The first run compiles the kernels.

@@ -2,7 +2,6 @@
 //! only says how often to ask.
 
 pub(crate) mod backward;
-mod choices;
 mod faster;
 pub(crate) mod forward;
 mod measure;
@@ -12,10 +11,9 @@ use crate::device::pipelines::shared::asks;
 use crate::device::recorder::{Args, Size};
 use crate::passes::{ALL, MATRIX, Passes, Per, SOLVE, TRIAL};
 use crate::world::{Effort, Product};
-pub use choices::Choices;
 #[cfg(test)]
 pub(crate) use faster::faster;
-pub(crate) use faster::world;
+pub(crate) use faster::{world, world_async};
 pub use measure::{CgSpeed, Traffic};
 
 /// Rounds for each allowed Newton iteration, as a step may be halved, and beyond: friction halves two of three.

@@ -231,7 +231,7 @@ fn a_kernel_that_does_not_compile_is_named() {
     {
         let source =
             PassSource { name: "broken", sources: [text; 2], lanes: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
-        let e = compile(&gpu.device, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
+        let e = compile(&gpu, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
         assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
         assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");
         // The device is none the worse.

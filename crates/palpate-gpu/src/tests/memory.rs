@@ -33,7 +33,7 @@ pub(super) fn check(gpu: &Arc<Gpu>, plan: &Plan, members: usize, request: &Reque
 /// Waits until uploads have arrived, whose copies on the way are memory as well.
 fn settle(gpu: &Gpu) {
     gpu.queue.submit([]);
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap_or_else(|e| panic!("{e}"));
+    gpu.wait().unwrap_or_else(|e| panic!("{e}"));
 }
 
 /// The same of what an evaluation holds, made without computing anything.

@@ -172,7 +172,7 @@ fn a_kernel_that_is_wrong_is_found_out() {
                 ..*source
             };
             let Some(owned) = Arc::get_mut(&mut gpu) else { panic!("somebody keeps the device") };
-            let Ok(kernel) = compile(&owned.device, &mutant, &owned.pipelines) else { continue };
+            let Ok(kernel) = compile(owned, &mutant, &owned.pipelines) else { continue };
             let right = owned.pipelines.swap(pass, OnceLock::from(Ok(kernel)));
             made += 1;
             let caught = (first..subjects.len()).find_map(|k| subjects[k].told(&gpu).into_iter().next());

@@ -2,19 +2,20 @@
 
 use super::faults::{BALANCE, Fault, faulty};
 use super::forward::{CLOSE, off, states};
-use super::scenes::{ball, device, held, plan, solving_part, spread};
+use super::host::Desk;
+use super::scenes::{ball, device, device_of, held, own_device, plan, solving_part, spread};
 use crate::costs::rollout_tests::{differences, seen, watched};
 use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::solving::PRODUCT;
 use crate::passes::Passes;
 use crate::solve;
-use crate::solve::Choices;
 use crate::world::World;
-use crate::{GpuBackend, Product, Tuning};
+use crate::{Gpu, GpuBackend, GpuError, Product, Tuning};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Plane, Scene};
+use std::sync::Arc;
 
 const BOTH: [Product; 2] = [Product::Matrix, Product::Free];
 
@@ -157,44 +158,59 @@ fn gradients_by_many_workgroups_agree_with_the_cpu() {
     }
 }
 
+/// The only note of a desk: its key and what is written.
+fn only_note(desk: &Desk, gpu: &Gpu) -> (String, String) {
+    let notes: Vec<_> = desk.notes().into_iter().collect();
+    let [(key, what)] = &notes[..] else { panic!("{notes:?}") };
+    assert!(key.contains(&gpu.name) && key.contains(&gpu.driver), "{key}");
+    (key.clone(), what.clone())
+}
+
 #[test]
 fn a_measurement_chooses_a_product_for_large_bodies_and_keeps_it() {
-    let Some(gpu) = device(None) else { return };
+    let desk = Arc::<Desk>::default();
+    let Some(gpu) = device_of(desk.clone()) else { return };
     let plan = plan(&ball(0.03));
-    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
-    let choices = Choices::at(folder.path().join("products.txt"));
     let mut world = World::new(gpu.clone(), &plan, 1, many(Product::Matrix)).unwrap_or_else(|e| panic!("{e}"));
-    let chosen = solve::faster(&mut world, &choices).unwrap_or_else(|e| panic!("{e}"));
+    let chosen = solve::faster(&mut world).unwrap_or_else(|e| panic!("{e}"));
     // Another process finds what was measured, and does not measure: it would not come to the opposite.
-    let line = std::fs::read_to_string(folder.path().join("products.txt")).unwrap_or_else(|e| panic!("{e}"));
-    assert!(line.starts_with(chosen.name()) && line.contains(&gpu.name) && line.contains(&gpu.driver), "{line}");
+    let (key, what) = only_note(&desk, &gpu);
+    assert_eq!(what, chosen.name());
     let other = BOTH[usize::from(chosen == Product::Matrix)];
-    let swapped = line.replacen(chosen.name(), other.name(), 1);
-    std::fs::write(folder.path().join("products.txt"), swapped).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(solve::faster(&mut world, &choices), Ok(other));
+    desk.rewrite(&key, other.name());
+    assert_eq!(solve::faster(&mut world), Ok(other));
     let small = GpuBackend::on(gpu).build(&plan, 1).unwrap_or_else(|e| panic!("{e}"));
     assert!(world.many && !small.many);
 }
 
 #[test]
 fn a_measurement_chooses_between_one_and_many_workgroups_and_keeps_it() {
-    let Some(gpu) = device(None) else { return };
+    let desk = Arc::<Desk>::default();
+    let Some(gpu) = device_of(desk.clone()) else { return };
     let plan = plan(&ball(0.03));
-    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
-    let choices = Choices::at(folder.path().join("choices.txt"));
-    let measured = || Tuning::measured(&gpu, &plan, &choices).unwrap_or_else(|e| panic!("{e}"));
+    let measured = || Tuning::measured(&gpu, &plan).unwrap_or_else(|e| panic!("{e}"));
     let chosen = measured();
-    let line = std::fs::read_to_string(folder.path().join("choices.txt")).unwrap_or_else(|e| panic!("{e}"));
+    let (key, what) = only_note(&desk, &gpu);
     let names = ["many", "one"];
     let is_one = usize::from(chosen.many_from > 0);
-    assert!(line.starts_with(names[is_one]) && line.contains(&gpu.name), "{line}");
+    assert_eq!(what, names[is_one]);
     // Another process does as the first one did.
-    std::fs::write(folder.path().join("choices.txt"), line.replacen(names[is_one], names[1 - is_one], 1))
-        .unwrap_or_else(|e| panic!("{e}"));
+    desk.rewrite(&key, names[1 - is_one]);
     assert_eq!(usize::from(measured().many_from > 0), 1 - is_one);
     // A software adapter is not asked, and neither is one that was told.
     if gpu.is_software() {
         assert_eq!(Tuning::default().on_device(&gpu, &plan), Ok(Tuning::default()));
     }
     assert_eq!(many(Product::Free).on_device(&gpu, &plan), Ok(many(Product::Free)));
+}
+
+/// Another body than above: what this process has measured it remembers.
+#[test]
+fn without_a_clock_nothing_is_measured_and_the_plain_way_is_taken() {
+    let Some(gpu) = own_device() else { return };
+    let plan = plan(&ball(0.04));
+    assert_eq!(Tuning::measured(&gpu, &plan), Ok(Tuning::default()));
+    let mut world = World::new(gpu.clone(), &plan, 1, Tuning { many_from: 0, product: None }).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(solve::faster(&mut world), Ok(Product::Matrix));
+    assert_eq!((gpu.copy_bandwidth().err(), world.cg_speed().err()), (Some(GpuError::NoClock), Some(GpuError::NoClock)));
 }

@@ -1,7 +1,8 @@
 //! Small scenes that hold every term of the balance, and the device that tests run on.
 
+use super::host::Desk;
 use crate::device::GpuError;
-use crate::device::{Choice, Gpu, Lanes};
+use crate::device::{Choice, Gpu, Host, Lanes};
 use crate::world::{SOLVING, SOLVING_VECTORS, World};
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_model::mechanics::motion::RigidMotion;
@@ -10,21 +11,10 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
-use std::cell::RefCell;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 /// What opening a device gave; `None` with a printed word where there is none and none is required (`PALPATE_GPU=require`).
-///
-/// From then on the test has all devices to itself until its thread ends: with lavapipe, threads that submit at the same time have
-/// been seen to change each other's last bits, and tests here compare bits.
 fn opened(result: Result<Arc<Gpu>, GpuError>) -> Option<Arc<Gpu>> {
-    static TURN: Mutex<()> = Mutex::new(());
-    thread_local! {
-        static ALONE: RefCell<Option<MutexGuard<'static, ()>>> = const { RefCell::new(None) };
-    }
-    ALONE.with_borrow_mut(|own| {
-        own.get_or_insert_with(|| TURN.lock().unwrap_or_else(PoisonError::into_inner));
-    });
     match result {
         Ok(gpu) => Some(gpu),
         Err(e) => {
@@ -38,7 +28,9 @@ fn opened(result: Result<Arc<Gpu>, GpuError>) -> Option<Arc<Gpu>> {
 /// The device that tests share, so that every kernel is compiled once; with a given way for lanes to talk if asked for.
 pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
     static OPEN: [OnceLock<Result<Arc<Gpu>, GpuError>>; 2] = [const { OnceLock::new() }; 2];
-    let open = |place: usize, lanes| OPEN[place].get_or_init(|| Gpu::open_with(&Choice::from_env(), lanes)).clone();
+    let open = |place: usize, lanes| {
+        OPEN[place].get_or_init(|| Gpu::open_for(&Choice::from_env(), lanes, Arc::<Desk>::default())).clone()
+    };
     let usual = opened(open(0, None))?;
     match lanes {
         Some(lanes) if lanes != usual.pipelines.lanes => opened(open(1, Some(lanes))),
@@ -49,6 +41,11 @@ pub fn device(lanes: Option<Lanes>) -> Option<Arc<Gpu>> {
 /// A device for one test alone: one that breaks it, or counts what is made on it.
 pub fn own_device() -> Option<Arc<Gpu>> {
     opened(Gpu::open(&Choice::from_env()))
+}
+
+/// The same for a given host.
+pub fn device_of(host: Arc<dyn Host>) -> Option<Arc<Gpu>> {
+    opened(Gpu::open_for(&Choice::from_env(), None, host))
 }
 
 /// A ball of radius 5 cm in cells of `h`.

@@ -1,13 +1,13 @@
 //! Every kernel is valid WGSL, in both variants: with subgroups, and with workgroup memory on adapters that have none.
 
 #[path = "../../validate.rs"]
-mod validate;
+pub(super) mod validate;
 
 use crate::device::Lanes;
 use crate::device::pipelines::PASSES;
 use validate::validate;
 
-const VARIANTS: [Lanes; 2] = [Lanes::Subgroup, Lanes::Memory];
+pub(super) const VARIANTS: [Lanes; 2] = [Lanes::Subgroup, Lanes::Memory];
 
 #[test]
 fn both_variants_of_every_pass_are_valid() {

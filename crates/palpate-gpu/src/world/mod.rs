@@ -39,7 +39,7 @@ pub(crate) use {
 use crate::costs::Observer;
 use crate::device::pipelines::shared::structs::FIELD_SEVERAL;
 use crate::device::recorder::{Buffers, Groups, PassTime, Recorder};
-use crate::device::{Counter, Gpu, GpuError, Maker as _};
+use crate::device::{Counter, Gpu, GpuError, HandedOver, Maker as _};
 use crate::layout::Shape;
 use crate::passes::Passes;
 use members::Batch;
@@ -79,7 +79,7 @@ pub struct World {
     pub(crate) counter: Option<Counter>,
     /// The work handed over last, and the ends of the latest stages.
     last: RefCell<Option<wgpu::SubmissionIndex>>,
-    ahead: VecDeque<wgpu::SubmissionIndex>,
+    ahead: VecDeque<HandedOver>,
     /// True when many workgroups share the solve of a member.
     pub(crate) many: bool,
     pub(crate) product: Product,
@@ -90,6 +90,11 @@ pub struct World {
 
 impl World {
     pub(crate) fn new(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
+        gpu.clone().waited(World::made(gpu, plan, members, tuning))
+    }
+
+    /// The same, for whoever may not wait.
+    pub(crate) async fn made(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuning: Tuning) -> Result<World, GpuError> {
         let mut buffers = Buffers::new();
         let capacity = members.max(1);
         let many = plan.body.nodes.len() >= tuning.many_from;
@@ -125,12 +130,12 @@ impl World {
         if world.needs_matrix() {
             world.product = Product::Matrix;
         }
-        world.learn_stiffness()?;
+        world.learn_stiffness().await?;
         Ok(world)
     }
 
     /// Shows the body at rest to the second level of the preconditioner, as the plan itself has it.
-    fn learn_stiffness(&mut self) -> Result<(), GpuError> {
+    async fn learn_stiffness(&mut self) -> Result<(), GpuError> {
         let Some(stage) = self.plan.clock.stages().first().cloned() else { return Ok(()) };
         let made = self.gpu.made();
         self.set_params(&ParamBatch::from_rows(std::slice::from_ref(&self.plan.theta.clone())));
@@ -143,7 +148,7 @@ impl World {
         });
         drop((tally, rest));
         let count = 9 * self.geometry.shape.blocks as usize;
-        let values = self.gpu.download::<f32>(&self.buffers["values"], count)?;
+        let values = self.gpu.items_of::<f32>(&self.buffers["values"], count).await?;
         self.coarse.learn(&self.plan, &self.geometry, &stage, &self.batch.physics[0], &values);
         // Nothing of it is kept: the batches to come bring their own.
         self.batch = Batch::default();
@@ -247,12 +252,22 @@ impl World {
 
     /// Waits for all but the last stages that were handed over: enough of them keep the device busy.
     pub(crate) fn keep_pace(&mut self) {
-        self.ahead.extend(self.last.take());
-        while self.ahead.len() > AHEAD {
-            let wait = wgpu::PollType::Wait { submission_index: self.ahead.pop_front(), timeout: None };
-            // A device that was lost says so when its results are read.
-            let _ = self.gpu.device.poll(wait);
+        while let Some(stage) = self.too_far_ahead() {
+            self.gpu.wait_until(stage);
         }
+    }
+
+    /// The same, for whoever may not wait.
+    pub(crate) async fn keep_pace_async(&mut self) {
+        while let Some(stage) = self.too_far_ahead() {
+            stage.done().await;
+        }
+    }
+
+    /// The first of too many stages that were handed over.
+    fn too_far_ahead(&mut self) -> Option<HandedOver> {
+        self.ahead.extend(self.last.take().map(|work| self.gpu.handed_over(work)));
+        if self.ahead.len() > AHEAD { self.ahead.pop_front() } else { None }
     }
 
     /// A buffer of `vectors` per node and member, from the pool.

@@ -17,7 +17,7 @@ pub enum Product {
 
 impl Product {
     /// As `PALPATE_GPU_PRODUCT` has it.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Product::Matrix => "csr",
             Product::Free => "free",

@@ -1,57 +1,49 @@
-//! What was measured once, kept in the user's cache folder: a later process on the same device makes the same choice, and so computes the same
-//! bits. A file that cannot be read or written does no harm: then each process measures for itself.
+//! The machine of this process, as devices know it: its clock, and what was measured once, kept in the user's cache folder. A later process on
+//! the same device makes the same choice, and so computes the same bits. A file that cannot be read or written does no harm: then each process
+//! measures for itself.
 
+use palpate_gpu::Host;
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
 
 /// Name of the file in the cache folder: one choice a line, what was chosen and the key with a tab between; the first of a key counts.
 const FILE: &str = "palpate/choices.txt";
 
-/// Where choices are kept.
-#[derive(Clone, Debug)]
-pub struct Choices {
+/// The machine, to open a device with ([`palpate_gpu::Gpu::open_for`]).
+pub fn host() -> Arc<dyn Host> {
+    let folder = cache_folder(|name| std::env::var_os(name).map(PathBuf::from));
+    Arc::new(Machine { begun: Instant::now(), file: folder.map(|f| f.join(FILE)) })
+}
+
+#[derive(Debug)]
+struct Machine {
+    begun: Instant,
+    /// Where choices are kept.
     file: Option<PathBuf>,
 }
 
-impl Choices {
-    /// Those of this user.
-    pub fn of_user() -> Choices {
-        Choices { file: cache_folder(|name| std::env::var_os(name).map(PathBuf::from)).map(|f| f.join(FILE)) }
+impl Host for Machine {
+    fn seconds(&self) -> Option<f64> {
+        Some(self.begun.elapsed().as_secs_f64())
     }
 
-    /// In a file of a test's own.
-    #[cfg(test)]
-    pub(crate) fn at(file: PathBuf) -> Choices {
-        Choices { file: Some(file) }
-    }
-
-    /// What was written down for a key; neither holds a tab or the end of a line.
-    pub fn written(&self, key: &str) -> Option<String> {
+    fn written(&self, key: &str) -> Option<String> {
         let text = std::fs::read_to_string(self.file.as_ref()?).ok()?;
         let line = text.lines().filter_map(|l| l.split_once('\t')).find(|l| l.1 == key)?;
         Some(line.0.to_string())
     }
 
-    /// Writes something down unless there is something for the key, and returns what counts from now on: another process may have been faster.
-    pub fn write(&self, key: &str, what: &str) -> String {
+    fn write(&self, key: &str, what: &str) -> String {
         self.written(key).unwrap_or_else(|| {
             self.append(&format!("{what}\t{key}\n"));
             self.written(key).unwrap_or_else(|| what.to_string())
         })
     }
+}
 
-    /// Which of these names was chosen for a key.
-    pub(crate) fn get(&self, key: &str, names: [&str; 2]) -> Option<usize> {
-        let written = self.written(key)?;
-        names.iter().position(|name| *name == written)
-    }
-
-    /// Keeps a choice unless there is one for the key, and returns what counts from now on.
-    pub(crate) fn keep(&self, key: &str, names: [&str; 2], chosen: usize) -> usize {
-        let written = self.write(key, names[chosen]);
-        names.iter().position(|name| *name == written).unwrap_or(chosen)
-    }
-
+impl Machine {
     fn append(&self, line: &str) {
         let Some(file) = &self.file else { return };
         let written = file.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| {
@@ -78,18 +70,20 @@ fn cache_folder(var: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> {
 mod tests {
     use super::*;
 
-    const NAMES: [&str; 2] = ["csr", "free"];
+    fn at(file: Option<PathBuf>) -> Machine {
+        Machine { begun: Instant::now(), file }
+    }
 
     #[test]
     fn the_first_choice_of_a_key_stays() {
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
-        let choices = || Choices::at(folder.path().join("deep").join(FILE));
-        assert_eq!(choices().get("a", NAMES), None);
-        assert_eq!(choices().keep("a", NAMES, 1), 1);
-        assert_eq!(choices().keep("b", NAMES, 0), 0);
+        let machine = || at(Some(folder.path().join("deep").join(FILE)));
+        assert_eq!(machine().written("a"), None);
+        assert_eq!(machine().write("a", "free"), "free");
+        assert_eq!(machine().write("b", "csr"), "csr");
         // A process that measured otherwise does as the first did.
-        assert_eq!(choices().keep("a", NAMES, 0), 1);
-        assert_eq!((choices().get("a", NAMES), choices().get("b", NAMES)), (Some(1), Some(0)));
+        assert_eq!(machine().write("a", "csr"), "free");
+        assert_eq!(["a", "b"].map(|key| machine().written(key)), ["free", "csr"].map(|what| Some(what.to_string())));
     }
 
     #[test]
@@ -97,12 +91,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
         let file = folder.path().join("choices");
         std::fs::write(&file, "nonsense\nfast\ta\n").unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(Choices::at(file.clone()).get("a", NAMES), None);
+        assert_eq!(at(Some(file.clone())).written("b"), None);
         // No folder can be where a file is; and there may be no place at all.
-        for choices in [Choices::at(file.join("below")), Choices { file: None }] {
-            assert_eq!(choices.keep("a", NAMES, 1), 1);
-            assert_eq!(choices.get("a", NAMES), None);
+        for machine in [at(Some(file.join("below"))), at(None)] {
+            assert_eq!(machine.write("a", "free"), "free");
+            assert_eq!(machine.written("a"), None);
         }
+    }
+
+    #[test]
+    fn its_clock_runs_on() {
+        let machine = at(None);
+        let (first, second) = (machine.seconds(), machine.seconds());
+        assert!(first.is_some() && first <= second, "{first:?} {second:?}");
     }
 
     #[test]
