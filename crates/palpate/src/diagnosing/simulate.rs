@@ -5,10 +5,14 @@ use super::laps::Lap;
 use super::limits::Limits;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
+use crate::fitting::demand;
+use crate::memory::Demand;
 use palpate_cpu::CpuBackend;
 use palpate_diagnose::{Change, LabError, Number, Reading, Readings};
 use palpate_engine::Rollout;
 use palpate_fit::{FitScene, Problem, Sample, Want};
+use palpate_model::plan::join::Joint;
+use palpate_model::scene::Optimizer;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -47,14 +51,26 @@ pub(super) fn problem(
     for (f, typical) in ready.free.iter_mut().zip(before.iter().flat_map(|lap| &lap.typical)) {
         f.typical = *typical;
     }
-    let mut scenes = Vec::new();
     for e in &mut ready.experiments {
         e.plan.solver.tolerance = e.plan.solver.tolerance.max(newton);
+    }
+    let plans: Vec<_> = ready.experiments.iter().map(|e| &e.plan).collect();
+    // Recordings of one body run side by side, as far as they fit on a device.
+    let members = |joint: &Joint| match joint.parts.len() {
+        starts if starts > 1 && backend == Backend::Gpu => {
+            let demand = demand(&ready.free, joint.parts[0].0, Optimizer::GaussNewton, 1);
+            backend.members(&joint.plan, &Demand { starts, ..demand }, 0)
+        }
+        all => Ok(all),
+    };
+    let evaluators = backend.evaluators_until(&plans, members, &limits.stop());
+    let mut scenes = Vec::new();
+    for (e, evaluate) in ready.experiments.iter().zip(evaluators.map_err(|e| limits.error(e))?) {
         scenes.push(FitScene {
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: e.plan.theta.clone(),
-            evaluate: backend.evaluator_until(&e.plan, 1, limits.stop()).map_err(|e| limits.error(e))?,
+            evaluate,
         });
     }
     Ok((Problem::new(scenes, ready.free).map_err(LabError::failed)?, numbers))
