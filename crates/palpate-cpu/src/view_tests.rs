@@ -89,6 +89,27 @@ fn members_with_recordings_and_parts_of_them_are_what_they_are_alone() {
 }
 
 #[test]
+fn members_with_sensitivities_of_their_own_are_what_they_are_alone() {
+    let plan = seen();
+    let short = other(&plan);
+    let both = Plan { others: vec![Recording { observation: short.observation, steps: short.clock.steps }], ..plan.clone() };
+    let all: Vec<usize> = (0..plan.layout.len()).collect();
+    let own = vec![all[..3].to_vec(), all[2..].to_vec(), Vec::new(), vec![all[all.len() - 1], 0]];
+    let views: Vec<View> = [0, 1, 0, 1].map(View::of).to_vec();
+    let request = |places: &[usize]| Request { gradient: Wanted::Nothing, sensitivities: places.to_vec() };
+    let mut rollout = Rollout::new(CpuBackend, &both, 4).unwrap();
+    let batch = ParamBatch::from_rows(&vec![plan.theta.clone(); 4]).seeing(views.clone()).along(own.clone());
+    let found = rollout.evaluate(&batch, &request(&own[1]));
+    for ((view, places), e) in views.into_iter().zip(&own).zip(found) {
+        let right = rollout.evaluate(&ParamBatch::of(&plan.theta).seeing(vec![view]), &request(places)).remove(0);
+        assert!(e.failure.is_none() && e.curvature.as_ref().is_some_and(|c| c.gradient.len() == places.len()));
+        // A member without any has an empty matrix; where nobody asks there is none.
+        let curvature = Some(right.curvature.unwrap_or_default());
+        assert_eq!(e, Evaluation { curvature, ..right });
+    }
+}
+
+#[test]
 fn what_a_member_would_meet_after_its_recording_does_not_matter() {
     let plan = seen();
     let short = other(&plan);

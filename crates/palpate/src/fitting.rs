@@ -10,7 +10,7 @@ use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
 use crate::results::fit::{FitStatus, Verdict};
 use crate::scatter::Excess;
-use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, MOST_SENSITIVITIES, ParamBatch, Request, Share, Stop, Wanted};
+use palpate_engine::{FailureKind, MOST_SENSITIVITIES, Stop};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
 use palpate_io::InputError;
 use palpate_model::observation::ReadingKind;
@@ -20,6 +20,7 @@ use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
 
 mod answer;
+mod counted;
 mod free;
 mod lead;
 mod verdict;
@@ -32,6 +33,7 @@ const SURPRISING: f64 = 3.0;
 
 pub use answer::{Headline, Parts};
 pub(crate) use free::free_parameters;
+use counted::Counted;
 use verdict::verdict;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
@@ -414,40 +416,4 @@ pub(crate) fn demand(free: &[FreeParameter], scene: usize, optimizer: Optimizer,
     places.sort_unstable();
     let fixed = free.iter().all(|f| f.start.0 == f.start.1);
     Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places, compared: true }
-}
-
-/// Counts evaluations against an interrupt's budget.
-struct Counted {
-    inner: Box<dyn Evaluate>,
-    interrupt: Interrupt,
-    /// Only the first scene counts, so that a joint evaluation counts once.
-    first: bool,
-}
-
-impl Evaluate for Counted {
-    fn parameters(&self) -> usize {
-        self.inner.parameters()
-    }
-
-    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
-        if self.first {
-            self.interrupt.count();
-        }
-        self.inner.evaluate(theta, request)
-    }
-
-    fn has_products(&self) -> bool {
-        self.inner.has_products()
-    }
-
-    fn share(&self) -> Option<Share> {
-        self.inner.share()
-    }
-
-    fn product(&mut self, at: &ParamBatch, v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        if self.first {
-            self.interrupt.count();
-        }
-        self.inner.product(at, v, wanted)
-    }
 }

@@ -8,7 +8,7 @@ use crate::GpuBackend;
 use crate::device::Gpu;
 use crate::tests::scenes::{device, held};
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
-use palpate_model::effects::{Effect, find};
+use palpate_model::effects::{Effect, Unstated, find};
 use palpate_model::observation::{Camera, MarkerRest, Observation, Recording, View};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::build::build_plan;
@@ -117,6 +117,40 @@ fn members_with_recordings_and_parts_of_them_have_the_bits_that_they_have_alone(
             let right = rollout(&gpu, plan, 1).product(&ParamBatch::of(theta), &v, &Wanted::All);
             assert_eq!(found, right, "{}, {view:?}", scheme.name);
         }
+    }
+}
+
+#[test]
+fn members_with_sensitivities_of_their_own_have_the_bits_that_they_have_alone() {
+    let Some(gpu) = device(None) else { return };
+    let mut scene = scene(true);
+    scene.time.steps = 2;
+    // What changes along a direction is another array for each of the first three.
+    let kinds = ["stiffness-gradient", "density-gradient", "rest-shape", "uniform-force"];
+    scene.effects.extend(kinds.map(|kind| Effect::absent(find(kind).unwrap())));
+    let both = members(&scene).0;
+    let amplitude = |kind: &str| {
+        let (law, range) = both.layout.effects().find(|(law, _)| law.kind == kind).unwrap();
+        range.start + law.params.iter().position(|p| matches!(p.default, Unstated::Absent(_))).unwrap()
+    };
+    let [young, ratio] = [ParamKey::YoungsModulus, ParamKey::PoissonRatio].map(|k| both.layout.index(k));
+    let own = vec![
+        vec![young, amplitude("stiffness-gradient"), amplitude("depth-bias")],
+        vec![young, amplitude("density-gradient")],
+        vec![ratio, amplitude("rest-shape"), amplitude("time-offset")],
+        vec![amplitude("marker-offset") + 1, amplitude("uniform-force")],
+    ];
+    let views: Vec<View> = [0, 1, 0, 1].map(View::of).to_vec();
+    let request = |places: &[usize]| Request { gradient: Wanted::Nothing, sensitivities: places.to_vec() };
+    let mut rollout = rollout(&gpu, &both, 4);
+    let batch = ParamBatch::from_rows(&vec![both.theta.clone(); 4]).seeing(views.clone()).along(own.clone());
+    let found = rollout.evaluate(&batch, &request(&own[0]));
+    for ((view, places), e) in views.into_iter().zip(&own).zip(found) {
+        let right = rollout.evaluate(&ParamBatch::of(&both.theta).seeing(vec![view]), &request(places)).remove(0);
+        assert!(e.failure.is_none(), "{e:?}");
+        assert_eq!(e, right, "{places:?}");
+        let c = e.curvature.unwrap();
+        assert!((0..places.len()).all(|q| c.matrix[q * places.len() + q] > 0.0), "{places:?}: {c:?}");
     }
 }
 
