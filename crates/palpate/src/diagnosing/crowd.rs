@@ -36,6 +36,11 @@ pub(super) struct Counts {
 }
 
 impl Counts {
+    fn and(self, more: Counts) -> Counts {
+        let Counts { simulations, asks, batches } = more;
+        Counts { simulations: self.simulations + simulations, asks: self.asks + asks, batches: self.batches + batches }
+    }
+
     /// In words, if anything was counted.
     pub fn told(&self) -> Option<String> {
         let mean = self.simulations as f64 / self.batches.max(1) as f64;
@@ -43,20 +48,45 @@ impl Counts {
     }
 }
 
-/// Does a job for each of the hypotheses `lines` out of `all`: with physics of the batches of a device where they can have a plan in common, in
-/// which Newton's method is no tighter than `newton`; else with none given.
+/// Does a job for each of the hypotheses `lines` out of `all`, in order: with physics of the batches of a device where they can have a plan in
+/// common, in which Newton's method is no tighter than `newton`; else with none given.
 pub(super) fn side_by_side<T: Send>(
-    (base, backend, limits): (&[Experiment], Backend, &Limits),
+    of: (&[Experiment], Backend, &Limits),
     all: &[&[Change]],
     newton: f64,
     lines: &[usize],
     job: impl Fn(usize, Option<Physics>) -> T + Sync,
 ) -> (Vec<T>, Counts) {
-    let crowd = (backend == Backend::Gpu && lines.len() > 1).then(|| Crowd::new(base, backend, limits, all, newton));
-    match crowd {
-        Some(Ok(crowd)) => crowd.run(lines, |k, physics| job(k, Some(physics))),
-        _ => (lines.par_iter().map(|k| job(*k, None)).collect(), Counts::default()),
+    let group: Vec<usize> = (0..all.len()).collect();
+    within(of, all, newton, (&group, lines), &job)
+}
+
+/// The same of a group. Where its hypotheses have no plan in common, halves of it may: a device takes so many laws of a kind at once.
+fn within<T: Send>(
+    of: (&[Experiment], Backend, &Limits),
+    all: &[&[Change]],
+    newton: f64,
+    (group, lines): (&[usize], &[usize]),
+    job: &(impl Fn(usize, Option<Physics>) -> T + Sync),
+) -> (Vec<T>, Counts) {
+    let (base, backend, limits) = of;
+    let open: Vec<usize> = lines.iter().copied().filter(|k| group.contains(k)).collect();
+    if backend == Backend::Gpu && group.len() > 1 && !open.is_empty() {
+        let own: Vec<&[Change]> = group.iter().map(|k| all[*k]).collect();
+        let places: Vec<usize> = open.iter().filter_map(|k| group.iter().position(|g| g == k)).collect();
+        match Crowd::new(base, backend, limits, &own, newton) {
+            Ok(crowd) => return crowd.run(&places, |k, physics| job(group[k], Some(physics))),
+            Err(LabError::Failed(_)) => {
+                let (a, b) = group.split_at(group.len() / 2);
+                let [(mut done, first), (more, second)] = [a, b].map(|half| within(of, all, newton, (half, lines), job));
+                done.extend(more);
+                return (done, first.and(second));
+            }
+            // Each of them says by itself why there is no time.
+            Err(_) => {}
+        }
     }
+    (open.par_iter().map(|k| job(*k, None)).collect(), Counts::default())
 }
 
 /// Plans that hold several hypotheses.
