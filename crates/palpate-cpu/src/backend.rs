@@ -425,9 +425,7 @@ impl Backend for CpuBackend {
         let (m, a, b) = (&world.members[member], &now.members[member], &next.members[member]);
         m.instants(shared, k)
             .iter()
-            .map(|at| {
-                m.compare(shared, at.frame, displacement(at, a, b)).residuals(m.look(shared, at.frame))
-            })
+            .map(|at| m.compare(shared, at.frame, displacement(at, a, b)).residuals(m.look(shared, at.frame)))
             .collect()
     }
 }

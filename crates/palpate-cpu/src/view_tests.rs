@@ -49,7 +49,8 @@ fn members_with_recordings_and_parts_of_them_are_what_they_are_alone() {
         let mut plan = seen();
         plan.clock.scheme = scheme;
         let short = other(&plan);
-        let both = Plan { others: vec![Recording { observation: short.observation.clone(), steps: short.clock.steps }], ..plan.clone() };
+        let both =
+            Plan { others: vec![Recording { observation: short.observation.clone(), steps: short.clock.steps }], ..plan.clone() };
         let mut softer = plan.theta.clone();
         softer[0] *= 0.7;
         let (own, frames) = (&plan.theta, plan.observation.frames.len());

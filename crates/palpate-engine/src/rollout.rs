@@ -166,7 +166,16 @@ impl<B: Backend> Rollout<B> {
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
         let stages = plan.clock.stages();
-        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), held: Vec::new(), at: None, stop: Stop::default() })
+        Ok(Rollout {
+            backend,
+            world,
+            plan: plan.clone(),
+            stages,
+            members: members.max(1),
+            held: Vec::new(),
+            at: None,
+            stop: Stop::default(),
+        })
     }
 
     /// The same rollout, whose evaluations end at their next stage once `stop` says so; every member then fails as

@@ -282,12 +282,12 @@ impl<'a> Problem<'a> {
         while let Some(first) = open.first().copied().filter(|_| !live.is_empty()) {
             let request = self.request(first, want);
             let share = self.scenes[first].evaluate.share();
-            let of = |s: usize| self.scenes[s].evaluate.share().filter(|other| share.as_ref().is_some_and(|own| own.of == other.of));
+            let of =
+                |s: usize| self.scenes[s].evaluate.share().filter(|other| share.as_ref().is_some_and(|own| own.of == other.of));
             let joins = |s: &usize| *s == first || (of(*s).is_some() && self.request(*s, want) == request);
             let together: Vec<usize> = open.iter().copied().filter(joins).collect();
             open.retain(|s| !together.contains(s));
-            let rows: Vec<Vec<f64>> =
-                together.iter().flat_map(|s| live.iter().map(|b| self.theta(*s, &values[*b]))).collect();
+            let rows: Vec<Vec<f64>> = together.iter().flat_map(|s| live.iter().map(|b| self.theta(*s, &values[*b]))).collect();
             let views = together.iter().filter_map(|s| of(*s)).flat_map(|share| vec![share.view; live.len()]).collect();
             let batch = ParamBatch { views, ..ParamBatch::from_rows(&rows) };
             let mut found = self.scenes[first].evaluate.evaluate(&batch, &request).into_iter();

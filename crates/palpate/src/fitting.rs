@@ -32,8 +32,8 @@ const ARRIVED: f64 = 1.0;
 const SURPRISING: f64 = 3.0;
 
 pub use answer::{Headline, Parts};
-pub(crate) use free::free_parameters;
 use counted::Counted;
+pub(crate) use free::free_parameters;
 use verdict::verdict;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.

@@ -22,10 +22,7 @@ impl Depth {
     /// Hashes the points of every frame.
     pub fn new(plan: &Plan, observation: &Observation) -> Depth {
         let hash = |points: &[ObservedPoint]| PointHash::new(points, plan.body.length);
-        Depth {
-            lookup: BandLookup::of(&plan.body.band),
-            hashes: observation.frames.iter().map(|f| hash(&f.points)).collect(),
-        }
+        Depth { lookup: BandLookup::of(&plan.body.band), hashes: observation.frames.iter().map(|f| hash(&f.points)).collect() }
     }
 
     /// Places of a frame's points on the body at displacement `u` `[N]`, by rising point; of those that met it.

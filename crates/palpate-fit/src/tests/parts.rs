@@ -1,7 +1,7 @@
 //! Scenes that are parts of one evaluator are one batch, and their joint fit is what it is with an evaluator each, bit by bit.
 
 use super::models::{Batches, LeastSquares, parameter};
-use crate::{FitScene, FreeParameter, Hooks, Problem, Settings, Slot, Want, fit};
+use crate::{FitResult, FitScene, FreeParameter, Hooks, Problem, Settings, Slot, Want, fit};
 use palpate_engine::{Evaluate, Evaluation, Failure, ParamBatch, Part, Request, Wanted};
 use palpate_model::observation::View;
 use palpate_model::params::Transform;
@@ -54,15 +54,14 @@ fn problem(joint: bool) -> (Problem<'static>, Batches) {
         evaluators.push(Box::new(LeastSquares { batches: batches.clone(), ..decay(1) }));
         evaluators.push(Box::new(parts.next().unwrap()));
     } else {
-        evaluators.extend((0..3).map(|k| -> Box<dyn Evaluate> { Box::new(LeastSquares { batches: batches.clone(), ..decay(k) }) }));
+        evaluators
+            .extend((0..3).map(|k| -> Box<dyn Evaluate> { Box::new(LeastSquares { batches: batches.clone(), ..decay(k) }) }));
     }
     let scene = |(k, evaluate)| FitScene { name: format!("{k}"), fingerprint: format!("{k}"), base: vec![1.0, 1.0], evaluate };
     let scenes = evaluators.into_iter().enumerate().map(scene).collect();
     let slot = |scene, place| Slot { scene, place, factor: 1.0 };
-    let shared = FreeParameter {
-        slots: (0..3).map(|s| slot(s, 0)).collect(),
-        ..parameter(0, Transform::Log, (0.01, 100.0), (0.1, 10.0))
-    };
+    let shared =
+        FreeParameter { slots: (0..3).map(|s| slot(s, 0)).collect(), ..parameter(0, Transform::Log, (0.01, 100.0), (0.1, 10.0)) };
     let own = |s: usize| FreeParameter {
         path: format!("amplitude {s}"),
         slots: vec![slot(s, 1)],
@@ -79,11 +78,12 @@ fn parts_of_one_evaluator_are_one_batch_and_change_no_bit() {
             let settings = Settings { starts: 3, iterations: 12, ..Settings::new(optimizer) };
             let result = fit(&mut problem, &settings, Hooks::default()).expect("a start can be computed");
             let batches = batches.lock().unwrap().clone();
-            (result, batches)
+            (FitResult { seconds: 0.0, ..result }, batches)
         });
         assert_eq!(format!("{apart:?}"), format!("{joint:?}"), "{optimizer:?}");
         // A round asks three evaluators, or two. Where nobody's first scenes can be computed the others are not asked.
-        let (before, after) = (all.iter().sum::<usize>() as f64 / all.len() as f64, fewer.iter().sum::<usize>() as f64 / fewer.len() as f64);
+        let (before, after) =
+            (all.iter().sum::<usize>() as f64 / all.len() as f64, fewer.iter().sum::<usize>() as f64 / fewer.len() as f64);
         println!("{optimizer:?}: {} batches of {before:.2} become {} of {after:.2}", all.len(), fewer.len());
         assert!(10 * fewer.len() <= 7 * all.len() && after > 1.4 * before);
     }

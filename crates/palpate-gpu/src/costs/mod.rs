@@ -355,7 +355,8 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
     let body = &*plan.body;
     let recordings: Vec<_> = (0..plan.recordings()).map(|r| plan.recording(r).observation).collect();
     // Until a batch is there, all members are compared with the recording that has most points.
-    let largest = (0..recordings.len()).max_by_key(|r| (recordings[*r].readings(ReadingKind::Depth), usize::MAX - r)).unwrap_or(0);
+    let largest =
+        (0..recordings.len()).max_by_key(|r| (recordings[*r].readings(ReadingKind::Depth), usize::MAX - r)).unwrap_or(0);
     let takes = readings::distinct(plan, vec![(largest, Sensors::new(&plan.layout, &plan.theta)); members.max(1)]);
     let shots = Shots::of(plan, &takes);
     let band = BandTables::new(plan);
