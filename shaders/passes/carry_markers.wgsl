@@ -12,17 +12,18 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         return;
     }
     let mark = marks[shot.marker_start + index];
-    let site = sites[mark.site];
-    let first = stencil_rows[mark.site];
+    let number = shot.first_site + mark.site;
+    let site = sites[number];
+    let first = stencil_rows[number];
     let origin = seen_at(s.slot, stencil_entries[first].node);
     var moved = vec3(0.0);
     var h = site.excess;
-    for (var k = first; k < stencil_rows[mark.site + 1u]; k++) {
+    for (var k = first; k < stencil_rows[number + 1u]; k++) {
         let d = between(origin, seen_at(s.slot, stencil_entries[k].node));
         moved += stencil_entries[k].weight * d;
         h += outer(d, stencil_gradients[k].xyz);
     }
-    let stalk = stalk_of(s.look.member, mark.site);
+    let stalk = stalk_of(s.look.member, shot.first_site, mark.site);
     let excess = excess_of(rotation_of(h));
     var c: Carried;
     c.turn = identity3() + excess;
@@ -30,9 +31,10 @@ fn carry_markers(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let far = (seen[origin].xyz - mark.goal) + (seen[rest_part() + origin].xyz - mark.goal_rest);
     // The measured place is counted from the stated one: the offset itself comes on top of its turning.
     let r = far + (moved + excess * stalk + (stalk - site.stalk));
-    carried[s.slot * sight.markers + index] = pulled(c, r, s.look.member, mark.site);
+    carried[s.slot * sight.markers + index] = pulled(c, r, s.look, shot.first_site, mark.site);
     let row = s.slot * sight.rows + shot.point_count + 3u * index;
-    rows[row] = vec2(r.x, site.weight);
-    rows[row + 1u] = vec2(r.y, site.weight);
-    rows[row + 2u] = vec2(r.z, site.weight);
+    let weight = site_weight(s.look, site);
+    rows[row] = vec2(r.x, weight);
+    rows[row + 1u] = vec2(r.y, weight);
+    rows[row + 2u] = vec2(r.z, weight);
 }

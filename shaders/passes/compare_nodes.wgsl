@@ -17,7 +17,7 @@ fn compare_nodes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let k = 2u * (shot.node_start + index);
     let at = seen_at(s.slot, index);
     let known = measured[k].w;
-    let weight = sight.displacement * known;
+    let weight = s.look.weights.w * known;
     let r = known * ((seen[at].xyz - measured[k].xyz) + (seen[rest_part() + at].xyz - measured[k + 1u].xyz));
     let row = displacement_row(s.slot, shot, index);
     rows[row] = vec2(r.x, weight);

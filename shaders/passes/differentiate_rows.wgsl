@@ -10,20 +10,21 @@ var<shots> reading_slopes: array<vec4<f32>>;
 // [slots][Q][most rows]
 var<storage, read_write> slopes: array<f32>;
 
-fn marker_change(base: u32, member: u32, q: u32, mark: Mark, carrier: Carried) -> vec3<f32> {
+fn marker_change(base: u32, member: u32, column: u32, first_site: u32, mark: Mark, carrier: Carried) -> vec3<f32> {
     var c = carrier;
     var moved = vec3(0.0);
     var df = mat3x3(vec3(0.0), vec3(0.0), vec3(0.0));
-    for (var k = stencil_rows[mark.site]; k < stencil_rows[mark.site + 1u]; k++) {
+    let number = first_site + mark.site;
+    for (var k = stencil_rows[number]; k < stencil_rows[number + 1u]; k++) {
         let d = changes[base + stencil_entries[k].node].xyz;
         moved += stencil_entries[k].weight * d;
         df += outer(d, stencil_gradients[k].xyz);
     }
     let spin = c.pair * axial(transpose(c.turn) * df);
-    moved += c.turn * cross(spin, stalk_of(member, mark.site));
+    moved += c.turn * cross(spin, stalk_of(member, first_site, mark.site));
     if sight.offsets > 0u {
         for (var axis = 0u; axis < 3u; axis++) {
-            moved += offset_along(q, mark.site, axis) * c.turn[axis];
+            moved += offset_along(column, mark.site, axis) * c.turn[axis];
         }
     }
     return moved;
@@ -41,6 +42,7 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
     if !s.runs || items == 0u || q >= call.mode {
         return;
     }
+    let column = s.look.member * call.mode + q;
     let base = (s.slot * call.mode + q) * sight.extended;
     let out = (s.slot * call.mode + q) * sight.rows;
     if item < shot.point_count {
@@ -52,7 +54,7 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
                 change += shape_at(f.xi, i) * changes[base + band_cells[f.cell].nodes[i]].xyz;
             }
             for (var k = 0u; k < sight.readings; k++) {
-                change -= reading_along(q, k) * reading_slopes[(shot.point_start + item) * sight.readings + k].xyz;
+                change -= reading_along(column, k) * reading_slopes[(shot.point_start + item) * sight.readings + k].xyz;
             }
             d = -dot(f.gradient, change);
         }
@@ -62,7 +64,8 @@ fn differentiate_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_work
     var change = vec3(0.0);
     let vector = item - shot.point_count;
     if vector < shot.marker_count {
-        change = marker_change(base, s.look.member, q, marks[shot.marker_start + vector], carried[s.slot * sight.markers + vector]);
+        let mark = marks[shot.marker_start + vector];
+        change = marker_change(base, s.look.member, column, shot.first_site, mark, carried[s.slot * sight.markers + vector]);
     } else {
         change = changes[base + vector - shot.marker_count].xyz;
     }

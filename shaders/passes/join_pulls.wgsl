@@ -10,10 +10,10 @@ var<storage, read_write> pulls: array<vec4<f32>>;
 var<body> fold_rows: array<u32>;
 var<body> fold_columns: array<u32>;
 var<body> fold_values: array<f32>;
-// Entries of the sites' lists at every node, and the sites that they belong to.
+// Recording by recording: entries of the sites' lists at every node, and the sites that they belong to.
 var<body> node_site_rows: array<u32>;
 var<body> node_site_list: array<vec2<u32>>;
-// Markers of a frame by site: [F][sites + 1].
+// Markers of a frame by site: [F][most sites + 1].
 var<body> mark_rows: array<u32>;
 
 @compute @workgroup_size(64)
@@ -34,9 +34,10 @@ fn join_pulls(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
     }
     if shot.marker_count != 0u {
-        for (var k = node_site_rows[node]; k < node_site_rows[node + 1u]; k++) {
+        let row = shot.node_rows + node;
+        for (var k = node_site_rows[row]; k < node_site_rows[row + 1u]; k++) {
             let entry = node_site_list[k];
-            let of_site = s.look.frame * (sight.sites + 1u) + entry.x;
+            let of_site = shot.mark_start + entry.x;
             let w = stencil_entries[entry.y].weight;
             let slope = stencil_gradients[entry.y].xyz;
             for (var m = mark_rows[of_site]; m < mark_rows[of_site + 1u]; m++) {

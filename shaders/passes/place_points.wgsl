@@ -33,13 +33,13 @@ fn place_points(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             if sight.readings > 0u {
                 line = recorded_lines[shot.point_start + index].xyz;
             }
-            p = side_of(e, f.cell, y, p, line);
+            p = side_of(e, f.cell, y, p, line, shot.reach);
         }
         if p.holds {
             f.xi = p.xi;
             f.phi = p.phi;
             f.gradient = p.gradient;
-            row = vec2(p.phi, sight.depth * depth_weight(p.phi, sight.band));
+            row = vec2(p.phi, s.look.weights.x * depth_weight(p.phi, sight.band));
         } else {
             f.cell = NONE;
         }

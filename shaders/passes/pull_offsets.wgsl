@@ -4,7 +4,7 @@
 
 // 3 · marker + axis of every such parameter, and its place in θ.
 var<body> offset_places: array<vec2<u32>>;
-// Markers of a frame by site: [F][sites + 1].
+// Markers of a frame by site: [F][most sites + 1].
 var<body> mark_rows: array<u32>;
 // [B][P]
 var<storage, read_write> gradient: array<f32>;
@@ -17,8 +17,9 @@ fn pull_offsets(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         return;
     }
     let own = offset_places[s.group];
-    let first = s.look.frame * (sight.sites + 1u) + own.x / 3u;
+    let shot = shots[s.look.shot];
     var sum = 0.0;
+    let first = shot.mark_start + own.x / 3u;
     for (var m = mark_rows[first] + local; m < mark_rows[first + 1u]; m += 64u) {
         var c = carried[s.slot * sight.markers + m];
         sum += dot(c.pull.xyz, c.turn[own.x % 3u]);

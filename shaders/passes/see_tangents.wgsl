@@ -27,7 +27,7 @@ fn see_tangents(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     let f = s.look.value;
     var d = f.x * tangent_now[a].xyz + f.y * tangent_now[plane + a].xyz
         + (f.z * tangent_next[a].xyz + f.w * tangent_next[plane + a].xyz);
-    let later = later_start(q);
+    let later = later_start(s.look.member * count + q);
     if later != 0.0 {
         let rate = s.look.rate;
         let moved = (next[a].xyz - now[a].xyz) + (next[plane + a].xyz - now[plane + a].xyz);

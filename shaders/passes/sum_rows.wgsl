@@ -21,9 +21,9 @@ fn sum_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
             sum += vec4(0.5 * row.y * r * r, select(0.0, 1.0, row.y > 0.0), r * r, 0.0);
         } else if row.y < 0.0 {
             // A point without a match costs what one at the edge of the band costs.
-            sum.x += sight.depth * depth_unmatched(sight.band);
+            sum.x += s.look.weights.x * depth_unmatched(sight.band);
         } else {
-            sum += vec4(sight.depth * depth_cost(r, sight.band), 1.0, r * r, r);
+            sum += vec4(s.look.weights.x * depth_cost(r, sight.band), 1.0, r * r, r);
         }
     }
     let total = tree(local, sum);

@@ -28,6 +28,6 @@ fn weigh_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     if vector < shot.marker_count {
         let mark = marks[shot.marker_start + vector];
         let at = s.slot * sight.markers + vector;
-        carried[at] = pulled(carried[at], vec3(slopes[row], slopes[row + 1u], slopes[row + 2u]), s.look.member, mark.site);
+        carried[at] = pulled(carried[at], vec3(slopes[row], slopes[row + 1u], slopes[row + 2u]), s.look, shot.first_site, mark.site);
     }
 }

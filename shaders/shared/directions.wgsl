@@ -4,7 +4,7 @@
 // In a call's `mode`: number of directions, plus DIRECTION times which of them.
 const DIRECTION = 65536u;
 
-// [Q][entries]: components of the directions by what the measurement depends on beside the states: the start on the recording's clock;
+// [B][Q][entries]: components of the directions by what the measurement depends on beside the states: the start on the recording's clock;
 // where offsets of markers are parameters, 3 · marker + axis of them; numbers that move readings.
 var<storage, read> own_directions: array<f32>;
 
@@ -12,18 +12,19 @@ fn of_offsets() -> u32 {
     return select(0u, 3u * sight.sites, sight.offsets > 0u);
 }
 
-fn own_entry(q: u32, entry: u32) -> f32 {
-    return own_directions[q * (1u + of_offsets() + sight.readings) + entry];
+// `column`: directions times the member, plus which of them.
+fn own_entry(column: u32, entry: u32) -> f32 {
+    return own_directions[column * (1u + of_offsets() + sight.readings) + entry];
 }
 
-fn later_start(q: u32) -> f32 {
-    return own_entry(q, 0u);
+fn later_start(column: u32) -> f32 {
+    return own_entry(column, 0u);
 }
 
-fn offset_along(q: u32, site: u32, axis: u32) -> f32 {
-    return own_entry(q, 1u + 3u * site + axis);
+fn offset_along(column: u32, site: u32, axis: u32) -> f32 {
+    return own_entry(column, 1u + 3u * site + axis);
 }
 
-fn reading_along(q: u32, number: u32) -> f32 {
-    return own_entry(q, 1u + of_offsets() + number);
+fn reading_along(column: u32, number: u32) -> f32 {
+    return own_entry(column, 1u + of_offsets() + number);
 }

@@ -74,12 +74,12 @@ fn continue_to(e: Hexahedron, y: vec3<f32>, nearby: vec3<f32>) -> Continued {
 }
 
 // The side of the point at y that lies nearest to a hidden one, at p: that one where a visible one is near; else the front, which holds
-// nothing where it lies beyond the band or cannot be told. `line` is the recorded line of sight.
-fn side_of(e: Hexahedron, cell: u32, y: vec3<f32>, p: Pulled, line: vec3<f32>) -> Pulled {
+// nothing where it lies beyond the band or cannot be told. `line` is the recorded line of sight, `reach` how far noise makes it look.
+fn side_of(e: Hexahedron, cell: u32, y: vec3<f32>, p: Pulled, line: vec3<f32>, reach: f32) -> Pulled {
     var front = p;
     front.holds = false;
     var xi = p.xi;
-    var t = 1.5 * abs(p.phi) + sight.reach;
+    var t = 1.5 * abs(p.phi) + reach;
     var inside = t;
     var beyond = 0.0;
     var marches = true;

@@ -18,7 +18,7 @@ struct Sight { // mirrored
     markers: u32,
     // A cell's candidates are dealt out to so many groups of eight lanes.
     stripes: u32,
-    // Marker sites.
+    // Most marker sites and most frames of a recording.
     sites: u32,
     frames: u32,
     // Parameters P.
@@ -31,16 +31,10 @@ struct Sight { // mirrored
     h: f32,
     // Half width of the cost's band [m].
     band: f32,
-    // Standard deviations that a hidden point looks towards the camera [m].
-    reach: f32,
     // Cosine beyond which a side is turned away.
     turned_away: f32,
-    // 1/(n σ²) of depth points and displacements [1/m²].
-    depth: f32,
-    displacement: f32,
     // Numbers that move depth readings.
     readings: u32,
-    pad: u32,
 }
 
 struct Look { // mirrored
@@ -52,6 +46,8 @@ struct Look { // mirrored
     // Factors of u₀, v₀, u₁, v₁, and their derivatives by time.
     value: vec4<f32>,
     rate: vec4<f32>,
+    // 1/(n σ²) of depth points, markers, tracked points and displacements [1/m²].
+    weights: vec4<f32>,
 }
 
 struct Shot { // mirrored
@@ -71,6 +67,12 @@ struct Shot { // mirrored
     // Frame's origin minus the body's [m]: a float, and what it leaves.
     shift: vec4<f32>,
     shift_rest: vec4<f32>,
+    // First entries of `mark_rows`, of its recording's sites, and of the recording's rows of sites at nodes.
+    mark_start: u32,
+    first_site: u32,
+    node_rows: u32,
+    // How far a hidden point looks towards the camera beside its distance [m].
+    reach: f32,
 }
 
 var<uniform> sight: Sight;

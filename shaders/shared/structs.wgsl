@@ -168,6 +168,8 @@ const BAD_PARAMETER = 6u;
 const NO_CLAMP = 7u;
 // Cut off before it had all the iterations that it is allowed.
 const HURRIED = 8u;
+// Well, but the recording that it is compared with takes no more steps.
+const RESTING = 9u;
 
 struct Health { // mirrored
     code: u32,

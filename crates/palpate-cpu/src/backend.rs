@@ -1,6 +1,6 @@
 //! [`Backend`] on the CPU: every pass over all members of the batch, side by side.
 
-use crate::costs::{Along, Instant, blend, instants};
+use crate::costs::{Along, Instant, blend};
 use crate::linear::vector::{self, Nodes};
 use crate::newton;
 use crate::simulate;
@@ -123,25 +123,33 @@ impl Backend for CpuBackend {
 
     fn new_tangent(&self, world: &World, directions: &[Direction]) -> Tangent {
         let n = world.shared.plan.body.nodes.len();
-        let blank = |m: &Member| MemberTangent {
-            rates: Arc::new(simulate::rates(&world.shared, m, directions)),
-            du: vec![zeros(n); directions.len()],
-            dv: vec![zeros(n); directions.len()],
+        let blank = |(b, m): (usize, &Member)| {
+            let own: Vec<Direction> = directions.iter().take(m.own.unwrap_or(directions.len())).map(|d| d.of(b)).collect();
+            MemberTangent {
+                rates: Arc::new(simulate::rates(&world.shared, m, &own)),
+                du: vec![zeros(n); own.len()],
+                dv: vec![zeros(n); own.len()],
+                directions: Arc::new(own),
+            }
         };
-        Tangent { directions: directions.to_vec(), members: world.members.iter().map(blank).collect() }
+        Tangent { members: world.members.iter().enumerate().map(blank).collect() }
     }
 
     fn new_tally(&self, world: &World, request: &Request) -> Tally {
-        let q = request.sensitivities.len();
-        let evaluation = Evaluation {
-            gradient: vec![0.0; world.shared.plan.layout.len()],
-            curvature: (q > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
-            residuals: world.shared.plan.observation.residuals(),
-            ..Evaluation::default()
+        let requested = request.sensitivities.len();
+        let evaluation = |m: &Member| {
+            let q = m.own.unwrap_or(requested);
+            Evaluation {
+                gradient: vec![0.0; world.shared.plan.layout.len()],
+                curvature: (requested > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
+                residuals: m.viewed.residuals(),
+                ..Evaluation::default()
+            }
         };
         let plan = &world.shared.plan;
         let gradient = request.gradient.any().then(|| Box::new(Gradient::new(plan, request.gradient.mask(plan.layout.len()))));
-        Tally { members: vec![MemberTally { evaluation, gradient, compared: Vec::new() }; world.members.len()] }
+        let blank = |m: &Member| MemberTally { evaluation: evaluation(m), gradient: gradient.clone(), compared: Vec::new() };
+        Tally { members: world.members.iter().map(blank).collect() }
     }
 
     fn start(&self, world: &mut World, first: &mut State, tally: &mut Tally) {
@@ -157,6 +165,7 @@ impl Backend for CpuBackend {
         let shared = &world.shared;
         (&mut world.members, &mut next.members, &mut tally.members).into_par_iter().enumerate().for_each(|(b, (m, next, t))| {
             if !t.failed()
+                && m.takes(stage)
                 && let Err(reason) = simulate::step(shared, m, stage, &of_member(past, b), next)
             {
                 t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
@@ -170,10 +179,10 @@ impl Backend for CpuBackend {
             if t.failed() {
                 return;
             }
-            for at in instants(&shared.plan, m.first_stamp(), k) {
-                let compared = shared.costs.compare(m.look(shared, at.frame), displacement(&at, a, b));
+            for at in m.instants(shared, k) {
+                let compared = m.compare(shared, at.frame, displacement(&at, a, b));
                 let (e, sums) = (&mut t.evaluation, compared.sums);
-                e.cost += shared.scale * sums.cost;
+                e.cost += m.scale * sums.cost;
                 e.matched += sums.matched;
                 e.sum_squares += sums.squares;
                 e.sum_signed += sums.signed;
@@ -200,10 +209,10 @@ impl Backend for CpuBackend {
                     return;
                 }
                 let shifts = shifts(&shared.plan, m);
-                for at in instants(&shared.plan, m.first_stamp(), k) {
+                for at in m.instants(shared, k) {
                     let MemberTally { evaluation, compared, .. } = &mut *t;
                     let found = MemberTally::find(compared, at.frame);
-                    let g = found.gradient(m.look(shared, at.frame), shared.scale, &mut evaluation.gradient);
+                    let g = found.gradient(m.look(shared, at.frame), m.scale, &mut evaluation.gradient);
                     let later = vector::dot(&g, &velocity(&at, [a, b]));
                     shifts.iter().for_each(|p| evaluation.gradient[*p] -= later);
                     pull_back(&at, &g, to_now, to_next);
@@ -228,7 +237,7 @@ impl Backend for CpuBackend {
         }
         (&mut world.members, &next.members, &adj.members, &mut to, &mut tally.members).into_par_iter().enumerate().for_each(
             |(b, (m, next, from, to, t))| {
-                if t.failed() {
+                if t.failed() || !m.takes(stage) {
                     return;
                 }
                 let gradient = t.gradient.as_mut().expect("an adjoint goes with a gradient");
@@ -289,6 +298,7 @@ impl Backend for CpuBackend {
             |(b, (m, next, d_next, t))| {
                 let before: Vec<&MemberTangent> = tangent_past.iter().map(|d| &d.members[b]).collect();
                 if !t.failed()
+                    && m.takes(stage)
                     && let Err(reason) = simulate::step_tangent(shared, m, stage, &of_member(past, b), next, &before, d_next)
                 {
                     t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
@@ -308,21 +318,20 @@ impl Backend for CpuBackend {
         tally: &mut Tally,
     ) {
         let shared = &world.shared;
-        let directions = &tangent.directions[..];
         (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members, &mut tally.members)
             .into_par_iter()
             .for_each(|(m, a, b, d0, d1, t)| {
                 if t.failed() {
                     return;
                 }
-                let shifts = shifts(&shared.plan, m);
-                for at in instants(&shared.plan, m.first_stamp(), k) {
+                let (shifts, directions) = (shifts(&shared.plan, m), &d0.directions[..]);
+                for at in m.instants(shared, k) {
                     let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
                     let MemberTally { evaluation, compared, .. } = &mut *t;
                     let c = evaluation.curvature.as_mut().expect("tangents go with a curvature");
                     let along = Along { directions, du: &du };
                     let found = MemberTally::find(compared, at.frame);
-                    found.gauss_newton(m.look(shared, at.frame), along, shared.scale, &mut c.gradient, &mut c.matrix);
+                    found.gauss_newton(m.look(shared, at.frame), along, m.scale, &mut c.gradient, &mut c.matrix);
                 }
             });
     }
@@ -339,20 +348,20 @@ impl Backend for CpuBackend {
         adj_now: &mut Adjoint,
         tally: &mut Tally,
     ) {
-        let (shared, directions) = (&world.shared, &tangent.directions[..]);
+        let shared = &world.shared;
         let states = (&world.members, &now.members, &next.members, &tangent.members, &tangent_next.members);
         let added = (&mut adj.members, &mut adj_now.members, &mut tally.members);
         (states, added).into_par_iter().for_each(|((m, a, b, d0, d1), (to_next, to_now, t))| {
             if t.failed() {
                 return;
             }
-            let shifts = shifts(&shared.plan, m);
-            for at in instants(&shared.plan, m.first_stamp(), k) {
+            let (shifts, directions) = (shifts(&shared.plan, m), &d0.directions[..]);
+            for at in m.instants(shared, k) {
                 let du = derivatives(&at, &shifts, directions, [a, b], [d0, d1]);
                 let MemberTally { evaluation, compared, .. } = &mut *t;
                 let found = MemberTally::find(compared, at.frame);
                 let along = Along { directions, du: &du };
-                let g = found.product(m.look(shared, at.frame), along, shared.scale, &mut evaluation.gradient);
+                let g = found.product(m.look(shared, at.frame), along, m.scale, &mut evaluation.gradient);
                 let later = vector::dot(&g, &velocity(&at, [a, b]));
                 shifts.iter().for_each(|p| evaluation.gradient[*p] -= later);
                 pull_back(&at, &g, to_now, to_next);
@@ -371,9 +380,9 @@ impl Backend for CpuBackend {
     ) -> Option<Rows> {
         let shared = &world.shared;
         let (m, t) = (&world.members[member], &tally.members[member]);
-        let (directions, shifts) = (&tangents[0].directions[..], shifts(&shared.plan, m));
+        let (directions, shifts) = (&tangents[0].members[member].directions[..], shifts(&shared.plan, m));
         let mut out = Rows::default();
-        for at in instants(&shared.plan, m.first_stamp(), k) {
+        for at in m.instants(shared, k) {
             let s = states.map(|s| &s.members[member]);
             let du = derivatives(&at, &shifts, directions, s, tangents.map(|t| &t.members[member]));
             let along = Along { directions, du: &du };
@@ -414,12 +423,9 @@ impl Backend for CpuBackend {
     fn residuals(&self, world: &World, k: usize, now: &State, next: &State, member: usize) -> Vec<FrameResiduals> {
         let shared = &world.shared;
         let (m, a, b) = (&world.members[member], &now.members[member], &next.members[member]);
-        instants(&shared.plan, m.first_stamp(), k)
+        m.instants(shared, k)
             .iter()
-            .map(|at| {
-                let look = m.look(shared, at.frame);
-                shared.costs.compare(look, displacement(at, a, b)).residuals(look)
-            })
+            .map(|at| m.compare(shared, at.frame, displacement(at, a, b)).residuals(m.look(shared, at.frame)))
             .collect()
     }
 }

@@ -132,7 +132,8 @@ fn derivatives_of_a_crushed_step_agree() {
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
     let rates = Arc::new(simulate::rates(shared, member, &Direction::parameters(&directions)));
     let blanks = || vec![zeros(n); directions.len()];
-    let tangents = || MemberTangent { rates: rates.clone(), du: blanks(), dv: blanks() };
+    let along = Arc::new(Direction::parameters(&directions));
+    let tangents = || MemberTangent { directions: along.clone(), rates: rates.clone(), du: blanks(), dv: blanks() };
     let mut moved = tangents();
     simulate::step_tangent(shared, member, &stages[last], &[&now], &next, &[&tangents()], &mut moved).unwrap();
     let wave = |scale: f64| {

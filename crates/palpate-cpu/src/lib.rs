@@ -19,6 +19,8 @@ mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;
 pub mod terms;
+#[cfg(test)]
+mod view_tests;
 mod world;
 
 pub use backend::CpuBackend;

@@ -59,7 +59,8 @@ impl<'a> Sizes<'a> {
         let pattern = Pattern::new(body);
         let blocks = pattern.blocks.columns.len();
         let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
-        let points: usize = plan.observation.frames.iter().map(|f| f.points.len()).sum();
+        let points_of = |r: usize| plan.recording(r).observation.frames.iter().map(|f| f.points.len()).sum::<usize>();
+        let points: usize = (0..plan.recordings()).map(points_of).sum();
         let tables = size_of_val(body.cells())
             + band.cells.len() * size_of::<BandCell>()
             + band.nodes.len() * size_of::<DVec3>()

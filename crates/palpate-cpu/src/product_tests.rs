@@ -22,7 +22,7 @@ fn a_tangent_and_an_adjoint_multiply_with_the_gauss_newton_matrix() {
         // One number alone, then all of them.
         let chosen = if round == 0 { &known[..1] } else { &known[..] };
         chosen.iter().for_each(|a| v[*a] = noise.next() / size[*a]);
-        let found = rollout.product(&plan.theta, &v, &Wanted::All).unwrap();
+        let found = rollout.product(&ParamBatch::of(&plan.theta), &v, &Wanted::All).unwrap();
         let right: Vec<f64> = (0..p).map(|a| (0..p).map(|b| matrix[a * p + b] * v[b]).sum()).collect();
         let length = known.iter().map(|a| (right[*a] / size[*a]).powi(2)).sum::<f64>().sqrt();
         for a in &known {

@@ -1,6 +1,6 @@
 //! What the backend holds: a world of members, their states, adjoints, tangents and tallies.
 
-use crate::costs::{Compared, Costs, Look};
+use crate::costs::{Compared, Costs, Instant, Look};
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
@@ -13,8 +13,10 @@ use palpate_engine::{Direction, Evaluation, Failure, ParamBatch};
 use palpate_model::cutcells::elements::{Classes, Elements};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::mechanics::plane::{PlaneNow, planes};
+use palpate_model::observation::Viewed;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
+use palpate_model::plan::scheme::Stage;
 use palpate_model::space::pattern::{Pattern, Places};
 use std::sync::Arc;
 
@@ -35,9 +37,8 @@ pub struct Shared {
     /// Element matrices at ν = 0, where the material has a viscosity.
     pub(crate) strains: Option<Elements>,
     pub(crate) solvers: Solvers,
-    pub(crate) costs: Costs,
-    /// 1/n: one over the number of scalar residuals of the whole recording.
-    pub(crate) scale: f64,
+    /// Of every recording.
+    pub(crate) costs: Vec<Costs>,
 }
 
 /// One member's parameters and scratch.
@@ -48,6 +49,12 @@ pub struct Member {
     pub(crate) planes: Vec<PlaneNow>,
     pub(crate) effects: Vec<Acting>,
     pub(crate) sensors: Sensors,
+    /// What it is compared with.
+    pub(crate) viewed: Viewed,
+    /// Number of its own sensitivities; `None` = as many as are requested.
+    pub(crate) own: Option<usize>,
+    /// 1/n: one over the number of scalar residuals that count.
+    pub(crate) scale: f64,
     pub(crate) altered: Altered,
     /// Mass matrix by block [kg], of a body of tetrahedra.
     pub(crate) masses: Vec<f64>,
@@ -65,7 +72,22 @@ impl Member {
 
     /// A frame as this member understands it.
     pub(crate) fn look<'a>(&'a self, shared: &'a Shared, frame: usize) -> Look<'a> {
-        Look { plan: &shared.plan, sensors: &self.sensors, frame }
+        Look { plan: &shared.plan, observation: self.viewed.observation(), sensors: &self.sensors, frame }
+    }
+
+    /// Frames of step k that count.
+    pub(crate) fn instants(&self, shared: &Shared, k: usize) -> Vec<Instant> {
+        self.viewed.instants(shared.plan.clock.step, self.first_stamp(), k)
+    }
+
+    /// Compares a frame with displacement `u` `[N]`.
+    pub(crate) fn compare(&self, shared: &Shared, frame: usize, u: Nodes) -> Compared {
+        shared.costs[self.viewed.view.recording].compare(self.look(shared, frame), u)
+    }
+
+    /// True where a stage is one of those that its recording takes, which follow from the start on.
+    pub(crate) fn takes(&self, stage: &Stage) -> bool {
+        stage.step < self.viewed.recording.steps
     }
 }
 
@@ -81,11 +103,9 @@ impl World {
         let places = Places::new(&plan, &pattern);
         let classes = Classes::new(&plan);
         let strains = plan.layout.is_viscous().then(|| Elements::new(&plan, &classes, 0.0));
-        let costs = Costs::new(&plan);
-        let residuals = plan.observation.residuals();
-        let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
+        let costs = (0..plan.recordings()).map(|r| Costs::new(&plan, &plan.recording(r).observation)).collect();
         let solvers = Solvers::new(plan.solver.linear);
-        World { shared: Shared { plan, pattern, places, classes, strains, solvers, costs, scale }, members: Vec::new() }
+        World { shared: Shared { plan, pattern, places, classes, strains, solvers, costs }, members: Vec::new() }
     }
 
     pub(crate) fn set_params(&mut self, theta: &ParamBatch) {
@@ -106,12 +126,16 @@ impl World {
             let effects = acting(&shared.plan, physics);
             let altered = Altered::new(&shared.plan, &coefficients, &elements);
             let masses = mass_matrix(&shared.plan, &shared.pattern, &shared.places, &coefficients);
+            let viewed = shared.plan.viewed(&theta.view(b));
             self.members.push(Member {
                 theta: row.to_vec(),
                 coefficients,
                 planes,
                 effects,
                 sensors: Sensors::new(&shared.plan.layout, row),
+                scale: viewed.scale(),
+                viewed,
+                own: theta.own.get(b).map(Vec::len),
                 altered,
                 masses,
                 elements,
@@ -144,13 +168,14 @@ pub struct Adjoint {
 /// du/dθ_q and dv/dθ_q of every member.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    pub(crate) directions: Vec<Direction>,
     pub(crate) members: Vec<MemberTangent>,
 }
 
 /// Tangents of one member, one vector per direction.
 #[derive(Clone, Debug)]
 pub struct MemberTangent {
+    /// The directions, as they are for this member.
+    pub(crate) directions: Arc<Vec<Direction>>,
     /// Derivatives of the coefficients along the directions.
     pub(crate) rates: Arc<Vec<Coefficients>>,
     pub(crate) du: Vec<Nodes>,

@@ -19,7 +19,7 @@ pub struct BuildError {
     pub broken: bool,
 }
 
-/// Computes simulations of B members that share a [`Plan`] and differ in θ. State stays where the backend keeps it;
+/// Computes simulations of B members that share a [`Plan`] and differ in θ and in the recordings that they are compared with. State stays where the backend keeps it;
 /// nothing between [`Backend::set_params`] and [`Backend::read`] needs to wait for a result.
 ///
 /// Shapes: B members, N simulation nodes, P parameters, Q tangent directions.
@@ -39,7 +39,8 @@ pub trait Backend: Send {
     fn name(&self) -> String;
     /// Prepares a plan for up to `members` simulations at once.
     fn build(&self, plan: &Plan, members: usize) -> Result<Self::World, BuildError>;
-    /// Sets θ `[B, P]`; B may be anything up to the `members` of [`Backend::build`].
+    /// Sets θ `[B, P]` and what each member is compared with; B may be anything up to the `members` of [`Backend::build`]. A member whose
+    /// recording takes fewer steps than the plan may be left where it is after them: nothing asks for its later states.
     fn set_params(&self, world: &mut Self::World, theta: &ParamBatch);
     /// Memory for a state of the current batch.
     fn new_state(&self, world: &Self::World) -> Self::State;

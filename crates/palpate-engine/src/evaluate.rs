@@ -1,14 +1,21 @@
 //! What an optimiser sees of physics: parameters in, cost and derivatives out.
 
 use crate::failure::{Failure, FailureKind};
+use crate::part::Share;
+use palpate_model::observation::View;
 
-/// Parameter vectors of a batch, shape `[B, P]`, SI units.
+/// Parameter vectors of a batch, shape `[B, P]`, SI units, and what each member is compared with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamBatch {
     /// Number of parameters P.
     pub parameters: usize,
     /// Values, member by member.
     pub values: Vec<f64>,
+    /// What each member is compared with `[B]`; empty where all are with the whole of the plan's own recording.
+    pub views: Vec<View>,
+    /// Places in θ that each member wants sensitivities for, in place of those that are requested and at most as many `[B]`, so that its Q is
+    /// their number; empty where all want the latter.
+    pub own: Vec<Vec<usize>>,
 }
 
 impl ParamBatch {
@@ -16,7 +23,48 @@ impl ParamBatch {
     pub fn from_rows(rows: &[Vec<f64>]) -> ParamBatch {
         let parameters = rows.first().map_or(0, Vec::len);
         assert!(rows.iter().all(|r| r.len() == parameters), "rows of a batch have the same length");
-        ParamBatch { parameters, values: rows.concat() }
+        ParamBatch { parameters, values: rows.concat(), views: Vec::new(), own: Vec::new() }
+    }
+
+    /// A batch of one.
+    pub fn of(row: &[f64]) -> ParamBatch {
+        ParamBatch { parameters: row.len(), values: row.to_vec(), views: Vec::new(), own: Vec::new() }
+    }
+
+    /// The same members, each compared with a view of its own.
+    #[must_use]
+    pub fn seeing(self, views: Vec<View>) -> ParamBatch {
+        assert!(views.len() == self.members(), "every member has a view");
+        ParamBatch { views, ..self }
+    }
+
+    /// The same members, each with places of its own that it wants sensitivities for.
+    #[must_use]
+    pub fn along(self, own: Vec<Vec<usize>>) -> ParamBatch {
+        assert!(own.len() == self.members(), "every member has places");
+        ParamBatch { own, ..self }
+    }
+
+    /// Directions of the tangents for which `requested` places ask `[Q]`.
+    pub fn directions(&self, requested: &[usize]) -> Vec<Direction> {
+        Direction::along(&self.own, requested)
+    }
+
+    /// What member b is compared with.
+    pub fn view(&self, b: usize) -> View {
+        self.views.get(b).cloned().unwrap_or_default()
+    }
+
+    /// The batch in parts of at most `most` members.
+    pub fn parts(&self, most: usize) -> impl Iterator<Item = ParamBatch> {
+        let (all, most) = (self.members(), most.max(1));
+        (0..all).step_by(most).map(move |first| {
+            let end = all.min(first + most);
+            let values = self.values[first * self.parameters..end * self.parameters].to_vec();
+            let views = self.views.get(first..end).map_or_else(Vec::new, <[View]>::to_vec);
+            let own = self.own.get(first..end).map_or_else(Vec::new, <[Vec<usize>]>::to_vec);
+            ParamBatch { parameters: self.parameters, values, views, own }
+        })
     }
 
     /// Number of members B.
@@ -69,6 +117,8 @@ pub enum Direction {
     Parameter(usize),
     /// Any direction dθ `[P]`.
     Dense(Vec<f64>),
+    /// Of every member one parameter alone `[B]`, or nowhere. What is asked of it without a member holds for any of them.
+    Each(Vec<Option<usize>>),
 }
 
 impl Direction {
@@ -77,21 +127,40 @@ impl Direction {
         places.iter().map(|p| Direction::Parameter(*p)).collect()
     }
 
+    /// Directions along the `own` places of every member, or those that are requested of all where there are none.
+    pub fn along(own: &[Vec<usize>], requested: &[usize]) -> Vec<Direction> {
+        if own.is_empty() {
+            return Direction::parameters(requested);
+        }
+        let each = |q: usize| own.iter().map(|places| places.get(q).copied()).collect();
+        (0..requested.len()).map(|q| Direction::Each(each(q))).collect()
+    }
+
+    /// The direction of member b; nowhere is `Each` of nobody.
+    pub fn of(&self, b: usize) -> Direction {
+        match self {
+            Direction::Each(places) => places[b].map_or(Direction::Each(Vec::new()), Direction::Parameter),
+            all => all.clone(),
+        }
+    }
+
     /// Component along the parameter at place p.
     pub fn component(&self, p: usize) -> f64 {
         match self {
             Direction::Parameter(own) => f64::from(u8::from(*own == p)),
             Direction::Dense(d) => d[p],
+            Direction::Each(places) => f64::from(u8::from(places.contains(&Some(p)))),
         }
     }
 
     /// Components that are not zero: place in θ and value.
     pub fn entries(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let (own, dense): (Option<usize>, &[f64]) = match self {
-            Direction::Parameter(p) => (Some(*p), &[]),
-            Direction::Dense(d) => (None, d),
+        let (own, dense): (Vec<usize>, &[f64]) = match self {
+            Direction::Parameter(p) => (vec![*p], &[]),
+            Direction::Dense(d) => (Vec::new(), d),
+            Direction::Each(places) => (places.iter().flatten().copied().collect(), &[]),
         };
-        own.map(|p| (p, 1.0)).into_iter().chain(dense.iter().copied().enumerate().filter(|(_, v)| *v != 0.0))
+        own.into_iter().map(|p| (p, 1.0)).chain(dense.iter().copied().enumerate().filter(|(_, v)| *v != 0.0))
     }
 
     /// All components `[P]`.
@@ -171,13 +240,18 @@ pub trait Evaluate: Send {
         false
     }
 
-    /// Product `H v` `[P]` with the Gauss–Newton matrix of [`Curvature`] over all parameters at `theta` `[P]`, for a direction `v` `[P]`;
-    /// entries that are not `wanted` are zero. What was simulated at the last `theta` is kept, so that further products with its matrix
+    /// Product `H v` `[P]` with the Gauss–Newton matrix of [`Curvature`] over all parameters of the only member `at`, for a direction `v` `[P]`;
+    /// entries that are not `wanted` are zero. What was simulated for the last member is kept, so that further products with its matrix
     /// take a tangent and an adjoint each.
     ///
     /// # Errors
     /// The simulation fails, or there are no products ([`FailureKind::Unsupported`]).
-    fn product(&mut self, _theta: &[f64], _v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+    fn product(&mut self, _at: &ParamBatch, _v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
         Err(Failure::new(FailureKind::Unsupported, 0.0, "there are no products with the Gauss-Newton matrix"))
+    }
+
+    /// What this is part of, where several evaluators are one behind: a batch through any of them may hold members of all.
+    fn share(&self) -> Option<Share> {
+        None
     }
 }

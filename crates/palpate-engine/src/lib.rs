@@ -7,6 +7,7 @@
 mod backend;
 mod evaluate;
 mod failure;
+mod part;
 mod product;
 mod residuals;
 mod rollout;
@@ -17,6 +18,7 @@ mod tape;
 pub use backend::{Backend, BuildError};
 pub use evaluate::{Curvature, Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};
 pub use failure::{Failure, FailureKind, number};
+pub use part::{Part, Share};
 pub use residuals::{FrameResiduals, Misfit, ReadingResidual};
 pub use rollout::{Rollout, Snapshot};
 pub use rows::{Linearised, ResidualRow, Rows, Source, Stream};

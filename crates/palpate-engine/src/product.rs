@@ -1,16 +1,16 @@
 //! Products with the Gauss–Newton matrix of a rollout, without the matrix: one tangent forward and one adjoint back over kept states.
 
 use crate::backend::Backend;
-use crate::evaluate::{Direction, Evaluation, Request, Wanted};
+use crate::evaluate::{Direction, Evaluation, ParamBatch, Request, Wanted};
 use crate::failure::Failure;
 use crate::rollout::stopped;
 use crate::stop::Stop;
 use crate::tape::{Adjoints, Tape};
 use palpate_model::plan::scheme::Stage;
 
-/// Every state of one member at one θ `[P]`.
+/// Every state of one member.
 pub(crate) struct Held<B: Backend> {
-    pub(crate) theta: Vec<f64>,
+    pub(crate) at: ParamBatch,
     pub(crate) states: Tape<B::State>,
 }
 

@@ -20,8 +20,10 @@ pub struct Rollout<B: Backend> {
     plan: Plan,
     stages: Vec<Stage>,
     members: usize,
-    /// The way forward that products were last asked for; it holds as long as the world has its θ.
-    held: Option<Held<B>>,
+    /// The ways forward that products were last asked for, one of each recording; they hold until the world is used for something else.
+    held: Vec<Held<B>>,
+    /// The member that the world is set to for products.
+    at: Option<ParamBatch>,
     /// Ends an evaluation at its next stage.
     stop: Stop,
 }
@@ -164,7 +166,16 @@ impl<B: Backend> Rollout<B> {
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
         let stages = plan.clock.stages();
-        Ok(Rollout { backend, world, plan: plan.clone(), stages, members: members.max(1), held: None, stop: Stop::default() })
+        Ok(Rollout {
+            backend,
+            world,
+            plan: plan.clone(),
+            stages,
+            members: members.max(1),
+            held: Vec::new(),
+            at: None,
+            stop: Stop::default(),
+        })
     }
 
     /// The same rollout, whose evaluations end at their next stage once `stop` says so; every member then fails as
@@ -179,6 +190,11 @@ impl<B: Backend> Rollout<B> {
         &self.plan
     }
 
+    /// What the backend holds, for those who measure it.
+    pub fn world_mut(&mut self) -> &mut B::World {
+        &mut self.world
+    }
+
     /// The backend.
     pub fn backend(&self) -> &B {
         &self.backend
@@ -186,9 +202,9 @@ impl<B: Backend> Rollout<B> {
 
     /// Evaluates a batch of at most as many members as there is room for.
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
-        self.held = None;
+        self.let_go();
         let (b, stop, stages) = (&self.backend, &self.stop, &self.stages);
-        let directions = Direction::parameters(&request.sensitivities);
+        let directions = theta.directions(&request.sensitivities);
         let wanted = Some(directions.as_slice()).filter(|d| !d.is_empty());
         let forward = Forward { backend: b, stages, stop, directions: wanted, keep: request.gradient.any() };
         let attempt = |w: &mut B::World| {
@@ -223,12 +239,12 @@ impl<B: Backend> Rollout<B> {
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
-        self.held = None;
+        self.let_go();
         let (b, dt) = (&self.backend, self.plan.clock.step);
         let (stages, stop) = (&self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: false };
         b.rollout(&mut self.world, true, |w| {
-            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            b.set_params(w, &ParamBatch::of(theta));
             let mut tally = b.new_tally(w, &Request::default());
             let each = |m: Moment<B>| {
                 let (displacement, velocity) = b.read_state(m.world, m.ends[1], 0);
@@ -250,13 +266,13 @@ impl<B: Backend> Rollout<B> {
     /// The simulation fails, somebody asked to stop, or the backend has no rows ([`FailureKind::Unsupported`]).
     pub fn linearise(&mut self, theta: &[f64], directions: &[usize]) -> Result<Linearised, Failure> {
         refuse_many(directions.len())?;
-        self.held = None;
+        self.let_go();
         let b = &self.backend;
         let along = Direction::parameters(directions);
         let (stages, stop) = (&self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: Some(&along), keep: false };
         b.rollout(&mut self.world, true, |w| {
-            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            b.set_params(w, &ParamBatch::of(theta));
             let request = Request { sensitivities: directions.to_vec(), ..Request::default() };
             let mut tally = b.new_tally(w, &request);
             let (mut rows, mut without_rows) = (Rows::default(), false);
@@ -298,23 +314,31 @@ impl<B: Backend> Rollout<B> {
 }
 
 impl<B: Backend> Rollout<B> {
-    /// Simulates one member at `theta` and keeps every state, unless that is what is kept already.
-    fn hold(&mut self, theta: &[f64]) -> Result<(), Failure> {
-        if self.held.as_ref().is_some_and(|h| h.theta == theta) {
+    /// Simulates one member and keeps every state, unless that is what is kept already.
+    fn hold(&mut self, at: &ParamBatch) -> Result<(), Failure> {
+        if self.held.iter().any(|h| h.at == *at) {
             return Ok(());
         }
-        self.held = None;
+        self.held.retain(|h| h.at.view(0).recording != at.view(0).recording);
+        self.at = None;
         let (b, stages, stop) = (&self.backend, &self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: true };
         let states = b.rollout(&mut self.world, false, |w| {
-            b.set_params(w, &ParamBatch::from_rows(&[theta.to_vec()]));
+            b.set_params(w, at);
             let mut tally = b.new_tally(w, &Request::default());
             let visit = |_: Moment<B>| ControlFlow::Continue(());
             let states = forward.run(w, &mut tally, visit).continue_value().ok_or_else(stopped)?;
             b.read(w, &tally).remove(0).failure.map_or(Ok(states), Err)
         })?;
-        self.held = Some(Held { theta: theta.to_vec(), states });
+        self.held.push(Held { at: at.clone(), states });
+        self.at = Some(at.clone());
         Ok(())
+    }
+
+    /// Lets go of what was kept for products: the world is needed for something else.
+    fn let_go(&mut self) {
+        self.held.clear();
+        self.at = None;
     }
 }
 
@@ -344,18 +368,21 @@ impl<B: Backend> Evaluate for Rollout<B> {
         if let Err(failure) = refuse_many(request.sensitivities.len()) {
             return vec![Evaluation::failed(failure); theta.members()];
         }
-        let rows: Vec<Vec<f64>> = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
-        rows.chunks(self.members).flat_map(|rows| self.run(&ParamBatch::from_rows(rows), request)).collect()
+        theta.parts(self.members).flat_map(|part| self.run(&part, request)).collect()
     }
 
     fn has_products(&self) -> bool {
         true
     }
 
-    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        self.hold(theta)?;
+    fn product(&mut self, at: &ParamBatch, v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        self.hold(at)?;
         let (b, ways) = (&self.backend, (&self.stages[..], &self.stop));
-        let states = &self.held.as_ref().expect("a way forward was just kept").states;
+        if self.at.as_ref() != Some(at) {
+            b.set_params(&mut self.world, at);
+            self.at = Some(at.clone());
+        }
+        let states = &self.held.iter().find(|h| h.at == *at).expect("a way forward was just kept").states;
         b.rollout(&mut self.world, false, |w| product(b, w, ways, states, v, wanted))
     }
 }

@@ -4,7 +4,7 @@ use crate::chart::Chart;
 use crate::known;
 use crate::optimise::{Sample, is_blind, want};
 use crate::priors::{FieldPrior, Priors};
-use palpate_engine::{Evaluate, Failure, FailureKind, ParamBatch, Request, Wanted};
+use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, ParamBatch, Request, Wanted};
 use palpate_model::params::Transform;
 use palpate_model::scene::Optimizer;
 
@@ -252,7 +252,7 @@ impl<'a> Problem<'a> {
             let mut v = vec![0.0; theta.len()];
             slots.iter().for_each(|(i, slot)| v[slot.place] = slot.factor * slopes[*i] * direction[*i]);
             let wanted = Wanted::Places(slots.iter().map(|(_, slot)| slot.place).collect());
-            let product = self.scenes[s].evaluate.product(&theta, &v, &wanted)?;
+            let product = self.scenes[s].evaluate.product(&ParamBatch::of(&theta), &v, &wanted)?;
             for (i, slot) in &slots {
                 out[*i] += self.residuals[s] / all * slot.factor * slopes[*i] * product[slot.place];
             }
@@ -260,6 +260,43 @@ impl<'a> Problem<'a> {
         let known = self.known_curvature(z, all);
         out.iter_mut().zip(known).zip(direction).for_each(|((o, k), d)| *o += k * d);
         Ok(out)
+    }
+
+    /// What a scene is asked for.
+    fn request(&self, scene: usize, want: Want) -> Request {
+        let mut places: Vec<usize> = self.slots(scene).map(|(_, slot)| slot.place).collect();
+        places.sort_unstable();
+        match want {
+            Want::Cost => Request::default(),
+            Want::Gradient => Request { gradient: Wanted::Places(places), sensitivities: Vec::new() },
+            Want::Curvature => Request { gradient: Wanted::Nothing, sensitivities: places },
+        }
+    }
+
+    /// Physics of every scene at each row of values, `[scenes][B]`, as far as it was computed: scenes that are parts of one evaluator and ask for
+    /// the same are one batch, and a member that failed in one scene is not worth simulating in the next.
+    fn simulate(&mut self, values: &[Vec<f64>], want: Want) -> Vec<Vec<Option<Evaluation>>> {
+        let mut all: Vec<Vec<Option<Evaluation>>> = vec![vec![None; values.len()]; self.scenes.len()];
+        let mut live: Vec<usize> = (0..values.len()).collect();
+        let mut open: Vec<usize> = (0..self.scenes.len()).collect();
+        while let Some(first) = open.first().copied().filter(|_| !live.is_empty()) {
+            let request = self.request(first, want);
+            let share = self.scenes[first].evaluate.share();
+            let of =
+                |s: usize| self.scenes[s].evaluate.share().filter(|other| share.as_ref().is_some_and(|own| own.of == other.of));
+            let joins = |s: &usize| *s == first || (of(*s).is_some() && self.request(*s, want) == request);
+            let together: Vec<usize> = open.iter().copied().filter(joins).collect();
+            open.retain(|s| !together.contains(s));
+            let rows: Vec<Vec<f64>> = together.iter().flat_map(|s| live.iter().map(|b| self.theta(*s, &values[*b]))).collect();
+            let views = together.iter().filter_map(|s| of(*s)).flat_map(|share| vec![share.view; live.len()]).collect();
+            let batch = ParamBatch { views, ..ParamBatch::from_rows(&rows) };
+            let mut found = self.scenes[first].evaluate.evaluate(&batch, &request).into_iter();
+            for s in &together {
+                live.iter().for_each(|b| all[*s][*b] = found.next());
+            }
+            live.retain(|b| together.iter().all(|s| all[*s][*b].as_ref().is_some_and(|e| fault("", e).is_none())));
+        }
+        all
     }
 
     /// Cost and derivatives by the free values at each row of physical values `[B][q]`.
@@ -274,30 +311,23 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let mut weights = vec![0.0; values.len()];
-        for s in 0..self.scenes.len() {
-            // A member that failed in one scene is not worth simulating in the next.
-            let live: Vec<usize> = (0..values.len()).filter(|&b| sums[b].failure.is_none()).collect();
-            if live.is_empty() {
-                break;
-            }
+        let found = self.simulate(values, want);
+        for (b, sum) in sums.iter_mut().enumerate() {
+            let fault = self.scenes.iter().zip(&found).find_map(|(scene, all)| fault(&scene.name, all[b].as_ref()?));
+            *sum = fault.unwrap_or(std::mem::take(sum));
+        }
+        for (s, results) in found.into_iter().enumerate() {
             let slots: Vec<(usize, Slot)> = self.slots(s).collect();
-            let mut places: Vec<usize> = slots.iter().map(|(_, slot)| slot.place).collect();
-            places.sort_unstable();
-            let request = Request {
-                gradient: if want == Want::Gradient { Wanted::Places(places.clone()) } else { Wanted::Nothing },
-                sensitivities: if want == Want::Curvature { places.clone() } else { Vec::new() },
-            };
-            let rows: Vec<Vec<f64>> = live.iter().map(|&b| self.theta(s, &values[b])).collect();
-            let results = self.scenes[s].evaluate.evaluate(&ParamBatch::from_rows(&rows), &request);
-            for (&b, e) in live.iter().zip(&results) {
+            let places = self.request(s, want).sensitivities;
+            for (b, found) in results.into_iter().enumerate() {
                 let sum = &mut sums[b];
-                if e.failure.is_some() || !e.cost.is_finite() {
-                    let why = e.failure.as_ref().map_or("the cost is not finite".into(), |f| f.to_string());
-                    let is = |kind| e.failure.as_ref().is_some_and(|f| f.kind == kind);
-                    let (broken, stopped) = (is(FailureKind::Device), is(FailureKind::Stopped));
-                    *sum = Sample { broken, stopped, ..Sample::failed(format!("{}: {why}", self.scenes[s].name)) };
+                if sum.failure.is_some() {
                     continue;
                 }
+                let Some(e) = found else {
+                    *sum = Sample::failed(format!("{}: the backend returned no result", self.scenes[s].name));
+                    continue;
+                };
                 // Physics that counts no residuals (an analytic cost) weighs as one.
                 let n = e.residuals.max(1) as f64;
                 weights[b] += n;
@@ -325,9 +355,6 @@ impl<'a> Problem<'a> {
                         }
                     }
                 }
-            }
-            for &b in live.iter().skip(results.len()) {
-                sums[b] = Sample::failed(format!("{}: the backend returned no result", self.scenes[s].name));
             }
         }
         for ((sum, n), values) in sums.iter_mut().zip(weights).zip(values) {
@@ -366,6 +393,17 @@ impl<'a> Problem<'a> {
             sample.curvature[row * q..(row + 1) * q].iter_mut().zip(along).for_each(|(h, p)| *h += weight * p);
         }
     }
+}
+
+/// What a member that failed in a scene leaves of its sample.
+fn fault(scene: &str, e: &Evaluation) -> Option<Sample> {
+    if e.failure.is_none() && e.cost.is_finite() {
+        return None;
+    }
+    let why = e.failure.as_ref().map_or("the cost is not finite".into(), |f| f.to_string());
+    let is = |kind| e.failure.as_ref().is_some_and(|f| f.kind == kind);
+    let (broken, stopped) = (is(FailureKind::Device), is(FailureKind::Stopped));
+    Some(Sample { broken, stopped, ..Sample::failed(format!("{scene}: {why}")) })
 }
 
 fn check_start(f: &FreeParameter) -> Result<(), String> {

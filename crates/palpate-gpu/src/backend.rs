@@ -165,7 +165,10 @@ impl Backend for GpuBackend {
     ) {
         let ends = [now, next].map(|s| &s.0.buffer);
         let adjoints = [&adj_now.0.buffer, &adj.0.buffer];
-        world.record(|r| world.observer.observe_adjoint(r, k, ends, adjoints, &tally.buffers));
+        world.record(|r| {
+            forward::rest(world, r, k, tally);
+            world.observer.observe_adjoint(r, k, ends, adjoints, &tally.buffers);
+        });
     }
 
     fn step_adjoint(
@@ -238,7 +241,10 @@ impl Backend for GpuBackend {
         let ends = [now, next].map(|s| &s.0.buffer);
         let along = [tangent, tangent_next].map(|t| &t.parts[0].buffer);
         let adjoints = [&adj_now.0.buffer, &adj.0.buffer];
-        world.record(|r| world.observer.observe_product(r, k, ends, along, adjoints, &tally.buffers));
+        world.record(|r| {
+            forward::rest(world, r, k, tally);
+            world.observer.observe_product(r, k, ends, along, adjoints, &tally.buffers);
+        });
     }
 
     fn rows(

@@ -22,7 +22,7 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
     let p = &world.batch.physics[member];
     let [a, b] = h.detail;
     let (kind, what) = match h.code {
-        code::WELL => return None,
+        code::WELL | code::RESTING => return None,
         code::NOT_FINITE => (FailureKind::NotFinite, "displacement, velocity or residual of a node".to_string()),
         code::STALLED => (
             FailureKind::NewtonStalled,
@@ -92,15 +92,18 @@ async fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuE
             Evaluation {
                 cost: if failure.is_some() { f64::INFINITY } else { 0.0 },
                 gradient: gradient[m * p..(m + 1) * p].iter().map(|g| f64::from(*g)).collect(),
-                curvature: (q > 0).then(|| Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }),
-                residuals: world.plan.observation.residuals(),
+                curvature: (q > 0).then(|| {
+                    let q = world.batch.count(m, q);
+                    Curvature { gradient: vec![0.0; q], matrix: vec![0.0; q * q] }
+                }),
+                residuals: world.batch.views[m].residuals(),
                 failure,
                 ..Evaluation::default()
             }
         })
         .collect();
     world.effort.learn(&bytemuck::pod_collect_to_vec::<u8, u32>(&own[2]));
-    world.observer.add_to(observed, q, &mut all);
+    world.observer.add_to(observed, q, |m| world.batch.count(m, q), &mut all);
     if let Some(own) = &tally.sums {
         for (m, e) in all.iter_mut().enumerate().filter(|(_, e)| e.failure.is_none()) {
             let by = own.gradient(&world.plan, &world.geometry, &world.batch.theta[m], m, &sums);

@@ -36,7 +36,7 @@ fn trial(plan: &Plan, steps: usize, compared: bool) -> Plan {
         let time = |k: usize| start + (k as f64 + 0.5) / count as f64 * short.clock.steps as f64 * dt;
         seen.frames = frames.iter().take(count).enumerate().map(|(k, f)| Frame { time: time(k), ..f.clone() }).collect();
     }
-    Plan { observation: Arc::new(seen), ..short }
+    Plan { observation: Arc::new(seen), others: Vec::new(), ..short }
 }
 
 /// Seconds of a step of such a trial with what is asked of it, for `members` simulations, so many at once, or why there are none; the

@@ -6,9 +6,10 @@ use crate::host::host;
 use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Rollout, Snapshot, Stop};
+use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::plan::Plan;
+use palpate_model::plan::join::{Joint, join};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -138,6 +139,30 @@ impl Backend {
             Backend::Gpu => Ok(Box::new(Rollout::new(gpu_for(members)?, plan, members)?.stopped_by(stop))),
             _ => Ok(Box::new(Rollout::new(CpuBackend, plan, members)?.stopped_by(stop))),
         }
+    }
+
+    /// Plans as functions of θ, in their order. Those that differ in θ and recordings alone are parts of one evaluator, for as many simulations
+    /// at once as `members` says of a plan with the recordings of so many.
+    ///
+    /// # Errors
+    /// As [`Backend::evaluator`], or `members` has one.
+    pub(crate) fn evaluators_until(
+        self,
+        plans: &[&Plan],
+        mut members: impl FnMut(&Joint) -> Result<usize, Error>,
+        stop: &Stop,
+    ) -> Result<Vec<Box<dyn Evaluate>>, Error> {
+        let mut all: Vec<Option<Box<dyn Evaluate>>> = plans.iter().map(|_| None).collect();
+        for joint in join(plans) {
+            let whole = self.evaluator_until(&joint.plan, members(&joint)?, stop.clone())?;
+            if let [(only, _)] = joint.parts[..] {
+                all[only] = Some(whole);
+                continue;
+            }
+            let parts = Part::all(whole, joint.parts.iter().map(|p| p.1.clone()));
+            joint.parts.iter().zip(parts).for_each(|((plan, _), part)| all[*plan] = Some(Box::new(part)));
+        }
+        Ok(all.into_iter().flatten().collect())
     }
 
     /// Simulates one member; `visit` gets every state (the initial one first) with the residuals of the frames of its step, and may

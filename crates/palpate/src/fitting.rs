@@ -10,14 +10,17 @@ use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
 use crate::results::fit::{FitStatus, Verdict};
 use crate::scatter::Excess;
-use palpate_engine::{Evaluate, Evaluation, Failure, FailureKind, MOST_SENSITIVITIES, ParamBatch, Request, Stop, Wanted};
+use palpate_engine::{FailureKind, MOST_SENSITIVITIES, Stop};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
 use palpate_io::InputError;
 use palpate_model::observation::ReadingKind;
+use palpate_model::plan::Plan;
+use palpate_model::plan::join::Joint;
 use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
 
 mod answer;
+mod counted;
 mod free;
 mod lead;
 mod verdict;
@@ -29,6 +32,7 @@ const ARRIVED: f64 = 1.0;
 const SURPRISING: f64 = 3.0;
 
 pub use answer::{Headline, Parts};
+use counted::Counted;
 pub(crate) use free::free_parameters;
 use verdict::verdict;
 
@@ -210,16 +214,22 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     };
     let (numbers, free, mut warnings) = free_parameters(experiments)?;
     let asked = options.optimizer.or(spec.optimizer);
+    let plans: Vec<&Plan> = experiments.iter().map(Experiment::plan).collect();
     let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free)), settings.starts);
+    // Recordings of the first body run side by side.
+    let trial = Demand { starts: trial.starts * plans.iter().filter(|p| p.is_like(plans[0])).count(), ..trial };
     let backend = options.backend.resolve_for(first.plan(), &trial, &mut |_| {}).0;
     let (optimizer, chosen) = optimizer(asked, &free).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
     let settings = Settings { optimizer, ..settings };
     let threads = options.threads.unwrap_or(spec.threads);
+    let members = |joint: &Joint| {
+        let demand = demand(&free, joint.parts[0].0, settings.optimizer, settings.starts);
+        let demand = Demand { asked: options.batch, starts: demand.starts * joint.parts.len(), ..demand };
+        backend.members(&joint.plan, &demand, threads)
+    };
+    let inner = backend.evaluators_until(&plans, members, &options.interrupt.at_once())?;
     let mut scenes = Vec::new();
-    for (s, e) in experiments.iter().enumerate() {
-        let demand = Demand { asked: options.batch, ..demand(&free, s, settings.optimizer, settings.starts) };
-        let members = backend.members(e.plan(), &demand, threads)?;
-        let inner = backend.evaluator_until(e.plan(), members, options.interrupt.at_once())?;
+    for (e, inner) in experiments.iter().zip(inner) {
         scenes.push(FitScene {
             name: e.scene().path.display().to_string(),
             fingerprint: fingerprint(e.plan()),
@@ -406,36 +416,4 @@ pub(crate) fn demand(free: &[FreeParameter], scene: usize, optimizer: Optimizer,
     places.sort_unstable();
     let fixed = free.iter().all(|f| f.start.0 == f.start.1);
     Demand { starts: if fixed { 1 } else { starts.max(1) }, asked: None, optimizer, places, compared: true }
-}
-
-/// Counts evaluations against an interrupt's budget.
-struct Counted {
-    inner: Box<dyn Evaluate>,
-    interrupt: Interrupt,
-    /// Only the first scene counts, so that a joint evaluation counts once.
-    first: bool,
-}
-
-impl Evaluate for Counted {
-    fn parameters(&self) -> usize {
-        self.inner.parameters()
-    }
-
-    fn evaluate(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
-        if self.first {
-            self.interrupt.count();
-        }
-        self.inner.evaluate(theta, request)
-    }
-
-    fn has_products(&self) -> bool {
-        self.inner.has_products()
-    }
-
-    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        if self.first {
-            self.interrupt.count();
-        }
-        self.inner.product(theta, v, wanted)
-    }
 }

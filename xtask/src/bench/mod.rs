@@ -198,6 +198,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,
         observation: Arc::new(observation),
+        others: Vec::new(),
         band: BAND * body.length,
         solver: Solver::default(),
         body: Arc::new(body),

@@ -6,7 +6,7 @@ use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_engine::{Misfit, ReadingResidual, ResidualRow, Source};
 use palpate_model::cutcells::band_lookup::BandLookup;
-use palpate_model::observation::{Camera, ObservedPoint, ReadingKind, Sensor, kernel};
+use palpate_model::observation::{Camera, Observation, ObservedPoint, ReadingKind, Sensor, kernel};
 use palpate_model::plan::Plan;
 use std::sync::Arc;
 
@@ -20,17 +20,14 @@ pub struct Depth {
 
 impl Depth {
     /// Hashes the points of every frame.
-    pub fn new(plan: &Plan) -> Depth {
+    pub fn new(plan: &Plan, observation: &Observation) -> Depth {
         let hash = |points: &[ObservedPoint]| PointHash::new(points, plan.body.length);
-        Depth {
-            lookup: BandLookup::of(&plan.body.band),
-            hashes: plan.observation.frames.iter().map(|f| hash(&f.points)).collect(),
-        }
+        Depth { lookup: BandLookup::of(&plan.body.band), hashes: observation.frames.iter().map(|f| hash(&f.points)).collect() }
     }
 
     /// Places of a frame's points on the body at displacement `u` `[N]`, by rising point; of those that met it.
     pub fn matches(&self, look: Look, u: &[DVec3]) -> Vec<Match> {
-        let (body, obs, points) = (&*look.plan.body, look.observation(), &look.seen().points);
+        let (body, obs, points) = (&*look.plan.body, look.observation, &look.seen().points);
         let recorded = (points.as_slice(), obs.cameras.as_slice());
         let reach = (look.plan.band, noise(look));
         if points.is_empty() {
@@ -139,11 +136,11 @@ impl Residuals for Distances {
 }
 
 fn noise(look: Look) -> f64 {
-    look.observation().noise(ReadingKind::Depth)
+    look.observation.noise(ReadingKind::Depth)
 }
 
 fn camera<'a>(look: Look<'a>, point: &ObservedPoint) -> &'a Camera {
-    &look.observation().cameras[point.camera as usize]
+    &look.observation.cameras[point.camera as usize]
 }
 
 /// ∂(true point)/∂θ by what measurement effects do, at the places in θ that are wanted.

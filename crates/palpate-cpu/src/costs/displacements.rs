@@ -13,7 +13,7 @@ pub struct Displacements;
 impl Cost for Displacements {
     fn compare(&self, look: Look, u: &[DVec3], sums: &mut Sums) -> Arc<dyn Residuals> {
         let off: Vec<DVec3> = look.seen().displacements.iter().map(|d| u[d.node as usize] - d.value).collect();
-        let noise = look.observation().noise(ReadingKind::Displacement);
+        let noise = look.observation.noise(ReadingKind::Displacement);
         off.iter().for_each(|r| sums.add_vector(*r, noise));
         Arc::new(Offsets { off })
     }
@@ -39,13 +39,13 @@ impl Residuals for Offsets {
     }
 
     fn influences(&self, look: Look, scale: f64) -> Vec<f64> {
-        let noise = look.observation().noise(ReadingKind::Displacement);
+        let noise = look.observation.noise(ReadingKind::Displacement);
         let factor = scale / (noise * noise);
         self.off.iter().flat_map(|r| (factor * *r).to_array()).collect()
     }
 
     fn rows(&self, look: Look, _u: &[DVec3], along: Along, visit: &mut dyn FnMut(ResidualRow, &[f64])) {
-        let noise = look.observation().noise(ReadingKind::Displacement);
+        let noise = look.observation.noise(ReadingKind::Displacement);
         let mut d = vec![0.0; along.du.len()];
         for (seen, off) in look.seen().displacements.iter().zip(&self.off) {
             let node = seen.node as usize;

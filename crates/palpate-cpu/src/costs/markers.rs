@@ -38,7 +38,7 @@ impl Offsets {
 impl Residuals for Offsets {
     fn readings(&self, look: Look) -> Vec<ReadingResidual> {
         let reading = |(m, off): (&ObservedMarker, DVec3)| ReadingResidual {
-            sensor: look.observation().sensor_of(m.site),
+            sensor: look.observation.sensor_of(m.site),
             item: m.site,
             place: m.position,
             misfit: Some(Misfit::Offset(off)),
@@ -69,7 +69,7 @@ impl Residuals for Offsets {
                 let direct: Vec<_> = places.flat_map(|at| (0..3).map(move |b| (at + b, b))).collect();
                 let direct: Vec<_> = direct.into_iter().map(|(at, b)| (at, carried.by_stalk(b)[a])).collect();
                 along.add_direct(&direct, &mut d);
-                let source = Source { sensor: look.observation().sensor_of(m.site), item: m.site, axis };
+                let source = Source { sensor: look.observation.sensor_of(m.site), item: m.site, axis };
                 visit(ResidualRow::coordinate(look.frame, source, off[a], noise(look, m), rest), &d);
             }
         }
@@ -88,12 +88,12 @@ impl Residuals for Offsets {
 }
 
 fn noise(look: Look, m: &ObservedMarker) -> f64 {
-    look.observation().noise(look.observation().markers[m.site as usize].kind)
+    look.observation.noise(look.observation.markers[m.site as usize].kind)
 }
 
 /// A marker's site as its offset has it, and the marker at displacement `u`.
 fn carry<'a>(look: Look<'a>, m: &ObservedMarker, u: &[DVec3]) -> (Cow<'a, MarkerSite>, Carried) {
-    let site = look.sensors.site(look.observation(), m.site);
+    let site = look.sensors.site(look.observation, m.site);
     let turns = site.stalk != DVec3::ZERO || look.sensors.marker_places(m.site).next().is_some();
     let carried = Carried::new(&look.plan.body, &site, u, turns);
     (site, carried)

@@ -14,15 +14,15 @@ use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_engine::{Direction, FrameResiduals, ReadingResidual, ResidualRow, Rows};
 use palpate_model::effects::sensors::Sensors;
-pub use palpate_model::observation::instant::{Instant, instants};
+pub use palpate_model::observation::instant::Instant;
 use palpate_model::observation::{Frame, Observation};
 use palpate_model::plan::Plan;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Every cost, ready for the recording of a plan, in the order in which residuals stand in a frame.
-fn registry(plan: &Plan) -> Vec<Box<dyn Cost>> {
-    vec![Box::new(depth::Depth::new(plan)), Box::new(markers::Markers), Box::new(displacements::Displacements)]
+/// Every cost, ready for a recording of a plan, in the order in which residuals stand in a frame.
+fn registry(plan: &Plan, observation: &Observation) -> Vec<Box<dyn Cost>> {
+    vec![Box::new(depth::Depth::new(plan, observation)), Box::new(markers::Markers), Box::new(displacements::Displacements)]
 }
 
 /// A way to compare readings with a displacement field, ready for one recording.
@@ -48,8 +48,10 @@ pub trait Residuals: Debug + Send + Sync {
 /// A frame of the recording as the measurement effects of one member understand it.
 #[derive(Clone, Copy, Debug)]
 pub struct Look<'a> {
-    /// Body and recording.
+    /// Body.
     pub plan: &'a Plan,
+    /// Recording.
+    pub observation: &'a Observation,
     /// The member's measurement effects.
     pub sensors: &'a Sensors,
     /// Number of the frame.
@@ -57,14 +59,9 @@ pub struct Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    /// The recording.
-    pub fn observation(&self) -> &'a Observation {
-        &self.plan.observation
-    }
-
     /// The frame.
     pub fn seen(&self) -> &'a Frame {
-        &self.plan.observation.frames[self.frame]
+        &self.observation.frames[self.frame]
     }
 }
 
@@ -120,9 +117,9 @@ impl Sums {
 pub struct Costs(Vec<Box<dyn Cost>>);
 
 impl Costs {
-    /// Ready for the recording of a plan.
-    pub fn new(plan: &Plan) -> Costs {
-        Costs(registry(plan))
+    /// Ready for a recording of a plan.
+    pub fn new(plan: &Plan, observation: &Observation) -> Costs {
+        Costs(registry(plan, observation))
     }
 
     /// Compares a frame with displacement `u` `[N]`.

@@ -95,7 +95,7 @@ fn directions(plan: &Plan, count: usize) -> (Vec<Direction>, Vec<Nodes>) {
 #[test]
 fn derivatives_of_every_residual_are_those_of_differences() {
     let plan = seen();
-    let costs = Costs::new(&plan);
+    let costs = Costs::new(&plan, &plan.observation);
     let (along, du) = directions(&plan, 2);
     let u = bent(&plan, 1e-3);
     // Numbers that choose something (a marker) do not vary.
@@ -105,7 +105,7 @@ fn derivatives_of_every_residual_are_those_of_differences() {
             (0..plan.theta.len()).map(|p| plan.theta[p] + if varies(p) { step * along[q].component(p) } else { 0.0 }).collect();
         let sensors = Sensors::new(&plan.layout, &theta);
         let moved = u.iter().zip(&du[q]).map(|(u, d)| *u + step * *d).collect();
-        let look = Look { plan: &plan, sensors: &sensors, frame: 1 };
+        let look = Look { plan: &plan, observation: &plan.observation, sensors: &sensors, frame: 1 };
         costs.compare(look, moved).rows(look, Along { directions: &along, du: &du })
     };
     let far = |rest: DVec3| {
@@ -135,8 +135,8 @@ fn derivatives_of_every_residual_are_those_of_differences() {
 fn vector_products_are_the_transpose_of_derivatives_of_every_cost() {
     let plan = seen();
     let sensors = Sensors::new(&plan.layout, &plan.theta);
-    let look = Look { plan: &plan, sensors: &sensors, frame: 0 };
-    let compared = Costs::new(&plan).compare(look, bent(&plan, 1e-3));
+    let look = Look { plan: &plan, observation: &plan.observation, sensors: &sensors, frame: 0 };
+    let compared = Costs::new(&plan, &plan.observation).compare(look, bent(&plan, 1e-3));
     let (along, du) = directions(&plan, 3);
     let mut noise = Noise(5);
     for part in &compared.parts {
@@ -161,8 +161,8 @@ fn vector_products_are_the_transpose_of_derivatives_of_every_cost() {
 fn products_are_those_with_the_gauss_newton_matrix() {
     let plan = seen();
     let sensors = Sensors::new(&plan.layout, &plan.theta);
-    let look = Look { plan: &plan, sensors: &sensors, frame: 2 };
-    let compared = Costs::new(&plan).compare(look, bent(&plan, 1e-3));
+    let look = Look { plan: &plan, observation: &plan.observation, sensors: &sensors, frame: 2 };
+    let compared = Costs::new(&plan, &plan.observation).compare(look, bent(&plan, 1e-3));
     let (along, du) = directions(&plan, 3);
     let (mut gradient, mut matrix) = (vec![0.0; 3], vec![0.0; 9]);
     let scale = 1.0 / plan.observation.residuals() as f64;

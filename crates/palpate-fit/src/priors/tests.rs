@@ -116,7 +116,8 @@ impl Evaluate for Readings {
         true
     }
 
-    fn product(&mut self, theta: &[f64], v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+    fn product(&mut self, at: &ParamBatch, v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        let theta = at.row(0);
         let rows = self.rows(theta);
         let along: Vec<f64> = rows.iter().map(|row| dot(row, v)).collect();
         let n = rows.len() as f64;

@@ -61,7 +61,8 @@ impl Evaluate for Chain {
         true
     }
 
-    fn product(&mut self, theta: &[f64], v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+    fn product(&mut self, at: &ParamBatch, v: &[f64], _wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        let theta = at.row(0);
         Ok(self.pull(theta, &self.along(theta, v)))
     }
 }

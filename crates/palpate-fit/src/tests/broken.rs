@@ -34,8 +34,8 @@ impl Evaluate for Fragile {
         self.inner.has_products()
     }
 
-    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
-        self.inner.product(theta, v, wanted)
+    fn product(&mut self, at: &ParamBatch, v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        self.inner.product(at, v, wanted)
     }
 }
 

@@ -7,4 +7,5 @@ mod errors;
 mod fits;
 mod known;
 pub(crate) mod models;
+mod parts;
 mod resume;

@@ -23,7 +23,7 @@ impl LeastSquares {
         LeastSquares { parameters, residuals: Box::new(residuals), batches: Default::default() }
     }
 
-    fn one(&self, theta: &[f64], request: &Request) -> Evaluation {
+    pub fn one(&self, theta: &[f64], request: &Request) -> Evaluation {
         let failed = || Evaluation::failed(Failure::new(FailureKind::NewtonStalled, 0.1, format!("at {theta:?}")));
         let Some(r) = (self.residuals)(theta) else { return failed() };
         let n = r.len() as f64;
@@ -73,7 +73,8 @@ impl Evaluate for LeastSquares {
         true
     }
 
-    fn product(&mut self, theta: &[f64], v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+    fn product(&mut self, at: &ParamBatch, v: &[f64], wanted: &Wanted) -> Result<Vec<f64>, Failure> {
+        let theta = at.row(0);
         let mask = wanted.mask(self.parameters);
         let places: Vec<usize> = (0..self.parameters).filter(|p| mask[*p]).collect();
         let e = self.one(theta, &Request { sensitivities: places.clone(), ..Request::default() });

@@ -1,7 +1,7 @@
 //! Upper bounds of the loop iterations of one invocation, for what is observed.
 
 use super::shots::Shots;
-use super::tables::{BandTables, SiteTables};
+use super::tables::{BandTables, Rows, SiteTables};
 use super::{MOST_LOOPS, PARTS};
 use crate::device::GpuError;
 use crate::layout::Sight;
@@ -59,7 +59,7 @@ impl Seen {
             rows: s.rows.into(),
             markers: s.markers.into(),
             site: sites.stencils.longest() as u64,
-            sites: sites.of_node.longest() as u64,
+            sites: sites.of_node.iter().map(Rows::longest).max().unwrap_or(0) as u64,
             readings: s.readings.into(),
         }
     }

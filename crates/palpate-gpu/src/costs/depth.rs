@@ -72,7 +72,7 @@ fn order(d: &Downloaded) -> Vec<usize> {
 }
 
 fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
-    let (obs, grid) = (&d.plan.observation, &d.plan.body.band.grid);
+    let (obs, grid) = (d.observation, &d.plan.body.band.grid);
     let (seen, found) = (&d.seen().points[point], &d.found[place]);
     let bare = ResidualRow {
         frame: d.frame,

@@ -83,21 +83,21 @@ fn single_residuals(backend: &GpuBackend, plan: &Plan, given: &Plan) -> (f64, us
     let mut theta = vec![given.theta.clone(); 2];
     theta[1][given.layout.index(ParamKey::TimeStart)] = MEMBERS[1].0;
     backend.set_params(&mut world, &ParamBatch::from_rows(&theta));
-    let (costs, sensors) = (Costs::new(plan), Sensors::default());
+    let (costs, sensors) = (Costs::new(plan, &plan.observation), Sensors::default());
     let (start, size) = MEMBERS[1];
     let (mut worst, mut compared) = (0.0f64, 0);
     for k in 0..plan.clock.steps {
         let (now, next) = (upload(&world, k), upload(&world, k + 1));
         let residuals = residuals(&world, k, [&now.0.buffer, &next.0.buffer], 1);
         let found = backend.gpu.waited(residuals).unwrap_or_else(|e| panic!("{e}"));
-        let all = instants(plan, start, k);
+        let all = instants(&plan.recording(0), plan.clock.step, start, k);
         assert_eq!(found.iter().map(|f| f.frame).collect::<Vec<_>>(), all.iter().map(|i| i.frame).collect::<Vec<_>>());
         for (found, i) in found.iter().zip(&all) {
             let at = |k: usize, f: fn(f64, f64, DVec3) -> DVec3| -> Vec<DVec3> {
                 plan.body.nodes.iter().map(|x| f(size, k as f64 * plan.clock.step, *x)).collect()
             };
             let u = blend(&i.value, [&at(k, motion), &at(k, velocity), &at(k + 1, motion), &at(k + 1, velocity)]);
-            let look = Look { plan, sensors: &sensors, frame: i.frame };
+            let look = Look { plan, observation: &plan.observation, sensors: &sensors, frame: i.frame };
             let right = costs.compare(look, u).residuals(look);
             assert_eq!(found.readings.len(), right.readings.len());
             compared += right.readings.len();

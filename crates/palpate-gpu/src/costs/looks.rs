@@ -2,7 +2,8 @@
 
 use super::shots::{node_count, row_count};
 use crate::layout::Look;
-use palpate_model::observation::instant::instants;
+use palpate_model::observation::instant::Instant;
+use palpate_model::observation::{ReadingKind, Viewed};
 use palpate_model::plan::Plan;
 
 /// Looks that are worked on together: `count` of them from `first` on in the buffer of all looks.
@@ -26,23 +27,26 @@ pub(crate) struct Agenda {
 }
 
 impl Agenda {
-    /// The looks of members that start at `starts` [s] on the recording's clock, at most `slots` in a round.
-    pub(crate) fn new(plan: &Plan, starts: &[f64], slots: usize) -> Agenda {
+    /// The looks of members that see these views, start at `starts` [s] on their recording's clock and have their first shots at `firsts`; at
+    /// most `slots` in a round.
+    pub(crate) fn new(plan: &Plan, views: &[Viewed], starts: &[f64], firsts: &[u32], slots: usize) -> Agenda {
         let mut agenda = Agenda::default();
+        let weights: Vec<[f32; 4]> = views.iter().map(weights).collect();
         for k in 0..plan.clock.steps.max(1) {
-            let of_member: Vec<Vec<Look>> = starts
+            let of_member: Vec<Vec<Look>> = views
                 .iter()
                 .enumerate()
-                .map(|(member, &start)| {
-                    let look = |at: &palpate_model::observation::instant::Instant| Look {
+                .map(|(member, viewed)| {
+                    let look = |at: &Instant| Look {
                         member: member as u32,
                         frame: at.frame as u32,
-                        shot: at.frame as u32,
+                        shot: firsts[member] + at.frame as u32,
                         pad: 0,
                         value: at.value.map(|f| f as f32),
                         rate: at.rate.map(|f| f as f32),
+                        weights: weights[member],
                     };
-                    instants(plan, start, k).iter().map(look).collect()
+                    viewed.instants(plan.clock.step, starts[member], k).iter().map(look).collect()
                 })
                 .collect();
             let most = of_member.iter().map(Vec::len).max().unwrap_or(0);
@@ -50,7 +54,7 @@ impl Agenda {
             for r in 0..most {
                 let together: Vec<Look> = of_member.iter().filter_map(|looks| looks.get(r).copied()).collect();
                 for part in together.chunks(slots.max(1)) {
-                    rounds.push(Round::new(plan, agenda.looks.len(), part));
+                    rounds.push(Round::new(plan, views, agenda.looks.len(), part));
                     agenda.looks.extend_from_slice(part);
                 }
             }
@@ -60,11 +64,20 @@ impl Agenda {
     }
 }
 
+/// 1/(n σ²) of every kind of readings [1/m²]: depth points, markers, tracked points, displacements.
+fn weights(viewed: &Viewed) -> [f32; 4] {
+    let kinds = [ReadingKind::Depth, ReadingKind::Marker, ReadingKind::Track, ReadingKind::Displacement];
+    kinds.map(|kind| {
+        let noise = viewed.observation().noise(kind);
+        (viewed.scale() / (noise * noise)) as f32
+    })
+}
+
 impl Round {
-    fn new(plan: &Plan, first: usize, looks: &[Look]) -> Round {
+    fn new(plan: &Plan, views: &[Viewed], first: usize, looks: &[Look]) -> Round {
         let mut round = Round { first, count: looks.len(), ..Round::default() };
         for look in looks {
-            let f = &plan.observation.frames[look.frame as usize];
+            let f = &views[look.member as usize].observation().frames[look.frame as usize];
             round.points = round.points.max(f.points.len());
             round.markers = round.markers.max(f.markers.len());
             round.nodes = round.nodes.max(node_count(plan, f));

@@ -37,13 +37,13 @@ impl Cost for Markers {
     }
 
     fn readings(&self, d: &Downloaded) -> Vec<ReadingResidual> {
-        let obs = &d.plan.observation;
+        let obs = d.observation;
         let all = order(d).into_iter().zip(&d.seen().markers);
         all.map(|(place, m)| d.reading(obs.sensor_of(m.site), m.site, m.position, place)).collect()
     }
 
     fn rows(&self, d: &Downloaded) -> Vec<(ResidualRow, usize)> {
-        let (obs, nodes) = (&d.plan.observation, &d.plan.body.nodes);
+        let (obs, nodes) = (d.observation, &d.plan.body.nodes);
         let all = order(d).into_iter().zip(&d.seen().markers);
         all.flat_map(|(place, m)| {
             let rest = obs.markers[m.site as usize].carry(|i| nodes[i]).0;
@@ -60,12 +60,12 @@ fn order(d: &Downloaded) -> Vec<usize> {
 
 /// Adds sites, and what was seen of them, to an arena.
 pub(super) fn put(plan: &Plan, (shots, sites): (&Shots, &SiteTables), tables: &mut Arena) {
-    let node_sites: Vec<[u32; 2]> = sites.of_node.columns.iter().zip(&sites.of_node.values).map(|(s, k)| [*s, *k]).collect();
+    let (starts, list) = sites.lists();
     tables.put("marks", &shots.marks);
     tables.put("mark_rows", &shots.mark_rows);
     tables.put("sites", &sites.sites);
     tables.put("offset_places", &readings::offset_places(plan));
     sites.stencils.put(tables);
-    tables.put("node_site_rows", &sites.of_node.starts);
-    tables.put("node_site_list", &node_sites);
+    tables.put("node_site_rows", &starts);
+    tables.put("node_site_list", &list);
 }

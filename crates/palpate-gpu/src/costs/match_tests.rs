@@ -46,11 +46,14 @@ struct Matched {
 /// The CPU's answer for a displacement field.
 fn right(plan: &Plan, u: &[DVec3]) -> Matched {
     let sensors = Sensors::default();
-    let look = Look { plan, sensors: &sensors, frame: 0 };
+    let look = Look { plan, observation: &plan.observation, sensors: &sensors, frame: 0 };
     let mut points = vec![None; plan.observation.frames[0].points.len()];
-    Depth::new(plan).matches(look, u).iter().for_each(|m| points[m.point as usize] = Some((m.cell, m.place.phi)));
+    Depth::new(plan, &plan.observation)
+        .matches(look, u)
+        .iter()
+        .for_each(|m| points[m.point as usize] = Some((m.cell, m.place.phi)));
     let scale = 1.0 / plan.observation.residuals() as f64;
-    let compared = Costs::new(plan).compare(look, u.to_vec());
+    let compared = Costs::new(plan, &plan.observation).compare(look, u.to_vec());
     Matched { points, gradient: compared.gradient(look, scale, &mut vec![0.0; plan.layout.len()]) }
 }
 

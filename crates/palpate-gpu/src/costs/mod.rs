@@ -29,6 +29,8 @@ mod shots;
 mod tables;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod view_tests;
 
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::{directions::DIRECTION, reduce};
@@ -40,12 +42,12 @@ pub(crate) use bounds::MOST_DIRECTIONS;
 pub(crate) use bounds::Seen;
 use looks::{Agenda, Round};
 use palpate_engine::{Direction, ReadingResidual, ResidualRow};
-use palpate_model::cutcells::pullback::{NOISE_REACH, TURNED_AWAY};
+use palpate_model::cutcells::pullback::TURNED_AWAY;
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::ReadingKind;
+use palpate_model::observation::{ReadingKind, Viewed};
 use palpate_model::plan::Plan;
 pub(crate) use results::{residuals, rows};
-use shots::{Shots, row_count};
+use shots::{Shots, Take, row_count};
 use std::collections::HashMap;
 use tables::{BandTables, SiteTables};
 
@@ -91,6 +93,8 @@ pub(crate) struct Observer {
     sight: Sight,
     agenda: Agenda,
     sensors: Vec<Sensors>,
+    /// What each member is compared with.
+    views: Vec<Viewed>,
     buffers: Buffers,
     /// Largest buffer that can be bound [B].
     largest: u64,
@@ -121,8 +125,8 @@ impl Observer {
 
     fn within(gpu: &Gpu, plan: &Plan, members: usize, room: Room) -> Result<Observer, GpuError> {
         let (shots, sight, buffers) = tables(gpu, plan, members, room)?;
-        let (agenda, sensors) = (Agenda::default(), Vec::new());
-        Ok(Observer { plan: plan.clone(), shots, sight, agenda, sensors, buffers, largest: gpu.largest, room })
+        let (agenda, sensors, views) = (Agenda::default(), Vec::new(), Vec::new());
+        Ok(Observer { plan: plan.clone(), shots, sight, agenda, sensors, views, buffers, largest: gpu.largest, room })
     }
 
     /// Device memory of tables and scratch [B].
@@ -130,20 +134,22 @@ impl Observer {
         self.buffers.values().map(wgpu::Buffer::size).sum()
     }
 
-    /// A new batch: where each member starts on the recording's clock [s], and what its sensors do.
-    pub(crate) fn set(&mut self, gpu: &Gpu, starts: &[f64], sensors: &[Sensors]) {
+    /// A new batch: what each member is compared with, where it starts on that recording's clock [s], and what its sensors do.
+    pub(crate) fn set(&mut self, gpu: &Gpu, views: &[Viewed], starts: &[f64], sensors: &[Sensors]) {
         self.sight.members = starts.len() as u32;
-        self.agenda = Agenda::new(&self.plan, starts, self.sight.slots as usize);
-        self.sensors = sensors.to_vec();
-        if self.sight.readings > 0 && self.sight.frames > 0 {
-            self.shots = Shots::of(&self.plan, sensors);
-            for look in &mut self.agenda.looks {
-                look.shot = look.member * self.sight.frames + look.frame;
-            }
-            if let Err(e) = readings::upload(gpu, &self.plan, sensors, &self.shots, &mut self.buffers) {
+        (self.views, self.sensors) = (views.to_vec(), sensors.to_vec());
+        let recordings = || views.iter().map(|v| v.view.recording);
+        let moved = self.sight.readings > 0 && self.sight.frames > 0;
+        if moved {
+            let takes: Vec<Take> = recordings().zip(sensors.iter().cloned()).collect();
+            self.shots = Shots::of(&self.plan, &takes);
+            if let Err(e) = readings::upload(gpu, &self.plan, &takes, &self.shots, &mut self.buffers) {
                 gpu.keep(e);
             }
         }
+        let take = |(member, recording): (usize, usize)| self.shots.firsts[if moved { member } else { recording }];
+        let firsts: Vec<u32> = recordings().enumerate().map(take).collect();
+        self.agenda = Agenda::new(&self.plan, views, starts, &firsts, self.sight.slots as usize);
         if let (Some(looks), Some(sight)) = (self.buffers.get("looks"), self.buffers.get("sight")) {
             let bytes: &[u8] = bytemuck::cast_slice(&self.agenda.looks);
             if bytes.len() as u64 <= looks.size() {
@@ -176,7 +182,7 @@ impl Observer {
         let together = self.tangent_slots(directions.len()) as u64;
         let sizes = tangent_sizes(&self.sight, directions.len() as u64, together);
         sizes.into_iter().for_each(|size| insert(gpu, size, tally));
-        let components = readings::components(&self.plan, directions);
+        let components = readings::components(&self.plan, self.sight.members as usize, directions);
         gpu.queue.write_buffer(&tally["own_directions"], 0, bytemuck::cast_slice(&components));
     }
 
@@ -322,7 +328,7 @@ fn tangent_sizes(s: &Sight, q: u64, together: u64) -> [(&'static str, u64); 4] {
         ("curvature", 4 * u64::from(s.members) * (q + q * q)),
         ("changes", VECTOR * together * q * u64::from(s.extended)),
         ("slopes", 4 * together * q * u64::from(s.rows)),
-        ("own_directions", 4 * q * (1 + offsets + u64::from(s.readings))),
+        ("own_directions", 4 * u64::from(s.members) * q * (1 + offsets + u64::from(s.readings))),
     ]
 }
 
@@ -346,12 +352,18 @@ type Made<B> = (Shots, Sight, HashMap<&'static str, B>);
 
 /// Tables, and scratch.
 fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<Made<M::Buffer>, GpuError> {
-    let (body, obs) = (&*plan.body, &*plan.observation);
-    let sensors = readings::distinct(plan, &vec![Sensors::new(&plan.layout, &plan.theta); members.max(1)]);
-    let shots = Shots::of(plan, &sensors);
+    let body = &*plan.body;
+    let recordings: Vec<_> = (0..plan.recordings()).map(|r| plan.recording(r).observation).collect();
+    // Until a batch is there, all members are compared with the recording that has most points.
+    let largest =
+        (0..recordings.len()).max_by_key(|r| (recordings[*r].readings(ReadingKind::Depth), usize::MAX - r)).unwrap_or(0);
+    let takes = readings::distinct(plan, vec![(largest, Sensors::new(&plan.layout, &plan.theta)); members.max(1)]);
+    let shots = Shots::of(plan, &takes);
     let band = BandTables::new(plan);
     let sites = SiteTables::new(plan);
-    let most = |f: &dyn Fn(&palpate_model::observation::Frame) -> usize| obs.frames.iter().map(f).max().unwrap_or(0);
+    let all = || recordings.iter().flat_map(|r| &r.frames);
+    let most = |f: &dyn Fn(&palpate_model::observation::Frame) -> usize| all().map(f).max().unwrap_or(0);
+    let frames = recordings.iter().map(|r| r.frames.len()).max().unwrap_or(0);
     let points = most(&|f| f.points.len());
     let mut sight = Sight {
         nodes: body.nodes.len() as u32,
@@ -361,18 +373,15 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
         rows: most(&|f| row_count(plan, f)) as u32,
         markers: most(&|f| f.markers.len()) as u32,
         stripes: points.div_ceil(room.points).max(1) as u32,
-        sites: sites.sites.len() as u32,
+        sites: readings::most_sites(plan) as u32,
         parameters: plan.layout.len() as u32,
         offsets: readings::offset_places(plan).len() as u32,
         readings: readings::places(plan).len() as u32,
-        frames: obs.frames.len() as u32,
+        frames: frames as u32,
         lattice: body.band.grid.size.map(|n| n as u32),
         h: body.length as f32,
         band: plan.band as f32,
-        reach: (NOISE_REACH * obs.channel(ReadingKind::Depth).map_or(0.0, |c| c.noise)) as f32,
         turned_away: TURNED_AWAY as f32,
-        depth: tables::weight(obs, ReadingKind::Depth),
-        displacement: tables::weight(obs, ReadingKind::Displacement),
         ..Sight::default()
     };
     Seen::new(&sight, &shots, &band, &sites).check()?;
@@ -384,16 +393,16 @@ fn tables<M: Maker>(gpu: &M, plan: &Plan, members: usize, room: Room) -> Result<
     sight.slots = fit.min(members.max(1) as u64) as u32;
 
     let mut buffers = HashMap::new();
-    if !obs.frames.is_empty() {
+    if frames > 0 {
         for (name, bytes) in each {
             buffers.insert(name, gpu.buffer(name, bytes * u64::from(sight.slots))?);
         }
-        let looks = size_of::<Look>() * members.max(1) * obs.frames.len();
+        let looks = size_of::<Look>() * members.max(1) * frames;
         buffers.insert("looks", gpu.buffer("looks", looks as u64)?);
         buffers.insert("sight", gpu.buffer("sight", size_of::<Sight>() as u64)?);
-        readings::upload(gpu, plan, &sensors, &shots, &mut buffers)?;
+        readings::upload(gpu, plan, &takes, &shots, &mut buffers)?;
         buffers.insert("measured", gpu.upload("measured", &shots.measured)?);
-        let offsets = VECTOR * (members.max(1) * sites.sites.len()) as u64;
+        let offsets = VECTOR * u64::from(sight.sites) * members.max(1) as u64;
         buffers.insert("offsets", gpu.buffer("offsets", offsets)?);
         let mut body = Arena::new("body_tables");
         body.put("reading_places", &readings::places(plan));

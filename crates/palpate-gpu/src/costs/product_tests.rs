@@ -13,7 +13,7 @@ use palpate_model::plan::build::build_plan;
 use palpate_model::scene::Scene;
 
 /// A held ball that is seen in every way, with numbers of the measurement that residuals depend on beside the states.
-fn plan(scene: &Scene) -> Plan {
+pub(super) fn plan(scene: &Scene) -> Plan {
     // Their effects need markers, which come after.
     let depth = seen(&Scene { effects: Vec::new(), ..scene.clone() });
     let mut observation = (*depth.observation).clone();
@@ -51,8 +51,9 @@ fn products_with_the_gauss_newton_matrix_are_those_of_the_cpu() {
         for chosen in [&known[..1], &known[..]] {
             let mut v = vec![0.0; p];
             chosen.iter().for_each(|a| v[*a] = noise.vector().x / size[*a]);
-            let [found, right] =
-                [gpu.product(&plan.theta, &v, &Wanted::All), cpu.product(&plan.theta, &v, &Wanted::All)].map(Result::unwrap);
+            let [found, right] = [&mut gpu as &mut dyn Evaluate, &mut cpu]
+                .map(|e| e.product(&ParamBatch::of(&plan.theta), &v, &Wanted::All))
+                .map(Result::unwrap);
             let length = known.iter().map(|a| (right[*a] / size[*a]).powi(2)).sum::<f64>().sqrt();
             let off = |b: &[f64]| known.iter().map(|a| (found[*a] - b[*a]).abs() / size[*a]).fold(0.0, f64::max) / length;
             println!("{steps} steps, {} numbers: {:.1e}", chosen.len(), off(&right));

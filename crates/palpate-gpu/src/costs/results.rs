@@ -11,7 +11,7 @@ use crate::world::World;
 use glam::DVec3;
 use palpate_engine::{Curvature, Evaluation, FrameResiduals, Misfit, ReadingResidual, ResidualRow, Rows, Source};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::{Frame, Sensor};
+use palpate_model::observation::{Frame, Observation, Sensor};
 use palpate_model::plan::Plan;
 
 impl Observer {
@@ -28,8 +28,8 @@ impl Observer {
         all
     }
 
-    /// Adds to evaluations (one a member) what [`Observer::results`] held.
-    pub(crate) fn add_to(&self, results: &[Vec<u8>], directions: usize, all: &mut [Evaluation]) {
+    /// Adds to evaluations (one a member) what [`Observer::results`] held; members take these `counts` of the directions.
+    pub(crate) fn add_to(&self, results: &[Vec<u8>], directions: usize, counts: impl Fn(usize) -> usize, all: &mut [Evaluation]) {
         let (frames, q) = (self.sight.frames as usize, directions);
         let [sums, later, curvature @ ..] = results else { return };
         let [sums, later] = [sums, later].map(|bytes| -> Vec<[f32; 4]> { bytemuck::pod_collect_to_vec(bytes) });
@@ -46,8 +46,11 @@ impl Observer {
                 e.gradient[place] += later[m * frames..(m + 1) * frames].iter().map(|s| f64::from(s[0])).sum::<f64>();
             }
             if q > 0 {
-                let mut own = curvature[m * each..(m + 1) * each].iter().map(|x| f64::from(*x));
-                e.curvature = Some(Curvature { gradient: own.by_ref().take(q).collect(), matrix: own.collect() });
+                let own: Vec<f64> = curvature[m * each..(m + 1) * each].iter().map(|x| f64::from(*x)).collect();
+                let (gradient, matrix) = own.split_at(q);
+                let n = counts(m);
+                let matrix = matrix.chunks(q).take(n).flat_map(|row| &row[..n]).copied().collect();
+                e.curvature = Some(Curvature { gradient: gradient[..n].to_vec(), matrix });
             }
         }
     }
@@ -56,6 +59,7 @@ impl Observer {
 /// A frame as one member saw it, back on the host.
 pub(super) struct Downloaded<'a> {
     pub(super) plan: &'a Plan,
+    pub(super) observation: &'a Observation,
     pub(super) sensors: &'a Sensors,
     /// Number of the frame.
     pub(super) frame: usize,
@@ -76,7 +80,8 @@ impl<'a> Downloaded<'a> {
     ) -> Result<(Downloaded<'a>, Vec<Vec<u8>>), GpuError> {
         let o = &world.observer;
         let (frame, shot) = (at.frame as usize, &o.shots.shots[at.shot as usize]);
-        let rows = row_count(&world.plan, &world.plan.observation.frames[frame]);
+        let observation = o.views[at.member as usize].observation();
+        let rows = row_count(&world.plan, &observation.frames[frame]);
         let own = [("found", FOUND as usize * shot.point_count as usize), ("rows", 8 * rows)];
         let wanted: Vec<_> = own.iter().map(|(name, bytes)| (&o.buffers[name], *bytes)).chain(more.iter().copied()).collect();
         let mut all = world.gpu.contents_of(&wanted).await?;
@@ -84,12 +89,12 @@ impl<'a> Downloaded<'a> {
         let found = bytemuck::pod_collect_to_vec(&all[0]);
         let values = bytemuck::pod_collect_to_vec(&all[1]);
         let sensors = &o.sensors[at.member as usize];
-        Ok((Downloaded { plan: &world.plan, sensors, frame, shot, shots: &o.shots, found, values }, more))
+        Ok((Downloaded { plan: &world.plan, observation, sensors, frame, shot, shots: &o.shots, found, values }, more))
     }
 
     /// What was seen.
     pub(super) fn seen(&self) -> &'a Frame {
-        &self.plan.observation.frames[self.frame]
+        &self.observation.frames[self.frame]
     }
 
     /// Place of a coordinate among the rows; `vector` counts markers, then nodes.
@@ -105,7 +110,7 @@ impl<'a> Downloaded<'a> {
 
     /// Its scalar residuals, with their places among the rows.
     pub(super) fn coordinates(&self, sensor: Sensor, item: u32, rest: DVec3, vector: usize) -> [(ResidualRow, usize); 3] {
-        let noise = self.plan.observation.noise(sensor.kind());
+        let noise = self.observation.noise(sensor.kind());
         [0u8, 1, 2].map(|axis| {
             let row = self.row(vector, axis.into());
             let value = self.values[row][0].into();

@@ -1,9 +1,11 @@
-//! Tables of the frames: points sorted into cubes, markers sorted by site, observed displacements.
+//! Tables of the frames of all recordings: points sorted into cubes, markers sorted by site, observed displacements.
 
+use super::readings::most_sites;
 use crate::layout::{Mark, Shot};
 use glam::DVec3;
+use palpate_model::cutcells::pullback::NOISE_REACH;
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::Frame;
+use palpate_model::observation::{Frame, Observation, ReadingKind};
 use palpate_model::plan::Plan;
 
 /// Most cubes along y and z: a cell's loop over rows of cubes stays far below [`super::MOST_LOOPS`] with it.
@@ -31,69 +33,95 @@ pub(crate) struct Shots {
     pub(crate) marks: Vec<Mark>,
     /// Which marker of its frame each of `marks` is.
     pub(crate) mark_order: Vec<u32>,
-    /// First marker of each site, counted in the frame, `[F][sites + 1]`.
+    /// First marker of each site, counted in the frame, `[F][most sites + 1]`.
     pub(crate) mark_rows: Vec<u32>,
     pub(crate) measured: Vec<[f32; 4]>,
+    /// First shot of every take.
+    pub(crate) firsts: Vec<u32>,
 }
 
+/// A recording, by its number, as these sensors took it.
+pub(crate) type Take = (usize, Sensors);
+
 impl Shots {
-    /// Of the recording as these sensors took it, `[sensors][F]`; markers and displacements are the same for all.
-    pub(crate) fn of(plan: &Plan, sensors: &[Sensors]) -> Shots {
+    /// Of the takes; markers and displacements of a recording are the same in all of them.
+    pub(crate) fn of(plan: &Plan, takes: &[Take]) -> Shots {
         let mut all = Shots::default();
-        for s in sensors {
-            all.add(plan, s);
+        let (mut bare, mut sites): (Vec<Vec<Shot>>, u32) = (Vec::new(), 0);
+        for number in 0..plan.recordings() {
+            let recording = plan.recording(number).observation;
+            let places = Shot {
+                first_site: sites,
+                node_rows: (number * (plan.body.nodes.len() + 1)) as u32,
+                reach: (NOISE_REACH * recording.channel(ReadingKind::Depth).map_or(0.0, |c| c.noise)) as f32,
+                ..Shot::default()
+            };
+            bare.push(all.add_vectors(plan, &recording, places));
+            sites += recording.markers.len() as u32;
+        }
+        let mut cameras = 0;
+        for (number, sensors) in takes {
+            let recording = plan.recording(*number).observation;
+            all.firsts.push(all.shots.len() as u32);
+            all.add_points(plan, &recording, sensors, &bare[*number], cameras);
+            cameras += recording.cameras.len();
         }
         all
     }
 
-    fn add(&mut self, plan: &Plan, sensors: &Sensors) {
-        let all = self;
+    /// Markers and displacements of a recording: its shots without points.
+    fn add_vectors(&mut self, plan: &Plan, recording: &Observation, places: Shot) -> Vec<Shot> {
         // Where markers are at rest: their goal is a displacement.
-        let sites = &plan.observation.markers;
+        let sites = &recording.markers;
         let rest: Vec<DVec3> = sites.iter().map(|s| s.carry(|i| plan.body.nodes[i]).0 + s.stalk).collect();
-        let count = plan.observation.frames.len();
-        let first_camera = all.shots.len() / count.max(1) * plan.observation.cameras.len();
-        for (frame, f) in plan.observation.frames.iter().enumerate() {
-            let known = (all.shots.len() >= count).then(|| all.shots[frame]);
-            let mut shot = Shot {
-                point_start: all.points.len() as u32,
-                point_count: f.points.len() as u32,
-                marker_start: known.map_or(all.marks.len() as u32, |s| s.marker_start),
+        let mut shots = Vec::new();
+        for f in &recording.frames {
+            shots.push(Shot {
+                marker_start: self.marks.len() as u32,
                 marker_count: f.markers.len() as u32,
-                node_start: known.map_or((all.measured.len() / 2) as u32, |s| s.node_start),
+                node_start: (self.measured.len() / 2) as u32,
                 node_count: node_count(plan, f) as u32,
-                cube_start: all.cube_starts.len() as u32,
-                ..Shot::default()
+                mark_start: self.mark_rows.len() as u32,
+                ..places
+            });
+            let mut order: Vec<u32> = (0..f.markers.len() as u32).collect();
+            order.sort_by_key(|&m| f.markers[m as usize].site);
+            for &m in &order {
+                let marker = &f.markers[m as usize];
+                let [goal, goal_rest] = split(marker.position - rest[marker.site as usize]).map(|[x, y, z, _]| [x, y, z]);
+                self.marks.push(Mark { goal, site: marker.site, goal_rest, pad: 0 });
+            }
+            let before = |site: usize| order.partition_point(|&m| (f.markers[m as usize].site as usize) < site) as u32;
+            self.mark_rows.extend((0..=most_sites(plan)).map(before));
+            self.mark_order.extend(order);
+            self.measured.extend(measured(plan, f).into_iter().flatten());
+        }
+        shots
+    }
+
+    /// Points of a take, whose cameras begin at `first_camera`.
+    fn add_points(&mut self, plan: &Plan, recording: &Observation, sensors: &Sensors, bare: &[Shot], first_camera: usize) {
+        for (f, bare) in recording.frames.iter().zip(bare) {
+            let mut shot = Shot {
+                point_start: self.points.len() as u32,
+                point_count: f.points.len() as u32,
+                cube_start: self.cube_starts.len() as u32,
+                ..*bare
             };
-            let moved = sensors.points(&plan.observation.cameras, &f.points);
+            let moved = sensors.points(&recording.cameras, &f.points);
             let points = moved.as_ref().unwrap_or(&f.points);
             let origin = points.iter().map(|p| p.position).sum::<DVec3>() / points.len().max(1) as f64;
             [shot.shift, shot.shift_rest] = split(origin - plan.body.center);
             let from: Vec<[f32; 3]> = points.iter().map(|p| (p.position - origin).as_vec3().to_array()).collect();
             let cubes = Cubes::new(&from, plan.body.length as f32);
             (shot.cubes, shot.low, shot.inverse_edge) = (cubes.size, cubes.low, cubes.inverse_edge);
-            all.cube_starts.extend(cubes.starts.iter().map(|s| s + shot.point_start));
+            self.cube_starts.extend(cubes.starts.iter().map(|s| s + shot.point_start));
             for &i in &cubes.order {
                 let [x, y, z] = from[i as usize];
-                all.points.push([x, y, z, (first_camera + points[i as usize].camera as usize) as f32]);
+                self.points.push([x, y, z, (first_camera + points[i as usize].camera as usize) as f32]);
             }
-            all.point_order.extend(cubes.order);
-            all.shots.push(shot);
-            if known.is_some() {
-                continue;
-            }
-
-            let mut order: Vec<u32> = (0..f.markers.len() as u32).collect();
-            order.sort_by_key(|&m| f.markers[m as usize].site);
-            for &m in &order {
-                let marker = &f.markers[m as usize];
-                let [goal, goal_rest] = split(marker.position - rest[marker.site as usize]).map(|[x, y, z, _]| [x, y, z]);
-                all.marks.push(Mark { goal, site: marker.site, goal_rest, pad: 0 });
-            }
-            let before = |site: usize| order.partition_point(|&m| (f.markers[m as usize].site as usize) < site) as u32;
-            all.mark_rows.extend((0..=sites.len()).map(before));
-            all.mark_order.extend(order);
-            all.measured.extend(measured(plan, f).into_iter().flatten());
+            self.point_order.extend(cubes.order);
+            self.shots.push(shot);
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::device::pipelines::shared::structs::NONE;
 use crate::layout::{BandCell, Site};
 use crate::stencils::StencilTable;
 use glam::{DMat3, DVec3};
-use palpate_model::observation::{MarkerSite, Observation, ReadingKind};
+use palpate_model::observation::{MarkerSite, ReadingKind};
 use palpate_model::plan::Plan;
 
 /// Rows of a sparse matrix: where each starts, which column, which value.
@@ -82,45 +82,50 @@ impl BandTables {
     }
 }
 
-/// The markers' sites.
+/// The sites of the markers of all recordings, one recording's after another's.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SiteTables {
     pub(crate) sites: Vec<Site>,
     /// Places and gradients.
     pub(crate) stencils: StencilTable,
-    /// Rows are nodes, columns sites; values are entries of `stencils`.
-    pub(crate) of_node: Rows<u32>,
+    /// Of every recording: rows are nodes, columns its sites; values are entries of `stencils`.
+    pub(crate) of_node: Vec<Rows<u32>>,
 }
 
 impl SiteTables {
     pub(crate) fn new(plan: &Plan) -> SiteTables {
         let mut tables = SiteTables::default();
-        let mut transposed = Vec::new();
-        for (s, site) in plan.observation.markers.iter().enumerate() {
-            tables.sites.push(place(plan, site));
-            let first = tables.stencils.entries.len() as u32;
-            transposed.extend((first..).zip(&site.stencil.nodes).map(|(k, node)| (*node, s as u32, k)));
-            tables.stencils.extend(std::iter::once(site.stencil.get()));
+        for recording in (0..plan.recordings()).map(|r| plan.recording(r)) {
+            let mut transposed = Vec::new();
+            for (s, site) in recording.observation.markers.iter().enumerate() {
+                tables.sites.push(place(plan, site));
+                let first = tables.stencils.entries.len() as u32;
+                transposed.extend((first..).zip(&site.stencil.nodes).map(|(k, node)| (*node, s as u32, k)));
+                tables.stencils.extend(std::iter::once(site.stencil.get()));
+            }
+            tables.of_node.push(Rows::new(plan.body.nodes.len(), &transposed));
         }
-        tables.of_node = Rows::new(plan.body.nodes.len(), &transposed);
         tables
     }
-}
 
-/// 1/(n σ²) of a kind of readings [1/m²].
-pub(crate) fn weight(obs: &Observation, kind: ReadingKind) -> f32 {
-    let residuals = obs.residuals();
-    let scale = if residuals == 0 { 0.0 } else { 1.0 / residuals as f64 };
-    (scale / (obs.noise(kind) * obs.noise(kind))) as f32
+    /// Sites at nodes, rows of all recordings one after the other: where each row starts, and pairs of site and entry.
+    pub(crate) fn lists(&self) -> (Vec<u32>, Vec<[u32; 2]>) {
+        let (mut starts, mut list): (Vec<u32>, Vec<[u32; 2]>) = (Vec::new(), Vec::new());
+        for rows in &self.of_node {
+            let first = list.len() as u32;
+            starts.extend(rows.starts.iter().map(|s| s + first));
+            list.extend(rows.columns.iter().zip(&rows.values).map(|(s, k)| [*s, *k]));
+        }
+        (starts, list)
+    }
 }
 
 fn place(plan: &Plan, site: &MarkerSite) -> Site {
     let excess = site.carry(|i| plan.body.nodes[i]).1 - DMat3::IDENTITY;
     let column = |c: DVec3| split(c)[0];
-    let weight = weight(&plan.observation, site.kind);
     Site {
         stalk: site.stalk.as_vec3().to_array(),
-        weight,
+        track: u32::from(site.kind == ReadingKind::Track),
         excess: [column(excess.x_axis), column(excess.y_axis), column(excess.z_axis)],
     }
 }

@@ -185,7 +185,7 @@ fn outcome(plan: &Plan, e: &Evaluation, adjoint: Vec<f64>) -> Outcome {
 pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
     let (start, size) = MEMBERS[member];
     let nodes = &plan.body.nodes;
-    let (costs, sensors) = (Costs::new(plan), Sensors::default());
+    let (costs, sensors) = (Costs::new(plan, &plan.observation), Sensors::default());
     let scale = 1.0 / plan.observation.residuals() as f64;
     let keys = directions(plan);
     let along: Vec<Direction> = keys.iter().copied().map(Direction::Parameter).collect();
@@ -201,8 +201,8 @@ pub(super) fn expected(plan: &Plan, member: usize) -> Outcome {
         let (a, b) = (state(k), state(k + 1));
         let ends = [&a[0][..], &a[1], &b[0], &b[1]];
         let mut adj = vec![vec![DVec3::ZERO; nodes.len()]; 4];
-        for i in instants(plan, start, k) {
-            let look = Look { plan, sensors: &sensors, frame: i.frame };
+        for i in instants(&plan.recording(0), plan.clock.step, start, k) {
+            let look = Look { plan, observation: &plan.observation, sensors: &sensors, frame: i.frame };
             let compared = costs.compare(look, blend(&i.value, ends));
             e.cost += scale * compared.sums.cost;
             e.matched += compared.sums.matched;
@@ -364,7 +364,7 @@ fn loops_stay_bounded_and_strays_do_not_stretch_the_cubes() {
 
     let plan = ball_plan();
     let (shots, band, sites) =
-        (super::Shots::of(&plan, &[Sensors::default()]), super::BandTables::new(&plan), super::SiteTables::new(&plan));
+        (super::Shots::of(&plan, &[(0, Sensors::default())]), super::BandTables::new(&plan), super::SiteTables::new(&plan));
     let mut crowd = shots.clone();
     crowd.shots[0].cubes = [4000, 40, 40];
     let sight = |points: u32, stripes: u32| super::Sight {

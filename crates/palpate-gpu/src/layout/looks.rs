@@ -24,9 +24,9 @@ pub struct Sight {
     pub markers: u32,
     /// Groups of eight lanes that share a cell's candidates.
     pub stripes: u32,
-    /// Marker sites.
+    /// Most marker sites of a recording.
     pub sites: u32,
-    /// Frames F.
+    /// Most frames F of a recording.
     pub frames: u32,
     /// Parameters P.
     pub parameters: u32,
@@ -38,18 +38,10 @@ pub struct Sight {
     pub h: f32,
     /// Half width of the cost's band [m].
     pub band: f32,
-    /// How far a hidden point looks towards the camera beside its distance [m].
-    pub reach: f32,
     /// Cosine beyond which a side is turned away.
     pub turned_away: f32,
-    /// 1/(n σ²) of depth points [1/m²].
-    pub depth: f32,
-    /// 1/(n σ²) of observed displacements [1/m²].
-    pub displacement: f32,
     /// Numbers that move depth readings.
     pub readings: u32,
-    /// Nothing.
-    pub pad: u32,
 }
 
 /// One frame, seen by one member.
@@ -68,6 +60,8 @@ pub struct Look {
     pub value: [f32; 4],
     /// Their derivatives by time [1/s].
     pub rate: [f32; 4],
+    /// 1/(n σ²) of depth points, markers, tracked points and observed displacements [1/m²].
+    pub weights: [f32; 4],
 }
 
 /// A point of a frame, as a look found it.
@@ -130,6 +124,14 @@ pub struct Shot {
     pub shift: [f32; 4],
     /// What single precision leaves of it [m].
     pub shift_rest: [f32; 4],
+    /// First entry of `mark_rows`.
+    pub mark_start: u32,
+    /// First site of its recording.
+    pub first_site: u32,
+    /// First of its recording's rows of sites at nodes.
+    pub node_rows: u32,
+    /// How far a hidden point looks towards the camera beside its distance [m].
+    pub reach: f32,
 }
 
 /// A cell of the band.
@@ -152,8 +154,8 @@ pub struct BandCell {
 pub struct Site {
     /// From the attachment point to the marker's centre at rest [m].
     pub stalk: [f32; 3],
-    /// 1/(n σ²) of its readings [1/m²].
-    pub weight: f32,
+    /// 1 of a tracked point.
+    pub track: u32,
     /// Columns of the rest shape's deformation gradient, minus the identity.
     pub excess: [[f32; 4]; 3],
 }
@@ -164,7 +166,7 @@ pub struct Site {
 pub struct Mark {
     /// Measured minus rest position [m].
     pub goal: [f32; 3],
-    /// Site.
+    /// Site, counted in its recording.
     pub site: u32,
     /// What single precision leaves of `goal` [m].
     pub goal_rest: [f32; 3],

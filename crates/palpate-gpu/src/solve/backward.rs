@@ -2,6 +2,7 @@
 
 use crate::device::pipelines::pass;
 use crate::passes::{ALL, Passes, Per};
+use crate::solve::forward::rest;
 use crate::world::columns;
 use crate::world::{Adjoint, Loan, SOLVING, SOLVING_VECTORS, State, Tally, Tangent, VECTOR, World};
 use palpate_model::plan::scheme::Stage;
@@ -22,6 +23,7 @@ pub(crate) fn step_adjoint(
     let now = mixed.as_ref().unwrap_or(past[0]);
     let share = world.lend(2 * mixed.iter().len() as u64);
     world.record(|r| {
+        rest(world, r, stage.step, tally);
         let mut s = Passes::of_stage(world, r, stage, past, now, next, tally);
         s.linearise();
         s.run_with(pass::FORM_RHS, ALL, Per::Node, 0, &[("adj", &adj.0.buffer)]);
@@ -124,6 +126,7 @@ pub(crate) fn step_tangent(
         stage.from.iter().zip(old).map(|(f, t)| (f.1 as f32, &t.parts[place].buffer)).collect()
     };
     world.record(|r| {
+        rest(world, r, stage.step, tally);
         let mut s = Passes::of_stage(world, r, stage, past, now, next, tally);
         room.lend_to(&mut s);
         s.linearise();

@@ -1,7 +1,7 @@
 //! Start and step: what one call of the backend puts on the device's list.
 
 use crate::device::pipelines::pass;
-use crate::device::recorder::{Args, Size};
+use crate::device::recorder::{Args, Recorder, Size};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{State, Tally, World};
 use palpate_model::plan::STATIC_ITERATIONS;
@@ -49,12 +49,23 @@ fn world_steps(world: &World) {
     }
 }
 
+/// Lets only those members take part in step k, and in what comes of it, whose recordings take it.
+pub(crate) fn rest(world: &World, r: &mut Recorder, k: usize, tally: &Tally) {
+    if world.batch.views.iter().all(|v| v.recording.steps >= world.plan.clock.steps) {
+        return;
+    }
+    let groups = world.members().div_ceil(64);
+    let args = Args { step: k as u32, ..Args::default() };
+    r.run(pass::REST_MEMBERS, &[("health", tally.get("health"))], Size::All { members: 1, groups }, args);
+}
+
 /// One stage.
 pub(crate) fn step(world: &World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
     world.enter(stage);
     let mixed = world.room_to_mix(past);
     let now = mixed.as_ref().unwrap_or(past[0]);
     world.record(|r| {
+        rest(world, r, stage.step, tally);
         Passes::of_stage(world, r, stage, past, now, next, tally).newton(world.plan.solver.newton_iterations);
     });
 }

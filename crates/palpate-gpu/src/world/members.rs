@@ -5,11 +5,12 @@ use super::geometry::Geometry;
 use crate::device::{Arena, Gpu, GpuError};
 use crate::layout::{ClampPose, Member, Plane};
 use glam::DVec3;
-use palpate_engine::ParamBatch;
+use palpate_engine::{Direction, ParamBatch};
 use palpate_model::cutcells::corotation::M24;
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::mechanics::plane::planes;
+use palpate_model::observation::Viewed;
 use palpate_model::plan::{Physics, Plan};
 use std::collections::HashMap;
 
@@ -22,6 +23,10 @@ fn vec4(v: DVec3, w: f64) -> [f32; 4] {
 pub(crate) struct Batch {
     pub(crate) physics: Vec<Physics>,
     pub(crate) theta: Vec<Vec<f64>>,
+    /// What each member is compared with.
+    pub(crate) views: Vec<Viewed>,
+    /// Places that each member wants sensitivities for; empty where all want those that are requested.
+    pub(crate) own: Vec<Vec<usize>>,
     /// Poisson's ratio of each slot of element matrices that is on the device.
     slots: Vec<f64>,
     /// The matrices themselves, kept where effects make other clamps of them.
@@ -29,6 +34,16 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
+    /// Directions of the tangents for which `requested` places ask.
+    pub(crate) fn directions(&self, requested: &[usize]) -> Vec<Direction> {
+        Direction::along(&self.own, requested)
+    }
+
+    /// Number of sensitivities of a member, where these many are requested.
+    pub(crate) fn count(&self, member: usize, requested: usize) -> usize {
+        self.own.get(member).map_or(requested, Vec::len)
+    }
+
     /// Uploads θ and what follows from it.
     ///
     /// # Errors
@@ -43,6 +58,8 @@ impl Batch {
         buffers: &mut HashMap<&'static str, wgpu::Buffer>,
     ) -> Result<(), GpuError> {
         self.theta = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
+        self.own.clone_from(&theta.own);
+        self.views = (0..theta.members()).map(|b| plan.viewed(&theta.view(b))).collect();
         self.physics = self.theta.iter().map(|row| Physics::new(&plan.layout, row)).collect();
         let mut slots: Vec<f64> = Vec::new();
         let mut members = Vec::new();
@@ -91,6 +108,7 @@ impl Batch {
         let mut tables = Arena::new("batch_tables");
         geometry.effects.put(plan, &geometry.mass, &self.physics, &mut tables);
         tables.put("members", &members);
+        tables.put("lasting", &self.views.iter().map(|v| v.recording.steps as u32).collect::<Vec<_>>());
         tables.put("planes", &all_planes);
         tables.put("poses", &poses);
         tables.put("mass_values", &masses);

@@ -208,7 +208,7 @@ impl World {
         // Frames are stamped by a clock that may be ahead.
         let sensors: Vec<Sensors> = self.batch.theta.iter().map(|row| Sensors::new(&self.plan.layout, row)).collect();
         let starts: Vec<f64> = self.batch.physics.iter().zip(&sensors).map(|(p, s)| p.start + s.ahead()).collect();
-        self.observer.set(&self.gpu, &starts, &sensors);
+        self.observer.set(&self.gpu, &self.batch.views, &starts, &sensors);
     }
 
     /// Tells the kernels how many Newton iterations they have.

@@ -101,7 +101,7 @@ impl Gathered {
             spin: vec4(p.angular_velocity),
         });
         numbers(&world.geometry, &world.plan, p, &mut self.numbers);
-        // Which arrays there are depends on the direction alone, not on the member.
+        // Which arrays there are depends on the direction alone, not on the member: see `fill`.
         self.moduli.extend(rate.changes.modulus.iter().flatten().map(|v| *v as f32));
         let (mass, density) = (&world.geometry.mass, rate.changes.density.as_deref());
         match (mass.entries(), density) {
@@ -144,18 +144,30 @@ impl Gathered {
     }
 }
 
+/// Where an array changes along the direction of some members, it does in all of them: by nothing where their own directions leave it.
+fn fill<T: Clone + Default>(rates: &mut [Coefficients], array: impl Fn(&mut Coefficients) -> &mut Option<Vec<T>>) {
+    let Some(len) = rates.iter_mut().find_map(|r| array(r).as_ref().map(Vec::len)) else { return };
+    for r in rates {
+        array(r).get_or_insert_with(|| vec![T::default(); len]);
+    }
+}
+
 impl Rates {
     /// Along every direction.
     pub(crate) fn all(world: &World, directions: &[Direction]) -> Vec<Rates> {
         let (plan, theta) = (&world.plan, &world.batch.theta);
-        let mut gathered: Vec<Gathered> = directions.iter().map(|_| Gathered::default()).collect();
-        for row in theta {
-            let own = Coefficients::new(plan, row);
-            for (all, direction) in gathered.iter_mut().zip(directions) {
-                all.add(world, &own.along(plan, &direction.dense(plan.layout.len())));
-            }
-        }
-        gathered.into_iter().zip(directions).map(|(all, direction)| all.upload(world, direction)).collect()
+        let members: Vec<Coefficients> = theta.iter().map(|row| Coefficients::new(plan, row)).collect();
+        let one = |direction: &Direction| {
+            let along = |(b, own): (usize, &Coefficients)| own.along(plan, &direction.of(b).dense(plan.layout.len()));
+            let mut rates: Vec<Coefficients> = members.iter().enumerate().map(along).collect();
+            fill(&mut rates, |r| &mut r.changes.modulus);
+            fill(&mut rates, |r| &mut r.changes.density);
+            fill(&mut rates, |r| &mut r.changes.rest);
+            let mut all = Gathered::default();
+            rates.iter().for_each(|r| all.add(world, r));
+            all.upload(world, direction)
+        };
+        directions.iter().map(one).collect()
     }
 
     /// All buffers, for passes.

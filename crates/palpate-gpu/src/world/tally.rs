@@ -40,7 +40,7 @@ impl Tally {
             buffers.insert(name, buffer);
         }
         let directions = &request.sensitivities;
-        world.observer.extend_tally(&world.gpu, &Direction::parameters(directions), &mut buffers);
+        world.observer.extend_tally(&world.gpu, &world.batch.directions(directions), &mut buffers);
         Tally { directions: directions.clone(), buffers, sums, pointed: false }
     }
 

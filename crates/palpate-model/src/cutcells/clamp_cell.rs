@@ -8,7 +8,7 @@ use crate::space::body::Body;
 use glam::DVec3;
 
 /// One cell of a held region.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ClampCell {
     /// Number of the cell in [`Body::cells`].
     pub cell: u32,

@@ -5,7 +5,7 @@ use crate::cutcells::grid::Grid;
 use glam::DVec3;
 
 /// A body's cells on their lattice.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CutCells {
     /// The lattice that covers body and band.
     pub grid: Grid,
@@ -23,7 +23,7 @@ impl CutCells {
 }
 
 /// A cell that holds some of the body.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
     /// Lattice coordinates of the lowest corner, counted from the grid's node (0, 0, 0).
     pub lattice: [usize; 3],
@@ -55,7 +55,7 @@ pub struct GhostLine {
 
 /// The body and a band of cells around it, where observed points are looked up. Extended nodes are numbered: first the N simulation nodes, then
 /// band nodes. On a body of tetrahedra no corner of a cell is a simulation node.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Band {
     /// The lattice that covers body and band.
     pub grid: Grid,
@@ -74,7 +74,7 @@ pub struct Band {
 }
 
 /// A cell in which observed points are looked up.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BandCell {
     /// Lattice coordinates of the lowest corner.
     pub lattice: [usize; 3],

@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 /// A rigid motion x ↦ R(t) x + b(t) about the world origin, sampled at increasing times.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RigidMotion {
     /// Sample times on the recording's clock [s], increasing.
     pub times: Vec<f64>,

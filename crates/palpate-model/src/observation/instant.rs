@@ -1,6 +1,6 @@
 //! Which frames belong to a step, and where on the cubic Hermite curve through both ends of the step each is read.
 
-use crate::plan::Plan;
+use super::view::Recording;
 
 /// Place of a frame inside a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,10 +13,9 @@ pub struct Instant {
     pub rate: [f64; 4],
 }
 
-/// Frames that belong to step k of a simulation that starts at `start` on the recording's clock.
-pub fn instants(plan: &Plan, start: f64, k: usize) -> Vec<Instant> {
-    let frames = &plan.observation.frames;
-    let (dt, steps) = (plan.clock.step, plan.clock.steps);
+/// Frames that belong to step k of a simulation in steps of `dt` [s] that starts at `start` on the recording's clock.
+pub fn instants(recording: &Recording, dt: f64, start: f64, k: usize) -> Vec<Instant> {
+    let (frames, steps) = (&recording.observation.frames, recording.steps);
     if steps == 0 {
         let hold = |frame| Instant { frame, value: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 4] };
         return (0..frames.len()).map(hold).collect();

@@ -6,10 +6,12 @@ pub mod instant;
 pub mod kernel;
 pub mod marker;
 pub mod target;
+pub mod view;
 
 pub use channel::{Channel, ReadingKind, Sensor};
 pub use frame::{Camera, Frame, ObservedDisplacement, ObservedMarker, ObservedPoint};
 pub use marker::{MarkerRest, MarkerSite, TrackRest};
+pub use view::{Recording, View, Viewed};
 
 use glam::DVec3;
 

@@ -173,7 +173,7 @@ impl Basis {
 }
 
 /// A field on its body: from values to factors, and back.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     /// What it varies.
     pub varied: Varied,

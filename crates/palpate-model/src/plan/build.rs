@@ -130,6 +130,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         initial: scene.initial.state,
         pivot: scene.initial.pivot.unwrap_or(body.center),
         observation: Arc::new(observation),
+        others: Vec::new(),
         band: band_cells(scene) * body.length,
         solver: scene.solver,
         body,

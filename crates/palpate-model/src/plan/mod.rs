@@ -1,6 +1,7 @@
 //! Everything a backend needs, and nothing else: below this line nobody reads the scene again.
 
 pub mod build;
+pub mod join;
 pub mod locking;
 pub mod scheme;
 
@@ -11,7 +12,7 @@ use crate::materials::curve::Curve;
 use crate::materials::principal_stretch::PrincipalStretch;
 use crate::materials::viscosity::Viscosity;
 use crate::mechanics::motion::RigidMotion;
-use crate::observation::Observation;
+use crate::observation::{Observation, Recording, View, Viewed};
 use crate::params::fields::Field;
 use crate::params::{Layout, ParamKey};
 use crate::scene::{InitialShape, Solver};
@@ -26,7 +27,7 @@ pub const WORLD_SIZE: f64 = 1000.0;
 /// Newton iterations that a static problem has at least: it starts far from its solution.
 pub const STATIC_ITERATIONS: usize = 200;
 
-/// A batch's common part: geometry, clock, observations. Members differ only in θ.
+/// A batch's common part: geometry, clock, recordings. Members differ in θ and in what of the recordings they are compared with.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The body.
@@ -55,6 +56,8 @@ pub struct Plan {
     pub pivot: DVec3,
     /// What was measured.
     pub observation: Arc<Observation>,
+    /// Further recordings of the same body, which take no more steps.
+    pub others: Vec<Recording>,
     /// Half width of the cost's band φ_max [m].
     pub band: f64,
     /// Numerical choices.
@@ -62,6 +65,24 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Number of recordings that members may be compared with.
+    pub fn recordings(&self) -> usize {
+        1 + self.others.len()
+    }
+
+    /// A recording, its own being the first.
+    pub fn recording(&self, number: usize) -> Recording {
+        match number.checked_sub(1) {
+            None => Recording { observation: self.observation.clone(), steps: self.clock.steps },
+            Some(other) => self.others[other].clone(),
+        }
+    }
+
+    /// A view with its recording.
+    pub fn viewed(&self, view: &View) -> Viewed {
+        Viewed { recording: self.recording(view.recording), view: view.clone() }
+    }
+
     /// The material's law for a member's numbers, where they make another of it than [`Model::law`].
     pub fn own_law(&self, physics: &Physics) -> Option<PrincipalStretch> {
         if !self.model.has_curves {

@@ -6,7 +6,7 @@ use crate::space::stencil::{Stencil, Stencils};
 use glam::DVec3;
 
 /// A body; constant over a simulation, in world coordinates of the rest configuration.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Typical size of an element [m], what lengths beside it are measured in: the edge of a lattice's cells, or the edge of the cube that
     /// six mean tetrahedra fill.
@@ -84,7 +84,7 @@ impl Body {
 }
 
 /// A piece of the surface of one element; forces and gaps are taken as means over it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     /// Number of the cell or element that it belongs to.
     pub cell: u32,

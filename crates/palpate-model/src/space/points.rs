@@ -7,7 +7,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use std::collections::BTreeMap;
 
 /// Elastic points of a body, element by element: as many of each.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
     /// Place and deformation gradient of every point, with gradients.
     pub stencils: Stencils,

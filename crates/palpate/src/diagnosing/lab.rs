@@ -2,13 +2,14 @@
 
 use super::DiagnoseOptions;
 use super::checkpoint::Checkpoint;
+use super::crowd::{Counts, side_by_side};
 use super::hypothesis::{Prepared, held, lab_error, prepare};
 use super::laps::{Lap, Laps, fit};
 use super::limits::Limits;
 use super::others::{contact_times, held_out, still_frames};
 use super::refined::{FINER, GRID, STEP, difference, finer, halved};
 use super::separate::separations;
-use super::simulate::{Try, cost, in_waves, linearise};
+use super::simulate::{NEWTON, NEWTON_OF_COST, Try, cost, in_waves, linearise};
 use super::systematic::systematic;
 use super::walls::walls;
 use super::world::strange;
@@ -210,6 +211,11 @@ impl<'a> Lab<'a> {
         }
     }
 
+    /// Tells how hypotheses ran side by side, if they did.
+    fn crowded(&mut self, counts: Counts) {
+        counts.told().iter().for_each(|told| self.say(told));
+    }
+
     fn key(&self, start: &Start, effort: (usize, f64)) -> String {
         let prints: Vec<String> = self.base.iter().map(|e| fingerprint(&e.plan)).collect();
         let theta: Vec<&[f64]> = self.base.iter().map(|e| e.plan.theta.as_slice()).collect();
@@ -288,7 +294,12 @@ impl Laboratory for Lab<'_> {
     fn costs(&mut self, tries: &[Try]) -> Vec<f64> {
         let (base, backend) = (&self.base, self.backend);
         let limits = &self.search();
-        tries.par_iter().map(|t| cost(base, backend, limits, t).unwrap_or(f64::INFINITY)).collect()
+        let lines: Vec<usize> = (0..tries.len()).collect();
+        let all: Vec<&[Change]> = tries.iter().map(|t| t.0.as_slice()).collect();
+        let one = |k: usize, physics| cost(base, (backend, physics), limits, &tries[k]).unwrap_or(f64::INFINITY);
+        let (costs, counts) = side_by_side((base, backend, limits), &all, NEWTON_OF_COST, &lines, one);
+        self.crowded(counts);
+        costs
     }
 
     fn fit(&mut self, tries: &[Start], iterations: usize, tolerance: f64) -> Vec<Result<Fit, LabError>> {
@@ -306,11 +317,14 @@ impl Laboratory for Lab<'_> {
             .collect();
         let (base, backend, laps) = (&self.base, self.backend, &self.laps);
         let limits = &self.fits(tries.len());
-        let answers: Vec<Result<(Fit, Lap), LabError>> = tries
-            .par_iter()
-            .zip(known)
-            .map(|(t, known)| known.unwrap_or_else(|| fit(base, backend, limits, t, effort, laps.before(t))))
-            .collect();
+        // The plan has those that are known as well: bits do not depend on where a search was taken up again.
+        let all: Vec<&[Change]> = tries.iter().map(|t| t.changes.as_slice()).collect();
+        let open: Vec<usize> = (0..tries.len()).filter(|k| known[*k].is_none()).collect();
+        let one = |k: usize, physics| fit(base, (backend, physics), limits, &tries[k], effort, laps.before(&tries[k]));
+        let (found, counts) = side_by_side((base, backend, limits), &all, NEWTON * tolerance, &open, one);
+        let mut found = found.into_iter();
+        let answer = |known: Option<_>| known.or_else(|| found.next()).unwrap_or(Err(LabError::Interrupted));
+        let answers: Vec<Result<(Fit, Lap), LabError>> = known.into_iter().map(answer).collect();
         // What the deadline cut short is not kept: with more time the fit would go on.
         let in_time = !limits.is_late();
         for (t, a) in tries.iter().zip(&answers) {
@@ -321,6 +335,7 @@ impl Laboratory for Lab<'_> {
                 self.checkpoint.keep(key, f, lap);
             }
         }
+        self.crowded(counts);
         answers.into_iter().map(|a| a.map(|(f, _)| f)).collect()
     }
 

@@ -1,6 +1,7 @@
 //! Fits in laps: one that goes on where an earlier one ended takes over its damping and the sizes that its steps count in, so that two laps
 //! of three iterations are one fit of six.
 
+use super::crowd::Physics;
 use super::limits::Limits;
 use super::simulate::{NEWTON, problem};
 use crate::engine::Backend;
@@ -58,14 +59,14 @@ impl Laps {
 /// Fits one hypothesis; when the time is over, what was reached until then.
 pub(super) fn fit(
     base: &[Experiment],
-    backend: Backend,
+    physics: (Backend, Option<Physics>),
     limits: &Limits,
     Start { changes, values, reach }: &Start,
     (iterations, tolerance): (usize, f64),
     before: Option<&Lap>,
 ) -> Result<(Fit, Lap), LabError> {
     limits.check()?;
-    let (mut problem, numbers) = problem(base, backend, limits, (changes, values), NEWTON * tolerance, before)?;
+    let (mut problem, numbers) = problem(base, physics, limits, (changes, values), NEWTON * tolerance, before)?;
     let settings = Settings {
         iterations,
         walk: before.map_or(Walk { reach: *reach, ..Walk::default() }, |lap| lap.walk),

@@ -1,14 +1,19 @@
 //! Simulations of hypotheses: costs, residuals and their sensitivities. Every one of them looks at the limits on its way.
 
+use super::crowd::Physics;
 use super::hypothesis::{Prepared, lab_error, prepare};
 use super::laps::Lap;
 use super::limits::Limits;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
+use crate::fitting::demand;
+use crate::memory::Demand;
 use palpate_cpu::CpuBackend;
 use palpate_diagnose::{Change, LabError, Number, Reading, Readings};
 use palpate_engine::Rollout;
 use palpate_fit::{FitScene, Problem, Sample, Want};
+use palpate_model::plan::join::Joint;
+use palpate_model::scene::Optimizer;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -25,10 +30,25 @@ const WAVE: f64 = 0.5;
 /// A set of changes with values of all free numbers.
 pub(super) type Try = (Vec<Change>, Vec<f64>);
 
-/// The problem of fitting one hypothesis from a start, with its numbers; Newton's method in it is no tighter than `newton`.
+/// Physics of its own for a hypothesis.
+pub(super) fn own_physics(ready: &Prepared, backend: Backend, limits: &Limits) -> Result<Physics, LabError> {
+    let plans: Vec<_> = ready.experiments.iter().map(|e| &e.plan).collect();
+    // Recordings of one body run side by side, as far as they fit on a device.
+    let members = |joint: &Joint| match joint.parts.len() {
+        starts if starts > 1 && backend == Backend::Gpu => {
+            let demand = demand(&ready.free, joint.parts[0].0, Optimizer::GaussNewton, 1);
+            backend.members(&joint.plan, &Demand { starts, ..demand }, 0)
+        }
+        all => Ok(all),
+    };
+    backend.evaluators_until(&plans, members, &limits.stop()).map_err(|e| limits.error(e))
+}
+
+/// The problem of fitting one hypothesis from a start, with its numbers; its physics is `physics`, or its own, in which Newton's method is no
+/// tighter than `newton`.
 pub(super) fn problem(
     base: &[Experiment],
-    backend: Backend,
+    (backend, physics): (Backend, Option<Physics>),
     limits: &Limits,
     (changes, start): (&[Change], &[f64]),
     newton: f64,
@@ -47,23 +67,34 @@ pub(super) fn problem(
     for (f, typical) in ready.free.iter_mut().zip(before.iter().flat_map(|lap| &lap.typical)) {
         f.typical = *typical;
     }
-    let mut scenes = Vec::new();
     for e in &mut ready.experiments {
         e.plan.solver.tolerance = e.plan.solver.tolerance.max(newton);
+    }
+    let physics = physics.map_or_else(|| own_physics(&ready, backend, limits), Ok)?;
+    let mut scenes = Vec::new();
+    for (e, evaluate) in ready.experiments.iter().zip(physics) {
         scenes.push(FitScene {
             name: e.scene.path.display().to_string(),
             fingerprint: String::new(),
             base: e.plan.theta.clone(),
-            evaluate: backend.evaluator_until(&e.plan, 1, limits.stop()).map_err(|e| limits.error(e))?,
+            evaluate,
         });
     }
     Ok((Problem::new(scenes, ready.free).map_err(LabError::failed)?, numbers))
 }
 
+/// Newton's tolerance of [`cost`].
+pub(super) const NEWTON_OF_COST: f64 = NEWTON * 1e-3;
+
 /// Cost of one hypothesis at these values.
-pub(super) fn cost(base: &[Experiment], backend: Backend, limits: &Limits, (changes, values): &Try) -> Result<f64, LabError> {
+pub(super) fn cost(
+    base: &[Experiment],
+    physics: (Backend, Option<Physics>),
+    limits: &Limits,
+    (changes, values): &Try,
+) -> Result<f64, LabError> {
     limits.check()?;
-    let (mut problem, _) = problem(base, backend, limits, (changes, values), NEWTON * 1e-3, None)?;
+    let (mut problem, _) = problem(base, physics, limits, (changes, values), NEWTON_OF_COST, None)?;
     let values = problem.free().iter().map(|f| f.start.0).collect();
     let Some(sample) = problem.evaluate_values(&[values], Want::Cost).into_iter().next() else { return Ok(f64::INFINITY) };
     match sample {

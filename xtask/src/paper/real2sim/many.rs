@@ -111,7 +111,9 @@ pub fn run(folder: &Path) -> Result<Figures, String> {
     places.iter().enumerate().for_each(|(k, p)| v[*p] = (0.01 * k as f64).sin());
     let mut product = || {
         let clock = Instant::now();
-        evaluator.product(theta, &v, &Wanted::Places(places.clone())).map_err(|e| fail(&e))?;
+        evaluator
+            .product(&ParamBatch::from_rows(std::slice::from_ref(theta)), &v, &Wanted::Places(places.clone()))
+            .map_err(|e| fail(&e))?;
         Ok::<_, String>(clock.elapsed().as_secs_f64())
     };
     // The first keeps the states.
