@@ -1,6 +1,6 @@
-//! Conjugate gradients by many workgroups, second and last of an iteration, a workgroup a group of nodes: p = z + β p, A p = A z + β A p,
-//! x ← x + α p, r ← r − α A p; and of the residual z = M⁻¹ r: the nodes' own blocks, and the group's motion from force and torque on all groups,
-//! which follow from those before without waiting for the others. call.extra: ODD; or BEGINS, for z of the residual as it is.
+//! Conjugate gradients by many workgroups, second and last of an iteration, a workgroup a group of nodes: x ← x + α p, r ← r − α A p; and of
+//! the residual z = M⁻¹ r: the nodes' own blocks, and the group's motion from force and torque on all groups, which follow from those before without
+//! waiting for the others. call.extra: ODD; or BEGINS, for z of the residual as it is.
 // use shared/grid
 // use shared/team_64
 // use shared/totals
@@ -22,20 +22,15 @@ fn added(a: Wrench, times: f32, b: Wrench) -> Wrench {
 }
 
 // Force and torque that A p is to a group.
-fn image_wrench(system: u32, g: u32, beta: f32) -> Wrench {
+fn image_wrench(system: u32, g: u32) -> Wrench {
     var sum = Wrench(vec3(0.0), vec3(0.0));
     for (var k = group_slices[g]; k < group_slices[g + 1u]; k++) {
         sum = added(sum, 1.0, wrench_at(slices_at(system) + OF_SLICE * k));
     }
-    return added(sum, beta, wrench_at(image_wrenches_at(system, 1u - parity()) + 2u * g));
+    return sum;
 }
 
-fn keep_wrench(place: u32, w: Wrench) {
-    cg_sums[place] = vec4(w.force, 0.0);
-    cg_sums[place + 1u] = vec4(w.torque, 0.0);
-}
-
-// zᵀ A z from the slices' parts.
+// pᵀ A p from the slices' parts.
 fn sum_bends(local: u32, system: u32) -> f32 {
     var sum = vec4(0.0);
     for (var i = local; i < shape.slices; i += 64u) {
@@ -55,19 +50,17 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let own = share.first;
     let begins = (call.extra & BEGINS) != 0u;
     var alpha = 0.0;
-    var beta = 0.0;
     if !begins {
         let now = scalars_of(local, scalars_at(system) + parity());
         if now.z != 0.0 {
             return;
         }
-        beta = way_factor_of(now.x, scalars_of(local, scalars_at(system) + 1u - parity()).x);
         let update = scalars_of(local, scalars_at(system) + 3u - parity());
-        let curvature = curvature_of(sum_bends(local, system), beta, now.x, update.z);
+        let curvature = sum_bends(local, system);
         let curved = is_curved(curvature);
         alpha = select(0.0, now.x / curvature, curved);
         if own == 0u && local == 0u {
-            cg_sums[scalars_at(system) + 2u + parity()] = vec4(select(1.0, 0.0, curved), update.y + alpha * now.x, alpha, 0.0);
+            cg_sums[scalars_at(system) + 2u + parity()] = vec4(select(1.0, 0.0, curved), update.y + alpha * now.x, 0.0, 0.0);
         }
         if !curved {
             return;
@@ -79,15 +72,12 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     for (var g = local; g < shape.groups; g += 64u) {
         var rest = wrench_at(wrenches_at(system, select(1u - parity(), parity(), begins)) + 2u * g);
         if !begins {
-            let image = image_wrench(system, g, beta);
-            rest = added(rest, -alpha, image);
-            if g == own {
-                keep_wrench(image_wrenches_at(system, parity()) + 2u * g, image);
-            }
+            rest = added(rest, -alpha, image_wrench(system, g));
         }
         sum = add_motion(sum, u32(choice.x), g, own, rest);
     }
     let motion = motion_of(Motion(total(local, sum.upper), total(local, sum.lower)), choice.y);
+    let way = solving_part(select(EVEN_WAY, ODD_WAY, parity() == 1u));
     var force = vec4(0.0);
     var torque = vec4(0.0);
     for (var k = group_rows[own] + local; k < group_rows[own + 1u]; k += 64u) {
@@ -95,12 +85,8 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let a = at_node(system, node);
         var r = solving[solving_part(REST) + a].xyz;
         if !begins {
-            let p = solving[solving_part(SCALED) + a].xyz + beta * solving[solving_part(WAY) + a].xyz;
-            let image = solving[solving_part(PRODUCT) + a].xyz + beta * solving[solving_part(IMAGE) + a].xyz;
-            solving[solving_part(WAY) + a] = vec4(p, 0.0);
-            solving[solving_part(IMAGE) + a] = vec4(image, 0.0);
-            solving[a] += vec4(alpha * p, 0.0);
-            r -= alpha * image;
+            solving[a] += alpha * solving[way + a];
+            r -= alpha * solving[solving_part(IMAGE) + a].xyz;
             solving[solving_part(REST) + a] = vec4(r, 0.0);
             let w = wrench_of(turn, arms[node].xyz, r);
             force += vec4(w.force, 0.0);
@@ -116,7 +102,9 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         cg_sums[rests_at(system) + own] = vec4(whole_force.w, 0.0, 0.0, 0.0);
         // Of the residual itself: what is added up iteration by iteration would drift from it.
         if !begins {
-            keep_wrench(wrenches_at(system, parity()) + 2u * own, Wrench(whole_force.xyz, whole_torque.xyz));
+            let at = wrenches_at(system, parity()) + 2u * own;
+            cg_sums[at] = whole_force;
+            cg_sums[at + 1u] = whole_torque;
         }
     }
 }

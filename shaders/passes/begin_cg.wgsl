@@ -35,8 +35,8 @@ fn begin_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         }
         solving[a] = vec4(0.0);
         solving[solving_part(REST) + a] = vec4(r, 0.0);
-        solving[solving_part(WAY) + a] = vec4(0.0);
-        solving[solving_part(IMAGE) + a] = vec4(0.0);
+        // The way before the first, which is even.
+        solving[solving_part(ODD_WAY) + a] = vec4(0.0);
         let w = wrench_of(turn, arms[node].xyz, r);
         force += vec4(w.force, 0.0);
         torque += vec4(w.torque, 0.0);
@@ -44,8 +44,6 @@ fn begin_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     let whole_force = total(local, force);
     let whole_torque = total(local, torque);
     if local < 2u {
-        // What A p was to the group: nothing.
-        cg_sums[image_wrenches_at(share.member, 1u) + 2u * share.first + local] = vec4(0.0);
         cg_sums[wrenches_at(share.member, 1u) + 2u * share.first + local] = select(whole_force, whole_torque, local == 1u);
     }
     if share.first == 0u && local < SCALARS {

@@ -1,4 +1,4 @@
-//! A z at every node from what multiply_cells left on the corners, with mass damping, ghost penalty, inertia, eight lanes a node. call.extra: ODD;
+//! A p at every node from what multiply_cells left on the corners, with mass damping, ghost penalty, inertia, eight lanes a node. call.extra: ODD;
 //! or OF_SOLUTION, for A x.
 // use shared/mix
 // use shared/team_256

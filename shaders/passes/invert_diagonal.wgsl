@@ -5,6 +5,7 @@
 // use shared/inertia
 // use shared/finite
 // use shared/inverse
+// use shared/held
 // use shared/team_64
 // use shared/totals
 // use shared/node_parts
@@ -44,6 +45,11 @@ fn inverse_of(p: Place) -> Inverse {
     let v = (p.member * shape.blocks + diagonals[p.item]) * 9u;
     let added = mass * mix.inertia;
     let trace = values[v] + values[v + 4u] + values[v + 8u];
+    // What rounding is measured by: nothing is balanced where a node is held, be its springs as stiff as they may.
+    var felt = trace;
+    if shape.held != 0u && is_held(p.member, p.item) {
+        felt = 0.0;
+    }
     // In units of its trace, so that the determinant of a sliver's block does not underflow.
     let unit = trace + 3.0 * added;
     let xx = (values[v] + added) / unit;
@@ -59,9 +65,9 @@ fn inverse_of(p: Place) -> Inverse {
     if is_finite(det) && is_finite(unit) && unit > 0.0 && xx > 0.0 && xx * yy - xy * xy > 0.0 && det > 0.0 {
         let s = 1.0 / (det * unit);
         return Inverse(vec4(cx, cy, cz, xx * zz - xz * xz) * s,
-                       vec4((xy * xz - xx * yz) * s, (xx * yy - xy * xy) * s, trace, 0.0));
+                       vec4((xy * xz - xx * yz) * s, (xx * yy - xy * xy) * s, felt, 0.0));
     }
-    return Inverse(vec4(0.0), vec4(0.0, 0.0, trace, 1.0));
+    return Inverse(vec4(0.0), vec4(0.0, 0.0, felt, 1.0));
 }
 
 @compute @workgroup_size(64)

@@ -19,12 +19,11 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let exact = call.extra == FOR_DERIVATIVE;
-    // Between chunks: rᵀ M⁻¹ r of the right-hand side and of the iteration before, xᵀ times the right-hand side, and α.
+    // Between chunks: rᵀ M⁻¹ r of the right-hand side and of the iteration before, and xᵀ times the right-hand side.
     let kept = scalars_of(local, scalars_at(p.member));
     var of_rhs = kept.x;
     var before = kept.y;
     var along_rhs = kept.z;
-    var alpha = kept.w;
     if n.cg == 0u {
         n.rz = precondition_alone(local, p.member, p.home);
         of_rhs = n.rz;
@@ -37,23 +36,21 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         if small {
             break;
         }
-        let beta = way_factor_of(n.rz, before);
-        let curvature = curvature_of(multiply_alone(local, p, SCALED), beta, n.rz, alpha);
+        set_way(n.cg & 1u, way_factor_of(n.rz, before));
+        let curvature = multiply_alone(local, p);
         n.cg += 1u;
         if !is_curved(curvature) {
             negative = true;
             break;
         }
-        alpha = n.rz / curvature;
+        let alpha = n.rz / curvature;
         along_rhs += alpha * n.rz;
         for (var i = local; i < shape.nodes; i += 256u) {
             let a = at_node(p.member, i);
-            let way = solving[solving_part(SCALED) + a] + beta * solving[solving_part(WAY) + a];
-            let image = solving[solving_part(PRODUCT) + a] + beta * solving[solving_part(IMAGE) + a];
-            solving[solving_part(WAY) + a] = way;
-            solving[solving_part(IMAGE) + a] = image;
-            solving[a] += alpha * way;
-            solving[solving_part(REST) + a] -= alpha * image;
+            let way = operand_at(a);
+            solving[a] += vec4(alpha * way, 0.0);
+            solving[solving_part(REST) + a] -= alpha * solving[solving_part(IMAGE) + a];
+            solving[way_at + a] = vec4(way, 0.0);
         }
         restrict_alone(local, p.member, p.home);
         before = n.rz;
@@ -61,7 +58,7 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         small = is_small(n.rz, of_rhs, n) || n.cg >= shape.most;
     }
     if local == 0u {
-        cg_sums[scalars_at(p.member)] = vec4(of_rhs, before, along_rhs, alpha);
+        cg_sums[scalars_at(p.member)] = vec4(of_rhs, before, along_rhs, 0.0);
     }
     leave_cg(local, p.member, n, of_rhs, along_rhs, negative, small && !exact, exact);
 }

@@ -19,10 +19,11 @@ fn look_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     if n.stage != WANTS_SOLVE || !(is_small(n.rz, kept.x, n) || n.cg >= shape.most) {
         return;
     }
-    _ = multiply_alone(local, p, SOLUTION);
+    set_solution();
+    _ = multiply_alone(local, p);
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(p.member, i);
-        solving[solving_part(REST) + a] = solving[solving_part(RIGHT) + a] - solving[solving_part(PRODUCT) + a];
+        solving[solving_part(REST) + a] = solving[solving_part(RIGHT) + a] - solving[solving_part(IMAGE) + a];
     }
     restrict_alone(local, p.member, p.home);
     n.rz = precondition_alone(local, p.member, p.home);

@@ -1,4 +1,4 @@
-//! First of an iteration where A z is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
+//! First of an iteration where A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
 //! (see tangent_cells), its clamps and its patches to its corners, for gather_product.
 // use shared/cells
 // use shared/tangents

@@ -1,4 +1,4 @@
-//! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, A z with the assembled matrix, eight lanes a row so
+//! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, A p with the assembled matrix, eight lanes a row so
 //! that neighbouring lanes read neighbouring blocks. call.extra: ODD; or OF_SOLUTION, for A x.
 // use shared/mix
 // use shared/team_256

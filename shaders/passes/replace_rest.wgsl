@@ -25,7 +25,7 @@ fn replace_rest(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     for (var k = group_rows[share.first] + local; k < group_rows[share.first + 1u]; k += 64u) {
         let node = group_nodes[k];
         let a = at_node(share.member, node);
-        let r = solving[solving_part(RIGHT) + a].xyz - solving[solving_part(PRODUCT) + a].xyz;
+        let r = solving[solving_part(RIGHT) + a].xyz - solving[solving_part(IMAGE) + a].xyz;
         solving[solving_part(REST) + a] = vec4(r, 0.0);
         let w = wrench_of(turn, arms[node].xyz, r);
         force += vec4(w.force, 0.0);

@@ -1,14 +1,11 @@
 //! Scalars of conjugate gradients that many workgroups of a system share. Every workgroup sums the parts again in the same order, so
 //! all of them see the same numbers and take the same decisions. call.extra: ODD. Who asks has sums over a workgroup (`shared/totals`).
-//!
-//! One reduction an iteration (Chronopoulos & Gear, J. Comput. Appl. Math. 25, 1989): rᵀ z and zᵀ A z are summed at once, and
-//! pᵀ A p = zᵀ A z − β rᵀ z / α follows, with α of the iteration before. A p = A z + β A p of the iteration before.
 // use shared/asks
 // use shared/finite
 // use shared/solving
 
 // Of each system: four scalars of even and of odd iterations (rᵀ z, iterations so far, 0 going on | 1 ended | 2 negative curvature, rᵀ z of the
-// right-hand side), then of even and odd updates (1 if the curvature was not positive, xᵀ times the right-hand side, α, 0); what else there is says
+// right-hand side), then of even and odd updates (1 if the curvature was not positive, xᵀ times the right-hand side, 0, 0); what else there is says
 // `shared/solving`.
 var<storage, read_write> cg_sums: array<vec4<f32>>;
 var<workgroup> common_scalars: vec4<f32>;
@@ -52,14 +49,6 @@ fn way_factor_of(rz: f32, before: f32) -> f32 {
         return 0.0;
     }
     return rz / before;
-}
-
-// pᵀ A p from zᵀ A z, β, rᵀ z and α of the iteration before.
-fn curvature_of(bend: f32, beta: f32, rz: f32, alpha: f32) -> f32 {
-    if beta == 0.0 {
-        return bend;
-    }
-    return bend - beta * rz / alpha;
 }
 
 fn is_curved(curvature: f32) -> bool {

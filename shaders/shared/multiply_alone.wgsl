@@ -6,11 +6,10 @@ var<body> block_rows: array<u32>;
 var<body> columns: array<u32>;
 var<storage, read> values: array<f32>;
 
-// A times one of the vectors; returns how long they are along each other.
-fn multiply_alone(local: u32, p: Share, which: u32) -> f32 {
+// A times the vector that was set; returns the one along the other.
+fn multiply_alone(local: u32, p: Share) -> f32 {
     storageBarrier();
     workgroupBarrier();
-    operand = solving_part(which);
     let m = members[p.home];
     let inertia = mix_of(m).inertia;
     var bend = vec4(0.0);
@@ -29,7 +28,7 @@ fn multiply_alone(local: u32, p: Share, which: u32) -> f32 {
                 q += (inertia * block_mass(m, p.home, k)) * x;
             }
         }
-        solving[solving_part(PRODUCT) + a] = vec4(q, 0.0);
+        solving[solving_part(IMAGE) + a] = vec4(q, 0.0);
         bend.x += dot(operand_at(a), q);
     }
     return total(local, bend).x;

@@ -25,10 +25,14 @@ fn keep_product(local: u32, share: Share, p: Place, own: vec3<f32>, parts: vec3<
             row += shares[local + i].xyz;
         }
         let a = at_node(p.member, p.item);
-        solving[solving_part(PRODUCT) + a] = vec4(row, 0.0);
+        let x = operand_at(a);
+        solving[solving_part(IMAGE) + a] = vec4(row, 0.0);
+        if (call.extra & OF_SOLUTION) == 0u {
+            solving[way_at + a] = vec4(x, 0.0);
+        }
         let arm = arms[p.item];
         let w = wrench_of(turn_of_group(p.home, u32(arm.w)), arm.xyz, row);
-        force = vec4(w.force, dot(operand_at(a), row));
+        force = vec4(w.force, dot(x, row));
         torque = vec4(w.torque, 0.0);
     }
     let whole_force = total(local, force);

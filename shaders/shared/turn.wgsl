@@ -3,7 +3,7 @@
 
 var<storage, read> newton: array<Newton>;
 
-// Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them.
+// Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them. Sets the way.
 fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
     let rz = sum_rests(local, system);
     let before = scalars_of(local, scalars_at(system) + 1u - parity());
@@ -21,14 +21,15 @@ fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
     if speaks && local == 0u {
         cg_sums[scalars_at(system) + parity()] = now;
     }
+    set_way(parity(), way_factor_of(rz, before.x));
     return now;
 }
 
-// Whether the first pass of a product takes part: one with the preconditioned residual where the solve goes on, one with the
-// solution where it claims to have ended.
+// Whether the first pass of a product takes part: one with the way of an iteration where the solve goes on, one with the solution where it claims
+// to have ended.
 fn multiplies(local: u32, share: Share) -> bool {
-    choose_operand();
     if (call.extra & OF_SOLUTION) != 0u {
+        set_solution();
         return claims(local, share.member);
     }
     return turn_cg(local, share.member, share.first == 0u).z == 0.0;

@@ -127,10 +127,9 @@ impl World {
     }
 
     fn bytes_of_iteration(&self) -> f64 {
-        // Way, its image, solution and residuals are read and written: 11 vectors a node beside those of the product, and the second level, which
-        // members share.
+        // Way, solution and residuals are read and written: 9 vectors a node beside those of the product, and the second level, which members share.
         let shape = &self.geometry.shape;
-        let vectors = 11.0 * self.members() as f64 * f64::from(shape.nodes) + coarse_vectors(shape.groups as usize) as f64;
+        let vectors = 9.0 * self.members() as f64 * f64::from(shape.nodes) + coarse_vectors(shape.groups as usize) as f64;
         self.bytes_of(self.product) + VECTOR as f64 * vectors
     }
 

@@ -154,7 +154,7 @@ impl<'a> Passes<'a, '_> {
         (purpose == asks::FOR_DERIVATIVE).then(|| ("health", &self.world.buffers["column_health"])).into_iter().collect()
     }
 
-    /// Multiplies A with the preconditioned residual of an iteration of this parity, or with the solution (`asks`).
+    /// Multiplies A with the way of an iteration of this parity, or with the solution (`asks`).
     pub(crate) fn multiply(&mut self, product: Product, ask: u32) {
         match product {
             Product::Matrix => self.run(pass::MULTIPLY_ROWS, SOLVE, Per::Slice, ask),

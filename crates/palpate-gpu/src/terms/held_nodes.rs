@@ -26,13 +26,6 @@ impl Passes<'_, '_> {
         }
     }
 
-    /// After the diagonal was inverted.
-    pub(super) fn forget_springs(&mut self, section: u32) {
-        if self.holds_nodes() {
-            self.run(pass::FORGET_SPRINGS, section, Per::Node, 0);
-        }
-    }
-
     /// What clamps bear at nodes that are placed, which derivatives by a layer's thickness need: nothing else tells how far springs give. Takes a
     /// residual at the states themselves.
     pub(crate) fn react(&mut self) {

@@ -189,7 +189,6 @@ impl Passes<'_, '_> {
     pub(crate) fn assemble(&mut self, section: u32) {
         TERMS.iter().for_each(|t| t.tangent(self, section));
         self.run(pass::INVERT_DIAGONAL, section, Per::Node, 0);
-        self.forget_springs(section);
     }
 
     /// Adds −T du to a tangent's right-hand side `rhs`, with T the derivative by past state `state` and du in `probe`; for the first of several

@@ -4,7 +4,7 @@ use super::products::crowded;
 use super::scenes::{device, plan, solving_part};
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::solving::{PRODUCT, SCALED};
+use crate::device::pipelines::shared::solving::{IMAGE, EVEN_WAY};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{SOLVING, State, World};
 use crate::{GpuBackend, Product};
@@ -136,13 +136,13 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
         s.precondition();
         s.multiply(Product::Matrix, 0);
     });
-    let (along, image) = (vectors(&solving_part(world, SCALED)), solving_part(world, PRODUCT));
+    let (along, image) = (vectors(&solving_part(world, EVEN_WAY)), solving_part(world, IMAGE));
     // Without a matrix nothing knows of what effects add to it.
     let free = without_effects(plan).then(|| {
         step(world, &now, &next, &tally, |s| {
             s.multiply(Product::Free, 0);
         });
-        ("multiply_cells", right.off_product(&along, &vectors(&solving_part(world, PRODUCT))), MATRIX)
+        ("multiply_cells", right.off_product(&along, &vectors(&solving_part(world, IMAGE))), MATRIX)
     });
     step(world, &now, &next, &tally, |s| s.solve());
     let solution = vectors(&get(SOLVING, n));

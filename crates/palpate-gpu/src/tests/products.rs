@@ -6,7 +6,7 @@ use super::host::Desk;
 use super::scenes::{ball, device, device_of, held, own_device, plan, solving_part, spread};
 use crate::costs::rollout_tests::{differences, seen, watched};
 use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::solving::PRODUCT;
+use crate::device::pipelines::shared::solving::IMAGE;
 use crate::passes::Passes;
 use crate::solve;
 use crate::world::World;
@@ -57,7 +57,7 @@ fn product(backend: &GpuBackend, world: &mut World, theta: &[Vec<f64>], product:
         s.precondition();
         s.multiply(product, 0);
     });
-    solving_part(world, PRODUCT).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+    solving_part(world, IMAGE).iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
 }
 
 /// Difference of two vectors over the size of the second.

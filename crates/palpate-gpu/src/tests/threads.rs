@@ -66,7 +66,7 @@ fn threads_side_by_side_get_the_bits_of_one() {
 /// Asks for what a device refuses: a copy beyond the end of a buffer.
 fn misuse(gpu: &Gpu) {
     let small = gpu.small();
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("thread") });
     encoder.copy_buffer_to_buffer(&small, 0, &small, 1 << 20, 256);
     gpu.queue.submit([encoder.finish()]);
 }
