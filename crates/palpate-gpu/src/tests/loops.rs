@@ -31,7 +31,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("elastic_rows[") => most.valence,
         () if has("pair_rows[") => most.pairs,
         () if has("held_rows[") => most.holders,
-        () if has("stencil_rows[mark.site") => seen.site,
+        () if has("stencil_rows[number") => seen.site,
         () if has("stencil_rows[") => most.stencil,
         () if has("block_rows[") => most.row,
         () if has("node_rows[") && !has("band_") => 8,

@@ -4,7 +4,7 @@ use super::products::crowded;
 use super::scenes::{device, plan, solving_part};
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::solving::{IMAGE, EVEN_WAY};
+use crate::device::pipelines::shared::solving::{EVEN_WAY, IMAGE};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{SOLVING, State, World};
 use crate::{GpuBackend, Product};
