@@ -6,8 +6,8 @@
 var<storage, read_write> solving: array<vec4<f32>>;
 var<storage, read_write> health: array<Health>;
 
-// What rounding may leave of a derivative's right-hand side when the iterations run out.
-const ACCEPTABLE = 1e-4;
+// What rounding may leave of a derivative's right-hand side: derivatives are promised to a thousandth.
+const ACCEPTABLE = 1e-3;
 
 // `of_rhs`: rᵀ M⁻¹ r of the right-hand side; `along_rhs`: xᵀ times it, which is Σ α rᵀ M⁻¹ r over the iterations. `exact`: the solve is for a
 // derivative; then a negative curvature is an error, and no line search follows.
