@@ -133,6 +133,7 @@ fn lines_are_made_wrong_where_they_add_up_or_take_off() {
 }
 
 #[test]
+// Every wrong kernel is compiled, and a rollout or several are computed with it.
 #[ignore = "slow: cargo xtask test --full"]
 fn a_kernel_that_is_wrong_is_found_out() {
     let Some(mut gpu) = own_device() else { return };
