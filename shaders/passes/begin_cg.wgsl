@@ -7,6 +7,7 @@
 // use shared/precondition
 // use shared/solving
 // use shared/coarse
+// use shared/keep_pair
 // use shared/newton_of
 
 var<storage, read> residual: array<vec4<f32>>;
@@ -41,11 +42,7 @@ fn begin_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         force += vec4(w.force, 0.0);
         torque += vec4(w.torque, 0.0);
     }
-    let whole_force = total(local, force);
-    let whole_torque = total(local, torque);
-    if local < 2u {
-        cg_sums[wrenches_at(share.member, 1u) + 2u * share.first + local] = select(whole_force, whole_torque, local == 1u);
-    }
+    keep_pair(local, wrenches_at(share.member, 1u) + 2u * share.first, force, torque);
     if share.first == 0u && local < SCALARS {
         cg_sums[scalars_at(share.member) + local] = vec4(0.0);
     }

@@ -56,10 +56,6 @@ fn finish_step(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             bad.x = 1.0;
         }
     }
-    let count = total(local, bad);
-    far = largest(local, far);
-    if local == 0u {
-        node_parts[own_parts(share)] = count;
-        node_parts[own_parts(share) + 1u] = vec4(far, 0.0, 0.0, 0.0);
-    }
+    keep_part(local, share, 0u, total(local, bad));
+    keep_part(local, share, 1u, vec4(largest(local, far), 0.0, 0.0, 0.0));
 }

@@ -96,10 +96,6 @@ fn invert_diagonal(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
                       size_of(own, residual[part(2u) + a].xyz));
         state = vec4(size_of(own, residual[a].xyz), own.lower.w, abs(own.lower.z), 0.0);
     }
-    let whole_forces = total(local, forces);
-    let whole_state = total(local, state);
-    if local == 0u {
-        node_parts[own_parts(share)] = whole_forces;
-        node_parts[own_parts(share) + 1u] = whole_state;
-    }
+    keep_part(local, share, 0u, total(local, forces));
+    keep_part(local, share, 1u, total(local, state));
 }

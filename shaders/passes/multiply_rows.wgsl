@@ -1,15 +1,11 @@
 //! Conjugate gradients by many workgroups, first of an iteration: has it converged? If not, A p with the assembled matrix, eight lanes a row so
 //! that neighbouring lanes read neighbouring blocks. call.extra: ODD; or OF_SOLUTION, for A x.
-// use shared/mix
 // use shared/team_256
 // use shared/totals
 // use shared/turn
-// use shared/product
+// use shared/blocks
 // use shared/slices
 
-var<body> block_rows: array<u32>;
-var<body> columns: array<u32>;
-var<storage, read> values: array<f32>;
 var<storage, read_write> solving: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
@@ -33,16 +29,7 @@ fn multiply_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
         let end = block_rows[p.item + 1u];
         for (var k = block_rows[p.item] + local % 8u; k < end; k += 8u) {
-            let x = operand_at(at_node(p.member, columns[k]));
-            let v = (p.home * shape.blocks + k) * 9u;
-            q += vec3(
-                values[v] * x.x + values[v + 1u] * x.y + values[v + 2u] * x.z,
-                values[v + 3u] * x.x + values[v + 4u] * x.y + values[v + 5u] * x.z,
-                values[v + 6u] * x.x + values[v + 7u] * x.y + values[v + 8u] * x.z,
-            );
-            if has_mass_matrix() {
-                q += (inertia * block_mass(m, p.home, k)) * x;
-            }
+            q = with_block(q, m, p, inertia, k);
         }
     }
     keep_product(local, share, p, own, q);

@@ -6,6 +6,7 @@
 // use shared/precondition
 // use shared/operand
 // use shared/coarse
+// use shared/keep_pair
 
 var<storage, read_write> solving: array<vec4<f32>>;
 
@@ -31,11 +32,5 @@ fn replace_rest(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         force += vec4(w.force, 0.0);
         torque += vec4(w.torque, 0.0);
     }
-    let whole_force = total(local, force);
-    let whole_torque = total(local, torque);
-    if local == 0u {
-        let at = wrenches_at(share.member, 1u) + 2u * share.first;
-        cg_sums[at] = whole_force;
-        cg_sums[at + 1u] = whole_torque;
-    }
+    keep_pair(local, wrenches_at(share.member, 1u) + 2u * share.first, force, torque);
 }

@@ -32,8 +32,5 @@ fn weigh_rhs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
             state += size * select(vec4(0.0, 0.0, 1.0, 0.0), vec4(0.0, 0.0, 0.0, 1.0), is_held(p.member, p.item));
         }
     }
-    let sum = total(local, state);
-    if local == 0u {
-        node_parts[own_parts(share)] = sum;
-    }
+    keep_part(local, share, 0u, total(local, state));
 }

@@ -29,8 +29,5 @@ fn weigh_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             state.w = dot(r.xyz, solving[a].xyz);
         }
     }
-    let sum = total(local, state);
-    if local == 0u {
-        node_parts[own_parts(share)] = sum;
-    }
+    keep_part(local, share, 0u, total(local, state));
 }

@@ -12,7 +12,9 @@ fn node_parts_at(member: u32) -> u32 {
     return 2u * member * node_shares();
 }
 
-// Where those of a workgroup are.
-fn own_parts(share: Share) -> u32 {
-    return node_parts_at(share.member) + 2u * (share.first / 64u);
+// Leaves one of the two vectors of a workgroup of 64 nodes.
+fn keep_part(local: u32, share: Share, which: u32, whole: vec4<f32>) {
+    if local == 0u {
+        node_parts[node_parts_at(share.member) + 2u * (share.first / 64u) + which] = whole;
+    }
 }

@@ -2,6 +2,7 @@
 //! the rows of the slice come to.
 // use shared/precondition
 // use shared/coarse
+// use shared/keep_pair
 
 // Where the nodes of each slice start among those of the groups.
 var<body> slice_starts: array<u32>;
@@ -35,11 +36,5 @@ fn keep_product(local: u32, share: Share, p: Place, own: vec3<f32>, parts: vec3<
         force = vec4(w.force, dot(x, row));
         torque = vec4(w.torque, 0.0);
     }
-    let whole_force = total(local, force);
-    let whole_torque = total(local, torque);
-    if local == 0u {
-        let at = slices_at(share.member) + OF_SLICE * share.first;
-        cg_sums[at] = whole_force;
-        cg_sums[at + 1u] = whole_torque;
-    }
+    keep_pair(local, slices_at(share.member) + OF_SLICE * share.first, force, torque);
 }

@@ -53,15 +53,14 @@ pub(crate) fn slices(groups: &Groups) -> [Vec<u32>; 2] {
     [starts, of_group]
 }
 
-/// Adds the groups to the body's arena.
-pub(crate) fn put(groups: &Groups, body: &Body, tables: &mut Arena) {
+/// Adds the groups and their slices to the body's arena.
+pub(crate) fn put(groups: &Groups, slices: &[Vec<u32>; 2], body: &Body, tables: &mut Arena) {
     let mut rows = vec![0u32];
     groups.nodes.iter().for_each(|g| rows.push(rows[rows.len() - 1] + g.len() as u32));
     tables.put("group_rows", &rows);
     tables.put("group_nodes", &groups.nodes.concat());
-    let [starts, of_group] = slices(groups);
-    tables.put("slice_starts", &starts);
-    tables.put("group_slices", &of_group);
+    tables.put("slice_starts", &slices[0]);
+    tables.put("group_slices", &slices[1]);
     let arms = groups.arms(body, &vec![DVec3::ZERO; body.nodes.len()]);
     let arms: Vec<[f32; 4]> =
         arms.iter().zip(&groups.of_node).map(|(a, g)| [a.x as f32, a.y as f32, a.z as f32, *g as f32]).collect();

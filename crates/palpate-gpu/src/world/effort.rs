@@ -39,7 +39,7 @@ impl Effort {
         let rounds = log[ROUNDS_AT as usize] as usize;
         let solves = &log[SOLVES_AT as usize..];
         let mut iterations: Vec<u32> = solves.iter().take(rounds).map(|n| more(*n)).collect();
-        // What is left over of a solve goes on in rounds that come on top, with as many as a round took in the middle.
+        // What is left over of a solve goes on in rounds that come on top, with the mean of the others.
         let all: u32 = solves.iter().take(rounds).sum();
         iterations.push(more(all.div_ceil(rounds.max(1) as u32)));
         let spare = 1 + (rounds as f64 * margin) as usize;

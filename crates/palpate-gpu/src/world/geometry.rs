@@ -102,6 +102,7 @@ impl Geometry {
         let elastic = ElasticTables::new(plan, &pattern, &stencils, acting as usize);
 
         let groups = coarse::groups(body, &pattern.blocks);
+        let slices = coarse::slices(&groups);
 
         // Gathering lists: corners of each node, contributions of each block; both in the order of the cells.
         let node_rows: Vec<u32> = pattern.cell_rows.iter().map(|r| *r as u32).collect();
@@ -188,7 +189,7 @@ impl Geometry {
             groups: groups.len() as u32,
             coarse_kind: 0,
             group_size: groups.size as f32,
-            slices: coarse::slices(&groups)[0].len() as u32 - 1,
+            slices: slices[0].len() as u32 - 1,
             pad: 0,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
@@ -209,7 +210,7 @@ impl Geometry {
         tables.put("place_rows", &place_rows);
         tables.put("places", &contributions.concat());
         tables.put("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>());
-        coarse::put(&groups, body, &mut tables);
+        coarse::put(&groups, &slices, body, &mut tables);
         tables.put("effects", &effects.sites());
         tables.put("cell_effects", &effects.cell_sites());
         tables.put("holds", &hold_sites);
