@@ -5,6 +5,7 @@ use super::model::Counts;
 use super::report::Times;
 use palpate_engine::{Backend, ParamBatch, Request, Wanted};
 use palpate_gpu::{Dispatches, Gpu, GpuBackend, Product, Tuning, World};
+use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use std::sync::Arc;
@@ -16,6 +17,17 @@ pub(super) enum Ways {
     Settled,
     /// The first, which is given all that is allowed: how many dispatches are recorded and how long that takes says nothing, and is zero.
     Once,
+}
+
+/// Parameters of so many members, which differ as the starts of a fit do.
+pub(super) fn members(plan: &Plan, count: usize) -> Vec<Vec<f64>> {
+    let at = plan.layout.index(ParamKey::YoungsModulus);
+    let row = |m: usize| {
+        let mut row = plan.theta.clone();
+        row[at] *= 1.0 + 0.01 * m as f64;
+        row
+    };
+    (0..count).map(row).collect()
 }
 
 /// What the first steps come to where many workgroups share a solve.

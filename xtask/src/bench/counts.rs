@@ -3,7 +3,7 @@
 
 use super::counting::{self, Ways};
 use super::model::{Counts, H100, Modelled};
-use super::{BAND, Seconds, data, placed, plan, there_and_back};
+use super::{BAND, DRAGON_EDGE, Seconds, dragon, placed, plan, there_and_back};
 use crate::paper::scenes::body as scene_of;
 use crate::real::report::Made;
 use crate::table;
@@ -84,10 +84,8 @@ fn dropped(shape: &dyn Shape, h: f64) -> Result<Plan, String> {
     Ok(plan(body, &[]))
 }
 
-fn dragon() -> Result<palpate_io::SdfGrid, String> {
-    let file = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file());
-    let file = file.ok_or("no dragon: set PALPATE_DATA to the folder of recordings")?;
-    Ok(palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped())
+fn the_dragon() -> Result<palpate_io::SdfGrid, String> {
+    dragon()?.ok_or_else(|| "it is not there".into())
 }
 
 /// What is clamped in a scene, watched as other bodies are, far above the ground.
@@ -100,7 +98,7 @@ fn clamped(scene: &Scene) -> Result<Plan, String> {
 
 /// The dragon, held by its lowest tenth, bends under its weight: the distances as a mesh, for a clamp is cut out of a scene's shape.
 fn clamped_dragon() -> Result<Plan, String> {
-    let sdf = dragon()?;
+    let sdf = the_dragon()?;
     let surface = stuff(&sdf, 0.004).map_err(|e| e.to_string())?.surface();
     let (low, high) = sdf.bounds();
     let mut scene = scene_of(Analytic::Ball { radius: 0.1, center: DVec3::ZERO }, 0.01, 5e4);
@@ -122,7 +120,7 @@ fn subjects() -> Vec<Subject> {
     let center = DVec3::new(0.001, 0.002, 0.103);
     let ball = move |across: f64| move || dropped(&placed(Analytic::Ball { radius: 0.1, center }), 0.2 / across);
     let torus = move || dropped(&placed(Analytic::Torus { major: 0.08, minor: 0.03, center, axis: DVec3::Z }), 0.2 / 13.0);
-    let whole = || dropped(&dragon()?, 0.3 / 5.0 / 6.0);
+    let whole = || dropped(&the_dragon()?, DRAGON_EDGE);
     let of = |name, batch, make: Box<dyn Fn() -> Result<Plan, String>>| Subject { name, batch, make };
     vec![
         of("torus", 1, Box::new(torus)),
@@ -155,15 +153,7 @@ pub fn run(only: Option<&str>) -> Result<(), String> {
         let nodes = plan.body.nodes.len();
         let big = nodes > BIG;
         plan.clock.steps = STEPS[usize::from(big)];
-        // Members differ, as the starts of a fit do.
-        let at = plan.layout.index(ParamKey::YoungsModulus);
-        let members: Vec<Vec<f64>> = (0..s.batch)
-            .map(|m| {
-                let mut row = plan.theta.clone();
-                row[at] *= 1.0 + 0.01 * m as f64;
-                row
-            })
-            .collect();
+        let members = counting::members(&plan, s.batch);
         let ways = if big { Ways::Once } else { Ways::Settled };
         let counts = counting::count(&gpu, &plan, &members, plan.clock.steps, ways)?;
         let row = Row {

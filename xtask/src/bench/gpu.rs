@@ -3,13 +3,12 @@
 use super::counting;
 use super::model::{Counts, H100, Modelled};
 use super::report::{Line, Report, Times};
-use super::{BAND, Case, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, data, one, placed, plan};
+use super::{BAND, Case, DRAGON_EDGE, PAPER_BALL, PAPER_DRAGON, PAPER_TORUS, blocks, dragon, one, placed, plan};
 use crate::table;
 use glam::DVec3;
 use palpate_engine::{Backend, Direction, ParamBatch, Request, Wanted};
 use palpate_gpu::{Choice, Gpu, GpuBackend, World};
 use palpate_model::cutcells::build::SUBDIVISIONS;
-use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::Analytic;
@@ -144,11 +143,8 @@ fn subjects(quick: bool) -> Result<Vec<Subject>, String> {
     }
     // Cells across that give about as many nodes as the paper's bodies have: 1138 and 770.
     let mut all = vec![like(PAPER_TORUS, of("torus", torus, 13.0)), like(PAPER_BALL, of("ball", ball.clone(), 8.6))];
-    if let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
-        let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
-        all.push(Subject { name: "dragon", shape: Box::new(sdf), h: 0.3 / 5.0 / 6.0, paper: Some(PAPER_DRAGON) });
-    } else {
-        println!("no dragon: set PALPATE_DATA to the folder of recordings");
+    if let Some(sdf) = dragon()? {
+        all.push(Subject { name: "dragon", shape: Box::new(sdf), h: DRAGON_EDGE, paper: Some(PAPER_DRAGON) });
     }
     let balls = [("ball 1k", 10.0), ("ball 10k", 24.0), ("ball 30k", 36.0), ("ball 100k", 55.0)];
     all.extend(balls.map(|(name, across)| of(name, ball.clone(), across)));
@@ -318,15 +314,7 @@ fn on_device(
     let clock = Instant::now();
     let mut world = backend.build(plan, batch).map_err(|e| e.to_string())?;
     let build = clock.elapsed().as_secs_f64();
-    // Members differ, as the starts of a fit do.
-    let at = plan.layout.index(ParamKey::YoungsModulus);
-    let rows: Vec<Vec<f64>> = (0..batch)
-        .map(|m| {
-            let mut row = plan.theta.clone();
-            row[at] *= 1.0 + 0.01 * m as f64;
-            row
-        })
-        .collect();
+    let rows = counting::members(plan, batch);
     backend.set_params(&mut world, &ParamBatch::from_rows(&rows));
     // With the clock of the passes, a second time where the first one compiled some of them; then as fits run, as often as there is time.
     let clock = Instant::now();

@@ -69,24 +69,19 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         report.lines.push(line);
     };
     let wanted = |name: &str| name.starts_with(only);
-    match data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) {
-        Some(file) => {
-            // Longest side 0.3 m: the file's unit is a fifth of it, with 6 cells to a unit.
-            let sdf = palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped();
-            let model = find("neo-hookean").ok_or("there is no such material")?;
-            let cases = [
-                ("dragon", Case::default()),
-                // Fixed numbers cost nothing: the gradient is that of the first.
-                ("dragon, effects absent", Case { laws: effects(), ..Case::default() }),
-                ("dragon, effects free", Case { laws: effects(), free: true, ..Case::default() }),
-                ("dragon, neo-Hookean", Case { model, ..Case::default() }),
-            ];
-            for (name, case) in cases.into_iter().filter(|c| wanted(c.0)) {
-                let line = one(name, &sdf, 0.3 / 5.0 / 6.0, &case)?;
-                add(Line { paper: (name == "dragon").then_some(PAPER_DRAGON), ..line });
-            }
+    if let Some(sdf) = dragon()? {
+        let model = find("neo-hookean").ok_or("there is no such material")?;
+        let cases = [
+            ("dragon", Case::default()),
+            // Fixed numbers cost nothing: the gradient is that of the first.
+            ("dragon, effects absent", Case { laws: effects(), ..Case::default() }),
+            ("dragon, effects free", Case { laws: effects(), free: true, ..Case::default() }),
+            ("dragon, neo-Hookean", Case { model, ..Case::default() }),
+        ];
+        for (name, case) in cases.into_iter().filter(|c| wanted(c.0)) {
+            let line = one(name, &sdf, DRAGON_EDGE, &case)?;
+            add(Line { paper: (name == "dragon").then_some(PAPER_DRAGON), ..line });
         }
-        None => println!("no dragon: set PALPATE_DATA to the folder of recordings"),
     }
     // Cells over the diameter or the edge that give about 1, 3, 10, 30, 100 thousand nodes.
     let balls = [10.0, 15.5, 24.0, 36.0, 55.0];
@@ -113,6 +108,18 @@ pub fn all(quick: bool, only: &str) -> Result<Report, String> {
         report.fields = Some(fields);
     }
     Ok(report)
+}
+
+/// Edge of the dragon's cells [m]: its longest side is 0.3 m, the file's unit a fifth of it, with 6 cells to a unit.
+pub(super) const DRAGON_EDGE: f64 = 0.3 / 5.0 / 6.0;
+
+/// The paper's dragon; `None` without the folder of recordings.
+pub(super) fn dragon() -> Result<Option<palpate_io::SdfGrid>, String> {
+    let Some(file) = data().map(|d| d.join("dragon-sdf/dragon.sdf")).filter(|f| f.is_file()) else {
+        println!("no dragon: set PALPATE_DATA to the folder of recordings");
+        return Ok(None);
+    };
+    Ok(Some(palpate_io::read_sdf(&file, 0.3 / 5.0).map_err(|e| e.to_string())?.snapped()))
 }
 
 /// What a body is made of, and what the gradient is wanted by.
