@@ -2,7 +2,7 @@
 //! know of it: bindings by name, workgroup size, overrides, and assertions that `#[repr(C)]` twins have the same layout.
 //!
 //! A line `// use shared/NAME` asks for a shared file (each once, before the file that asks). Buffers are declared without
-//! numbers; the linker numbers them. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
+//! numbers; the linker numbers them. A line `// coherent` in a pass makes what it writes coherent among workgroups. `shared/lanes` stands for `lanes_subgroup` or `lanes_memory`: such passes have two variants.
 //! `effects/points` stands for every law of points (`effects/KIND.wgsl`, one function of that name) with the call by number, `effects/nodes`
 //! and `effects/patches` for those that act there (a kernel compiles as long as all its laws take), `effects/cells` and `effects/tets` for
 //! every law of cells, on cells and on tetrahedra; `materials/all` for every material that cells are not made of already (`materials/NAME.wgsl`).
@@ -46,8 +46,8 @@ fn main() {
         let sources: Vec<&str> = variants.iter().map(|v| v.text.as_str()).collect();
         writeln!(
             out,
-            "    PassSource {{ name: {name:?}, sources: {sources:?}, lanes: {}, width: {}, memory: {}, bindings: &{:?}, overrides: &{:?} }},",
-            !same, facts[0].width, facts.iter().map(|f| f.memory).max().unwrap_or(0), facts[0].bindings, facts[0].overrides,
+            "    PassSource {{ name: {name:?}, sources: {sources:?}, lanes: {}, coherent: {}, width: {}, memory: {}, bindings: &{:?}, overrides: &{:?} }},",
+            !same, variants[0].coherent, facts[0].width, facts.iter().map(|f| f.memory).max().unwrap_or(0), facts[0].bindings, facts[0].overrides,
         )
         .expect("a String takes all");
         writeln!(indices, "    /// `shaders/passes/{name}.wgsl`.\n    pub const {}: usize = {index};", name.to_uppercase())
@@ -123,6 +123,8 @@ fn constants_of(shaders: &Path, file: &str) -> Vec<String> {
 /// A pass with everything it uses.
 struct Linked {
     text: String,
+    /// Its workgroups see what others write in the same dispatch, which only some devices offer.
+    coherent: bool,
     /// It is the variant that needs subgroups.
     subgroups: bool,
     /// Constants of the shared files in it that Rust uses as well.
@@ -137,18 +139,21 @@ fn link(shaders: &Path, name: &str, variant: &str, tables: &Tables) -> Linked {
     let shared = used.flat_map(|file| constants_of(shaders, file).into_iter().map(|name| (file.to_string(), name))).collect();
     let mut number = 0;
     let text = tables::resolve(&text, tables);
+    let own = fs::read_to_string(shaders.join(format!("passes/{name}.wgsl"))).expect("the file is there");
+    let coherent = own.lines().any(|line| line == "// coherent");
     let lines: Vec<String> = text
         .lines()
         .map(|line| {
             if line.starts_with("var<storage") || line.starts_with("var<uniform") {
                 number += 1;
-                format!("@group(0) @binding({}) {line}", number - 1)
+                let shared = if coherent && line.starts_with("var<storage, read_write>") { "@coherent " } else { "" };
+                format!("@group(0) @binding({}) {shared}{line}", number - 1)
             } else {
                 line.to_string()
             }
         })
         .collect();
-    Linked { text: lines.join("\n"), subgroups: variant == VARIANTS[0], shared }
+    Linked { text: lines.join("\n"), coherent, subgroups: variant == VARIANTS[0], shared }
 }
 
 fn include(shaders: &Path, file: &str, variant: &str, done: &mut BTreeSet<String>, out: &mut String) {

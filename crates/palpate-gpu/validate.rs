@@ -8,7 +8,7 @@ use naga::valid::{Capabilities, ModuleInfo, ShaderStages, SubgroupOperationSet, 
 /// What is wrong with the text, with its place.
 pub fn validate(text: &str, subgroups: bool) -> Result<(naga::Module, ModuleInfo), String> {
     let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-    let mut capabilities = Capabilities::IMMEDIATES;
+    let mut capabilities = Capabilities::IMMEDIATES | Capabilities::MEMORY_DECORATION_COHERENT;
     if subgroups {
         capabilities |= Capabilities::SUBGROUP;
     }

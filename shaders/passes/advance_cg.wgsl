@@ -1,43 +1,12 @@
-//! Conjugate gradients by many workgroups, second and last of an iteration, a workgroup a group of nodes: x ← x + α p, r ← r − α A p; and of
-//! the residual z = M⁻¹ r: the nodes' own blocks, and the group's motion from force and torque on all groups, which follow from those before without
-//! waiting for the others. call.extra: ODD; or BEGINS, for z of the residual as it is.
+//! Conjugate gradients by many workgroups, second and last of an iteration, a workgroup a group of nodes (`shared/advance`). call.extra: ODD; or
+//! BEGINS, for z of the residual as it is.
 // use shared/grid
 // use shared/team_64
 // use shared/totals
-// use shared/precondition
-// use shared/iteration
-// use shared/correction
-
-// First slice of each group.
-var<body> group_slices: array<u32>;
+// use shared/parity_called
+// use shared/advance
 
 var<storage, read_write> solving: array<vec4<f32>>;
-
-fn wrench_at(place: u32) -> Wrench {
-    return Wrench(cg_sums[place].xyz, cg_sums[place + 1u].xyz);
-}
-
-fn added(a: Wrench, times: f32, b: Wrench) -> Wrench {
-    return Wrench(a.force + times * b.force, a.torque + times * b.torque);
-}
-
-// Force and torque that A p is to a group.
-fn image_wrench(system: u32, g: u32) -> Wrench {
-    var sum = Wrench(vec3(0.0), vec3(0.0));
-    for (var k = group_slices[g]; k < group_slices[g + 1u]; k++) {
-        sum = added(sum, 1.0, wrench_at(slices_at(system) + OF_SLICE * k));
-    }
-    return sum;
-}
-
-// pᵀ A p from the slices' parts.
-fn sum_bends(local: u32, system: u32) -> f32 {
-    var sum = vec4(0.0);
-    for (var i = local; i < shape.slices; i += 64u) {
-        sum.x += cg_sums[slices_at(system) + OF_SLICE * i].w;
-    }
-    return total(local, sum).x;
-}
 
 @compute @workgroup_size(64)
 fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -46,65 +15,17 @@ fn advance_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     if !share.runs {
         return;
     }
-    let system = share.member;
-    let own = share.first;
     let begins = (call.extra & BEGINS) != 0u;
     var alpha = 0.0;
     if !begins {
-        let now = scalars_of(local, scalars_at(system) + parity());
+        let now = scalars_of(local, scalars_at(share.member) + parity());
         if now.z != 0.0 {
             return;
         }
-        let update = scalars_of(local, scalars_at(system) + 3u - parity());
-        let curvature = sum_bends(local, system);
-        let curved = is_curved(curvature);
-        alpha = select(0.0, now.x / curvature, curved);
-        if own == 0u && local == 0u {
-            cg_sums[scalars_at(system) + 2u + parity()] = vec4(select(1.0, 0.0, curved), update.y + alpha * now.x, 0.0, 0.0);
-        }
-        if !curved {
+        alpha = length_of(local, share.member, now.x, share.first == 0u);
+        if alpha == 0.0 {
             return;
         }
     }
-    let choice = coarse_choice(share.home);
-    let turn = turn_of_group(share.home, own);
-    var sum: Motion;
-    for (var g = local; g < shape.groups; g += 64u) {
-        var rest = wrench_at(wrenches_at(system, select(1u - parity(), parity(), begins)) + 2u * g);
-        if !begins {
-            rest = added(rest, -alpha, image_wrench(system, g));
-        }
-        sum = add_motion(sum, u32(choice.x), g, own, rest);
-    }
-    let motion = motion_of(Motion(total(local, sum.upper), total(local, sum.lower)), choice.y);
-    let way = solving_part(select(EVEN_WAY, ODD_WAY, parity() == 1u));
-    var force = vec4(0.0);
-    var torque = vec4(0.0);
-    for (var k = group_rows[own] + local; k < group_rows[own + 1u]; k += 64u) {
-        let node = group_nodes[k];
-        let a = at_node(system, node);
-        var r = solving[solving_part(REST) + a].xyz;
-        if !begins {
-            solving[a] += alpha * solving[way + a];
-            r -= alpha * solving[solving_part(IMAGE) + a].xyz;
-            solving[solving_part(REST) + a] = vec4(r, 0.0);
-            let w = wrench_of(turn, arms[node].xyz, r);
-            force += vec4(w.force, 0.0);
-            torque += vec4(w.torque, 0.0);
-        }
-        let z = scaled(at_node(share.home, node), r) + carried(turn, arms[node].xyz, motion);
-        solving[solving_part(SCALED) + a] = vec4(z, 0.0);
-        force.w += dot(r, z);
-    }
-    let whole_force = total(local, force);
-    let whole_torque = total(local, torque);
-    if local == 0u {
-        cg_sums[rests_at(system) + own] = vec4(whole_force.w, 0.0, 0.0, 0.0);
-        // Of the residual itself: what is added up iteration by iteration would drift from it.
-        if !begins {
-            let at = wrenches_at(system, parity()) + 2u * own;
-            cg_sums[at] = whole_force;
-            cg_sums[at + 1u] = whole_torque;
-        }
-    }
+    advance_group(local, share.member, share.home, share.first, alpha, begins);
 }

@@ -1,5 +1,6 @@
 //! Conjugate gradients before their first iteration, a workgroup a group of nodes: the residual of a solve from zero, no way that came before, and
 //! force and torque on the group. A solve that goes on is left as it is. call.extra: FOR_DIRECTION or FOR_DERIVATIVE.
+// use shared/parity_called
 // use shared/asks
 // use shared/grid
 // use shared/team_64

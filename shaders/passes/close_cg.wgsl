@@ -1,5 +1,6 @@
 //! Conjugate gradients by many workgroups, now and then after an odd iteration: members that are done go on to what comes next. A derivative whose
 //! residual was only said to be small goes on. call.extra: FOR_DIRECTION or FOR_DERIVATIVE.
+// use shared/parity_called
 // use shared/asks
 // use shared/grid
 // use shared/team_256
@@ -17,6 +18,14 @@ fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     var n = newton_of(local, p.member);
     let exact = call.extra == FOR_DERIVATIVE;
     let s = scalars_of(local, scalars_at(p.member) + 1u);
+    if s.z == ALONE {
+        if local == 0u {
+            n.stage = IDLE;
+            newton[p.member] = n;
+            health[p.member] = Health(STRANDED, call.step + call.mode, vec2(0.0));
+        }
+        return;
+    }
     let update = scalars_of(local, scalars_at(p.member) + 3u);
     let rz = sum_rests(local, p.member);
     let negative = s.z == 2.0 || (s.z == 0.0 && update.x != 0.0);

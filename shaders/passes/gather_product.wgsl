@@ -1,5 +1,6 @@
 //! A p at every node from what multiply_cells left on the corners, with mass damping, ghost penalty, inertia, eight lanes a node. call.extra: ODD;
 //! or OF_SOLUTION, for A x.
+// use shared/parity_called
 // use shared/mix
 // use shared/team_256
 // use shared/totals

@@ -1,6 +1,7 @@
 //! A bounded number of conjugate-gradient iterations, one workgroup per member and column; every scalar stays on the device. Ends in the
 //! norm sqrt(rᵀ M⁻¹ r), to which a nearly massless node counts as much as any other. call.extra: FOR_DIRECTION or
 //! FOR_DERIVATIVE, whose end is look_cg's business.
+// use shared/parity_called
 // use shared/asks
 // use shared/multiply_alone
 // use shared/iteration

@@ -27,6 +27,7 @@ fn groups_of(kind: u32) -> u32 {
         case PER_SLICE: { return shape.slices; }
         case PER_ELASTIC: { return (shape.elastic + 63u) / 64u; }
         case PER_GROUP: { return shape.groups; }
+        case PER_CREW: { return shape.crew; }
         default: { return 1u; }
     }
 }

@@ -1,5 +1,6 @@
 //! Of a derivative's solve by one workgroup whose residual is said to be small: the true one takes its place, and the solve has ended or begins anew
 //! with what is left.
+// use shared/parity_called
 // use shared/asks
 // use shared/multiply_alone
 // use shared/true_rest

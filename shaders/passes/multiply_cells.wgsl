@@ -1,5 +1,6 @@
 //! First of an iteration where A p is made without a matrix: has the solve converged? If not, every cell applies R (s K + …) Rᵀ of its class
 //! (see tangent_cells), its clamps and its patches to its corners, for gather_product.
+// use shared/parity_called
 // use shared/cells
 // use shared/tangents
 // use shared/patches

@@ -1,5 +1,6 @@
 //! Conjugate gradients by many workgroups for a derivative, now and then after an odd iteration, where the residual is said to be small: the
 //! true one, r = b − A x, and force and torque that it is to each group, a workgroup each.
+// use shared/parity_called
 // use shared/grid
 // use shared/team_64
 // use shared/totals

@@ -1,13 +1,17 @@
 //! Scalars of conjugate gradients that many workgroups of a system share. Every workgroup sums the parts again in the same order, so
-//! all of them see the same numbers and take the same decisions. call.extra: ODD. Who asks has sums over a workgroup (`shared/totals`).
+//! all of them see the same numbers and take the same decisions. Who asks has sums over a workgroup (`shared/totals`), and says by `parity()` whether
+//! the iteration is an odd one.
 // use shared/asks
 // use shared/finite
 // use shared/solving
 
-// Of each system: four scalars of even and of odd iterations (rᵀ z, iterations so far, 0 going on | 1 ended | 2 negative curvature, rᵀ z of the
+// Of each system: four scalars of even and of odd iterations (rᵀ z, iterations so far, 0 going on | 1 ended | 2 negative curvature | 3 given up, rᵀ z of the
 // right-hand side), then of even and odd updates (1 if the curvature was not positive, xᵀ times the right-hand side, 0, 0); what else there is says
 // `shared/solving`.
 var<storage, read_write> cg_sums: array<vec4<f32>>;
+// In place of what the scalars say of an end: workgroups that had to meet have not (`shared/meeting`).
+const ALONE = 3.0;
+
 var<workgroup> common_scalars: vec4<f32>;
 
 // Scalars at a place, read once for a workgroup: who reads what others may write does not know that all of it sees the same.
@@ -16,10 +20,6 @@ fn scalars_of(local: u32, place: u32) -> vec4<f32> {
         common_scalars = cg_sums[place];
     }
     return workgroupUniformLoad(&common_scalars);
-}
-
-fn parity() -> u32 {
-    return call.extra & ODD;
 }
 
 // rᵀ z from the groups' parts.

@@ -4,7 +4,7 @@
 const SECTIONS = 4u;
 
 // Kinds of items: the member itself, nodes, cells, blocks, patches, clamp cells, slices of groups of nodes,
-// elastic points, and groups of nodes. The host's `Per` has the same numbers.
+// elastic points, groups of nodes, and workgroups that stay for a whole solve. The host's `Per` has the same numbers.
 const PER_MEMBER = 0u;
 const PER_NODE = 1u;
 const PER_CELL = 2u;
@@ -14,7 +14,8 @@ const PER_HOLD = 5u;
 const PER_SLICE = 6u;
 const PER_ELASTIC = 7u;
 const PER_GROUP = 8u;
-const KINDS = 9u;
+const PER_CREW = 9u;
+const KINDS = 10u;
 
 // Most nodes of a slice, each with eight lanes.
 const NARROW = 32u;

@@ -53,6 +53,8 @@ struct Shape { // mirrored
     group_size: f32,
     // Slices of them that products are made in.
     slices: u32,
+    // Workgroups that a system's solve is given for a whole dispatch; 0: none stays.
+    crew: u32,
 }
 
 struct Member { // mirrored
@@ -170,6 +172,8 @@ const NO_CLAMP = 7u;
 const HURRIED = 8u;
 // Well, but the recording that it is compared with takes no more steps.
 const RESTING = 9u;
+// Workgroups that had to run at the same time did not.
+const STRANDED = 10u;
 
 struct Health { // mirrored
     code: u32,

@@ -105,8 +105,8 @@ pub struct Shape {
     pub group_size: f32,
     /// Slices of them that products are made in.
     pub slices: u32,
-    /// Fills up.
-    pub pad: u32,
+    /// Workgroups that stay for all iterations of a system's solve; 0: none stays.
+    pub crew: u32,
 }
 
 /// Parameters of one member.

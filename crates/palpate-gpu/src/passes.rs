@@ -27,6 +27,8 @@ pub(crate) enum Per {
     Elastic = roster::PER_ELASTIC,
     /// Groups of nodes, a workgroup each.
     Group = roster::PER_GROUP,
+    /// Workgroups that stay for a whole solve.
+    Crew = roster::PER_CREW,
 }
 
 /// One balance on the way to the device: a step, or the static problem.

@@ -49,6 +49,10 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
             world.effort.fell_short();
             (FailureKind::NewtonStalled, "more iterations are needed than were planned".to_string())
         }
+        code::STRANDED => (
+            FailureKind::LinearSolve,
+            "workgroups that had to run at the same time did not (PALPATE_GPU_CG = many needs none)".to_string(),
+        ),
         _ => (FailureKind::NoEquilibrium, "no clamp holds the body".to_string()),
     };
     // A start that does not converge has no equilibrium.

@@ -32,7 +32,7 @@ pub(super) fn members(plan: &Plan, count: usize) -> Vec<Vec<f64>> {
 
 /// What the first steps come to where many workgroups share a solve.
 pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize, ways: Ways) -> Result<Counts, String> {
-    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix) };
+    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 };
     let mut backend = GpuBackend::on(gpu.clone()).tuned(tuning);
     if ways == Ways::Settled {
         backend = backend.sparing();

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 
 /// The first error since it was read last, of every thread: those that compute side by side do not end each other's work.
@@ -49,6 +49,8 @@ pub struct Gpu {
     pub(super) trouble: Arc<Troubles>,
     pub(super) scopes: Scopes,
     pub(super) lost: Arc<AtomicBool>,
+    /// How many workgroups are known to run at the same time, once somebody has asked.
+    pub(crate) together: OnceLock<u32>,
     /// What is handed over, where somebody wants to know.
     pub(super) trace: Mutex<Option<Trace>>,
 }

@@ -9,7 +9,7 @@ mod gpu;
 mod host;
 mod open;
 pub mod pipelines;
-mod probe;
+pub(crate) mod probe;
 pub mod recorder;
 pub mod trace;
 pub(crate) mod wait;

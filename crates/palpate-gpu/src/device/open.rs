@@ -7,7 +7,7 @@ use super::host::{Bare, Host};
 use super::pipelines::{Lanes, Pipelines};
 use super::probe::lanes_work;
 use super::wait;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// How lanes talk after what the probe of subgroups said. A driver that lists subgroups and cannot compile or run a kernel with them
@@ -141,6 +141,7 @@ impl Opened {
             trouble: self.trouble.clone(),
             scopes: Scopes::default(),
             lost: self.lost.clone(),
+            together: OnceLock::new(),
             trace: Default::default(),
         }
     }

@@ -25,6 +25,8 @@ pub struct PassSource {
     pub sources: [&'static str; 2],
     /// True when the two differ.
     pub lanes: bool,
+    /// True where its workgroups see what others write in the same dispatch: only with [`wgpu::Features::MEMORY_DECORATION_COHERENT`].
+    pub coherent: bool,
     /// Invocations of a workgroup.
     pub width: u32,
     /// Workgroup memory of the hungrier variant [B].

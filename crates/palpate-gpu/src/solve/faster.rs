@@ -48,7 +48,7 @@ impl Tuning {
 }
 
 /// One workgroup a member, and many.
-const WAYS: [Tuning; 2] = [Tuning { many_from: usize::MAX, product: None }, Tuning { many_from: 0, product: None }];
+const WAYS: [Tuning; 2] = [Tuning { many_from: usize::MAX, product: None, crew: 0 }, Tuning { many_from: 0, product: None, crew: 0 }];
 
 /// A plan made ready on a device, with the ways to solve that are stated, or else faster; without a clock those that were faster before, or the
 /// plain ones.
@@ -77,9 +77,9 @@ pub(crate) async fn world_async(gpu: Arc<Gpu>, plan: &Plan, members: usize, tuni
     Ok(world)
 }
 
-/// True where products can be made in either way, and none is stated.
+/// True where products can be made in either way, which workgroups that stay cannot, and none is stated.
 fn has_choice(world: &World, stated: Tuning) -> bool {
-    world.many && stated.product.is_none() && !world.needs_matrix()
+    world.many && world.geometry.shape.crew == 0 && stated.product.is_none() && !world.needs_matrix()
 }
 
 const PRODUCTS: [Product; 2] = [Product::Matrix, Product::Free];
@@ -215,7 +215,7 @@ mod tests {
     fn settings_are_read_and_others_refused() {
         assert_eq!(Tuning::parse("", "").unwrap_or_else(|e| panic!("{e}")), Tuning::default());
         let forced = Tuning::parse("many", "free").unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(forced, Tuning { many_from: 0, product: Some(Product::Free) });
+        assert_eq!(forced, Tuning { many_from: 0, product: Some(Product::Free), crew: 0 });
         let e = Tuning::parse("many", "fast").unwrap_err();
         assert_eq!(e.to_string(), "PALPATE_GPU_PRODUCT = \"fast\"; allowed: csr, free");
     }

@@ -5,6 +5,7 @@ pub(crate) mod backward;
 mod faster;
 pub(crate) mod forward;
 mod measure;
+mod stay;
 
 use crate::device::pipelines::pass;
 use crate::device::pipelines::shared::asks;
@@ -90,6 +91,9 @@ impl<'a> Passes<'a, '_> {
         }
         self.precondition();
         let exact = purpose == asks::FOR_DERIVATIVE;
+        if let Some(chunk) = self.world.stay(self.columns * self.world.geometry.shape.members) {
+            return self.stay(purpose, budget, chunk);
+        }
         let mut left = budget.next_multiple_of(2);
         for block in 1.. {
             if left == 0 {
@@ -103,6 +107,24 @@ impl<'a> Passes<'a, '_> {
             }
             self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
             if block % GATED == 0 { self.list() } else { self.relist() }
+        }
+    }
+
+    /// The same by workgroups that stay, so many iterations in a dispatch.
+    fn stay(&mut self, purpose: u32, budget: u32, chunk: u32) {
+        let exact = purpose == asks::FOR_DERIVATIVE;
+        for _ in 0..if exact { 1 + asks::MOST_CLAIMS } else { 1 } {
+            let mut left = budget.next_multiple_of(2);
+            while left > 0 {
+                let now = left.min(chunk);
+                self.run(pass::PERSIST_CG, SOLVE, Per::Crew, 8 * now);
+                left -= now;
+            }
+            if exact {
+                self.look_at_rest();
+            }
+            self.run_with(pass::CLOSE_CG, SOLVE, Per::Member, purpose, &self.failures(purpose));
+            self.relist();
         }
     }
 

@@ -41,8 +41,8 @@ fn conjugate_gradients_are_timed_by_whole_iterations_of_the_kernels_that_run() {
     let Some(gpu) = device(None) else { return };
     let plan = plan(&crowded());
     let theta = ParamBatch::from_rows(&spread(&plan, 2));
-    let one = Tuning { many_from: usize::MAX, product: None };
-    let many = [Product::Matrix, Product::Free].map(|p| Tuning { many_from: 0, product: Some(p) });
+    let one = Tuning { many_from: usize::MAX, product: None, crew: 0 };
+    let many = [Product::Matrix, Product::Free].map(|p| Tuning { many_from: 0, product: Some(p), crew: 0 });
     for tuning in [one, many[0], many[1]] {
         let backend = GpuBackend::on(gpu.clone()).tuned(tuning);
         let mut world = backend.build(&plan, 2).unwrap_or_else(|e| panic!("{e}"));

@@ -117,9 +117,9 @@ fn measured(scene: &Scene) -> Plan {
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-const ONE: Tuning = Tuning { many_from: usize::MAX, product: None };
+const ONE: Tuning = Tuning { many_from: usize::MAX, product: None, crew: 0 };
 const MANY: [Tuning; 2] =
-    [Tuning { many_from: 0, product: Some(Product::Matrix) }, Tuning { many_from: 0, product: Some(Product::Free) }];
+    [Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 }, Tuning { many_from: 0, product: Some(Product::Free), crew: 0 }];
 
 #[test]
 fn evaluations_of_a_body_pressed_inside_out_agree_and_one_percent_shows() {

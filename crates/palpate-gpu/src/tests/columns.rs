@@ -38,7 +38,7 @@ fn tangents(backend: &GpuBackend, plan: &Plan, theta: &[Vec<f64>], directions: &
 fn a_column_has_the_same_bits_alone_and_among_others() {
     let Some(gpu) = device(None) else { return };
     for many_from in [usize::MAX, 0] {
-        let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { many_from, product: Some(Product::Matrix) });
+        let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { many_from, product: Some(Product::Matrix), crew: 0 });
         for state in [InitialShape::Rest, InitialShape::StaticEquilibrium] {
             let mut scene = crowded();
             scene.initial.state = state;

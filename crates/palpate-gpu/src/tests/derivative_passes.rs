@@ -242,7 +242,7 @@ const PLACE: Fault = ("place of the point mass", |p| p.masses.values_mut().iter_
 #[test]
 fn passes_of_derivatives_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
-    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix) });
+    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 });
     let mut scene = scene();
     // Else damping and the old state's weight cancel in the ghost penalty's old force.
     scene.material.stiffness_damping = 0.006;

@@ -17,7 +17,7 @@ fn few_dispatches_bring_the_same_bits_as_all_and_more_follow_where_they_are_need
     let theta = ParamBatch::from_rows(&spread(&plan, 3));
     let request = Request { gradient: Wanted::All, sensitivities: vec![0, 1, 5] };
     for many_from in [0, usize::MAX] {
-        let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { many_from, product: Some(Product::Matrix) });
+        let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { many_from, product: Some(Product::Matrix), crew: 0 });
         let run = |levels: &'static [(usize, u32, u32)]| {
             let mut rollout = Rollout::new(backend.clone().levels(levels), &plan, 3).unwrap_or_else(|e| panic!("{e}"));
             [0; 2].map(|_| {

@@ -109,7 +109,7 @@ fn passes_of_a_step_agree_with_the_cpu_and_one_percent_shows() {
 #[test]
 fn passes_of_derivatives_agree_with_the_cpu_and_one_percent_shows() {
     let Some(gpu) = device(None) else { return };
-    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix) });
+    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 });
     for model in &materials::ALL[..2] {
         let plan = plan(&crowded(model));
         let (right, sizes) = derivative_passes::exact(&plan);

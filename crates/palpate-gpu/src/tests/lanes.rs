@@ -48,7 +48,7 @@ fn evaluations_have_the_same_bits_with_subgroups_and_with_workgroup_memory() {
         return;
     }
     let plan = seen(&scene());
-    for tuning in [Tuning::default(), Tuning { many_from: 0, product: None }] {
+    for tuning in [Tuning::default(), Tuning { many_from: 0, product: None, crew: 0 }] {
         let Some((memory, rows)) = everything(&plan, Lanes::Memory, tuning) else { return };
         assert!(memory.iter().all(|e| e.failure.is_none() && e.matched > 100), "{:?}", memory[0].failure);
         let numbers = memory.iter().flat_map(|e| e.gradient.iter().chain(e.curvature.iter().flat_map(|c| &c.matrix)));

@@ -139,6 +139,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         elastic: 4321,
         groups: 17,
         slices: 23,
+        crew: 5,
         ..Shape::default()
     };
     let [_, sizes] = listed(&gpu, shape);
@@ -153,6 +154,7 @@ fn listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through
         (Per::Slice, pass::MULTIPLY_ROWS, PASSES[pass::MULTIPLY_ROWS].width, shape.slices),
         (Per::Elastic, pass::PRESS_ELASTIC, 1, shape.elastic),
         (Per::Group, pass::ADVANCE_CG, PASSES[pass::ADVANCE_CG].width, shape.groups),
+        (Per::Crew, pass::PERSIST_CG, PASSES[pass::PERSIST_CG].width, shape.crew),
     ];
     assert_eq!(kinds.len(), KINDS);
     for (per, pass, lanes, items) in kinds {
@@ -230,7 +232,7 @@ fn a_kernel_that_does_not_compile_is_named() {
         ["@compute @workgroup_size(1) fn broken() { let x = ; }", "@compute @workgroup_size(1) fn broken() { let x: u32 = 1.5; }"]
     {
         let source =
-            PassSource { name: "broken", sources: [text; 2], lanes: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
+            PassSource { name: "broken", sources: [text; 2], lanes: false, coherent: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
         let e = compile(&gpu, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
         assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
         assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");

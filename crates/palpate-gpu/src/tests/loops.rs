@@ -59,7 +59,7 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         // Parts of a product, or of a residual.
         () if has("i < node_shares()") => most.nodes.div_ceil(64 * 256),
         () if has("group_slices[") => most.group.div_ceil(32),
-        () if has("i < shape.slices; i += 64u") => (most.nodes.div_ceil(32) + most.groups).div_ceil(64),
+        () if has("i < shape.slices; i +=") => (most.nodes.div_ceil(32) + most.groups).div_ceil(64),
         () if has("2u * shape.groups; g += 256u") => (2 * most.groups).div_ceil(256),
         () if has("group_rows[") && has("k += 4u") => most.group.div_ceil(4),
         () if has("group_rows[") => most.group.div_ceil(64),
@@ -77,6 +77,12 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("< MOST_LAWS") => laws::MOST_LAWS.into(),
         () if has("< MOST;") => palpate_model::effects::law::MOST as u64,
         () if has("shape.chunk") => most.chunk,
+        () if has("k < call.extra / 8u") => most.stay,
+        () if has("slice += shape.crew") => most.nodes.div_ceil(32) + most.groups,
+        () if has("own += shape.crew") => most.groups,
+        // One alone finds itself, and who waits in vain waits for the last time.
+        () if has("look < LOOKS") => 1,
+        () if has("k <= MEETINGS") => 8,
         () if has("i < shape.nodes; i += 256u") => most.share(),
         () if has("c.low.z") => seen.layers,
         () if has("sight.stripes") => seen.stripes,
@@ -201,6 +207,7 @@ const BODY: Most = Most {
     groups: MOST_GROUPS as u64,
     group: 4096,
     chunk: 1,
+    stay: 0,
     many: false,
 };
 
@@ -241,6 +248,7 @@ fn no_invocation_can_loop_longer_than_every_adapter_allows() {
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.grips = n, built),
         largest(Most { nodes: 1_000_000, ..many }, |m, n| m.aging = n, built),
         largest(Most { nodes: 512, masses: 0, ..BODY }, |m, n| m.chunk = n, built),
+        largest(Most { nodes: 512, masses: 0, groups: 20, group: 30, ..many }, |m, n| m.stay = n, built),
     ];
     assert!(bodies[0].nodes > 25_000 && bodies[2].nodes > 1_000_000 && bodies[3].supports > 1000, "{bodies:?}");
     let recordings = [
@@ -322,6 +330,7 @@ fn a_nested_loop_is_counted_as_often_as_it_runs() {
                 groups: 0,
                 group: 0,
                 chunk: 0,
+                stay: 0,
                 many: false,
             },
             &RECORDING,

@@ -27,6 +27,7 @@ mod products;
 pub(crate) mod scenes;
 mod schemes;
 mod sizes;
+mod stay;
 mod tet_effects;
 mod threads;
 mod translations;

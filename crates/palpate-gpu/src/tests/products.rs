@@ -20,7 +20,7 @@ use std::sync::Arc;
 const BOTH: [Product; 2] = [Product::Matrix, Product::Free];
 
 fn many(product: Product) -> Tuning {
-    Tuning { many_from: 0, product: Some(product) }
+    Tuning { many_from: 0, product: Some(product), crew: 0 }
 }
 
 /// Everything at once: a clamp, two planes that press, a point mass, a ghost penalty.
@@ -113,7 +113,7 @@ fn steps_by_many_workgroups_are_as_close_to_the_cpu_as_those_by_one() {
                 .zip(exact.iter().flatten())
                 .fold([0.0f64; 2], |w, (a, b)| [w[0].max(off(&a.0, &b.0)), w[1].max(off(&a.1, &b.1))])
         };
-        let one = worst(Tuning { many_from: usize::MAX, product: None }, None);
+        let one = worst(Tuning { many_from: usize::MAX, product: None, crew: 0 }, None);
         for product in BOTH {
             let d = worst(many(product), None);
             println!("{product:?}: {d:?}, one workgroup {one:?}");
@@ -210,7 +210,7 @@ fn without_a_clock_nothing_is_measured_and_the_plain_way_is_taken() {
     let Some(gpu) = own_device() else { return };
     let plan = plan(&ball(0.04));
     assert_eq!(Tuning::measured(&gpu, &plan), Ok(Tuning::default()));
-    let mut world = World::new(gpu.clone(), &plan, 1, Tuning { many_from: 0, product: None }).unwrap_or_else(|e| panic!("{e}"));
+    let mut world = World::new(gpu.clone(), &plan, 1, Tuning { many_from: 0, product: None, crew: 0 }).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(solve::faster(&mut world), Ok(Product::Matrix));
     assert_eq!((gpu.copy_bandwidth().err(), world.cg_speed().err()), (Some(GpuError::NoClock), Some(GpuError::NoClock)));
 }

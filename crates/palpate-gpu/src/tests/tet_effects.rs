@@ -42,7 +42,7 @@ fn passes_with_laws_of_cells_on_tetrahedra_agree_and_one_percent_shows() {
         print!("{name}: ");
         assert!(!apart(&found(&backend, &wrong, &right), &right).is_empty(), "1 % of {name} is not seen");
     }
-    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix) });
+    let backend = GpuBackend::on(gpu).tuned(Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 });
     let (right, sizes) = derivative_passes::exact(&plan);
     // The CPU's old forces by themselves have what would be lost on the way to a state at rest.
     let seen = |plan: &Plan| -> Vec<String> {

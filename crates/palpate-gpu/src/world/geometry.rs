@@ -28,6 +28,8 @@ const LONGEST_CHUNK: u64 = 512;
 #[derive(Debug)]
 pub(crate) struct Geometry {
     pub(crate) shape: Shape,
+    /// Iterations that workgroups which stay make in one dispatch, an even number.
+    pub(crate) stay: u32,
     pub(crate) classes: Classes,
     /// (clamp, cell of the body) of every clamp cell in the device's order: all that a member may hold.
     pub(crate) holds: Vec<(usize, u32)>,
@@ -144,10 +146,12 @@ impl Geometry {
             groups: groups.len() as u64,
             group: groups.nodes.iter().map(Vec::len).max().unwrap_or(0) as u64,
             chunk: 1,
+            stay: 0,
             many,
         };
         check_loops(&most)?;
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
+        let stay = 2 * (LOOPS / most.of_staying() / 2).min(LONGEST_CHUNK) as u32;
         let [rate_effects, rate_numbers] = effects.rate_places(plan);
         let shape = Shape {
             members: 0,
@@ -190,7 +194,7 @@ impl Geometry {
             coarse_kind: 0,
             group_size: groups.size as f32,
             slices: slices[0].len() as u32 - 1,
-            pad: 0,
+            crew: 0,
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         let mut tables = Arena::new("body_tables");
@@ -215,6 +219,6 @@ impl Geometry {
         tables.put("cell_effects", &effects.cell_sites());
         tables.put("holds", &hold_sites);
         tables.upload(gpu, buffers)?;
-        Ok(Geometry { shape, classes, holds, effects, mass, groups, blocks: pattern.blocks })
+        Ok(Geometry { shape, stay, classes, holds, effects, mass, groups, blocks: pattern.blocks })
     }
 }

@@ -44,8 +44,9 @@ pub(crate) struct Most {
     /// Groups of nodes of the preconditioner's second level, and nodes of the largest.
     pub(crate) groups: u64,
     pub(crate) group: u64,
-    /// Iterations of conjugate gradients in one dispatch.
+    /// Iterations of conjugate gradients in one dispatch, by one workgroup and by those that stay.
     pub(crate) chunk: u64,
+    pub(crate) stay: u64,
     /// Many workgroups share the solve of a member.
     pub(crate) many: bool,
 }
@@ -62,6 +63,15 @@ impl Most {
         1 + self.share() * (self.row + 4 + (1 + 2 * self.stencil) * self.masses) + 20 + self.restriction() + self.correction()
     }
 
+    /// Of one iteration by workgroups that stay, if one alone had all slices and groups: a look at how far it is, rows with eight lanes each, and each
+    /// group's motion.
+    pub(super) fn of_staying(&self) -> u64 {
+        let slices = self.nodes.div_ceil(32) + self.groups;
+        let of_slice = 1 + self.row + (1 + 2 * self.stencil) * self.masses + 8 + 16;
+        let of_group = 1 + self.groups.div_ceil(64) * (1 + self.group.div_ceil(32)) + self.group.div_ceil(64) + 4 * 8;
+        40 + self.groups.div_ceil(64) + slices.div_ceil(64) + slices * of_slice + self.groups * of_group
+    }
+
     /// Of the groups' forces, by one workgroup.
     fn restriction(&self) -> u64 {
         self.groups.div_ceil(64) * (1 + self.group.div_ceil(4))
@@ -73,7 +83,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 26] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 27] {
         [
             ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
             (
@@ -91,6 +101,8 @@ impl Most {
                     + self.group.div_ceil(64)
                     + 60,
             ),
+            // Waits in vain end all of it, and others are short.
+            ("persist_cg", self.stay * self.of_staying() + 40),
             ("step_back", 3 * self.row + 20),
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),

@@ -127,7 +127,8 @@ impl World {
             effort,
             alone: false,
         };
-        if world.needs_matrix() {
+        world.engage(tuning.crew).await?;
+        if world.needs_matrix() || world.geometry.shape.crew != 0 {
             world.product = Product::Matrix;
         }
         world.learn_stiffness().await?;

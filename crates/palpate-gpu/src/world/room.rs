@@ -37,9 +37,10 @@ const WORK: [Work; 22] = [
 ];
 
 /// The same per column of a member that is solved for at the same time as others.
-const OF_COLUMN: [Work; 3] = [
+const OF_COLUMN: [Work; 4] = [
     ("cg_sums", |s| solving::SCALARS + solving::OF_SLICE * s.slices + solving::OF_GROUP * s.groups, VECTOR),
     ("newton", |_| 1, size_of::<Newton>() as u64),
+    ("meetings", |_| 3, 4),
     ("column_health", |_| 1, size_of::<Health>() as u64),
 ];
 

@@ -37,16 +37,18 @@ pub struct Tuning {
     pub many_from: usize,
     /// `None` = whichever is faster on the device.
     pub product: Option<Product>,
+    /// So many workgroups at most stay for all iterations of a member's linear solve (`solve/stay.rs`); 0 = every iteration has dispatches of its own.
+    pub crew: u32,
 }
 
 impl Default for Tuning {
     fn default() -> Tuning {
-        Tuning { many_from: MANY, product: None }
+        Tuning { many_from: MANY, product: None, crew: 0 }
     }
 }
 
 impl Tuning {
-    /// As `PALPATE_GPU_CG` (one, many) and `PALPATE_GPU_PRODUCT` (csr, free) say.
+    /// As `PALPATE_GPU_CG` (one, many, stay) and `PALPATE_GPU_PRODUCT` (csr, free) say.
     ///
     /// # Errors
     /// They say something else.
@@ -61,9 +63,10 @@ impl Tuning {
             many_from: match cg {
                 "" => MANY,
                 "one" => usize::MAX,
-                "many" => 0,
-                _ => return Err(wrong("PALPATE_GPU_CG", cg, "one, many")),
+                "many" | "stay" => 0,
+                _ => return Err(wrong("PALPATE_GPU_CG", cg, "one, many, stay")),
             },
+            crew: if cg == "stay" { u32::MAX } else { 0 },
             product: match product {
                 "" => None,
                 name => Some(Product::named(name).ok_or_else(|| wrong("PALPATE_GPU_PRODUCT", name, "csr, free"))?),
