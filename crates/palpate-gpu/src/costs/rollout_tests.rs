@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 
 /// Single precision through a few steps and their solves (to 1e-5 or so of the forces) leaves derivatives that are right to a
 /// thousandth of what they could be at most.
-const AGREEMENT: f64 = 1e-3;
+pub(crate) const AGREEMENT: f64 = 1e-3;
 
 /// How the surface is compared.
 pub(crate) fn watched() -> Option<palpate_model::scene::ObservationSpec> {
@@ -86,29 +86,34 @@ fn sizes(e: &Evaluation, q: usize) -> Vec<f64> {
     out
 }
 
-fn apart(a: &[Number], b: &[Number], sizes: &[f64]) -> Vec<String> {
+fn apart(a: &[Number], b: &[Number], sizes: &[f64], allowed: f64) -> Vec<String> {
     assert_eq!(a.len(), b.len());
     let all = a.iter().zip(b).zip(sizes).map(|(((name, x), (_, y)), size)| (name, x, y, (x - y).abs() / size));
     // Not a number is a difference as well.
-    all.filter(|n| n.3.is_nan() || n.3 > AGREEMENT).map(|(name, x, y, d)| format!("{name}: {x} is not {y} ({d:.1e})")).collect()
+    all.filter(|n| n.3.is_nan() || n.3 > allowed).map(|(name, x, y, d)| format!("{name}: {x} is not {y} ({d:.1e})")).collect()
 }
 
 /// What differs of two evaluations.
 pub(crate) fn differences(a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
-    apart(&numbers(a, directions), &numbers(b, directions), &sizes(b, directions.len()))
+    differences_beyond(AGREEMENT, a, b, directions)
+}
+
+/// What differs by more than is allowed.
+pub(crate) fn differences_beyond(allowed: f64, a: &Evaluation, b: &Evaluation, directions: &[usize]) -> Vec<String> {
+    apart(&numbers(a, directions), &numbers(b, directions), &sizes(b, directions.len()), allowed)
 }
 
 /// Two evaluations agree, and would not if any number of the first, gradients among them, were one percent larger. Only of numbers
 /// above 15 % of what they could be at most is that half as much again as the agreement; what is compared is off by some of it already.
 pub(crate) fn assert_agreement(a: &Evaluation, b: &Evaluation, directions: &[usize]) {
     let (found, right, sizes) = (numbers(a, directions), numbers(b, directions), sizes(b, directions.len()));
-    let off = apart(&found, &right, &sizes);
+    let off = apart(&found, &right, &sizes, AGREEMENT);
     assert!(off.is_empty(), "{off:#?}");
     let large = |k: usize| right[k].1.abs() > 0.15 * sizes[k];
     for k in (0..found.len()).filter(|k| large(*k)) {
         let mut wrong = found.clone();
         wrong[k].1 *= 1.01;
-        assert_eq!(apart(&wrong, &right, &sizes).len(), 1, "1 % of {} was not seen", found[k].0);
+        assert_eq!(apart(&wrong, &right, &sizes, AGREEMENT).len(), 1, "1 % of {} was not seen", found[k].0);
     }
     let shares: Vec<String> = right
         .iter()
