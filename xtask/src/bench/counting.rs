@@ -30,9 +30,10 @@ pub(super) fn members(plan: &Plan, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(row).collect()
 }
 
-/// What the first steps come to where many workgroups share a solve.
-pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize, ways: Ways) -> Result<Counts, String> {
-    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 };
+/// What the first steps come to where many workgroups share a solve, and where they stay for all its iterations: then one is counted in place of all,
+/// which makes the same dispatches.
+pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize, ways: Ways, stay: bool) -> Result<Counts, String> {
+    let tuning = Tuning { many_from: 0, product: Some(Product::Matrix), crew: u32::from(stay) };
     let mut backend = GpuBackend::on(gpu.clone()).tuned(tuning);
     if ways == Ways::Settled {
         backend = backend.sparing();
@@ -58,6 +59,7 @@ pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize
         adjoint,
         recorded: if ways == Ways::Settled { of_step(counted.dispatches.recorded as f64) } else { 0.0 },
         live: of_step(counted.dispatches.live as f64),
+        meetings: if stay { 2.0 * linear } else { 0.0 },
         host: if recording.is_empty() { 0.0 } else { Times::of(recording).median },
         // A round more looks at the last trial.
         bytes: (newton + 1.0) * round + linear * iteration,

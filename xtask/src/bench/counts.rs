@@ -76,6 +76,8 @@ impl Row {
 struct Subject {
     name: &'static str,
     batch: usize,
+    /// Its workgroups stay for all iterations of a solve.
+    stays: bool,
     make: Box<dyn Fn() -> Result<Plan, String>>,
 }
 
@@ -121,11 +123,12 @@ fn subjects() -> Vec<Subject> {
     let ball = move |across: f64| move || dropped(&placed(Analytic::Ball { radius: 0.1, center }), 0.2 / across);
     let torus = move || dropped(&placed(Analytic::Torus { major: 0.08, minor: 0.03, center, axis: DVec3::Z }), 0.2 / 13.0);
     let whole = || dropped(&the_dragon()?, DRAGON_EDGE);
-    let of = |name, batch, make: Box<dyn Fn() -> Result<Plan, String>>| Subject { name, batch, make };
+    let of = |name, batch, make: Box<dyn Fn() -> Result<Plan, String>>| Subject { name, batch, stays: false, make };
     vec![
         of("torus", 1, Box::new(torus)),
         of("ball", 1, Box::new(ball(8.6))),
         of("dragon", 1, Box::new(whole)),
+        Subject { stays: true, ..of("dragon, staying", 1, Box::new(whole)) },
         of("dragon × 64", 64, Box::new(whole)),
         of("dragon clamped", 1, Box::new(clamped_dragon)),
         of("beam clamped", 1, Box::new(beam)),
@@ -135,7 +138,7 @@ fn subjects() -> Vec<Subject> {
     ]
 }
 
-/// Counts every workload whose name begins with `only`, or all but the dragon's batch and the largest ball, which a software adapter takes long
+/// Counts the workload of a name, or all but the dragon's batch and the largest ball, which a software adapter takes long
 /// for; the others' rows stay.
 ///
 /// # Errors
@@ -146,7 +149,7 @@ pub fn run(only: Option<&str>) -> Result<(), String> {
     let made = Made::now()?;
     let long = |name: &str| matches!(name, "dragon × 64" | "ball 100k");
     for s in subjects() {
-        if !only.map_or(!long(s.name), |o| s.name.starts_with(o)) {
+        if !only.map_or(!long(s.name), |o| s.name == o) {
             continue;
         }
         let mut plan = (s.make)().map_err(|e| format!("{}: {e}", s.name))?;
@@ -155,7 +158,7 @@ pub fn run(only: Option<&str>) -> Result<(), String> {
         plan.clock.steps = STEPS[usize::from(big)];
         let members = counting::members(&plan, s.batch);
         let ways = if big { Ways::Once } else { Ways::Settled };
-        let counts = counting::count(&gpu, &plan, &members, plan.clock.steps, ways)?;
+        let counts = counting::count(&gpu, &plan, &members, plan.clock.steps, ways, s.stays)?;
         let row = Row {
             name: s.name.into(),
             date: made.date.clone(),

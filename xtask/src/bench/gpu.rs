@@ -344,7 +344,7 @@ fn on_device(
     let columns: Vec<f64> = run.columns.into_iter().map(|s| of_member(s).median).collect();
     let ratio = |a: &Times, b: &Times| a.median / b.median.max(1e-12);
     let cpu = of_cpu(steps)?;
-    let counts = counting::count(gpu, plan, &rows, steps, counting::Ways::Settled)?;
+    let counts = counting::count(gpu, plan, &rows, steps, counting::Ways::Settled, false)?;
     let line = Line {
         name: format!("gpu {} × {batch}", cpu.name),
         build,
