@@ -32,7 +32,14 @@ pub(super) fn members(plan: &Plan, count: usize) -> Vec<Vec<f64>> {
 
 /// What the first steps come to where many workgroups share a solve, and where they stay for all its iterations: then one is counted in place of all,
 /// which makes the same dispatches.
-pub(super) fn count(gpu: &Arc<Gpu>, plan: &Plan, rows: &[Vec<f64>], steps: usize, ways: Ways, stay: bool) -> Result<Counts, String> {
+pub(super) fn count(
+    gpu: &Arc<Gpu>,
+    plan: &Plan,
+    rows: &[Vec<f64>],
+    steps: usize,
+    ways: Ways,
+    stay: bool,
+) -> Result<Counts, String> {
     let tuning = Tuning { many_from: 0, product: Some(Product::Matrix), crew: u32::from(stay) };
     let mut backend = GpuBackend::on(gpu.clone()).tuned(tuning);
     if ways == Ways::Settled {

@@ -39,7 +39,9 @@ pub fn run(options: Options) -> Result<(), String> {
         .iter()
         .flat_map(|p| {
             let variants = if p.lanes { &[0, 1][..] } else { &[1] };
-            variants.iter().map(|v| json!({ "name": p.name, "variant": VARIANTS[*v], "code": p.sources[*v].replace("@coherent ", "") }))
+            variants
+                .iter()
+                .map(|v| json!({ "name": p.name, "variant": VARIANTS[*v], "code": p.sources[*v].replace("@coherent ", "") }))
         })
         .collect();
     write(&folder.join("kernels.json"), &json!(kernels))?;
@@ -54,7 +56,8 @@ pub fn run(options: Options) -> Result<(), String> {
     for (name, plan) in scenes::all()? {
         for (way, tuning) in [("one workgroup", usize::MAX), ("many workgroups", 0)] {
             println!("{name}, {way} a member");
-            let traced = trace_step(&gpu, &plan, Tuning { many_from: tuning, product: None, crew: 0 }).map_err(|e| e.to_string())?;
+            let traced =
+                trace_step(&gpu, &plan, Tuning { many_from: tuning, product: None, crew: 0 }).map_err(|e| e.to_string())?;
             for work in traced.trace.submissions.iter().flat_map(|s| &s.work) {
                 if let Work::Dispatch { pass, .. } = work {
                     ran[*pass] = true;

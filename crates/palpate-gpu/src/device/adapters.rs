@@ -99,9 +99,8 @@ impl std::fmt::Display for Choice {
 /// Features without which no kernel runs: small arguments of a dispatch.
 pub(super) const NEEDED: wgpu::Features = wgpu::Features::IMMEDIATES;
 /// Features that are used where they are.
-pub(super) const WELCOME: wgpu::Features = wgpu::Features::SUBGROUP
-    .union(wgpu::Features::TIMESTAMP_QUERY)
-    .union(wgpu::Features::MEMORY_DECORATION_COHERENT);
+pub(super) const WELCOME: wgpu::Features =
+    wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY).union(wgpu::Features::MEMORY_DECORATION_COHERENT);
 /// Storage buffers that the widest kernel binds: as many as browsers give.
 pub(crate) const STORAGE_BUFFERS: u32 = 10;
 /// Invocations of the widest workgroup.

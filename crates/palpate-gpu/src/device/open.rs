@@ -7,8 +7,8 @@ use super::host::{Bare, Host};
 use super::pipelines::{Lanes, Pipelines};
 use super::probe::lanes_work;
 use super::wait;
-use std::sync::{Arc, OnceLock};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// How lanes talk after what the probe of subgroups said. A driver that lists subgroups and cannot compile or run a kernel with them
 /// still has workgroup memory.

@@ -48,7 +48,8 @@ impl Tuning {
 }
 
 /// One workgroup a member, and many.
-const WAYS: [Tuning; 2] = [Tuning { many_from: usize::MAX, product: None, crew: 0 }, Tuning { many_from: 0, product: None, crew: 0 }];
+const WAYS: [Tuning; 2] =
+    [Tuning { many_from: usize::MAX, product: None, crew: 0 }, Tuning { many_from: 0, product: None, crew: 0 }];
 
 /// A plan made ready on a device, with the ways to solve that are stated, or else faster; without a clock those that were faster before, or the
 /// plain ones.

@@ -15,7 +15,11 @@ use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource, Clamp, Scene};
 
 fn backend(gpu: std::sync::Arc<crate::Gpu>, many: bool) -> GpuBackend {
-    GpuBackend::on(gpu).tuned(Tuning { many_from: if many { 0 } else { usize::MAX }, product: Some(crate::Product::Matrix), crew: 0 })
+    GpuBackend::on(gpu).tuned(Tuning {
+        many_from: if many { 0 } else { usize::MAX },
+        product: Some(crate::Product::Matrix),
+        crew: 0,
+    })
 }
 
 fn vector(v: [f32; 4]) -> DVec3 {

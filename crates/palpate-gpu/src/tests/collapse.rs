@@ -118,8 +118,10 @@ fn measured(scene: &Scene) -> Plan {
 }
 
 const ONE: Tuning = Tuning { many_from: usize::MAX, product: None, crew: 0 };
-const MANY: [Tuning; 2] =
-    [Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 }, Tuning { many_from: 0, product: Some(Product::Free), crew: 0 }];
+const MANY: [Tuning; 2] = [
+    Tuning { many_from: 0, product: Some(Product::Matrix), crew: 0 },
+    Tuning { many_from: 0, product: Some(Product::Free), crew: 0 },
+];
 
 #[test]
 fn evaluations_of_a_body_pressed_inside_out_agree_and_one_percent_shows() {

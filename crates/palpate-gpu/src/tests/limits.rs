@@ -231,8 +231,16 @@ fn a_kernel_that_does_not_compile_is_named() {
     for text in
         ["@compute @workgroup_size(1) fn broken() { let x = ; }", "@compute @workgroup_size(1) fn broken() { let x: u32 = 1.5; }"]
     {
-        let source =
-            PassSource { name: "broken", sources: [text; 2], lanes: false, coherent: false, width: 1, memory: 0, bindings: &[], overrides: &[] };
+        let source = PassSource {
+            name: "broken",
+            sources: [text; 2],
+            lanes: false,
+            coherent: false,
+            width: 1,
+            memory: 0,
+            bindings: &[],
+            overrides: &[],
+        };
         let e = compile(&gpu, &source, &Pipelines::new(Lanes::Memory)).err().unwrap_or_else(|| panic!("{text} compiles"));
         assert!(matches!(&e, GpuError::Shader { pass, message } if pass == "broken" && !message.is_empty()), "{e}");
         assert!(e.to_string().contains("the kernel broken does not compile") && e.hint().contains("--backend cpu"), "{e}");

@@ -210,7 +210,8 @@ fn without_a_clock_nothing_is_measured_and_the_plain_way_is_taken() {
     let Some(gpu) = own_device() else { return };
     let plan = plan(&ball(0.04));
     assert_eq!(Tuning::measured(&gpu, &plan), Ok(Tuning::default()));
-    let mut world = World::new(gpu.clone(), &plan, 1, Tuning { many_from: 0, product: None, crew: 0 }).unwrap_or_else(|e| panic!("{e}"));
+    let mut world =
+        World::new(gpu.clone(), &plan, 1, Tuning { many_from: 0, product: None, crew: 0 }).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(solve::faster(&mut world), Ok(Product::Matrix));
     assert_eq!((gpu.copy_bandwidth().err(), world.cg_speed().err()), (Some(GpuError::NoClock), Some(GpuError::NoClock)));
 }

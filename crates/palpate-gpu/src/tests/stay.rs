@@ -24,7 +24,8 @@ fn workgroups_that_stay_solve_as_dispatches_do_and_in_fewer_of_them() {
     row[directions[0]] *= 1.2;
     let rows = [row.clone(), plan.theta.clone()];
     let request = Request { gradient: Wanted::All, sensitivities: directions.clone() };
-    let right = Rollout::new(CpuBackend, &plan, 2).unwrap_or_else(|e| panic!("{e}")).evaluate(&ParamBatch::from_rows(&rows), &request);
+    let right =
+        Rollout::new(CpuBackend, &plan, 2).unwrap_or_else(|e| panic!("{e}")).evaluate(&ParamBatch::from_rows(&rows), &request);
     let live = |crew| {
         let backend = GpuBackend::on(gpu.clone()).tuned(Tuning { crew, ..DISPATCHES });
         let mut rollout = Rollout::new(backend, &plan, 2).unwrap_or_else(|e| panic!("{e}"));
