@@ -1,7 +1,7 @@
 //! `palpate diagnose`: what a model lacks.
 
 use crate::cli::{Console, INTERRUPTED};
-use crate::diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
+use crate::diagnosing::{DiagnoseOptions, Diagnosed, demand, diagnose};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -131,7 +131,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let mut track = console.progress(0, "diagnosing");
     track.on(0, "reading");
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
-    let (backend, note) = a.backend.choose(experiments[0].plan(), 1, &mut track)?;
+    let statistics = palpate_diagnose::Options::default();
+    let (backend, note) = a.backend.choose_for(experiments[0].plan(), &demand(&experiments, &statistics)?, &mut track)?;
     let held_out = a.held_out.as_ref().map(Experiment::open).transpose()?;
     track.aside(|| {
         experiments.iter().chain(&held_out).for_each(|e| console.warn(e.warnings()));
@@ -146,6 +147,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         held_out.as_ref(),
         DiagnoseOptions {
             backend,
+            statistics,
             budget,
             clock: clock.clone(),
             interrupt: console.interrupt.clone(),

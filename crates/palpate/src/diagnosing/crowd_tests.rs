@@ -132,3 +132,12 @@ fn recordings_of_one_body_are_one_batch_of_a_joint_fit() {
     assert_eq!(together.result.parameters, apart.result.parameters);
     assert_eq!((together.result.cost, together.result.theta), (apart.result.cost, apart.result.theta));
 }
+
+#[test]
+fn auto_times_as_many_members_as_a_round_has_candidates() {
+    let folder = tempfile::tempdir().unwrap();
+    let base = recorded(folder.path());
+    let statistics = palpate_diagnose::Options::default();
+    let demand = super::super::demand(&base, &statistics).unwrap();
+    assert_eq!((demand.starts, demand.places.len(), demand.compared), (statistics.search.fits * base.len(), 1, true));
+}

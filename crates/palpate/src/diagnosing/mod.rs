@@ -17,14 +17,15 @@ mod world;
 use crate::engine::{Backend, with_threads};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fitting::Fitted;
+use crate::fitting::{self, Fitted, free_parameters};
 use crate::interrupt::{Clock, Interrupt};
+use crate::memory::Demand;
 use lab::Lab;
 use palpate_diagnose::{Change, Diagnosis, LabError, Model};
 use palpate_io::InputError;
 use palpate_model::effects::Effect;
 use palpate_model::params::ParamKey;
-use palpate_model::scene::ObservationSpec;
+use palpate_model::scene::{ObservationSpec, Optimizer};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -72,6 +73,16 @@ pub struct Diagnosed {
     pub broken: Option<String>,
     /// Wall-clock time [s].
     pub seconds: f64,
+}
+
+/// What a round of a diagnosis asks of its backend at the same time: candidates of every scene, with derivatives by what is free in the baseline.
+///
+/// # Errors
+/// A path that is no number of its scene, or shared parameters that disagree.
+pub(crate) fn demand(experiments: &[Experiment], statistics: &palpate_diagnose::Options) -> Result<Demand, Error> {
+    let (_, free, _) = free_parameters(experiments)?;
+    let starts = statistics.search.fits * experiments.len();
+    Ok(Demand { starts, ..fitting::demand(&free, 0, Optimizer::GaussNewton, starts) })
 }
 
 /// Finds what the model of one or several experiments lacks. `held_out` is a recording of the same body that no fit sees.
