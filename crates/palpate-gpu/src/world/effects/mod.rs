@@ -61,6 +61,10 @@ impl Effects {
             let what = format!("the material \"{}\", which the CPU backend has", plan.model.name);
             return Err(GpuError::Plan { what });
         }
+        if plan.initial == InitialShape::Given {
+            let what = "a shape that is given as the equilibrium (object.state = \"static\"), which the CPU backend has".into();
+            return Err(GpuError::Plan { what });
+        }
         let mut e = Effects { steps: plan.clock.stages().len(), viscous: plan.layout.is_viscous(), ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
