@@ -7,7 +7,7 @@ use crate::simulate;
 use crate::terms::zeros;
 use crate::world::{Adjoint, Gradient, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
-use palpate_engine::{Backend, BuildError, Curvature, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
+use palpate_engine::{Backend, BuildError, Curvature, Direction, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
@@ -34,6 +34,22 @@ impl CpuBackend {
         let of_row = |a: usize| (rows.rows[a]..rows.rows[a + 1]).map(move |k| (a, k));
         let blocks = (0..rows.len()).flat_map(of_row).map(|(a, k)| (a, rows.columns[k] as usize, matrix.values[k]));
         (forces, blocks.collect())
+    }
+}
+
+impl CpuBackend {
+    /// Displacement W of the stress-free shape from the one given `[N]` [m], of a plan whose given shape is the equilibrium.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn stress_free(&self, plan: &Plan, theta: &[f64]) -> Result<Vec<DVec3>, Failure> {
+        let mut world = World::new(plan);
+        world.set_params(&ParamBatch::from_rows(&[theta.to_vec()]));
+        let mut first = State { members: blank(&world) };
+        let (shared, member) = (&world.shared, &mut world.members[0]);
+        simulate::start(shared, member, &mut first.members[0])
+            .map_err(|reason| newton::at(0.0)(reason).with_values(&plan.layout, theta))?;
+        Ok(world.members.remove(0).coefficients.changes.rest.unwrap_or_default())
     }
 }
 
@@ -126,7 +142,7 @@ impl Backend for CpuBackend {
         let blank = |(b, m): (usize, &Member)| {
             let own: Vec<Direction> = directions.iter().take(m.own.unwrap_or(directions.len())).map(|d| d.of(b)).collect();
             MemberTangent {
-                rates: Arc::new(simulate::rates(&world.shared, m, &own)),
+                rates: simulate::rates(&world.shared, m, &own),
                 du: vec![zeros(n); own.len()],
                 dv: vec![zeros(n); own.len()],
                 directions: Arc::new(own),

@@ -130,7 +130,7 @@ fn derivatives_of_a_crushed_step_agree() {
     let guarded = (0..plan.body.cells().len()).filter(|e| pose(*e).guard().is_some()).count();
     assert!(guarded > 0, "no cell is turned inside out far enough");
     let directions: Vec<usize> = (0..plan.layout.len()).collect();
-    let rates = Arc::new(simulate::rates(shared, member, &Direction::parameters(&directions)));
+    let rates = simulate::rates(shared, member, &Direction::parameters(&directions));
     let blanks = || vec![zeros(n); directions.len()];
     let along = Arc::new(Direction::parameters(&directions));
     let tangents = || MemberTangent { directions: along.clone(), rates: rates.clone(), du: blanks(), dv: blanks() };

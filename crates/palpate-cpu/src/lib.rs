@@ -18,6 +18,9 @@ mod product_tests;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;
+mod stress_free;
+#[cfg(test)]
+mod stress_free_tests;
 pub mod terms;
 #[cfg(test)]
 mod view_tests;

@@ -4,6 +4,7 @@ use crate::linear::Purpose;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, Effort, Reason};
+use crate::stress_free;
 use crate::terms::{Context, Curvature, Equation, Past, PastChange, Rates, Weights, zeros};
 use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
@@ -12,6 +13,7 @@ use palpate_model::params::coefficients::Coefficients;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
+use std::sync::Arc;
 
 /// The past of a stage: the weighted sum of past states, and each of them.
 pub(crate) struct Start<'a> {
@@ -29,7 +31,7 @@ impl<'a> Start<'a> {
     }
 
     /// Of a static problem: nothing.
-    fn still(n: usize) -> Start<'a> {
+    pub(crate) fn still(n: usize) -> Start<'a> {
         Start { u: zeros(n), v: zeros(n), each: Vec::new() }
     }
 
@@ -146,6 +148,9 @@ fn check_parameters(member: &Member) -> Result<(), Reason> {
 pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
     let plan = &shared.plan;
     check_parameters(member)?;
+    if stress_free::applies(plan) {
+        stress_free::solve(shared, member)?;
+    }
     s.u.fill(DVec3::ZERO);
     if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.coefficients.changes.rest) {
         // At rest is where nothing is strained.
@@ -201,6 +206,9 @@ pub fn start_adjoint(
             rest[i] += adj.u[i] + v.cross(spin);
         }
     }
+    if stress_free::applies(&shared.plan) {
+        return stress_free::pull(shared, member, gradient);
+    }
     if at_rest {
         return Ok(());
     }
@@ -215,10 +223,15 @@ pub fn start_adjoint(
     })
 }
 
-/// Derivatives of the coefficients along directions.
-pub(crate) fn rates(shared: &Shared, member: &Member, directions: &[Direction]) -> Vec<Coefficients> {
+/// Derivatives of the coefficients along directions; that of a stress-free shape which follows from others comes with the start's tangent.
+pub(crate) fn rates(shared: &Shared, member: &Member, directions: &[Direction]) -> Arc<Vec<Coefficients>> {
+    if let Some((known, rates)) = &member.rates
+        && known[..] == *directions
+    {
+        return rates.clone();
+    }
     let plan = &shared.plan;
-    directions.iter().map(|d| member.coefficients.along(plan, &d.dense(plan.layout.len()))).collect()
+    Arc::new(directions.iter().map(|d| member.coefficients.along(plan, &d.dense(plan.layout.len()))).collect())
 }
 
 /// Derivatives of the start along `t`'s directions.
@@ -234,6 +247,14 @@ pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &
             t.dv[q].iter_mut().zip(dw).for_each(|(v, w)| *v += spin.cross(*w));
             t.du[q].copy_from_slice(dw);
         }
+    }
+    if stress_free::applies(&shared.plan) {
+        let mut rates = t.rates.to_vec();
+        stress_free::along(shared, member, &mut rates)?;
+        t.rates = Arc::new(rates);
+        // Tangents of later states are made with them.
+        member.rates = Some((t.directions.clone(), t.rates.clone()));
+        return Ok(());
     }
     if at_rest {
         return Ok(());

@@ -62,6 +62,8 @@ pub struct Member {
     pub(crate) matrix: Matrix,
     /// Of the time steps since the parameters were set.
     pub(crate) effort: Effort,
+    /// Directions, and derivatives of the coefficients along them, where the stress-free shape follows from the parameters.
+    pub(crate) rates: Option<(Arc<Vec<Direction>>, Arc<Vec<Coefficients>>)>,
 }
 
 impl Member {
@@ -141,6 +143,7 @@ impl World {
                 elements,
                 matrix: scratch.pop().unwrap_or_default(),
                 effort: Effort::default(),
+                rates: None,
             });
         }
     }

@@ -44,7 +44,7 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "object",
             Schema {
-                keys: &["mesh", "volume_mesh", "pose", "discretisation", "cell_size", "cells", "edge_length"],
+                keys: &["mesh", "volume_mesh", "state", "pose", "discretisation", "cell_size", "cells", "edge_length"],
                 tables: &[(
                     "shape",
                     Schema {

@@ -271,6 +271,8 @@ pub enum InitialShape {
     Rest,
     /// In equilibrium under gravity, clamps, planes and masses.
     StaticEquilibrium,
+    /// The shape given, which is the equilibrium: the stress-free shape follows from it.
+    Given,
 }
 
 /// Time steps.

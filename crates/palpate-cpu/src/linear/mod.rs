@@ -4,6 +4,7 @@ pub mod cholesky;
 pub mod coarse;
 pub mod conjugate_gradient;
 pub mod dense;
+pub mod gmres;
 pub mod jacobi;
 pub mod matrix;
 pub mod simd;

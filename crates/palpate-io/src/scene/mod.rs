@@ -79,7 +79,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         Some(w) => w.optional_vec3("gravity")?,
         None => None,
     };
-    let initial = initial(&root)?;
+    let initial = initial(&root, object::is_given(&root)?)?;
     let mut scene = Scene {
         path: source.path.clone(),
         title: root.optional_str("title")?.unwrap_or_default().to_string(),
@@ -180,14 +180,23 @@ fn masses(root: &Table) -> Result<Vec<PointMass>, InputError> {
     Ok(masses)
 }
 
-fn initial(root: &Table) -> Result<Initial, InputError> {
-    let mut initial = Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state: InitialShape::Rest };
+/// `given`: the object's shape is the equilibrium.
+fn initial(root: &Table, given: bool) -> Result<Initial, InputError> {
+    let state = if given { InitialShape::Given } else { InitialShape::Rest };
+    let mut initial = Initial { velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO, pivot: None, state };
     if let Some(t) = root.optional_table("initial")? {
         initial.velocity = t.optional_vec3("velocity")?.unwrap_or_default();
         initial.angular_velocity = t.optional_vec3("angular_velocity")?.unwrap_or_default();
         initial.pivot = t.optional_vec3("pivot")?;
         let states = [("rest", InitialShape::Rest), ("static-equilibrium", InitialShape::StaticEquilibrium)];
-        initial.state = t.optional_choice("state", &states)?.unwrap_or(InitialShape::Rest);
+        let state = t.optional_choice("state", &states)?;
+        if given && state.is_some() {
+            return Err(t.error(
+                "state",
+                "belongs to object.state = \"rest\": a static shape is the equilibrium that the motion starts from",
+            ));
+        }
+        initial.state = state.unwrap_or(initial.state);
     }
     Ok(initial)
 }
@@ -216,6 +225,11 @@ fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
     if count > MOST_STEPS {
         return Err(
             t.error(key, format!("asks for {} steps, at most {MOST_STEPS:.0} are allowed; is step in seconds?", number(count)))
+        );
+    }
+    if count == 0.0 && state == InitialShape::Given {
+        return Err(
+            t.error(key, "0 leaves nothing to compute: a shape that is given as the equilibrium (object.state) needs steps")
         );
     }
     if count == 0.0 && state != InitialShape::StaticEquilibrium {

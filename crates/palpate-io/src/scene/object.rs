@@ -1,4 +1,4 @@
-//! `[object]`: the rest shape.
+//! `[object]`: the shape.
 
 use super::corners;
 use crate::document::Table;
@@ -49,6 +49,12 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
         Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
     };
     Ok(Object { source: body, pose, resolution: resolution(&t, extent.max_element())? })
+}
+
+/// True where the shape is the equilibrium that the motion starts from; else it is free of stress.
+pub(super) fn is_given(root: &Table) -> Result<bool, InputError> {
+    let t = root.optional_table("object")?;
+    Ok(t.map(|t| t.optional_choice("state", &[("rest", false), ("static", true)])).transpose()?.flatten().unwrap_or(false))
 }
 
 /// Cells or tetrahedra, and how fine.

@@ -119,7 +119,7 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
     assert!(
         error_with("cell_size", "zzz")
-            .contains("known: mesh, volume_mesh, pose, discretisation, cell_size, cells, edge_length, shape")
+            .contains("known: mesh, volume_mesh, state, pose, discretisation, cell_size, cells, edge_length, shape")
     );
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));
@@ -140,6 +140,7 @@ fn numbers_out_of_range_say_what_is_allowed() {
         ("step = 0.008333", "step = 0.01\ntheta = 1.0", "must lie in [0.5, 1)"),
         ("step = 0.008333\nduration = 1.5", "steps = 3", "time.step: missing"),
         ("duration = 1.5", "duration = 0", "static-equilibrium"),
+        ("cell_size = 0.01", "cell_size = 0.01\nstate = \"hanging\"", "allowed: \"rest\", \"static\""),
         ("duration = 1.5", "duration = 1.5\nsteps = 3", "exclude each other"),
         ("normal = [0, 0, 2]", "normal = [0, 0, 0]", "has no length"),
         ("normal = [0, 0, 2]", "normal = [0, 0]", "array of 3 numbers, found 2"),
@@ -433,4 +434,15 @@ fn found_regions_are_written_in_place_and_files_are_named() {
     let named = name_field_files(&written, &scene, &[(1, "field-1.npz".into(), "values")]).unwrap();
     assert!(named.contains("file = \"field-1.npz\"\narray = \"values\""), "{named}");
     assert!(name_field_files(&written, &scene, &[(2, "field-2.npz".into(), "values")]).is_err());
+}
+
+#[test]
+fn a_static_shape_is_where_the_motion_starts() {
+    let given = BASE.replace("cell_size = 0.01", "cell_size = 0.01\nstate = \"static\"");
+    assert_eq!(parse_scene(&given, "scene.toml").unwrap().value.initial.state, InitialShape::Given);
+    let fault = |text: &str| parse_scene(text, "scene.toml").unwrap_err().to_string();
+    let twice = given.replace("[time]", "[initial]\nstate = \"rest\"\n[time]");
+    assert!(fault(&twice).contains("belongs to object.state = \"rest\""), "{}", fault(&twice));
+    let nothing = given.replace("duration = 1.5", "duration = 0");
+    assert!(fault(&nothing).contains("needs steps"), "{}", fault(&nothing));
 }

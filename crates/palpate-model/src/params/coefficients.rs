@@ -10,6 +10,7 @@ use crate::effects::Site;
 use crate::params::ParamKey;
 use crate::params::fields::Varied;
 use crate::plan::{Physics, Plan};
+use crate::scene::InitialShape;
 use glam::DVec3;
 
 /// The coefficients of one member, or a derivative of or by them.
@@ -54,6 +55,8 @@ impl Sought {
     /// What the parameters of a mask `[P]` act through.
     pub fn new(plan: &Plan, wanted: &[bool]) -> Sought {
         let mut s = Sought { effects: vec![false; plan.layout.effects().count()], ..Sought::default() };
+        // It follows from everything else.
+        s.rest = plan.initial == InitialShape::Given && wanted.contains(&true);
         for (key, _) in plan.layout.keys.iter().zip(wanted).filter(|(_, w)| **w) {
             match *key {
                 ParamKey::YoungsModulus => s.modulus = true,

@@ -11,13 +11,13 @@ use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
 use crate::cutcells::shadow::shadow;
-use crate::effects::check_choices;
+use crate::effects::{Site, check_choices};
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::Field;
 use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
-use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, Resolution, Scene};
+use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, InitialShape, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::Body;
 use crate::space::stencil::Stencils;
@@ -92,6 +92,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     let (parts, shape) = build_parts(scene, observation.frames.iter().any(|f| !f.points.is_empty()))?;
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
+    check_given(scene)?;
     let body = Arc::new(parts.body);
     let mut masses = Stencils::default();
     for (i, m) in scene.masses.iter().enumerate() {
@@ -166,6 +167,21 @@ fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64
         ParamKey::Field { field, index } => fields[usize::from(field)][index as usize],
     };
     layout.keys.iter().map(value).collect()
+}
+
+/// A shape that is given as the equilibrium needs something that holds it, and leaves no choice of a stress-free one.
+fn check_given(scene: &Scene) -> Result<(), PlanError> {
+    if scene.initial.state != InitialShape::Given {
+        return Ok(());
+    }
+    if scene.clamps.is_empty() {
+        return Err(error("object.state", "\"static\" needs a [[clamp]]: nothing holds the body".into()));
+    }
+    let changed = scene.effects.iter().position(|e| matches!(e.law().site, Site::Rest(_)));
+    changed.map_or(Ok(()), |i| {
+        let message = "changes the stress-free shape, which follows from object.state = \"static\"".into();
+        Err(error(format!("effect.{i}.kind"), message))
+    })
 }
 
 fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {

@@ -11,9 +11,11 @@ use crate::results::simulation::SimulationDocument;
 use crate::results::{self, finite};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use palpate_cpu::CpuBackend;
 use palpate_engine::Snapshot;
 use palpate_io::output::{make_folder, write_file};
 use palpate_io::vtk::{Elements, Values, write_vtu};
+use palpate_model::scene::InitialShape;
 use palpate_model::shape::TriMesh;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -103,6 +105,8 @@ struct Writer<'a> {
     triangles: Vec<[u32; 3]>,
     elements: Elements,
     fields: OnGrid,
+    /// Displacement of the stress-free shape, where the shape given is the equilibrium [m].
+    stress_free: Option<Vec<DVec3>>,
     camera: Pinhole,
     series: Vec<(f64, String)>,
     files: usize,
@@ -129,6 +133,7 @@ impl Writer<'_> {
                     let mut of_nodes = named(&self.fields.nodes);
                     of_nodes.push(("displacement", Values::Vectors(&state.displacement)));
                     of_nodes.push(("velocity", Values::Vectors(&state.velocity)));
+                    of_nodes.extend(self.stress_free.iter().map(|w| ("stress_free", Values::Vectors(w))));
                     let mut of_elements = named(&self.fields.elements);
                     if body.cut.is_some() {
                         of_elements.push(("fraction", Values::Numbers(&fractions)));
@@ -198,7 +203,10 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if stale > 0 {
         console.note(&format!("removed from {}: {stale} frames of an earlier simulation", folder.display()));
     }
+    let given = experiment.scene().initial.state == InitialShape::Given;
+    let stress_free = given.then(|| CpuBackend.stress_free(plan, &plan.theta)).transpose()?;
     let mut writer = Writer {
+        stress_free,
         camera: camera(&experiment, &extent),
         elements: Elements::of(&plan.body),
         fields: OnGrid::new(plan, &plan.theta, &(0..plan.fields.len()).collect::<Vec<_>>()),
