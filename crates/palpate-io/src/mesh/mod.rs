@@ -24,12 +24,24 @@ const SMALLEST_SIDE: f64 = 1e-4;
 /// A file that cannot be parsed, holds no triangle, is in the wrong unit, is open, one-sided, or encloses no volume. Small holes
 /// are closed and inward faces turned, with a warning.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Loaded<TriMesh>, InputError> {
-    let Loaded { value, warnings } = read_repaired(path.as_ref())?;
+    read_mesh_in(path, |_| 1.0)
+}
+
+/// The same of a mesh in any unit: `metres` is asked with its longest side in the file's own unit and answers with the metres of one.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn read_mesh_in(path: impl AsRef<Path>, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<TriMesh>, InputError> {
+    let Loaded { value, warnings } = read_scaled(path.as_ref(), metres)?;
     Ok(Loaded { value: value.mesh, warnings })
 }
 
 /// As [`read_mesh`], with what the file was like.
 pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Repaired>, InputError> {
+    read_scaled(path, |_| 1.0)
+}
+
+fn read_scaled(path: &Path, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<Repaired>, InputError> {
     let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.as_str() {
@@ -38,7 +50,10 @@ pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Repaired>, InputError>
         "stl" => parse::stl(&bytes),
         other => Err(format!("\".{other}\" is not a mesh format that is read; allowed: .obj, .ply, .stl")),
     };
-    let mesh = merge(raw.map_err(|e| InputError::file(path, e))?);
+    let mut mesh = merge(raw.map_err(|e| InputError::file(path, e))?);
+    let (min, max) = bounds(&mesh.vertices);
+    let scale = metres((max - min).max_element());
+    mesh.vertices.iter_mut().for_each(|v| *v *= scale);
     check(path, mesh)
 }
 

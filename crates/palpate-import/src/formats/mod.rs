@@ -1,0 +1,44 @@
+//! Formats that are read: one file each, and one line in [`ALL`].
+
+mod azure;
+mod folder;
+mod realsense;
+
+use crate::Watch;
+use crate::capture::Capture;
+use crate::error::{ImportError, refuse, refuse_option};
+use crate::options::Options;
+use crate::place::Place;
+
+/// A format of sources.
+pub struct Format {
+    /// As `--format` names it.
+    pub name: &'static str,
+    /// In words.
+    pub what: &'static str,
+    /// Why a source is of this format; `None` where it is not.
+    pub detect: fn(&Place) -> Option<String>,
+    /// Reads a source.
+    pub read: fn(&Place, &Options, &mut Watch) -> Result<Capture, ImportError>,
+}
+
+/// Every format, the more particular before the more general: the first that knows a source reads it.
+pub const ALL: [&Format; 2] = [&azure::FORMAT, &realsense::FORMAT];
+
+/// The format of a source: the one that was asked for, or the first that knows it; and why.
+pub fn choose(place: &Place, asked: Option<&str>) -> Result<(&'static Format, String), ImportError> {
+    let names: Vec<&str> = ALL.iter().map(|f| f.name).collect();
+    if let Some(asked) = asked {
+        return match ALL.iter().find(|f| f.name == asked) {
+            Some(f) => Ok((f, "as --format says".into())),
+            None => refuse_option("format", asked, format!("is not known; allowed: {}", names.join(", "))),
+        };
+    }
+    match ALL.iter().find_map(|f| (f.detect)(place).map(|why| (*f, why))) {
+        Some(found) => Ok(found),
+        None => {
+            let known: Vec<String> = ALL.iter().map(|f| format!("{} ({})", f.name, f.what)).collect();
+            refuse(&place.path, format!("is of no format that is read; --format names one of: {}", known.join(", ")))
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! One file a kind of source.
+
+mod realsense;
+mod truth;

@@ -1,0 +1,151 @@
+//! Folders of depth images with intrinsics in JSON.
+
+use super::truth::*;
+use palpate_import::{Background, Options};
+use std::fs;
+
+fn intrinsics() -> String {
+    format!(
+        r#"{{"width": {}, "height": {}, "fx": {FOCAL}, "fy": {FOCAL}, "ppx": {}, "ppy": {}, "model": "distortion.brown_conrady",
+        "coeffs": [0, 0, 0, 0, 0], "depth_scale": 0.001, "fps": 30}}"#,
+        SIZE[0], SIZE[1], CENTER[0], CENTER[1]
+    )
+}
+
+fn folder(bench: &Bench) {
+    bench.write("rs/intrinsics.json", intrinsics());
+    for k in 0..FRAMES {
+        png(&bench.path(&format!("rs/depth/{k:06}.png")), &counts(time(k), 0.001), SIZE);
+    }
+}
+
+fn far() -> Options {
+    Options { far: Some(0.9), ..Options::default() }
+}
+
+#[test]
+fn a_folder_becomes_the_recording_that_was_seen() {
+    let bench = Bench::new();
+    folder(&bench);
+    let (imported, r, scene) = bench.good("rs", &far());
+    assert_eq!((imported.format, imported.images), ("realsense", FRAMES));
+    for (k, f) in r.frames.iter().enumerate() {
+        assert!((f.time - time(k)).abs() < 1e-12);
+        let camera = &r.cameras[f.camera];
+        let all = counts(f.time, 0.001);
+        let (u0, v0) = (CENTER[0] - camera.center[0], CENTER[1] - camera.center[1]);
+        let recorded: Vec<(usize, u16)> =
+            f.readings().map(|(u, v, c)| (u + u0 as usize + (v + v0 as usize) * SIZE[0], c)).collect();
+        let seen: Vec<(usize, u16)> = all.iter().copied().enumerate().filter(|(_, c)| *c < 900).collect();
+        // Counts go through untouched, wherever the images are cut.
+        assert_eq!(recorded, seen, "frame {k}");
+    }
+    let (off, n) = off_ball(&r);
+    // Half a count along the ray; rays slant by less than a third.
+    assert!(off < 0.0006 && n == imported.depth_readings, "{off}");
+    let release: f64 = scene.lines().find_map(|l| l.strip_prefix("start = ")).unwrap().parse().unwrap();
+    assert!((release - RELEASE).abs() < 0.02, "{release}");
+    assert!(scene.contains("gravity = [0.0, 9.81, 0.0]"), "{scene}");
+}
+
+#[test]
+fn a_mesh_in_millimetres_is_put_where_the_ball_is() {
+    let bench = Bench::new();
+    folder(&bench);
+    let mesh = bench.write("ball.obj", ball_obj(1000.0));
+    let (imported, ..) = bench.good("rs", &Options { mesh: Some(mesh), ..far() });
+    let scene = palpate_io::read_scene(bench.path("out/scene.toml")).unwrap().value;
+    let off = scene.object.pose.translation - center(0.0);
+    // The mesh's chords lie up to 0.3 mm inside the ball, counts are of 1 mm; both even out over hundreds of points, and a cap of the ball is
+    // all that is seen.
+    assert!(off.length() < 0.002, "{off}");
+    assert!(imported.guesses.iter().any(|g| g.what == "unit" && g.text.contains("mesh is in mm")));
+}
+
+#[test]
+fn a_background_a_box_and_a_plane_leave_the_ball() {
+    let bench = Bench::new();
+    folder(&bench);
+    // Two frames without the ball go before.
+    let empty = vec![(WALL / 0.001) as u16; SIZE[0] * SIZE[1]];
+    png(&bench.path("empty.png"), &empty, SIZE);
+    for k in 0..FRAMES {
+        fs::rename(bench.path(&format!("rs/depth/{k:06}.png")), bench.path(&format!("rs/depth/{:06}.png", k + 100))).unwrap();
+    }
+    for k in [98, 99] {
+        png(&bench.path(&format!("rs/depth/{k:06}.png")), &empty, SIZE);
+    }
+    let all = [
+        Options { background: Some(Background::Frames(0, 1)), ..Options::default() },
+        Options { background: Some(Background::File(bench.path("empty.png"))), ..Options::default() },
+        Options {
+            within: Some([glam::DVec3::new(-0.2, -0.3, 0.3), glam::DVec3::new(0.2, 1.0, 0.9)]),
+            ..Options::default()
+        },
+        Options { remove_plane: true, ..Options::default() },
+    ];
+    let full = (0..FRAMES).map(|k| counts(time(k), 0.001).iter().filter(|c| **c < 900).count()).sum::<usize>();
+    for o in all {
+        let (imported, r, _) = bench.good("rs", &Options { force: true, ..o.clone() });
+        assert_eq!(imported.images, FRAMES, "{o:?}");
+        assert_eq!(r.frames[0].readings().count(), counts(0.0, 0.001).iter().filter(|c| **c < 900).count(), "{o:?}");
+        // Specks alone are lost: pixels at the ball's rim without two neighbours.
+        assert!(imported.depth_readings <= full && imported.depth_readings + 4 * FRAMES > full, "{o:?} {}", imported.depth_readings);
+    }
+}
+
+#[test]
+fn what_contradicts_itself_is_refused() {
+    let cases: [(&str, &dyn Fn(&Bench), &[&str]); 9] = [
+        (
+            "another size",
+            &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("120", "640").replace("160", "480"))),
+            &["000000.png", "120 × 160", "640 × 480"],
+        ),
+        ("NaN", &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("150", "NaN"))), &["intrinsics.json:1", "NaN"]),
+        ("null", &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("60.5", "null"))), &["ppx", "not a finite number"]),
+        ("focal length", &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("150", "-150"))), &["fx", "> 0"]),
+        ("too many times", &|b| drop(b.write("rs/timestamps.txt", "0\n0.1\n")), &["timestamps.txt", "2 times for 12"]),
+        (
+            "a time twice",
+            &|b| drop(b.write("rs/timestamps.txt", "0\n0.1\n0.1\n0.2\n0.3\n0.4\n0.5\n0.6\n0.7\n0.8\n0.9\n1.0\n")),
+            &["timestamps.txt:3", "not after"],
+        ),
+        (
+            "a picture",
+            &|b| image::RgbImage::new(120, 160).save(b.path("rs/depth/000003.png")).unwrap(),
+            &["000003.png", "picture of depth"],
+        ),
+        ("a truncated image", &|b| drop(b.write("rs/depth/000003.png", b"\x89PNG\r\n\x1a\n")), &["000003.png", "PNG"]),
+        (
+            "a unit that cannot be",
+            &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("0.001", "0.5"))),
+            &["median depth", "--depth-scale 0.001"],
+        ),
+    ];
+    for (name, spoil, words) in cases {
+        let bench = Bench::new();
+        folder(&bench);
+        spoil(&bench);
+        let e = bench.bad("rs", &far());
+        assert!(words.iter().all(|w| e.contains(w)), "{name}: {e}");
+    }
+    let bench = Bench::new();
+    folder(&bench);
+    let e = bench.bad("rs", &Options { far: Some(0.1), ..Options::default() });
+    assert!(e.contains("--far") && e.contains("no reading"), "{e}");
+    let e = bench.bad("rs", &Options { background: Some(Background::Frames(0, 99)), ..Options::default() });
+    assert!(e.contains("--background 0..99") && e.contains("0 to 11"), "{e}");
+    let e = bench.bad("nothing", &far());
+    assert!(e.contains("no such file or folder"), "{e}");
+}
+
+#[test]
+fn empty_frames_are_left_out_with_a_word() {
+    let bench = Bench::new();
+    folder(&bench);
+    png(&bench.path("rs/depth/000004.png"), &vec![0; SIZE[0] * SIZE[1]], SIZE);
+    let (imported, ..) = bench.good("rs", &far());
+    assert_eq!(imported.images, FRAMES - 1);
+    assert!(imported.losses.iter().any(|l| l.contains("1 of 12 depth images")), "{:?}", imported.losses);
+}

@@ -1,0 +1,3 @@
+//! Sources of every format, written from one small truth, imported and compared with it.
+
+mod import;
