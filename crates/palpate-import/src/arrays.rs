@@ -115,6 +115,7 @@ fn decode(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
     let wide = |v: Vec<i64>| Numbers::Whole(v);
     let numbers = match (kind, size) {
         (TypeChar::Uint, 2) => Numbers::Counts(all::<u16>(open()?)?),
+        (TypeChar::Bool, 1) => wide(all::<bool>(open()?)?.into_iter().map(i64::from).collect()),
         (TypeChar::Uint, 1) => wide(all::<u8>(open()?)?.into_iter().map(i64::from).collect()),
         (TypeChar::Uint, 4) => wide(all::<u32>(open()?)?.into_iter().map(i64::from).collect()),
         (TypeChar::Uint, 8) => wide(all::<u64>(open()?)?.into_iter().map(|x| x.min(i64::MAX as u64) as i64).collect()),

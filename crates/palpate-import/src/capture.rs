@@ -51,6 +51,8 @@ pub struct DepthCamera {
     pub poses: Vec<DAffine3>,
     /// Images, ordered by time.
     pub frames: Vec<DepthFrame>,
+    /// True for a camera that was made up here: there is no word about its units and pose.
+    pub made: bool,
 }
 
 /// One depth image.
@@ -77,16 +79,11 @@ pub enum Pixels {
 
 impl Pixels {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         match self {
             Pixels::Counts(c) => c.len(),
             Pixels::Lengths(l) => l.len(),
         }
-    }
-
-    /// True where there is no pixel.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 

@@ -33,16 +33,16 @@ pub(crate) fn refuse<T>(file: impl AsRef<Path>, message: impl Into<String>) -> R
 }
 
 /// Something is wrong with a key of a file.
-pub(crate) fn refuse_key<T>(file: impl AsRef<Path>, key: impl Into<String>, message: impl Into<String>) -> Result<T, ImportError> {
+pub(crate) fn refuse_key<T>(
+    file: impl AsRef<Path>,
+    key: impl Into<String>,
+    message: impl Into<String>,
+) -> Result<T, ImportError> {
     Err(InputError { key: key.into(), ..InputError::file(file, message) }.into())
 }
 
 /// Something is wrong with an option.
-pub(crate) fn refuse_option<T>(
-    option: &'static str,
-    given: impl ToString,
-    message: impl Into<String>,
-) -> Result<T, ImportError> {
+pub(crate) fn refuse_option<T>(option: &'static str, given: impl ToString, message: impl Into<String>) -> Result<T, ImportError> {
     Err(ImportError::Option { option, given: given.to_string(), message: message.into() })
 }
 

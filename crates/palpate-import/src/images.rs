@@ -108,7 +108,7 @@ fn read_tiff(path: &Path, bytes: &[u8]) -> Result<([usize; 2], Pixels), ImportEr
         DecodingResult::F64(l) => Pixels::Lengths(l.into_iter().map(|x| x as f32).collect()),
         _ => return refuse(path, "is no TIFF of 16-bit whole numbers or 32-bit floats"),
     };
-    if pixels.len() != size[0] * size[1] {
+    if pixels.count() != size[0] * size[1] {
         return refuse(path, "has several channels: a picture of depth, not depth");
     }
     Ok((size, pixels))

@@ -104,7 +104,10 @@ pub fn of_json(path: &Path, json: &Value) -> Result<Intrinsics, ImportError> {
         let deep: Vec<_> = found.iter().filter(|(p, _)| p.to_ascii_lowercase().contains("depth")).cloned().collect();
         if deep.len() != 1 {
             let names: Vec<&str> = found.iter().map(|f| f.0.as_str()).collect();
-            return refuse(path, format!("holds {} cameras ({}), none or several with depth in its name", names.len(), names.join(", ")));
+            return refuse(
+                path,
+                format!("holds {} cameras ({}), none or several with depth in its name", names.len(), names.join(", ")),
+            );
         }
         found = deep;
     }
@@ -227,12 +230,14 @@ pub fn lens_of(model: &str, k: &[f64]) -> Result<Lens, String> {
         ("inverse_brown_conrady", _) => five().map(Lens::Inverse),
         ("modified_brown_conrady", _) => five().map(Lens::Modified),
         ("equidistant" | "fisheye" | "kannala_brandt4", 4..) => Ok(Lens::Angle([k[0], k[1], k[2], k[3]])),
-        ("" | "brown_conrady" | "plumb_bob" | "opencv" | "radtan" | "radial_tangential" | "rational_polynomial" | "rational", 8) => {
-            Ok(Lens::Rational(std::array::from_fn(|i| k[i])))
-        }
-        ("" | "brown_conrady" | "plumb_bob" | "opencv" | "radtan" | "radial_tangential" | "rational_polynomial" | "rational", 4 | 5) => {
-            five().map(Lens::Brown)
-        }
+        (
+            "" | "brown_conrady" | "plumb_bob" | "opencv" | "radtan" | "radial_tangential" | "rational_polynomial" | "rational",
+            8,
+        ) => Ok(Lens::Rational(std::array::from_fn(|i| k[i]))),
+        (
+            "" | "brown_conrady" | "plumb_bob" | "opencv" | "radtan" | "radial_tangential" | "rational_polynomial" | "rational",
+            4 | 5,
+        ) => five().map(Lens::Brown),
         (_, n) => Err(format!(
             "{n} coefficients of model \"{model}\" are not known; allowed: 4, 5 or 8 of OpenCV's (k1 k2 p1 p2 k3 k4 k5 k6), \
              brown_conrady, modified_brown_conrady, inverse_brown_conrady, rational_polynomial, equidistant"

@@ -56,9 +56,9 @@ fn a_slanted_plane_through_the_lens_is_straight_again() {
             let ray = plain.ray(u as f64, v as f64).unwrap();
             let [a, b] = optics.pixel(ray).unwrap();
             if z > 0.0 && a > 0.0 && b > 0.0 && a < size[0] as f64 - 1.0 && b < size[1] as f64 - 1.0 {
-                // Bilinear between rays up to 1.6/126 apart (the lens squeezes its rim): an eighth of the second derivative, 2 · 0.3² z³, times
-                // that squared, is 5e-6 in one direction; and f32's digits.
-                assert!((f64::from(z) - plane(ray)).abs() < 1e-5, "{u} {v} {z} {}", plane(ray));
+                // Bilinear between rays: an eighth of the second derivative, 2 · 0.3² z³ = 0.3, times the square of their distance, which at the rim of this
+                // lens is up to 2.6/126; and f32's digits.
+                assert!((f64::from(z) - plane(ray)).abs() < 2e-5, "{u} {v} {z} {}", plane(ray));
                 checked += 1;
             }
         }

@@ -29,7 +29,7 @@ use palpate_io::output::{make_folder, write_file};
 use stages::body::Seen;
 use stages::release::Motion;
 use stages::settle::Said;
-use stages::{body, crop, masks, release, settle, thin};
+use stages::{body, clouds, crop, masks, points, release, settle, thin};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -114,7 +114,21 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     };
     let up = up(&capture, o, &mut said);
     let empty = add_background(&mut capture, o)?;
+    if !capture.clouds.is_empty() {
+        let places = capture.clouds.iter().flat_map(|c| c.points.iter().copied());
+        let metres = points::unit(&capture, &place, places, "camera", o, &mut said)?;
+        let made = clouds::camera(&capture.clouds, capture.viewpoint, metres, o, &mut said, watch)?;
+        capture.cameras.push(made);
+    }
     let mut r = settle::depth(&mut capture, o, &mut said, watch)?;
+    if let Some(m) = &capture.markers {
+        let metres = points::unit(&capture, &place, m.places.iter().flatten().copied(), "markers.file", o, &mut said)?;
+        r.markers = Some(points::markers(m, metres, o, &mut said));
+    }
+    if let Some(t) = &capture.tracks {
+        let metres = points::unit(&capture, &place, t.places.iter().copied(), "points.file", o, &mut said)?;
+        r.points = Some(points::tracks(t, metres, o, &mut said));
+    }
     // The image without the object came along with the others, behind the last.
     let empty = empty.then(|| r.frames.pop().and_then(|f| f.depth)).flatten();
     let plane = masks::apply(&mut r, o, empty, &mut said, watch)?;
@@ -129,9 +143,10 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     {
         return refuse_option("release", from, format!("comes after the last time, {last} s"));
     }
+    points::at_rest(&mut r, motion, &place, &mut said)?;
     let before = if let Motion::Moving { from, .. } = motion { from.max(first) } else { first };
-    let everything = points(&r, |_| true);
-    let at_rest = points(&r, |t| t <= before + 1e-9);
+    let everything = seen_points(&r, |_| true);
+    let at_rest = seen_points(&r, |t| t <= before + 1e-9);
     // Where nothing was seen at rest, what is seen first.
     let at_rest = if at_rest.is_empty() { everything.clone() } else { at_rest };
     let Some(bounds) = masks::bounds(&at_rest) else { return refuse(&place.path, "holds no reading") };
@@ -157,7 +172,7 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         last,
         lowest,
         plane,
-        held: None,
+        held: if motion == Motion::Still { None } else { points::held(&r) },
         cost,
         thinned,
     };
@@ -279,13 +294,14 @@ fn times(r: &Recording) -> Option<[f64; 2]> {
     let images = r.frames.iter().map(|f| f.time);
     let markers = r.markers.iter().flat_map(|m| m.samples.iter().map(|s| s.time));
     let tracks = r.points.iter().flat_map(|p| p.track.times.iter().copied());
-    images.chain(markers).chain(tracks).fold(None, |span: Option<[f64; 2]>, t| {
-        Some(span.map_or([t, t], |[a, b]| [a.min(t), b.max(t)]))
-    })
+    images
+        .chain(markers)
+        .chain(tracks)
+        .fold(None, |span: Option<[f64; 2]>, t| Some(span.map_or([t, t], |[a, b]| [a.min(t), b.max(t)])))
 }
 
 /// World points at some times; of dense images a part.
-fn points(r: &Recording, at: impl Fn(f64) -> bool) -> Vec<DVec3> {
+fn seen_points(r: &Recording, at: impl Fn(f64) -> bool) -> Vec<DVec3> {
     let mut all = Vec::new();
     for f in r.frames.iter().filter(|f| at(f.time)) {
         let camera = &r.cameras[f.camera];
@@ -339,4 +355,3 @@ fn write_all(out: &Path, r: &Recording, body: &body::Body, scene: &str, said: &S
     ];
     put(&out.join("scene.toml"), scene, &of_scene, &head.map(String::from))
 }
-

@@ -67,8 +67,12 @@ const MODES: [([usize; 2], f64, [f64; 2]); 4] = [
 /// The depth camera of the device's calibration, which is in shares of the sensor, for images of a size.
 fn depth_camera(path: &Path, json: &Value, size: [usize; 2]) -> Result<Optics, ImportError> {
     let Some((_, sensor, crop)) = MODES.iter().find(|m| m.0 == size) else {
-        let text = format!("{} × {} pixels are of no depth mode (640 × 576, 320 × 288, 512 × 512, 1024 × 1024)", size[0], size[1]);
-        return refuse(path, format!("{text}; are the images aligned to the colour camera? --intrinsics FILE gives its intrinsics"));
+        let text =
+            format!("{} × {} pixels are of no depth mode (640 × 576, 320 × 288, 512 × 512, 1024 × 1024)", size[0], size[1]);
+        return refuse(
+            path,
+            format!("{text}; are the images aligned to the colour camera? --intrinsics FILE gives its intrinsics"),
+        );
     };
     let cameras = json.pointer("/CalibrationInformation/Cameras").and_then(Value::as_array).map_or(&[][..], |a| a);
     let depth = |c: &&Value| c.get("Location").and_then(Value::as_str).is_some_and(|l| l.ends_with("D0"));

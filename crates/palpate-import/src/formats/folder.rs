@@ -66,7 +66,10 @@ pub fn intrinsics(place: &Place, o: &Options) -> Result<(PathBuf, Intrinsics), I
             for f in place.with_ending(&["json"]) {
                 read_json(f)?;
             }
-            refuse(&place.path, "holds no JSON file with intrinsics (fx, fy, cx, cy or an intrinsic_matrix); --intrinsics FILE names one")
+            refuse(
+                &place.path,
+                "holds no JSON file with intrinsics (fx, fy, cx, cy or an intrinsic_matrix); --intrinsics FILE names one",
+            )
         }
         (several, _) => {
             let names: Vec<String> = several.iter().map(|f| place.name(f)).collect();
@@ -119,6 +122,7 @@ pub fn read_images(
         usual_scale,
         poses: Vec::new(),
         frames,
+        made: false,
     };
     Ok(Capture {
         title: place.title(),
@@ -130,12 +134,7 @@ pub fn read_images(
 }
 
 /// A folder of depth images with intrinsics in JSON.
-pub fn read(
-    place: &Place,
-    o: &Options,
-    usual_scale: (f64, &'static str),
-    watch: &mut Watch,
-) -> Result<Capture, ImportError> {
+pub fn read(place: &Place, o: &Options, usual_scale: (f64, &'static str), watch: &mut Watch) -> Result<Capture, ImportError> {
     let files = depth_files(place);
     if files.is_empty() {
         return refuse(&place.path, format!("holds no depth image; read are .{}", ENDINGS.join(", .")));

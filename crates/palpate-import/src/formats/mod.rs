@@ -1,8 +1,19 @@
 //! Formats that are read: one file each, and one line in [`ALL`].
 
 mod azure;
+mod c3d;
+mod cdr;
 mod folder;
+mod mcap;
+mod npy;
+mod optitrack;
+mod pcd;
+mod ply;
+mod qualisys;
 mod realsense;
+mod table;
+mod tum;
+mod vicon;
 
 use crate::Watch;
 use crate::capture::Capture;
@@ -23,7 +34,19 @@ pub struct Format {
 }
 
 /// Every format, the more particular before the more general: the first that knows a source reads it.
-pub const ALL: [&Format; 2] = [&azure::FORMAT, &realsense::FORMAT];
+pub const ALL: [&Format; 11] = [
+    &mcap::FORMAT,
+    &tum::FORMAT,
+    &azure::FORMAT,
+    &npy::FORMAT,
+    &realsense::FORMAT,
+    &pcd::FORMAT,
+    &ply::FORMAT,
+    &c3d::FORMAT,
+    &optitrack::FORMAT,
+    &vicon::FORMAT,
+    &qualisys::FORMAT,
+];
 
 /// The format of a source: the one that was asked for, or the first that knows it; and why.
 pub fn choose(place: &Place, asked: Option<&str>) -> Result<(&'static Format, String), ImportError> {

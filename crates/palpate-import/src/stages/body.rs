@@ -106,7 +106,10 @@ fn placed(mesh: &TriMesh, seen: &Seen, said: &mut Said) -> DAffine3 {
             shift += sum / f64::max(n, 1.0);
         }
     }
-    let text = format!("the mesh is shifted by ({:.4}, {:.4}, {:.4}) m to where the object is seen, and not turned", shift.x, shift.y, shift.z);
+    let text = format!(
+        "the mesh is shifted by ({:.4}, {:.4}, {:.4}) m to where the object is seen, and not turned",
+        shift.x, shift.y, shift.z
+    );
     said.guesses.push(Guess::scene("pose", "object.pose", text, "--pose"));
     DAffine3::from_translation(shift)
 }

@@ -106,7 +106,8 @@ pub fn apply(
         said.facts.push(format!("masks: {kept} of {all} readings are taken for the object"));
     } else if r.frames.iter().all(|f| f.mask.is_none()) {
         said.facts.push(
-            "masks: none, every reading counts as the object; --far, --box, --background or --remove-plane take the rest away".into(),
+            "masks: none, every reading counts as the object; --far, --box, --background or --remove-plane take the rest away"
+                .into(),
         );
     }
     Ok(plane)
@@ -151,7 +152,8 @@ fn without_specks(mask: &[bool], width: usize) -> Vec<bool> {
     let height = mask.len() / width;
     let count = |i: usize| {
         let (u, v) = (i % width, i / width);
-        let around = (v.saturating_sub(1)..(v + 2).min(height)).flat_map(|y| (u.saturating_sub(1)..(u + 2).min(width)).map(move |x| x + y * width));
+        let around = (v.saturating_sub(1)..(v + 2).min(height))
+            .flat_map(|y| (u.saturating_sub(1)..(u + 2).min(width)).map(move |x| x + y * width));
         around.filter(|j| *j != i && mask[*j]).count()
     };
     (0..mask.len()).map(|i| mask[i] && count(i) >= 3).collect()
@@ -160,7 +162,13 @@ fn without_specks(mask: &[bool], width: usize) -> Vec<bool> {
 /// The removed plane in words.
 pub fn describe(plane: &Plane) -> String {
     let n = plane.normal;
-    format!("the largest plane, normal ({:.3}, {:.3}, {:.3}), holds {:.0} % of the first image", n.x, n.y, n.z, 100.0 * plane.share)
+    format!(
+        "the largest plane, normal ({:.3}, {:.3}, {:.3}), holds {:.0} % of the first image",
+        n.x,
+        n.y,
+        n.z,
+        100.0 * plane.share
+    )
 }
 
 /// Lowest and highest corner of points; `None` of none.

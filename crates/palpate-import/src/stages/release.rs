@@ -100,7 +100,11 @@ pub fn find(r: &Recording, o: &Options, said: &mut Said) -> Motion {
     let from = f64::max(first, times[begun] - (2.0 * far[begun] / GRAVITY).sqrt());
     let rested = from > first + 0.5 * usual;
     let text = if rested {
-        format!("{from:.4} s, a free fall before the first time at which something has moved by {:.1} mm ({:.4} s)", 1e3 * far[begun], times[begun])
+        format!(
+            "{from:.4} s, a free fall before the first time at which something has moved by {:.1} mm ({:.4} s)",
+            1e3 * far[begun],
+            times[begun]
+        )
     } else {
         format!("{first:.4} s, the first time, since the body moves from there on; it may have been released before")
     };

@@ -6,8 +6,8 @@ use crate::error::{ImportError, refuse, refuse_option};
 use crate::lens::Straightened;
 use crate::options::Options;
 use glam::DAffine3;
-use palpate_io::recording::{DepthImage, RecordedCamera, RecordedFrame};
 use palpate_io::Recording;
+use palpate_io::recording::{DepthImage, RecordedCamera, RecordedFrame};
 use rayon::prelude::*;
 
 /// Noise of a depth reading where nothing says it [m]: that of common depth cameras at half a metre.
@@ -58,7 +58,7 @@ pub fn median(mut all: Vec<f64>) -> Option<f64> {
 
 /// Every so-maniest reading of a camera, in its unit: enough for a median.
 fn sample(camera: &DepthCamera) -> Vec<f64> {
-    let every = (camera.frames.iter().map(|f| f.pixels.len()).sum::<usize>() / 200_000).max(1);
+    let every = (camera.frames.iter().map(|f| f.pixels.count()).sum::<usize>() / 200_000).max(1);
     let mut all = Vec::new();
     let mut k = 0;
     for f in &camera.frames {
@@ -86,7 +86,7 @@ fn metres(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Resu
     };
     let counts = matches!(camera.frames[0].pixels, Pixels::Counts(_));
     let key = format!("{key}.depth_scale");
-    let asked = o.depth_scale.map(|s| ("depth-scale", s)).or(o.unit.map(|u| ("unit", u.metres())));
+    let asked = o.depth_scale.map(|s| ("depth-scale", s)).or(o.unit.map(|u| ("unit", u.metres()))).filter(|_| !camera.made);
     let scale = match (asked, counts, camera.scale) {
         (Some((option, s)), _, stated) => {
             if !(s > 0.0 && s <= 1.0) {
@@ -97,6 +97,7 @@ fn metres(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Resu
             }
             s
         }
+        (None, true, Some(stated)) if camera.made => stated,
         (None, true, Some(stated)) => {
             said.facts.push(format!("{stated} m a count, as the source says"));
             stated
@@ -107,7 +108,11 @@ fn metres(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Resu
             said.guesses.push(Guess::recording("unit", key, text, "--depth-scale"));
             usual
         }
-        (None, false, _) => {
+        (None, false, Some(stated)) => {
+            said.facts.push(format!("floats of {stated} m, as the source says"));
+            stated
+        }
+        (None, false, None) => {
             let (scale, unit) = if median > FLOAT_METRES { (0.001, "millimetres") } else { (1.0, "metres") };
             let text = format!("floats are {unit}, since their median is {median:.4}");
             said.guesses.push(Guess::recording("unit", key, text, "--unit"));
@@ -131,7 +136,7 @@ fn metres(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Resu
 
 /// Poses of a camera's images: one where it stood still.
 fn poses(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Vec<DAffine3> {
-    if let Some(p) = o.camera_pose {
+    if let Some(p) = o.camera_pose.filter(|_| !camera.made) {
         return vec![p];
     }
     let Some(first) = camera.poses.first() else {
@@ -228,7 +233,10 @@ fn check_lens(camera: &DepthCamera, recorded: &RecordedCamera) -> Result<(), Imp
     let (u, v) = (camera.size[0] as f64 - 1.0, camera.size[1] as f64 - 1.0);
     match [[0.0, 0.0], [u, 0.0], [0.0, v], [u, v]].iter().find(|p| recorded.ray(p[0], p[1]).is_none()) {
         Some(p) => {
-            let text = format!("its camera's distortion cannot be inverted at pixel ({}, {}); are the coefficients k1 k2 p1 p2 k3?", p[0], p[1]);
+            let text = format!(
+                "its camera's distortion cannot be inverted at pixel ({}, {}); are the coefficients k1 k2 p1 p2 k3?",
+                p[0], p[1]
+            );
             refuse(&camera.frames[0].file, text)
         }
         None => Ok(()),

@@ -34,7 +34,8 @@ pub fn choose(r: &Recording, from: f64, to: f64, o: &Options, said: &mut Said) -
     times.dedup();
     let every = times.len().div_ceil(INSTANTS).max(1);
     if stride > 1 {
-        let text = format!("every {stride}th row and column, about {wanted} of {dense:.0} readings an image; the recording keeps all");
+        let text =
+            format!("every {stride}th row and column, about {wanted} of {dense:.0} readings an image; the recording keeps all");
         said.guesses.push(Guess::scene("thinning", "observation.pixel_stride", text, "--points"));
     }
     if every > 1 {

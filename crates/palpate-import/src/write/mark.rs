@@ -60,7 +60,8 @@ mod tests {
         let text = "a = 1\n\n[time]\nstart = 0.5\n\n[[camera]]\nname = \"x\"\npose = [\n  1,\n]\n";
         let g = |what| Guess::scene(what, "", "because", "--flag");
         let (a, b, c, d) = (g("A"), g("B"), g("C"), g("D"));
-        let marked = mark(text, &[("time.start", &a), ("camera.0.pose", &b), ("camera", &c), ("none", &d)], &["x".into()]).unwrap();
+        let marked =
+            mark(text, &[("time.start", &a), ("camera.0.pose", &b), ("camera", &c), ("none", &d)], &["x".into()]).unwrap();
         let expected = "# x\n# guess: D: because; fix with --flag\n\na = 1\n\n[time]\n# guess: A: because; fix with --flag\nstart = 0.5\n\n\
                         # guess: C: because; fix with --flag\n[[camera]]\nname = \"x\"\n# guess: B: because; fix with --flag\npose = [\n  1,\n]\n";
         assert_eq!(marked, expected);

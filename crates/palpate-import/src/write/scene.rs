@@ -96,11 +96,18 @@ fn supports(p: &Parts, o: &Options, said: &mut Said) -> Supports {
     if clamp.is_none() && p.motion == Motion::Still && !wants_floor {
         // What hangs at rest is held somewhere: at its top, where nothing says otherwise.
         let height = |v: DVec3| v.dot(p.up);
-        let (bottom, top) = (height(DVec3::select(p.up.cmpge(DVec3::ZERO), low, high)), height(DVec3::select(p.up.cmpge(DVec3::ZERO), high, low)));
+        let (bottom, top) = (
+            height(DVec3::select(p.up.cmpge(DVec3::ZERO), low, high)),
+            height(DVec3::select(p.up.cmpge(DVec3::ZERO), high, low)),
+        );
         let axis = (0..3).max_by(|a, b| p.up[*a].abs().total_cmp(&p.up[*b].abs())).unwrap_or(2);
         let (mut a, mut b) = (low - 0.05 * (high - low), high + 0.05 * (high - low));
         let tenth = 0.1 * (top - bottom) / p.up[axis].abs();
-        if p.up[axis] > 0.0 { a[axis] = high[axis] - tenth } else { b[axis] = low[axis] + tenth }
+        if p.up[axis] > 0.0 {
+            a[axis] = high[axis] - tenth
+        } else {
+            b[axis] = low[axis] + tenth
+        }
         clamp = Some([a, b]);
         let text = "the top tenth of the body, since what is at rest is held somewhere";
         said.guesses.push(Guess::scene("clamp", "clamp", text, "--clamp"));
@@ -114,7 +121,8 @@ fn supports(p: &Parts, o: &Options, said: &mut Said) -> Supports {
         }
         (None, _) if clamp.is_none() => {
             let under = p.lowest.min(corner(p.body.bounds, p.up));
-            let text = format!("{under:.4} m along the upward direction, the lowest that is ever seen; nothing else holds the body");
+            let text =
+                format!("{under:.4} m along the upward direction, the lowest that is ever seen; nothing else holds the body");
             said.guesses.push(Guess::scene("floor", "plane", text, "--floor (a height, or none) and --clamp"));
             Some((p.up * short(under), p.up))
         }
@@ -140,7 +148,8 @@ pub fn text(p: &Parts, o: &Options, said: &mut Said) -> String {
         given.unwrap_or(usual)
     };
     let density = material("density", "--density", o.density, 1000.0, "1000 kg/m³, that of water and nearly of silicone");
-    let young = material("youngs_modulus", "--youngs", o.youngs_modulus, 1e5, "1e5 Pa, where the fit begins; soft silicone is near");
+    let young =
+        material("youngs_modulus", "--youngs", o.youngs_modulus, 1e5, "1e5 Pa, where the fit begins; soft silicone is near");
     let poisson = material("poisson_ratio", "--poisson", o.poisson_ratio, 0.45, "0.45, that of rubbery bodies is 0.45 to 0.499");
     // Writing to a string cannot fail.
     let _ = write!(t, "format = \"scene/1\"\ntitle = {title}\n\n[object]\n");

@@ -78,10 +78,7 @@ fn a_background_a_box_and_a_plane_leave_the_ball() {
     let all = [
         Options { background: Some(Background::Frames(0, 1)), ..Options::default() },
         Options { background: Some(Background::File(bench.path("empty.png"))), ..Options::default() },
-        Options {
-            within: Some([glam::DVec3::new(-0.2, -0.3, 0.3), glam::DVec3::new(0.2, 1.0, 0.9)]),
-            ..Options::default()
-        },
+        Options { within: Some([glam::DVec3::new(-0.2, -0.3, 0.3), glam::DVec3::new(0.2, 1.0, 0.9)]), ..Options::default() },
         Options { remove_plane: true, ..Options::default() },
     ];
     let full = (0..FRAMES).map(|k| counts(time(k), 0.001).iter().filter(|c| **c < 900).count()).sum::<usize>();
@@ -90,7 +87,11 @@ fn a_background_a_box_and_a_plane_leave_the_ball() {
         assert_eq!(imported.images, FRAMES, "{o:?}");
         assert_eq!(r.frames[0].readings().count(), counts(0.0, 0.001).iter().filter(|c| **c < 900).count(), "{o:?}");
         // Specks alone are lost: pixels at the ball's rim without two neighbours.
-        assert!(imported.depth_readings <= full && imported.depth_readings + 4 * FRAMES > full, "{o:?} {}", imported.depth_readings);
+        assert!(
+            imported.depth_readings <= full && imported.depth_readings + 4 * FRAMES > full,
+            "{o:?} {}",
+            imported.depth_readings
+        );
     }
 }
 

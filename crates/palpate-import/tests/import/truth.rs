@@ -61,7 +61,8 @@ pub fn time(k: usize) -> f64 {
 
 /// Points of the ball's surface that move with it: markers.
 pub fn marks() -> Vec<DVec3> {
-    let turned = |k: f64| DVec3::new((2.4 * k).cos() * (1.0 - 0.3 * k).sqrt(), (2.4 * k).sin() * (1.0 - 0.3 * k).sqrt(), 0.5 * k - 0.6);
+    let turned =
+        |k: f64| DVec3::new((2.4 * k).cos() * (1.0 - 0.3 * k).sqrt(), (2.4 * k).sin() * (1.0 - 0.3 * k).sqrt(), 0.5 * k - 0.6);
     (0..4).map(|k| turned(f64::from(k) * 0.7).normalize() * RADIUS).collect()
 }
 

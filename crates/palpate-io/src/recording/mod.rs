@@ -106,6 +106,18 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     })
 }
 
+/// Names and samples of a C3D file's markers, in metres and on the file's own clock, and what looks suspicious in it.
+///
+/// # Errors
+/// The file cannot be read, is damaged, or holds no marker that was seen.
+pub fn read_c3d(path: impl AsRef<Path>) -> Result<(Vec<String>, Vec<MarkerSample>, Vec<String>), InputError> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let mut warnings = Vec::new();
+    let (names, samples) = c3d::read_c3d(path, &bytes, &mut warnings)?;
+    Ok((names, samples, warnings))
+}
+
 /// A file that is there; its path must stay inside the recording's folder.
 fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, InputError> {
     t.optional_str(key)?.map(|text| inside_text(source, t, key, text)).transpose()
