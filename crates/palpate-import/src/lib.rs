@@ -102,6 +102,7 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
             return refuse_option("out", out.display(), format!("{name} is already there; add --force to replace it"));
         }
     }
+    apart(source, out)?;
     watch.at(0, 1, "looking at the source")?;
     let place = place::Place::open(source)?;
     let (format, why) = formats::choose(&place, o.format.as_deref())?;
@@ -195,6 +196,18 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         losses: said.losses,
         warnings: body.warnings,
     })
+}
+
+/// Refuses to write among what is read: images could be written over, and the next import would read what this one wrote.
+fn apart(source: &Path, out: &Path) -> Result<(), ImportError> {
+    let mut there = std::path::absolute(out).unwrap_or_else(|_| out.to_path_buf());
+    while !there.exists() && there.pop() {}
+    match (source.canonicalize(), there.canonicalize()) {
+        (Ok(s), Ok(o)) if s.is_dir() && o.starts_with(&s) => {
+            refuse_option("out", out.display(), format!("lies in the source, {}; choose a folder beside it", source.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn check(o: &Options) -> Result<(), ImportError> {

@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, inspect, observe, simulate};
+use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -15,6 +15,7 @@ pub const INTERRUPTED: i32 = 130;
 
 const AFTER_HELP: &str = "\
 A first session:
+  palpate import   camera-folder --out ball    a recording and a first scene of one's own measurements
   palpate inspect  scene.toml                  what would be simulated and fitted, and what looks wrong
   palpate simulate scene.toml --format png     pictures of the motion in out/scene/
   palpate fit      scene.toml --out found      parameters, errors and a report in found/
@@ -34,6 +35,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Import(Box<import::Arguments>),
     Simulate(simulate::Arguments),
     Observe(observe::Arguments),
     Fit(fit::Arguments),
@@ -124,6 +126,7 @@ pub fn run<A: Into<OsString> + Clone>(
     };
     let mut console = Console { out, err, talk: cli.talk, alive, interrupt };
     let done = match &cli.command {
+        Command::Import(a) => import::run(a, &mut console),
         Command::Simulate(a) => simulate::run(a, &mut console),
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),

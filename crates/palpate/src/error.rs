@@ -4,6 +4,7 @@ use palpate_diagnose::LabError;
 use palpate_engine::{BuildError, Failure};
 use palpate_fit::{FitError, JournalError};
 use palpate_gpu::GpuError;
+use palpate_import::ImportError;
 use palpate_io::{InputError, OutputError};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -152,6 +153,17 @@ impl Error {
         match self {
             Error::Diagnosis(LabError::Failed(cause)) => cause.downcast_ref(),
             _ => None,
+        }
+    }
+}
+
+impl From<ImportError> for Error {
+    fn from(e: ImportError) -> Error {
+        match e {
+            ImportError::File(e) => Error::File(e),
+            ImportError::Option { option, given, message } => Error::Option { option, given, message },
+            ImportError::Output(e) => Error::Output(e),
+            ImportError::Interrupted => Error::Interrupted,
         }
     }
 }

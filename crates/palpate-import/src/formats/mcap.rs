@@ -117,7 +117,9 @@ impl Topics {
             let Some(info) = info(&m.data) else { return refuse(file, short()) };
             match self.infos.get(topic) {
                 // As texts: NaN differs from itself.
-                Some(before) if format!("{before:?}") != format!("{info:?}") => refuse(file, format!("{topic} changes within the bag")),
+                Some(before) if format!("{before:?}") != format!("{info:?}") => {
+                    refuse(file, format!("{topic} changes within the bag"))
+                }
                 _ => {
                     self.infos.insert(topic.clone(), info);
                     Ok(())

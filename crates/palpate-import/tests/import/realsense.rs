@@ -142,6 +142,41 @@ fn what_contradicts_itself_is_refused() {
 }
 
 #[test]
+fn nothing_is_written_among_the_source_or_after_an_interruption() {
+    use palpate_import::{ImportError, Watch, import};
+    use std::ops::ControlFlow;
+    let bench = Bench::new();
+    folder(&bench);
+    for out in ["rs", "rs/depth", "rs/new/folder"] {
+        let e = import(&bench.path("rs"), &bench.path(out), &far(), &mut Watch::new(&mut |_, _| ControlFlow::Continue(())));
+        let e = e.unwrap_err().to_string();
+        assert!(e.contains("--out") && e.contains("lies in the source"), "{e}");
+    }
+    let mut looks = 0;
+    let _ = import(
+        &bench.path("rs"),
+        &bench.path("out"),
+        &far(),
+        &mut Watch::new(&mut |_, _| {
+            looks += 1;
+            ControlFlow::Continue(())
+        }),
+    );
+    assert!(bench.path("out/scene.toml").exists() && looks > 3);
+    let e = bench.import("rs", &far()).unwrap_err().to_string();
+    assert!(e.contains("already there") && e.contains("--force"), "{e}");
+    for stop in 0..looks {
+        let mut k = 0;
+        let mut watch = |_: f64, _: &str| {
+            k += 1;
+            if k > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let e = import(&bench.path("rs"), &bench.path("other"), &far(), &mut Watch::new(&mut watch));
+        assert!(matches!(e, Err(ImportError::Interrupted)) && !bench.path("other").exists(), "{stop}");
+    }
+}
+
+#[test]
 fn empty_frames_are_left_out_with_a_word() {
     let bench = Bench::new();
     folder(&bench);

@@ -5,6 +5,7 @@ pub mod coarsen;
 pub mod devices;
 pub mod diagnose;
 pub mod fit;
+pub mod import;
 pub mod inspect;
 pub mod observe;
 pub mod simulate;
