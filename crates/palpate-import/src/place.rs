@@ -53,7 +53,10 @@ impl Place {
 
     /// Name of a file as seen from the source.
     pub fn name(&self, file: &Path) -> String {
-        file.strip_prefix(&self.path).unwrap_or(file).to_string_lossy().to_ascii_lowercase()
+        let inside = file.strip_prefix(&self.path).ok().filter(|n| !n.as_os_str().is_empty());
+        // A source that is a file goes by its own name.
+        let own = || file.file_name().map_or(file, Path::new);
+        inside.unwrap_or_else(own).to_string_lossy().to_ascii_lowercase()
     }
 
     /// What the source is called: its name without folder and ending.

@@ -16,7 +16,7 @@
 use crate::experiment::short;
 use glam::DVec3;
 use palpate_engine::number;
-use palpate_model::observation::{Observation, ReadingKind};
+use palpate_model::observation::Observation;
 use palpate_model::scene::{Inertia, Resolution, Scene};
 use palpate_model::shape::Shape;
 use std::f64::consts::{PI, TAU};
@@ -50,8 +50,8 @@ pub(crate) fn choose(scene: &mut Scene, shape: &dyn Shape, observation: &Observa
     if !open && scene.time.open.is_none() {
         return chosen;
     }
-    let seen = ReadingKind::ALL.into_iter().filter(|k| observation.readings(*k) > 0).map(|k| observation.noise(k));
-    let noise = seen.fold(f64::NAN, f64::min);
+    // Of channels, since markers have no sites yet by which their readings could be counted; one without readings is refused before.
+    let noise = observation.channels.iter().map(|c| c.noise).fold(f64::NAN, f64::min);
     let (low, high) = shape.bounds();
     let thickness = thickness(shape);
     if open {

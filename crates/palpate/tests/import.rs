@@ -67,7 +67,6 @@ fn a_camera_s_folder_is_fitted_in_three_commands() {
     fs::write(at("ball-mm.obj"), ball(1000.0)).expect("writable");
     read_mesh(at("ball.obj")).expect("a closed ball");
     fs::write(at("truth.toml"), TRUTH).expect("writable");
-    fs::write(at("camera.txt"), "").expect("writable");
     let mut observe = Command::new(env!("CARGO_BIN_EXE_palpate"));
     observe.current_dir(folder.path()).args([
         "observe",
@@ -116,16 +115,39 @@ fn a_camera_s_folder_is_fitted_in_three_commands() {
     }
     let (code, out, err) = palpate(folder.path(), "inspect ball/scene.toml");
     assert!(code == 0 && out.contains("to be found"), "{err}{out}");
-    let (code, out, err) = palpate(folder.path(), "fit ball/scene.toml --backend cpu --out found");
+    let (code, out, err) = palpate(folder.path(), "fit ball/scene.toml --backend cpu --no-grid-check --out found");
     assert_eq!(code, 0, "{err}{out}");
     let result: Value = serde_json::from_str(&fs::read_to_string(at("found/result.json")).expect("a result")).expect("JSON");
     let young = result["parameters"].as_array().and_then(|p| p[0]["value"].as_f64()).expect("a value");
-    // Start 1e5 Pa, truth 5e4. The pose is guessed from a cap of the ball, to a millimetre or two, and the release to some milliseconds.
-    assert!((young / 5e4 - 1.0).abs() < 0.25, "{young}\n{out}");
+    // Start 1e5 Pa, truth 5e4 on cells half as large: a fit that looks at its grid says ± 6 % for that, and two of these are allowed. The pose, guessed
+    // from the near side of the ball, is a tenth of a millimetre off.
+    assert!((young / 5e4 - 1.0).abs() < 0.12, "{young}\n{out}");
 
     let (code, out, err) = palpate(folder.path(), "import take --far 0.01 --out none");
     assert!(code == 2 && out.is_empty() && err.contains("error: --far: no reading"), "{err}");
     let (code, out, _) = palpate(folder.path(), "import take --json --out json");
     let json: Value = serde_json::from_str(&out).expect("JSON");
     assert!(code == 0 && json["format"] == "import/1" && json["guesses"].as_array().is_some_and(|g| g.len() > 5), "{out}");
+}
+
+#[test]
+fn markers_are_inspected_and_fitted_as_they_were_imported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut t = String::from(
+        "Trajectories\n100\n,,tip,,,mid,,,base,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n",
+    );
+    for i in 0..40 {
+        // A beam's swing of 5 mm at 5 Hz, begun after a tenth of a second.
+        let s = f64::max(0.0, f64::from(i) * 0.01 - 0.1);
+        let z = -2.5 * (1.0 - (31.4 * s).cos());
+        t += &format!("{i},0,100,15,{:.3},50,15,{:.3},0,15,30\n", 30.0 + z, 30.0 + 0.3 * z);
+    }
+    fs::write(folder.path().join("beam.csv"), t).expect("writable");
+    let (code, out, err) = palpate(folder.path(), "import beam.csv --clamp -0.01,-0.01,-0.1,0.01,0.1,0.1 --out beam");
+    assert!(code == 0 && out.contains("vicon"), "{err}");
+    // Cells and step are left open, and chosen by the noise of markers.
+    let (code, out, err) = palpate(folder.path(), "inspect beam/scene.toml");
+    assert!(code == 0 && out.contains("noise 1.00 mm (markers)"), "{err}{out}");
+    let (code, out, err) = palpate(folder.path(), "fit beam/scene.toml --backend cpu --iterations 2 --no-grid-check --out found");
+    assert!(code == 0 && out.contains("material.youngs_modulus"), "{err}{out}");
 }

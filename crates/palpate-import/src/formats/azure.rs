@@ -49,6 +49,7 @@ fn read(place: &Place, o: &Options, watch: &mut Watch) -> Result<Capture, Import
     };
     let files = folder::depth_files(place);
     let Some(first) = files.first() else { return refuse(&place.path, "holds no depth image") };
+    folder::one_folder(place, &files)?;
     let (size, _) = read_depth(first, None)?;
     let optics = depth_camera(&path, &json, size)?;
     let i = Intrinsics { size: Some(size), optics, scale: None, fps: None };

@@ -45,6 +45,20 @@ fn one_kind(files: Vec<PathBuf>) -> Vec<PathBuf> {
     files
 }
 
+/// Refuses images that lie in several folders: they are of several cameras, or of several takes.
+pub fn one_folder(place: &Place, files: &[PathBuf]) -> Result<(), ImportError> {
+    let mut folders: Vec<&Path> = files.iter().filter_map(|f| f.parent()).collect();
+    folders.dedup();
+    if folders.len() < 2 {
+        return Ok(());
+    }
+    let names: Vec<String> = folders.iter().take(4).map(|f| place.name(f)).collect();
+    refuse(
+        &place.path,
+        format!("holds depth images in several folders ({}); name the folder of one camera and take", names.join(", ")),
+    )
+}
+
 /// The JSON files of a source that hold a camera, with what they hold.
 pub fn camera_files(place: &Place) -> Vec<(PathBuf, Value)> {
     let json = place.with_ending(&["json"]).filter(|f| std::fs::metadata(f).is_ok_and(|m| m.len() < 1 << 24));
@@ -139,6 +153,7 @@ pub fn read(place: &Place, o: &Options, usual_scale: (f64, &'static str), watch:
     if files.is_empty() {
         return refuse(&place.path, format!("holds no depth image; read are .{}", ENDINGS.join(", .")));
     }
+    one_folder(place, &files)?;
     let (path, i) = intrinsics(place, o)?;
     let times = of_files(place, &files, o.fps, i.fps)?;
     read_images(place, &files, times, (&path, &i), usual_scale, watch)

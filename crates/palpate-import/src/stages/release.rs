@@ -98,6 +98,8 @@ pub fn find(r: &Recording, o: &Options, said: &mut Said) -> Motion {
     // How far the first times are apart says whether rest was seen at all.
     let usual = median(times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or(0.0);
     let from = f64::max(first, times[begun] - (2.0 * far[begun] / GRAVITY).sqrt());
+    // No release is known to less than ten microseconds.
+    let from = f64::max(first, (from * 1e5).round() / 1e5);
     let rested = from > first + 0.5 * usual;
     let text = if rested {
         format!(

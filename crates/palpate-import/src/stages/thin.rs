@@ -35,11 +35,11 @@ pub fn choose(r: &Recording, from: f64, to: f64, o: &Options, said: &mut Said) -
     let every = times.len().div_ceil(INSTANTS).max(1);
     if stride > 1 {
         let text =
-            format!("every {stride}th row and column, about {wanted} of {dense:.0} readings an image; the recording keeps all");
+            format!("one of {stride} rows and columns, about {wanted} of {dense:.0} readings an image; the recording keeps all");
         said.guesses.push(Guess::scene("thinning", "observation.pixel_stride", text, "--points"));
     }
     if every > 1 {
-        let text = format!("every {every}th of {} times is compared; the recording keeps all", times.len());
+        let text = format!("one of {every} times is compared, of {} in all; the recording keeps them", times.len());
         said.guesses.push(Guess::scene("thinning", "observation.frames", text, "--every (leaves times out of the recording)"));
     }
     Thinned { stride, every }

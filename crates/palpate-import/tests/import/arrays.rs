@@ -142,3 +142,18 @@ fn what_contradicts_itself_is_refused() {
         bench.bad("bad.npz", &Options { format: Some("npy".into()), ..Options::default() });
     }
 }
+
+#[test]
+fn damaged_arrays_never_panic() {
+    let bench = Bench::new();
+    let depth = array(&[2, SIZE[1], SIZE[0]], [image(0.0), image(0.2)].concat());
+    write_npz(bench.path("ball.npz"), &[("depth", &depth), ("K", &matrix())]).unwrap();
+    let bytes = std::fs::read(bench.path("ball.npz")).unwrap();
+    let (head, rest) = bytes.split_at(256);
+    for k in 0..60 {
+        let bench = Bench::new();
+        let b = if k % 2 == 0 { damaged(&bytes, k) } else { [&damaged(head, k)[..], rest].concat() };
+        bench.write("b.npz", b);
+        let _ = bench.import("b.npz", &Options { format: Some("npy".into()), ..far() });
+    }
+}

@@ -119,3 +119,23 @@ fn what_contradicts_itself_is_refused() {
     let e = bench.bad("s", &Options::default());
     assert!(e.contains("finite") || e.contains("no point"), "{e}");
 }
+
+#[test]
+fn damaged_clouds_never_panic() {
+    let points = cloud(0.0);
+    let all = [
+        ("0.pcd", pcd(&points, "binary_compressed")),
+        ("0.pcd", pcd(&points, "ascii")),
+        ("0.ply", ply(&points, 1.0).into_bytes()),
+    ];
+    for (file, bytes) in all {
+        // The head is where damage does most.
+        let (head, rest) = bytes.split_at(200);
+        for k in 0..80 {
+            let bench = Bench::new();
+            let b = if k % 2 == 0 { damaged(&bytes, k) } else { [&damaged(head, k)[..], rest].concat() };
+            bench.write(&format!("s/{file}"), b);
+            let _ = bench.import("s", &Options::default());
+        }
+    }
+}

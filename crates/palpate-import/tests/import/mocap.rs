@@ -256,19 +256,7 @@ fn damaged_tables_never_panic() {
     ] {
         for k in 0..60 {
             let bench = Bench::new();
-            let mut b = bytes.clone();
-            match k % 3 {
-                0 => b.truncate(b.len() * k / 60),
-                1 => (0..k).for_each(|j| {
-                    let at = (j * 7919 + k * 104_729) % b.len();
-                    b[at] = b[at].wrapping_mul(31).wrapping_add(k as u8);
-                }),
-                _ => {
-                    let at = (k * 104_729) % b.len();
-                    b.drain(at..(at + 40).min(b.len()));
-                }
-            }
-            bench.write(file, b);
+            bench.write(file, damaged(&bytes, k));
             // Good or bad, it ends.
             let _ = bench.import(file, &Options::default());
         }

@@ -137,6 +137,9 @@ fn what_contradicts_itself_is_refused() {
     assert!(e.contains("--far") && e.contains("no reading"), "{e}");
     let e = bench.bad("rs", &Options { background: Some(Background::Frames(0, 99)), ..Options::default() });
     assert!(e.contains("--background 0..99") && e.contains("0 to 11"), "{e}");
+    png(&bench.path("rs/depth/second/000000.png"), &counts(0.0, 0.001), SIZE);
+    let e = bench.bad("rs", &far());
+    assert!(e.contains("several folders (depth, depth/second)"), "{e}");
     let e = bench.bad("nothing", &far());
     assert!(e.contains("no such file or folder"), "{e}");
 }
@@ -184,4 +187,52 @@ fn empty_frames_are_left_out_with_a_word() {
     let (imported, ..) = bench.good("rs", &far());
     assert_eq!(imported.images, FRAMES - 1);
     assert!(imported.losses.iter().any(|l| l.contains("1 of 12 depth images")), "{:?}", imported.losses);
+}
+
+#[test]
+fn open3d_s_matrix_goes_column_by_column() {
+    let bench = Bench::new();
+    folder(&bench);
+    let (w, h) = (SIZE[0], SIZE[1]);
+    let m = format!("[{FOCAL}, 0, 0, 0, {FOCAL}, 0, {}, {}, 1]", CENTER[0], CENTER[1]);
+    let json = format!(r#"{{"width": {w}, "height": {h}, "intrinsic_matrix": {m}, "depth_scale": 1000.0}}"#);
+    bench.write("rs/intrinsics.json", json);
+    let (_, r, _) = bench.good("rs", &far());
+    assert!(off_ball(&r).0 < 0.0006);
+    assert!((r.cameras[0].depth_scale.unwrap() - 0.001).abs() < 1e-15);
+}
+
+#[test]
+fn floats_in_tiff_with_times_in_milliseconds() {
+    let bench = Bench::new();
+    bench.write("rs/intrinsics.json", intrinsics());
+    let mut times = String::from("frame,timestamp\n");
+    for k in 0..FRAMES {
+        let path = bench.write(&format!("rs/depth/{k:06}.tiff"), "");
+        let pixels: Vec<f32> = image(time(k)).into_iter().map(|z| z as f32).collect();
+        let mut tiff = tiff::encoder::TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+        tiff.write_image::<tiff::encoder::colortype::Gray32Float>(SIZE[0] as u32, SIZE[1] as u32, &pixels).unwrap();
+        times += &format!("{k},{:.4}\n", 1.7e12 + 1000.0 * time(k));
+    }
+    bench.write("rs/timestamps.csv", times);
+    let (imported, r, _) = bench.good("rs", &far());
+    // Depth in tenths of a millimetre; times of a clock that has four digits of a millisecond, in doubles of 1.7e12: 2e-7 s.
+    assert!(off_ball(&r).0 < 1e-4, "{}", off_ball(&r).0);
+    assert!(r.frames.iter().enumerate().all(|(k, f)| (f.time - time(k)).abs() < 1e-6));
+    assert!(imported.guesses.iter().any(|g| g.what == "clock" && g.text.contains("milliseconds")), "{:?}", imported.guesses);
+}
+
+#[test]
+fn damaged_folders_never_panic() {
+    let json = intrinsics().into_bytes();
+    for k in 0..80 {
+        let bench = Bench::new();
+        png(&bench.path("rs/depth/0.png"), &counts(0.0, 0.001), SIZE);
+        if k % 4 == 0 {
+            let image = fs::read(bench.path("rs/depth/0.png")).unwrap();
+            bench.write("rs/depth/0.png", damaged(&image, k));
+        }
+        bench.write("rs/intrinsics.json", if k % 4 == 0 { json.clone() } else { damaged(&json, k) });
+        let _ = bench.import("rs", &far());
+    }
 }

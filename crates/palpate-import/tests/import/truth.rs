@@ -146,3 +146,18 @@ pub fn ball_obj(scale: f64) -> String {
     let t: String = mesh.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1)).collect();
     v + &t
 }
+
+/// Bytes that are cut, changed or lack a piece, another way for every `k`.
+pub fn damaged(bytes: &[u8], k: usize) -> Vec<u8> {
+    let mut b = bytes.to_vec();
+    let at = (k * 104_729) % b.len();
+    match k % 3 {
+        0 => b.truncate(at),
+        1 => (0..k).for_each(|j| {
+            let at = (j * 7919 + k * 104_729) % b.len();
+            b[at] = b[at].wrapping_mul(31).wrapping_add(k as u8);
+        }),
+        _ => drop(b.drain(at..(at + 40).min(b.len()))),
+    }
+    b
+}

@@ -12,12 +12,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 const AFTER_HELP: &str = "\
-From a camera's folder to a fit in three commands:
+Examples: from a camera's folder to a fit in three commands
   palpate import  takes/ball --mesh ball.obj --far 0.9 --out ball
   palpate inspect ball/scene.toml
   palpate fit     ball/scene.toml --out found
 
-More examples:
+More:
   palpate import take.csv --mesh beam.obj --clamp -0.01,-0.01,-0.01,0.001,0.04,0.04 --out beam
   palpate import bag/ --pick /camera/depth/image_rect_raw --background 0..9 --out ball
   palpate import clouds/ --fps 30 --unit mm --box -0.2,-0.2,0.3,0.2,0.2,0.9 --out ball
