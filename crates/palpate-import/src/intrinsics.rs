@@ -2,6 +2,7 @@
 
 use crate::error::{ImportError, read_text, refuse, refuse_key};
 use crate::lens::{Lens, Optics};
+use crate::place::has_ending;
 use serde_json::Value;
 use std::path::Path;
 
@@ -18,13 +19,35 @@ pub struct Intrinsics {
     pub fps: Option<f64>,
 }
 
+/// Reads a file that may hold a camera: JSON, or the metadata in CSV that the RealSense Viewer writes beside an image, as the same in JSON.
+pub fn read_camera(path: &Path) -> Result<Value, ImportError> {
+    if !has_ending(path, &["csv"]) {
+        return read_json(path);
+    }
+    let text = read_text(path)?;
+    let mut camera = serde_json::Map::new();
+    for (key, value) in text.lines().filter_map(|l| l.split_once(',')) {
+        let key = match key.trim() {
+            "Resolution x" => "width",
+            "Resolution y" => "height",
+            k @ ("Fx" | "Fy" | "PPx" | "PPy") => k,
+            _ => continue,
+        };
+        let value = value.trim();
+        let whole = value.parse::<u64>().map(Value::from);
+        let number = whole.or_else(|_| value.parse::<f64>().map(Value::from));
+        camera.insert(key.into(), number.unwrap_or_else(|_| Value::from(value)));
+    }
+    Ok(Value::Object(camera))
+}
+
 /// Reads a file as JSON; what is wrong with it is said with its line.
 pub fn read_json(path: &Path) -> Result<Value, ImportError> {
     let text = read_text(path)?;
-    serde_json::from_str(&text).or_else(|e| {
+    serde_json::from_str(&text).map_err(|e| {
         let hint = if text.contains("NaN") { " (NaN is no number of JSON: the camera's intrinsics are not known)" } else { "" };
         let message = format!("not valid JSON: {e}{hint}");
-        Err(palpate_io::InputError::line(path, e.line().max(1), message).into())
+        palpate_io::InputError::line(path, e.line().max(1), message).into()
     })
 }
 
@@ -93,7 +116,7 @@ fn numbers(v: &Value) -> Vec<f64> {
 /// # Errors
 /// The file is no JSON, holds none or several cameras, or a number that cannot be one of a camera.
 pub fn read_intrinsics(path: &Path) -> Result<Intrinsics, ImportError> {
-    of_json(path, &read_json(path)?)
+    of_json(path, &read_camera(path)?)
 }
 
 /// The same of what was read.
@@ -129,7 +152,7 @@ pub fn of_json(path: &Path, json: &Value) -> Result<Intrinsics, ImportError> {
         None => [number(&["fx"])?, number(&["fy"])?, number(&["cx", "ppx"])?, number(&["cy", "ppy"])?],
     };
     for (k, f) in [("fx", fx), ("fy", fy)] {
-        if !(f > 0.0) {
+        if f <= 0.0 {
             return refuse_key(path, key(k), format!("{f} is not allowed: a focal length is > 0 (pixels)"));
         }
     }
@@ -168,12 +191,22 @@ pub fn of_json(path: &Path, json: &Value) -> Result<Intrinsics, ImportError> {
     Ok(Intrinsics { size, optics, scale, fps })
 }
 
-/// A principal point far outside the image belongs to another image.
+/// Focal lengths in sides of the image: fields of view of 170° to half a degree.
+const FOCAL: std::ops::RangeInclusive<f64> = 0.04..=60.0;
+
+/// A principal point far outside the image belongs to another image, and so does a focal length with which it would show all or nothing.
 pub fn check_center(path: &Path, key: &str, optics: &Optics, size: Option<[usize; 2]>) -> Result<(), ImportError> {
     let Some(size) = size else { return Ok(()) };
     let inside = |a: usize| (-0.5..=size[a] as f64 + 0.5).contains(&optics.center[a]);
     if inside(0) && inside(1) {
-        return Ok(());
+        return match (0..2).find(|a| !FOCAL.contains(&(optics.focal[*a] / size[*a] as f64))) {
+            None => Ok(()),
+            Some(a) => {
+                let text =
+                    format!("the focal length {} is no one of an image of {} × {} pixels", optics.focal[a], size[0], size[1]);
+                refuse_key(path, key, format!("{text}: allowed are {} to {} of its side", FOCAL.start(), FOCAL.end()))
+            }
+        };
     }
     let [x, y] = optics.center;
     refuse_key(path, key, format!("the principal point ({x}, {y}) lies outside of the {} × {} pixels", size[0], size[1]))

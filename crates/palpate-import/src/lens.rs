@@ -49,7 +49,7 @@ fn invert(map: impl Fn([f64; 2]) -> [f64; 2], goal: [f64; 2]) -> Option<[f64; 2]
         let j = [[(dx[0] - f[0]) / STEP, (dy[0] - f[0]) / STEP], [(dx[1] - f[1]) / STEP, (dy[1] - f[1]) / STEP]];
         let det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
         // An image that is folded over itself has no way back.
-        if !(det > 1e-9) {
+        if det <= 1e-9 || det.is_nan() {
             return None;
         }
         p = [p[0] - (j[1][1] * miss[0] - j[0][1] * miss[1]) / det, p[1] - (j[0][0] * miss[1] - j[1][0] * miss[0]) / det];

@@ -140,7 +140,7 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     let times = times(&r);
     let Some([first, last]) = times else { return refuse(&place.path, "holds no reading") };
     if let Motion::Moving { from, .. } = motion
-        && !(from < last)
+        && from >= last
     {
         return refuse_option("release", from, format!("comes after the last time, {last} s"));
     }
@@ -345,7 +345,7 @@ fn write_all(out: &Path, r: &Recording, body: &body::Body, scene: &str, said: &S
         palpate_io::write_obj(out.join("object.obj"), mesh)?;
     }
     palpate_io::write_recording(out, r)?;
-    let (mut of_recording, mut of_scene): (Vec<(&str, &Guess)>, Vec<(&str, &Guess)>) = Default::default();
+    let (mut of_recording, mut of_scene) = (Vec::<(&str, &Guess)>::new(), Vec::<(&str, &Guess)>::new());
     for g in &said.guesses {
         match &g.spot {
             Spot::Recording(key) => of_recording.push((key, g)),

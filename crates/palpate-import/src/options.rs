@@ -205,7 +205,7 @@ pub(crate) fn rigid_of(n: &[f64]) -> Result<DAffine3, String> {
         let shift = DVec3::from_slice(&n[..3]);
         let q = if n.len() == 7 { glam::DQuat::from_slice(&n[3..]) } else { glam::DQuat::IDENTITY };
         // A quaternion in a file is rounded; one that is far from unit length is none.
-        if !((q.length() - 1.0).abs() < 0.01) {
+        if (q.length() - 1.0).abs() >= 0.01 || q.is_nan() {
             return Err(format!("the quaternion has length {:.4}, must be 1", q.length()));
         }
         return Ok(DAffine3::from_rotation_translation(q.normalize(), shift));

@@ -122,7 +122,7 @@ fn by_list(list: &Path, count: usize) -> Result<Times, ImportError> {
 
 /// Refuses times that do not rise.
 pub fn rising(times: &[f64], fault: impl Fn(usize) -> InputError) -> Result<(), ImportError> {
-    match (1..times.len()).find(|k| !(times[*k] > times[k - 1])) {
+    match (1..times.len()).find(|k| times[*k] <= times[k - 1] || times[*k].is_nan()) {
         Some(k) => Err(fault(k).into()),
         None => Ok(()),
     }

@@ -24,7 +24,8 @@ fn read(place: &Place, _: &Options, watch: &mut Watch) -> Result<Capture, Import
     let Some(path) = place.only(&["c3d"]) else { return refuse(&place.path, "is no C3D file, and does not hold a single one") };
     watch.at(0, 1, "motion capture")?;
     crate::error::read(path)?;
-    let (names, samples, losses) = read_c3d(path)?;
+    let read = read_c3d(path)?;
+    let (names, samples, losses) = (read.value.names, read.value.samples, read.warnings);
     let mut m = Markers { names, ..Markers::default() };
     let n = m.names.len();
     for s in &samples {

@@ -1,10 +1,10 @@
 //! What folders of depth images have in common: which files are images, what belongs to them, when they were taken.
 
 use crate::Watch;
-use crate::capture::{Capture, DepthCamera, DepthFrame};
+use crate::capture::{Capture, DepthCamera, DepthFrame, Guess};
 use crate::error::{ImportError, refuse};
 use crate::images::{ENDINGS, read_depth, read_mask};
-use crate::intrinsics::{Intrinsics, check_center, holds_camera, read_intrinsics, read_json};
+use crate::intrinsics::{Intrinsics, check_center, holds_camera, read_camera, read_intrinsics, read_json};
 use crate::options::Options;
 use crate::place::{Place, has_ending};
 use crate::times::{Times, of_files};
@@ -59,10 +59,18 @@ pub fn one_folder(place: &Place, files: &[PathBuf]) -> Result<(), ImportError> {
     )
 }
 
-/// The JSON files of a source that hold a camera, with what they hold.
+/// The files of a source that hold a camera, with what they hold: JSON, or the Viewer's metadata in CSV, of which one stands for all that say the same.
 pub fn camera_files(place: &Place) -> Vec<(PathBuf, Value)> {
-    let json = place.with_ending(&["json"]).filter(|f| std::fs::metadata(f).is_ok_and(|m| m.len() < 1 << 24));
-    json.filter_map(|f| Some((f.clone(), read_json(f).ok()?))).filter(|(_, v)| holds_camera(v)).collect()
+    let small = |f: &&PathBuf| std::fs::metadata(f).is_ok_and(|m| m.len() < 1 << 24);
+    let viewer = |f: &&PathBuf| has_ending(f, &["json"]) || place.name(f).contains("metadata");
+    let mut found: Vec<(PathBuf, Value)> = Vec::new();
+    for f in place.with_ending(&["json", "csv"]).filter(small).filter(viewer) {
+        let Some(v) = read_camera(f).ok().filter(holds_camera) else { continue };
+        if !(has_ending(f, &["csv"]) && found.iter().any(|(_, w)| *w == v)) {
+            found.push((f.clone(), v));
+        }
+    }
+    found
 }
 
 /// The intrinsics of a source: of the file that the user names, of the only JSON file that holds a camera, or of the one named after depth.
@@ -156,5 +164,10 @@ pub fn read(place: &Place, o: &Options, usual_scale: (f64, &'static str), watch:
     one_folder(place, &files)?;
     let (path, i) = intrinsics(place, o)?;
     let times = of_files(place, &files, o.fps, i.fps)?;
-    read_images(place, &files, times, (&path, &i), usual_scale, watch)
+    let mut capture = read_images(place, &files, times, (&path, &i), usual_scale, watch)?;
+    if has_ending(&path, &["csv"]) {
+        let text = "no distortion, since the Viewer's metadata state none; depth images of D400 cameras have none";
+        capture.guesses.push(Guess::recording("intrinsics", "camera.0.distortion", text, "--intrinsics"));
+    }
+    Ok(capture)
 }

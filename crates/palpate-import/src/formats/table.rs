@@ -22,7 +22,7 @@ pub fn rows(path: &Path, delimiter: char) -> Result<Vec<Row>, ImportError> {
 }
 
 /// A row's cell, empty where there is none.
-pub fn cell<'a>(row: &'a Row, i: usize) -> &'a str {
+pub fn cell(row: &Row, i: usize) -> &str {
     row.1.get(i).map_or("", String::as_str)
 }
 
@@ -56,7 +56,7 @@ impl Trajectories {
     /// Adds the places at a time, as texts x, y, z marker by marker; a marker whose three texts hold nothing was not seen.
     pub fn push(&mut self, line: usize, time: f64, cells: &[[&str; 3]], zeros_are_gaps: bool) -> Result<(), ImportError> {
         let wrong = |text: String| Err(InputError::line(&self.path, line, text).into());
-        if self.markers.times.last().is_some_and(|t| !(time > *t)) {
+        if self.markers.times.last().is_some_and(|t| time <= *t || time.is_nan()) {
             return wrong(format!("time {time} does not come after the one before it"));
         }
         let mut places = Vec::with_capacity(cells.len());

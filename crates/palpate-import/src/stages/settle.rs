@@ -108,11 +108,12 @@ fn metres(camera: &DepthCamera, key: &str, o: &Options, said: &mut Said) -> Resu
             said.guesses.push(Guess::recording("unit", key, text, "--depth-scale"));
             usual
         }
-        (None, false, Some(stated)) => {
-            said.facts.push(format!("floats of {stated} m, as the source says"));
-            stated
+        (None, false, Some(1.0)) => {
+            said.facts.push("floats in metres, as the source says".into());
+            1.0
         }
-        (None, false, None) => {
+        // Any other scale is that of counts, which the camera could have written as well.
+        (None, false, _) => {
             let (scale, unit) = if median > FLOAT_METRES { (0.001, "millimetres") } else { (1.0, "metres") };
             let text = format!("floats are {unit}, since their median is {median:.4}");
             said.guesses.push(Guess::recording("unit", key, text, "--unit"));

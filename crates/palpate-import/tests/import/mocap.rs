@@ -188,7 +188,7 @@ fn markers_that_never_move_are_held() {
     let bench = Bench::new();
     let mut t = String::from("Trajectories\n100\n,,a,,,b,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm\n");
     for i in 0..SAMPLES {
-        writeln!(t, "{i},0,0.0,0.0,100.0,100.0,0.0,{:.3}", 100.0 + 10.0 * (at(i) - 0.1).max(0.0).min(0.2) / 0.2).unwrap();
+        writeln!(t, "{i},0,0.0,0.0,100.0,100.0,0.0,{:.3}", 100.0 + 10.0 * (at(i) - 0.1).clamp(0.0, 0.2) / 0.2).unwrap();
     }
     bench.write("t.csv", t);
     let (imported, _, scene) = bench.good("t.csv", &Options::default());

@@ -97,7 +97,14 @@ fn a_background_a_box_and_a_plane_leave_the_ball() {
 
 #[test]
 fn what_contradicts_itself_is_refused() {
-    let cases: [(&str, &dyn Fn(&Bench), &[&str]); 9] = [
+    /// A name, what is done to a good folder, and words of the answer.
+    type Case<'a> = (&'a str, &'a dyn Fn(&Bench), &'a [&'a str]);
+    let cases: [Case; 10] = [
+        (
+            "a telescope",
+            &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("150", "1e300"))),
+            &["focal length", "0.04 to 60"],
+        ),
         (
             "another size",
             &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("120", "640").replace("160", "480"))),
@@ -234,5 +241,28 @@ fn damaged_folders_never_panic() {
         }
         bench.write("rs/intrinsics.json", if k % 4 == 0 { json.clone() } else { damaged(&json, k) });
         let _ = bench.import("rs", &far());
+    }
+}
+
+#[test]
+fn raw_files_of_the_viewer_with_their_metadata() {
+    let bench = Bench::new();
+    for k in 0..FRAMES {
+        let stamp = format!("{:.6}", 1.6e12 + 1000.0 * time(k));
+        let bytes: Vec<u8> = counts(time(k), 0.001).iter().flat_map(|c| c.to_le_bytes()).collect();
+        bench.write(&format!("v/take_Depth_{stamp}.raw"), bytes);
+        let meta = format!(
+            "Frame Info: \nType,Depth\nFormat,Z16\nFrame Number,{k}\nTimestamp (ms),{stamp}\nResolution x,{}\nResolution y,{}\nBytes per pixel,2\n\n\
+             Intrinsic:,\nFx,{FOCAL:.6}\nFy,{FOCAL:.6}\nPPx,{:.6}\nPPy,{:.6}\nDistorsion,Brown Conrady\n",
+            SIZE[0], SIZE[1], CENTER[0], CENTER[1]
+        );
+        bench.write(&format!("v/take_Depth_metadata_{stamp}.csv"), meta);
+    }
+    let (imported, r, _) = bench.good("v", &far());
+    assert_eq!((imported.format, imported.images), ("realsense", FRAMES));
+    // Half a count; times of six digits of a millisecond, as doubles of 1.6e12.
+    assert!(off_ball(&r).0 < 0.0006 && r.frames.iter().enumerate().all(|(k, f)| (f.time - time(k)).abs() < 1e-6));
+    for about in ["clock", "intrinsics", "unit"] {
+        assert!(imported.guesses.iter().any(|g| g.what == about), "{about}: {:?}", imported.guesses);
     }
 }

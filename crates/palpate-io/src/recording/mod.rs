@@ -20,7 +20,7 @@ pub use sequence::{RecordedDisplacements, RecordedPoints, Sequence};
 pub use write::write_recording;
 
 use crate::document::{Source, Table};
-use crate::error::InputError;
+use crate::error::{InputError, Loaded};
 use crate::keys::{RECORDING, suggest};
 use crate::scene::{check_format, marker_rest};
 use palpate_model::observation::MarkerRest;
@@ -106,16 +106,18 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     })
 }
 
-/// Names and samples of a C3D file's markers, in metres and on the file's own clock, and what looks suspicious in it.
+/// The markers of a C3D file, in metres and on the file's own clock, without noise and rest places.
 ///
 /// # Errors
 /// The file cannot be read, is damaged, or holds no marker that was seen.
-pub fn read_c3d(path: impl AsRef<Path>) -> Result<(Vec<String>, Vec<MarkerSample>, Vec<String>), InputError> {
+pub fn read_c3d(path: impl AsRef<Path>) -> Result<Loaded<RecordedMarkers>, InputError> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
     let mut warnings = Vec::new();
     let (names, samples) = c3d::read_c3d(path, &bytes, &mut warnings)?;
-    Ok((names, samples, warnings))
+    let file = path.to_path_buf();
+    let value = RecordedMarkers { file, names, samples, noise_sigma: None, noise_systematic: 0.0, rest: Vec::new() };
+    Ok(Loaded { value, warnings })
 }
 
 /// A file that is there; its path must stay inside the recording's folder.
@@ -194,8 +196,8 @@ fn frames(
     }
     let load = |path: &PathBuf| std::fs::read(path).map_err(|e| InputError::io(path, &e));
     // Files are read and decoded side by side; what is wrong is still reported in the order of the file.
-    type Loaded = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);
-    let images: Vec<Loaded> = (headers.iter().map(|h| (h.camera, h.depth.clone(), h.mask.clone())).collect::<Vec<_>>())
+    type Images = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);
+    let images: Vec<Images> = (headers.iter().map(|h| (h.camera, h.depth.clone(), h.mask.clone())).collect::<Vec<_>>())
         .into_par_iter()
         .map(|(c, depth, mask)| {
             let size = (cameras[c].width, cameras[c].height);
