@@ -1,5 +1,5 @@
-//! Sequences of PCD files (Point Cloud Library), as text, binary and compressed. An own reader: the crates there are panic on damaged files or lack the
-//! compressed kind.
+//! Sequences of PCD files (Point Cloud Library), as text, binary and compressed. A file is a header and columns of numbers: read here, where every
+//! announced size is checked before room is made.
 
 use super::Format;
 use super::ply::{Points, read_sequence};
