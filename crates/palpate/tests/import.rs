@@ -143,11 +143,12 @@ fn markers_are_inspected_and_fitted_as_they_were_imported() {
         t += &format!("{i},0,100,15,{:.3},50,15,{:.3},0,15,30\n", 30.0 + z, 30.0 + 0.3 * z);
     }
     fs::write(folder.path().join("beam.csv"), t).expect("writable");
-    let (code, out, err) = palpate(folder.path(), "import beam.csv --clamp -0.01,-0.01,-0.1,0.01,0.1,0.1 --out beam");
+    let (code, out, err) =
+        palpate(folder.path(), "import beam.csv --clamp -0.01,-0.01,-0.1,0.01,0.1,0.1 --duration 0.1 --out beam");
     assert!(code == 0 && out.contains("vicon"), "{err}");
     // Cells and step are left open, and chosen by the noise of markers.
     let (code, out, err) = palpate(folder.path(), "inspect beam/scene.toml");
     assert!(code == 0 && out.contains("noise 1.00 mm (markers)"), "{err}{out}");
-    let (code, out, err) = palpate(folder.path(), "fit beam/scene.toml --backend cpu --iterations 2 --no-grid-check --out found");
+    let (code, out, err) = palpate(folder.path(), "fit beam/scene.toml --backend cpu --iterations 1 --no-grid-check --out found");
     assert!(code == 0 && out.contains("material.youngs_modulus"), "{err}{out}");
 }
