@@ -33,7 +33,7 @@ fn persist_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         let now = turn_cg(local, system, first == 0u);
         if now.z != 0.0 {
             // What comes next reads the scalars of an odd iteration.
-            if is_odd == 0u {
+            if k % 2u == 0u {
                 is_odd = 1u;
                 _ = turn_cg(local, system, first == 0u);
             }
