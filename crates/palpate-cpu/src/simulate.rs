@@ -6,7 +6,7 @@ use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, Effort, Reason};
 use crate::stress_free;
 use crate::terms::{Context, Curvature, Equation, Past, PastChange, Rates, Weights, zeros};
-use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
+use crate::world::{Gradient, Member, MemberState, MemberTangent, Rated, Shared};
 use glam::DVec3;
 use palpate_engine::{Direction, FailureKind, number};
 use palpate_model::params::coefficients::Coefficients;
@@ -225,10 +225,10 @@ pub fn start_adjoint(
 
 /// Derivatives of the coefficients along directions; that of a stress-free shape which follows from others comes with the start's tangent.
 pub(crate) fn rates(shared: &Shared, member: &Member, directions: &[Direction]) -> Arc<Vec<Coefficients>> {
-    if let Some((known, rates)) = &member.rates
-        && known[..] == *directions
+    if let Some(known) = &member.rates
+        && known.directions[..] == *directions
     {
-        return rates.clone();
+        return known.rates.clone();
     }
     let plan = &shared.plan;
     Arc::new(directions.iter().map(|d| member.coefficients.along(plan, &d.dense(plan.layout.len()))).collect())
@@ -253,7 +253,7 @@ pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &
         stress_free::along(shared, member, &mut rates)?;
         t.rates = Arc::new(rates);
         // Tangents of later states are made with them.
-        member.rates = Some((t.directions.clone(), t.rates.clone()));
+        member.rates = Some(Rated { directions: t.directions.clone(), rates: t.rates.clone() });
         return Ok(());
     }
     if at_rest {

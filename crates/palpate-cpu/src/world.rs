@@ -62,8 +62,15 @@ pub struct Member {
     pub(crate) matrix: Matrix,
     /// Of the time steps since the parameters were set.
     pub(crate) effort: Effort,
-    /// Directions, and derivatives of the coefficients along them, where the stress-free shape follows from the parameters.
-    pub(crate) rates: Option<(Arc<Vec<Direction>>, Arc<Vec<Coefficients>>)>,
+    /// Known where the stress-free shape follows from the parameters.
+    pub(crate) rates: Option<Rated>,
+}
+
+/// Directions, and derivatives of the coefficients along them.
+#[derive(Clone, Debug)]
+pub(crate) struct Rated {
+    pub(crate) directions: Arc<Vec<Direction>>,
+    pub(crate) rates: Arc<Vec<Coefficients>>,
 }
 
 impl Member {
