@@ -153,7 +153,6 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             interrupt: console.interrupt.clone(),
             checkpoints: Some((folder.clone(), a.resume)),
             on_progress: Some(&mut hear),
-            ..DiagnoseOptions::default()
         },
     )?;
     track.finish();
