@@ -22,6 +22,7 @@ mod stress_free;
 #[cfg(test)]
 mod stress_free_tests;
 pub mod terms;
+mod tracking;
 #[cfg(test)]
 mod view_tests;
 mod world;
@@ -29,4 +30,5 @@ mod world;
 pub use backend::CpuBackend;
 pub use memory::{Memory, Sizes};
 pub use newton::Effort;
+pub use tracking::Tracker;
 pub use world::{Adjoint, State, Tally, Tangent, World};

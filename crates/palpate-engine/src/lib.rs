@@ -14,6 +14,7 @@ mod rollout;
 mod rows;
 mod stop;
 mod tape;
+pub mod tracking;
 
 pub use backend::{Backend, BuildError};
 pub use evaluate::{Curvature, Direction, Evaluate, Evaluation, MOST_SENSITIVITIES, ParamBatch, Request, Wanted};

@@ -91,6 +91,7 @@ pub(crate) const SCENE: Schema = Schema {
                 tables: &[("frames", table(&["from", "to", "every"])), ("marker", table(&["name", "position", "surface"]))],
             },
         ),
+        ("track", table(&["prior", "temperature", "outliers", "soft_start"])),
         ("target", table(&["time", "tolerance", "points", "positions", "file"])),
         (
             "fit",

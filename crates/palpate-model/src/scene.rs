@@ -57,8 +57,30 @@ pub struct Scene {
     pub observation: Option<ObservationSpec>,
     /// Where points of the body shall be, of a scene that is compared with a wish instead of a recording.
     pub targets: Vec<Target>,
+    /// How it is tracked.
+    pub tracking: Tracking,
     /// What is to be found out, if anything.
     pub fit: Option<FitSpec>,
+}
+
+/// How a body is tracked from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracking {
+    /// Each frame is a step from the one before; else the equilibrium under the loads. `None` = as the scene's frames are: a step where
+    /// there are several or nothing holds the body.
+    pub dynamic: Option<bool>,
+    /// How far the prior may be wrong [J]; `None` = that of the largest evidence.
+    pub temperature: Option<f64>,
+    /// Share of depth points that belong to something else, 0 to 0.9.
+    pub outliers: f64,
+    /// How far a depth point may be from its place at the beginning [m]; `None` = half the body.
+    pub spread: Option<f64>,
+}
+
+impl Default for Tracking {
+    fn default() -> Tracking {
+        Tracking { dynamic: None, temperature: None, outliers: 0.05, spread: None }
+    }
 }
 
 impl Scene {

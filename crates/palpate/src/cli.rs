@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate};
+use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, track};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -19,6 +19,7 @@ A first session:
   palpate inspect  scene.toml                  what would be simulated and fitted, and what looks wrong
   palpate simulate scene.toml --format png     pictures of the motion in out/scene/
   palpate fit      scene.toml --out found      parameters, errors and a report in found/
+  palpate track    scene.toml --out seen       the moving body in every frame of its recording
   palpate simulate found/model.toml            the scene with the found values
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
 
@@ -38,6 +39,7 @@ enum Command {
     Import(Box<import::Arguments>),
     Simulate(simulate::Arguments),
     Observe(observe::Arguments),
+    Track(track::Arguments),
     Fit(fit::Arguments),
     Batch(batch::Arguments),
     Coarsen(coarsen::Arguments),
@@ -129,6 +131,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Import(a) => import::run(a, &mut console),
         Command::Simulate(a) => simulate::run(a, &mut console),
         Command::Observe(a) => observe::run(a, &mut console),
+        Command::Track(a) => track::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),
         Command::Batch(a) => batch::run(a, &mut console),
         Command::Coarsen(a) => coarsen::run(a, &mut console),

@@ -62,6 +62,7 @@ pub mod results;
 mod scatter;
 mod suited;
 pub mod synthetic;
+mod tracking;
 
 pub use coarsen::{CoarsenOptions, Coarsened, coarsen, usual_numbers};
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};
@@ -75,3 +76,4 @@ pub use host::host;
 pub use interrupt::{Clock, Interrupt};
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};
+pub use tracking::{TrackedBody, TrackedFrame, track};

@@ -4,7 +4,8 @@ use super::matrix::Matrix;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::factorize_symbolic_cholesky;
-use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering};
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, Mat, Par, Side};
 use glam::DVec3;
@@ -89,6 +90,28 @@ pub struct Factor {
 }
 
 impl Factor {
+    /// L⁻ᵀ z for A = L Lᵀ up to the order of the unknowns: of a standard normal z a draw with the covariance A⁻¹.
+    pub fn solve_half(&self, z: &[DVec3]) -> Vec<DVec3> {
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
+            unreachable!("the analysis asks for supernodes");
+        };
+        let n = z.len();
+        let mut rhs = Mat::from_fn(3 * n, 1, |i, _| z[i / 3][i % 3]);
+        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let factor = SupernodalLltRef::<'_, usize, f64>::new(symbolic, &self.values);
+        factor.l_transpose_solve_with_conj(Conj::No, rhs.as_mut(), Par::Seq, MemStack::new(&mut memory));
+        let mut out = vec![DVec3::ZERO; n];
+        match self.symbolic.perm() {
+            // Unknown k of the factor is unknown `forward[k]` of the matrix.
+            Some(order) => {
+                let (forward, _) = order.arrays();
+                forward.iter().enumerate().for_each(|(k, i)| out[i / 3][i % 3] = rhs[(k, 0)]);
+            }
+            None => (0..3 * n).for_each(|i| out[i / 3][i % 3] = rhs[(i, 0)]),
+        }
+        out
+    }
+
     /// Solves A x = b for several right-hand sides in place.
     pub fn solve(&self, columns: &mut [&mut [DVec3]]) {
         if columns.is_empty() {

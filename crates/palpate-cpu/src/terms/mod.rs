@@ -317,6 +317,11 @@ impl<'a> Equation<'a> {
         self.terms.iter().map(|t| t.potential(u1)).sum()
     }
 
+    /// That of the elements alone, up to a constant [J].
+    pub fn strain_energy(&self, u1: &[DVec3]) -> f64 {
+        self.terms[0].potential(u1)
+    }
+
     /// The tangent stiffness.
     pub fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
         self.terms.iter().for_each(|t| t.tangent(u1, curvature, matrix));

@@ -14,9 +14,10 @@ pub(crate) mod scale;
 mod target;
 #[cfg(test)]
 mod tests;
+mod track;
 mod write;
 
-pub use rework::recast_scene;
+pub use rework::{recast_scene, scene_of_tracks};
 pub use write::{append_effects, name_field_files, write_scene};
 
 use crate::document::{Source, Table};
@@ -97,6 +98,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         solver: solver(&root, of_tets)?,
         observation: observation(&root)?,
         targets: target::targets(&root)?,
+        tracking: track::tracking(&root)?,
         fit: None,
     };
     if scene.gravity.length() > 100.0 {

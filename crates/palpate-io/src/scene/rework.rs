@@ -19,9 +19,7 @@ pub fn recast_scene(
     free: &[String],
     folder: &Path,
 ) -> Result<String, InputError> {
-    let mut doc: DocumentMut = template
-        .parse()
-        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
+    let mut doc = parsed(template, scene)?;
     for key in ["observation", "target", "fit"] {
         doc.remove(key);
     }
@@ -37,11 +35,35 @@ pub fn recast_scene(
     without.iter().flat_map(|keys| *keys).for_each(|key| drop(object.remove(key)));
     with.into_iter().for_each(|(key, value)| set(object, key, value));
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
-    let observation = section(&mut doc, "observation").ok_or_else(|| wrong("observation"))?;
-    set(observation, "recording", Value::from(recording));
-    set(observation, "cost", Value::from("points"));
+    compare_with(&mut doc, scene, recording)?;
     let parameters: Array = free.iter().map(|p| Value::InlineTable(InlineTable::from_iter([("path", p.as_str())]))).collect();
     let fit = section(&mut doc, "fit").ok_or_else(|| wrong("fit"))?;
     fit.insert("parameter", Item::Value(Value::Array(parameters)));
     Ok(doc.to_string())
+}
+
+/// The text of `scene` with another recording, readable from `folder`: its `[observation]` gives way to tracked points at `recording` (relative to
+/// `folder`). All else stays.
+///
+/// # Errors
+/// A template that is no TOML.
+pub fn scene_of_tracks(template: &str, scene: &Scene, recording: &str, folder: &Path) -> Result<String, InputError> {
+    let mut doc = parsed(template, scene)?;
+    doc.remove("observation");
+    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    compare_with(&mut doc, scene, recording)?;
+    Ok(doc.to_string())
+}
+
+fn parsed(template: &str, scene: &Scene) -> Result<DocumentMut, InputError> {
+    let wrong = |e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message()));
+    template.parse().map_err(wrong)
+}
+
+fn compare_with(doc: &mut DocumentMut, scene: &Scene, recording: &str) -> Result<(), InputError> {
+    let wrong = || InputError { key: "observation".into(), ..InputError::file(&scene.path, "must be a table") };
+    let observation = section(doc, "observation").ok_or_else(wrong)?;
+    set(observation, "recording", Value::from(recording));
+    set(observation, "cost", Value::from("points"));
+    Ok(())
 }

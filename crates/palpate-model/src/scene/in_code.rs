@@ -22,6 +22,7 @@ impl Scene {
             solver: Solver::default(),
             observation: None,
             targets: Vec::new(),
+            tracking: Tracking::default(),
             fit: None,
         }
     }

@@ -9,3 +9,4 @@ pub mod import;
 pub mod inspect;
 pub mod observe;
 pub mod simulate;
+pub mod track;

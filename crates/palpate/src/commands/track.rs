@@ -1,0 +1,230 @@
+//! `palpate track`: the moving body in every frame of a recording.
+
+use crate::cli::{Console, INTERRUPTED};
+use crate::error::Error;
+use crate::experiment::{Experiment, short};
+use crate::options::out_folder;
+use crate::results::tracking::{FrameRow, TrackingDocument};
+use crate::results::{self, finite};
+use crate::tracking::{TrackedBody, TrackedFrame, noise, track};
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use palpate_engine::number;
+use palpate_engine::tracking::Doubt;
+use palpate_io::npy::{Array, write_npz};
+use palpate_io::output::{make_folder, write_file};
+use palpate_io::vtk::{Elements, Values, write_vtu};
+use palpate_model::shape::TriMesh;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const AFTER_HELP: &str = "\
+Examples:
+  palpate track leaf.toml --out seen                 arrays, verdicts and a recording of points in seen/
+  palpate track leaf.toml --out seen --format ply    the surface of every frame as well
+  palpate track leaf.toml --out seen && palpate fit seen/scene.toml
+
+The scene's recording says where its cameras or markers saw the body; no forces need to be known. Every frame is the most probable shape
+between what the material allows and what was measured, with the uncertainty of each place. [track] in the scene chooses: prior
+(\"dynamic\": a step from the frame before, \"elastic\": the equilibrium), temperature (J, how far the prior may be wrong; found where absent),
+outliers (share of depth points that are something else) and soft_start (m, how far the body may be from its place).
+
+tracked.json (tracking/1) holds a verdict and a row a frame. tracked.npz holds time [F], displacement and velocity [F, N, 3] of the nodes,
+surface [F, V, 3], sigma [F, V] (m, one coordinate), seen [F, V] and data [F, N] (share of the prior's variance that readings took away);
+nodes [N, 3], rest [V, 3] and triangles are the body at rest.
+recording/ and scene.toml are the scene with the points that were seen as its measurement: `palpate fit` reads them.";
+
+/// Find the moving body in every frame of a recording
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Scene file, with the recording it is tracked in
+    scene: PathBuf,
+    /// Output folder [default: out/SCENE-tracked]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Files per frame, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',')]
+    format: Vec<Format>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// The deformed surface
+    Ply,
+    /// The elements with displacement, velocity and share of data, and a .pvd for the series
+    Vtu,
+}
+
+/// What is wrong, in words.
+fn words(doubt: &Doubt) -> String {
+    match doubt {
+        Doubt::Unmatched(share) => format!("only {:.0} % of the readings meet the body", 100.0 * share),
+        Doubt::Far(rms) => format!("the body lies {} m from its readings", number(*rms)),
+        Doubt::Pierced(share) => format!("{:.1} % of the rays pass through the body", 100.0 * share),
+        Doubt::Jumped(factor) => format!("the elastic energy rose {:.0} times from the frame before", factor),
+        Doubt::Unseen => "has no reading".into(),
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut all: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
+}
+
+fn row(f: &TrackedFrame) -> FrameRow {
+    let of = |seen: bool| median(f.deviation.iter().zip(&f.seen).filter(|(_, s)| **s == seen).map(|(d, _)| *d));
+    FrameRow {
+        time: f.time,
+        readings: f.met.readings,
+        matched: f.met.matched,
+        rms: finite(f.met.rms),
+        deviation_seen: of(true),
+        deviation_hidden: of(false),
+        seen: f.seen.iter().filter(|s| **s).count(),
+        determined: finite(f.determined),
+        temperature: finite(f.temperature),
+        steps: f.steps,
+        cold: f.cold,
+        doubts: f.doubts.iter().map(words).collect(),
+    }
+}
+
+/// The verdict and why.
+fn verdict(t: &TrackedBody) -> (&'static str, String) {
+    let doubted = t.frames.len() - t.sound();
+    let first = t.frames.iter().find(|f| !f.doubts.is_empty());
+    let why = first.map_or(String::new(), |f| {
+        format!("{doubted} of {} frames are doubted, first at {} s: {}", t.frames.len(), short(f.time), words(&f.doubts[0]))
+    });
+    match (t.interrupted, doubted) {
+        (true, _) => {
+            ("interrupted", format!("{} of {} frames were tracked. {why}", t.frames.len(), t.recorded).trim_end().to_string())
+        }
+        (false, 0) => ("tracked", String::new()),
+        _ => ("doubtful", why),
+    }
+}
+
+fn array(shape: &[usize], values: impl Iterator<Item = f64>) -> Array {
+    Array { shape: shape.to_vec(), values: values.collect() }
+}
+
+fn vectors(count: usize, of: impl Iterator<Item = DVec3>) -> Array {
+    let values: Vec<f64> = of.flat_map(|v| v.to_array()).collect();
+    array(&[values.len() / (3 * count.max(1)), count, 3], values.into_iter())
+}
+
+fn write_arrays(folder: &Path, experiment: &Experiment, t: &TrackedBody) -> Result<(), Error> {
+    let nodes = &experiment.plan().body.nodes;
+    let (f, n, v) = (t.frames.len(), t.frames.first().map_or(0, |f| f.data.len()), t.surface.rest.len());
+    let frames = || t.frames.iter();
+    let flag = |b: &bool| f64::from(u8::from(*b));
+    let all = [
+        ("time", array(&[f], frames().map(|x| x.time))),
+        ("displacement", vectors(n, frames().flat_map(|x| x.displacement.iter().copied()))),
+        ("velocity", vectors(n, frames().flat_map(|x| x.velocity.iter().copied()))),
+        ("surface", vectors(v, frames().flat_map(|x| x.surface.iter().copied()))),
+        ("sigma", array(&[f, v], frames().flat_map(|x| x.deviation.iter().copied()))),
+        ("seen", array(&[f, v], frames().flat_map(|x| x.seen.iter().map(flag)))),
+        ("nodes", array(&[nodes.len(), 3], nodes.iter().flat_map(|x| x.to_array()))),
+        ("rest", array(&[v, 3], t.surface.rest.iter().flat_map(|x| x.to_array()))),
+        ("triangles", array(&[t.triangles.len(), 3], t.triangles.iter().flatten().map(|k| f64::from(*k)))),
+        ("data", array(&[f, n], frames().flat_map(|x| x.data.iter().copied()))),
+    ];
+    Ok(write_npz(folder.join("tracked.npz"), &all.iter().map(|(name, a)| (*name, a)).collect::<Vec<_>>())?)
+}
+
+fn write_frames(folder: &Path, experiment: &Experiment, t: &TrackedBody, formats: &[Format]) -> Result<(), Error> {
+    let body = &experiment.plan().body;
+    let elements = Elements::of(body);
+    let mut series = Vec::new();
+    for (k, f) in t.frames.iter().enumerate() {
+        if formats.contains(&Format::Ply) {
+            let mesh = TriMesh { vertices: f.surface.clone(), triangles: t.triangles.clone() };
+            palpate_io::write_ply(folder.join(format!("frame_{k:05}.ply")), &mesh)?;
+        }
+        if formats.contains(&Format::Vtu) {
+            let name = format!("frame_{k:05}.vtu");
+            let points: Vec<DVec3> = body.nodes.iter().zip(&f.displacement).map(|(x, u)| *x + *u).collect();
+            let of_nodes = [
+                ("displacement", Values::Vectors(&f.displacement)),
+                ("velocity", Values::Vectors(&f.velocity)),
+                ("data", Values::Numbers(&f.data)),
+            ];
+            write_vtu(folder.join(&name), &points, &elements, &of_nodes, &[])?;
+            series.push((f.time, name));
+        }
+    }
+    if !series.is_empty() {
+        palpate_io::write_pvd(folder.join("series.pvd"), &series)?;
+    }
+    Ok(())
+}
+
+pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let experiment = Experiment::open(&a.scene)?;
+    console.warn(experiment.warnings());
+    let folder = out_folder(&a.out, &a.scene, "-tracked");
+    make_folder(&folder)?;
+    let clock = Instant::now();
+    let mut progress = console.progress(experiment.plan().observation.frames.len() as u64, "tracking");
+    let interrupt = console.interrupt.clone();
+    let tracked = track(&experiment, |done| {
+        progress.at(done as u64, "");
+        if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    progress.finish();
+    let seconds = clock.elapsed().as_secs_f64();
+    write_arrays(&folder, &experiment, &tracked)?;
+    write_frames(&folder, &experiment, &tracked, &a.format)?;
+    let (verdict, reason) = verdict(&tracked);
+    let document = TrackingDocument {
+        scene: experiment.scene().path.display().to_string(),
+        verdict: verdict.into(),
+        reason: reason.clone(),
+        prior: if tracked.dynamic { "dynamic" } else { "elastic" }.into(),
+        recorded: tracked.recorded,
+        nodes: experiment.plan().body.nodes.len(),
+        places: tracked.surface.rest.len(),
+        seconds,
+        frames: tracked.frames.iter().map(row).collect(),
+    };
+    match tracked.recording(&experiment.scene().title, noise(&experiment)) {
+        Ok(recording) => {
+            palpate_io::write_recording(folder.join("recording"), &recording)?;
+            let text = palpate_io::scene_of_tracks(experiment.text(), experiment.scene(), "recording", &folder)?;
+            write_file(folder.join("scene.toml"), |w| w.write_all(text.as_bytes()))?;
+        }
+        // The frames say what is wrong; nothing of them is to be fitted.
+        Err(e) => console.warn(&[e.to_string()]),
+    }
+    results::write(folder.join("tracked.json"), &document)?;
+    if console.json() {
+        console.print(&results::line(&document));
+    } else {
+        print(console, &document, &folder);
+    }
+    Ok(if tracked.interrupted { INTERRUPTED } else { 0 })
+}
+
+fn print(console: &mut Console, d: &TrackingDocument, folder: &Path) {
+    let because = if d.reason.is_empty() { String::new() } else { format!(": {}", d.reason) };
+    console.print(&format!("{}{because}", d.verdict));
+    let worst = |of: fn(&FrameRow) -> Option<f64>| d.frames.iter().filter_map(of).fold(0.0, f64::max);
+    console.print(&format!(
+        "{}: {} of {} frames, {} nodes, {:.2} s a frame; readings lie at most {} m (rms) from the body; ± of a place that was seen at most {} m, \
+         of a hidden one {} m; files in {}",
+        d.scene,
+        d.frames.len(),
+        d.recorded,
+        d.nodes,
+        d.seconds / d.frames.len().max(1) as f64,
+        number(worst(|f| f.rms)),
+        number(worst(|f| f.deviation_seen)),
+        number(worst(|f| f.deviation_hidden)),
+        folder.display()
+    ));
+}
