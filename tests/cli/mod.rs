@@ -5,6 +5,7 @@ mod effects;
 mod fields;
 mod fitting;
 mod tets;
+mod tracking;
 mod usage;
 
 use support::command::{arg, succeed};

@@ -119,6 +119,7 @@ impl Made {
             solver: Solver { tetrahedron: self.tetrahedron, ..Solver::default() },
             observation: None,
             targets: Vec::new(),
+            tracking: palpate_model::scene::Tracking::default(),
             fit: None,
         }
     }

@@ -19,7 +19,7 @@ impl Noise {
         2.0 * (self.0 >> 11) as f64 / (1u64 << 53) as f64 - 1.0
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(crate) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.next(), self.next(), self.next())
     }
 }

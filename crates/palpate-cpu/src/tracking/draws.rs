@@ -19,8 +19,8 @@ use palpate_engine::tracking::Certainty;
 const DIRECTIONS: usize = 240;
 /// Directions between two looks at the eigenvalues.
 const LOOK: usize = 20;
-/// An eigenvalue that is smaller says nothing: its direction is the prior's but for a hundredth.
-const FAINT: f64 = 0.02;
+/// Growth of γ from look to look at which what is left says nothing.
+const GROWTH: f64 = 0.01;
 
 /// Directions that readings determine, and the eigenvalue λ of each.
 struct Spectrum {
@@ -40,7 +40,7 @@ pub fn certainty(
     let inverse = |b: &[DVec3]| solved(&k.prepared, b);
     let spectrum = spectrum(&inverse, |v| scaled(temperature, &pulls.product(v)), draws.first().map_or(&[][..], |d| d));
     let excess = inverse(residual).map_or(0.0, |x| 0.5 * dot(&x, residual));
-    let determined = spectrum.values.iter().map(|l| l / (1.0 + l)).sum();
+    let determined = determined(&spectrum.values);
     let (mut posterior, mut prior) = (Vec::new(), Vec::new());
     if let Prepared::Direct(factor) = &k.prepared {
         let root = temperature.sqrt();
@@ -58,6 +58,11 @@ pub fn certainty(
         }
     }
     Certainty { posterior, prior, determined, excess, energy }
+}
+
+/// γ = Σ λ/(1 + λ); it grows with every direction of Lanczos' method.
+fn determined(values: &[f64]) -> f64 {
+    values.iter().map(|l| l.max(0.0)).map(|l| l / (1.0 + l)).sum()
 }
 
 fn scaled(factor: f64, v: &[DVec3]) -> Nodes {
@@ -86,11 +91,11 @@ fn spectrum(inverse: &dyn Fn(&[DVec3]) -> Option<Nodes>, b: impl Fn(&[DVec3]) ->
     let mut force = b(draw);
     let Some(mut next) = inverse(&force) else { return found };
     let first = dot(&next, &force).max(0.0).sqrt();
-    if first == 0.0 || draw.is_empty() {
+    if first == 0.0 {
         return found;
     }
     let mut length = first;
-    let mut eigen = None;
+    let (mut eigen, mut known) = (None, 0.0);
     while basis.len() < DIRECTIONS.min(3 * draw.len()) {
         basis.push(scaled(1.0 / length, &next));
         forces.push(scaled(1.0 / length, &force));
@@ -111,9 +116,11 @@ fn spectrum(inverse: &dyn Fn(&[DVec3]) -> Option<Nodes>, b: impl Fn(&[DVec3]) ->
         let exhausted = length <= 1e-12 * first;
         if exhausted || basis.len().is_multiple_of(LOOK) || basis.len() == DIRECTIONS {
             eigen = tridiagonal(&diagonal, &beside);
-            if exhausted || eigen.as_ref().is_none_or(|(values, _)| values.iter().any(|l| *l < FAINT)) {
+            let now = eigen.as_ref().map_or(known, |(values, _)| determined(values));
+            if exhausted || now - known <= GROWTH * now {
                 break;
             }
+            known = now;
         }
         beside.push(length);
     }

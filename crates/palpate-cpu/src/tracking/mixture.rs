@@ -22,6 +22,8 @@ const PAIRS: usize = 4_000_000;
 #[derive(Debug)]
 pub struct Mixture {
     pub shares: Vec<(f64, DVec3)>,
+    /// Logarithm of the likelihood of all points, up to a constant.
+    pub likelihood: f64,
 }
 
 /// Every so-manieth of `n` things.
@@ -52,13 +54,11 @@ impl Mixture {
 fn shares(points: &[ObservedPoint], positions: &[DVec3], weights: &[Vec<f64>], spread: f64, outliers: f64) -> Mixture {
     let mut shares = vec![(0.0, DVec3::ZERO); positions.len()];
     if points.is_empty() {
-        return Mixture { shares };
+        return Mixture { shares, likelihood: 0.0 };
     }
-    let (low, high) = points
-        .iter()
-        .map(|p| p.position)
-        .chain(positions.iter().copied())
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    // Where points can be, outliers are.
+    let of_points = points.iter().map(|p| p.position);
+    let (low, high) = of_points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     let side = (high - low).max(DVec3::splat(spread));
     let volume = side.x * side.y * side.z;
     // Wide Gaussians hold everything: then a sample is as good.
@@ -101,7 +101,8 @@ fn shares(points: &[ObservedPoint], positions: &[DVec3], weights: &[Vec<f64>], s
         })
         .collect();
     some_places.iter().zip(found).for_each(|(k, s)| shares[*k] = s);
-    Mixture { shares }
+    let likelihood = thin as f64 * sums.iter().filter(|s| **s > 0.0).map(|s| s.ln()).sum::<f64>();
+    Mixture { shares, likelihood }
 }
 
 #[cfg(test)]
@@ -126,11 +127,8 @@ mod tests {
         let weights: Vec<f64> = (0..places.len()).map(|k| if k % 7 == 0 { 0.0 } else { 1.0 + 0.1 * (k % 3) as f64 }).collect();
         let (spread, w) = (0.015, 0.1);
         let found = shares(&seen, &places, &[weights.clone()], spread, w);
-        let (low, high) = seen
-            .iter()
-            .map(|p| p.position)
-            .chain(places.iter().copied())
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        let at = seen.iter().map(|p| p.position);
+        let (low, high) = at.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         let side = (high - low).max(DVec3::splat(spread));
         let volume = side.x * side.y * side.z;
         let l = |k: usize, n: usize| {

@@ -9,6 +9,8 @@ mod draws;
 mod mixture;
 mod pull;
 mod surface;
+#[cfg(test)]
+mod tests;
 
 use crate::linear::conjugate_gradient::{self, CgEnd, Precondition};
 use crate::linear::jacobi::BlockJacobi;
