@@ -39,6 +39,8 @@ const ITERATIONS: usize = 400;
 const ARMIJO: f64 = 1e-4;
 /// Times that a step is halved.
 const HALVINGS: usize = 20;
+/// Most that a step changes the deformation gradient of an element: what is linear in the displacement stretches where it should turn.
+const TURN: f64 = 0.5;
 
 /// A body on its way from frame to frame.
 #[derive(Debug)]
@@ -162,7 +164,14 @@ impl Operator for Total<'_> {
 }
 
 /// One step of Gauss–Newton's method; how far its model says that Φ falls.
-fn step(shared: &Shared, equation: &mut Equation, problem: &Problem, pulls: &dyn Pulls, u: &mut Nodes) -> Result<f64, Reason> {
+fn step(
+    shared: &Shared,
+    places: &Places,
+    equation: &mut Equation,
+    problem: &Problem,
+    pulls: &dyn Pulls,
+    u: &mut Nodes,
+) -> Result<f64, Reason> {
     let temperature = problem.temperature;
     let balance = balance(problem, equation);
     let mut slope = equation.residual(u);
@@ -187,7 +196,7 @@ fn step(shared: &Shared, equation: &mut Equation, problem: &Problem, pulls: &dyn
         equation.potential(u) - balance.as_ref().map_or(0.0, |b| dot(b, u)) + temperature * pulls.value(u)
     };
     let before = value(&start, equation);
-    let mut length = 1.0;
+    let mut length = (TURN / places.largest_gradient(&direction)).min(1.0);
     for _ in 0..HALVINGS {
         u.copy_from_slice(&start);
         add_scaled(u, length, &direction);
@@ -229,7 +238,7 @@ impl Follow for Tracker {
                 Box::new(ByMixture::new(&shared.plan.body, mixture, look, u))
             }
         };
-        step(shared, &mut equation, problem, pulls.as_ref(), u).map_err(self.failure(problem.frame))
+        step(shared, &self.places, &mut equation, problem, pulls.as_ref(), u).map_err(self.failure(problem.frame))
     }
 
     fn look(&mut self, frame: usize, u: &[DVec3], band: f64) -> Met {

@@ -96,6 +96,12 @@ impl Places {
         Places { spacing: (body.area / body.patches.len().max(1) as f64).sqrt(), gradients }
     }
 
+    /// Largest displacement gradient in an element (Frobenius norm).
+    pub fn largest_gradient(&self, u: &[DVec3]) -> f64 {
+        let square = |m: DMat3| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();
+        self.gradients.iter().map(|s| square(s.gradient_of(u))).fold(0.0, f64::max).sqrt()
+    }
+
     /// Where they are at displacement u `[N]`.
     pub fn at(&self, body: &Body, u: &[DVec3]) -> Vec<Place> {
         let turned: Vec<DMat3> = self.gradients.iter().map(|s| cofactor(DMat3::IDENTITY + s.gradient_of(u))).collect();
