@@ -23,6 +23,7 @@ const PAIRS: usize = 4_000_000;
 pub struct Mixture {
     pub shares: Vec<(f64, DVec3)>,
     /// Logarithm of the likelihood of all points, up to a constant.
+    #[cfg(test)]
     pub likelihood: f64,
 }
 
@@ -54,7 +55,11 @@ impl Mixture {
 fn shares(points: &[ObservedPoint], positions: &[DVec3], weights: &[Vec<f64>], spread: f64, outliers: f64) -> Mixture {
     let mut shares = vec![(0.0, DVec3::ZERO); positions.len()];
     if points.is_empty() {
-        return Mixture { shares, likelihood: 0.0 };
+        return Mixture {
+            shares,
+            #[cfg(test)]
+            likelihood: 0.0,
+        };
     }
     // Where points can be, outliers are.
     let of_points = points.iter().map(|p| p.position);
@@ -101,8 +106,11 @@ fn shares(points: &[ObservedPoint], positions: &[DVec3], weights: &[Vec<f64>], s
         })
         .collect();
     some_places.iter().zip(found).for_each(|(k, s)| shares[*k] = s);
-    let likelihood = thin as f64 * sums.iter().filter(|s| **s > 0.0).map(|s| s.ln()).sum::<f64>();
-    Mixture { shares, likelihood }
+    Mixture {
+        shares,
+        #[cfg(test)]
+        likelihood: thin as f64 * sums.iter().filter(|s| **s > 0.0).map(|s| s.ln()).sum::<f64>(),
+    }
 }
 
 #[cfg(test)]

@@ -154,7 +154,7 @@ fn evaluations_of_a_body_pressed_inside_out_agree_and_one_percent_shows() {
 }
 
 /// A soft block of some thirty cells thrown at the ground, which crushes it.
-fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
+pub(super) fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
     let mut s = ball(0.03);
     let (min, max) = (DVec3::new(0.0, 0.0, 0.01), DVec3::new(0.1, 0.08, 0.09));
     s.object.source = BodySource::Analytic(Analytic::Box { min, max });

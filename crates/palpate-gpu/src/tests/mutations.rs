@@ -2,10 +2,12 @@
 //! smallest cell is one percent stiffer. `PALPATE_MUTANTS` in the environment
 //! lists kernels, or says `all`; otherwise one out of [`PART`] stands for them.
 
+use super::collapse::thrown;
 use super::effects::with;
 use super::elastic::{of_tets, seen as marked};
 use super::faults::busy;
 use super::scenes::{ball, held, own_device};
+use super::tet_effects::{slipping, spinning};
 use super::{cell_laws::lawful, products};
 use crate::costs::rollout_tests::{AGREEMENT, differences_beyond, seen, watched};
 use crate::device::Gpu;
@@ -14,6 +16,7 @@ use crate::{GpuBackend, Product, Tuning};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::find;
@@ -30,12 +33,30 @@ const WATCHED: [(&str, &str); 3] = [
     ("close_cg", "limits::conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations"),
 ];
 
+/// Lines that may be wrong without any result being so, and why.
+const EQUIVALENT: [(&str, &str, &str); 9] = [
+    ("begin_solve", "n.scale = f.x + f.y + f.z + f.w;", "says when Newton's method ends, which passes its tolerance by far"),
+    ("invert_diagonal", "mass += mass_values[p.member * shape.masses + s] * w * w;", "a preconditioner"),
+    (
+        "judge_trial",
+        "let falls = s.y < n.potential - rounding;",
+        "the solution is where the residual vanishes, whatever the way there",
+    ),
+    ("place_next", "w = (exp2(-f32(n.trial)) - 1.0) * (shape.dt * v + fall);", "a guess"),
+    ("press_elastic", "energy += 0.5 * mix.rate * contract(g, linear_stress(g, lame));", "compared where a step is judged alone"),
+    ("pull_holds", "let poses = extractBits(call.extra, POSES_AT, MATRICES_AT - POSES_AT);", "more bits of a small number"),
+    ("push_holds", "let poses = extractBits(call.extra, POSES_AT, MATRICES_AT - POSES_AT);", "likewise"),
+    ("look_cg", "n.trial += 1u;", "counts"),
+    ("couple_old", "shift += turn;", "a rigid motion of both states"),
+];
+
 /// A plan, how it is solved, what is asked of it, and what the CPU makes of it.
 struct Subject {
     plan: Plan,
     tuning: Tuning,
     request: Request,
-    right: Evaluation,
+    /// What each member of the batch should give.
+    right: Vec<Evaluation>,
     /// How far it may be off.
     allowed: f64,
 }
@@ -46,17 +67,21 @@ const ONE: Tuning = Tuning { many_from: usize::MAX, product: Some(Product::Matri
 
 impl Subject {
     fn new(plan: Plan, tuning: Tuning) -> Subject {
-        let mut cpu = Rollout::new(CpuBackend, &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+        Subject::of_members(plan, tuning, 1)
+    }
+
+    fn of_members(plan: Plan, tuning: Tuning, members: usize) -> Subject {
+        let mut cpu = Rollout::new(CpuBackend, &plan, members).unwrap_or_else(|e| panic!("{e}"));
         let mut of = |sensitivities: Vec<usize>| {
             let request = Request { gradient: Wanted::All, sensitivities };
-            let right = cpu.evaluate(&moved(&plan), &request).remove(0);
-            assert!(right.failure.is_none(), "{:?}", right.failure);
+            let right = cpu.evaluate(&moved(&plan, members), &request);
+            right.iter().for_each(|r| assert!(r.failure.is_none(), "{:?}", r.failure));
             (request, right)
         };
         // What moves nothing has nothing to be compared with.
         let (all, whole) = of((0..plan.layout.len()).collect());
         let count = all.sensitivities.len();
-        let moves = |i: &usize| whole.curvature.as_ref().is_some_and(|c| c.matrix[i * (count + 1)] > 0.0);
+        let moves = |i: &usize| whole[0].curvature.as_ref().is_some_and(|c| c.matrix[i * (count + 1)] > 0.0);
         let (request, right) = of(all.sensitivities.into_iter().filter(moves).collect());
         Subject { plan, tuning, request, right, allowed: AGREEMENT }
     }
@@ -64,23 +89,27 @@ impl Subject {
     /// Numbers in which the device differs from the CPU, or the words of a failure.
     fn told(&self, gpu: &Arc<Gpu>) -> Vec<String> {
         let backend = GpuBackend::on(gpu.clone()).tuned(self.tuning);
-        let mut rollout = match Rollout::new(backend, &self.plan, 1) {
+        let mut rollout = match Rollout::new(backend, &self.plan, self.right.len()) {
             Ok(r) => r,
             Err(e) => return vec![e.to_string()],
         };
-        let found = rollout.evaluate(&moved(&self.plan), &self.request).remove(0);
-        match found.failure {
+        let found = rollout.evaluate(&moved(&self.plan, self.right.len()), &self.request);
+        let told = |(found, right): (Evaluation, &Evaluation)| match found.failure {
             Some(f) => vec![f.to_string()],
-            None => differences_beyond(self.allowed, &found, &self.right, &self.request.sensitivities),
-        }
+            None => differences_beyond(self.allowed, &found, right, &self.request.sensitivities),
+        };
+        found.into_iter().zip(&self.right).flat_map(told).collect()
     }
 }
 
-/// Away from what was measured, so that there is something to explain.
-fn moved(plan: &Plan) -> ParamBatch {
-    let mut row = plan.theta.clone();
-    row[plan.layout.index(ParamKey::YoungsModulus)] *= 1.2;
-    ParamBatch::from_rows(&[row])
+/// Away from what was measured, so that there is something to explain, each member farther.
+fn moved(plan: &Plan, members: usize) -> ParamBatch {
+    let row = |b: usize| {
+        let mut row = plan.theta.clone();
+        row[plan.layout.index(ParamKey::YoungsModulus)] *= 1.2 + 0.1 * b as f64;
+        row
+    };
+    ParamBatch::from_rows(&(0..members).map(row).collect::<Vec<_>>())
 }
 
 /// Few iterations of Newton's method: right kernels need no more, and wrong ones do not take long.
@@ -107,12 +136,44 @@ fn subjects() -> Vec<Subject> {
     with(&mut hanging, "density-gradient", &[("slope", &[3.0])]);
     let mut bare = short(products::crowded());
     bare.observation = watched();
+    // A clamp that slips, other stress-free shapes, what flows and what ages: of cells, of tetrahedra, and of a body that spins freely.
+    let mut slipping_cells = short(held(0.03));
+    slipping_cells.initial.velocity.z = -1.0;
+    slipping_cells.time.steps = 2;
+    slipping_cells.observation = watched();
+    with(
+        &mut slipping_cells,
+        "clamp-slip",
+        &[("offset", &[0.002, -0.001, 0.001]), ("turn", &[0.02, 0.01, -0.03]), ("drift", &[0.02])],
+    );
+    with(&mut slipping_cells, "rest-shape", &[("stretch", &[0.04, -0.02, 0.03]), ("bend_x_to_z", &[1.5])]);
+    with(&mut slipping_cells, "strain-stiffening", &[("coefficient", &[60.0])]);
+    with(&mut slipping_cells, "structural-damping", &[("loss", &[1.0])]);
+    with(&mut slipping_cells, "creep", &[("fraction", &[0.6]), ("time", &[0.005])]);
+    slipping_cells.material.viscosity = Some(Viscosity { coefficient: 40.0, exponent: 0.7 });
+    let mut slipping_tets = short(slipping(of_tets(held(0.03), Tetrahedron::Linear, 1), 0.004));
+    with(&mut slipping_tets, "power-law-viscosity", &[("coefficient", &[0.2]), ("exponent", &[0.6])]);
+    let mut spinning_cells = short(busy(ball(0.03)));
+    spinning_cells.time.steps = 2;
+    spinning_cells.initial.angular_velocity = DVec3::new(0.0, 3.0, 5.0);
+    with(&mut spinning_cells, "rest-shape", &[("stretch", &[0.02, -0.01, 0.015]), ("bend_y_to_z", &[0.8])]);
+    let mut crushed = thrown(300.0, 3);
+    crushed.observation = watched();
+    let loose = |subject: Subject, allowed: f64| Subject { allowed, ..subject };
     vec![
         Subject::new(seen(&crowded), MANY),
         Subject::new(seen(&bare), FREE),
         Subject::new(seen(&bare), ONE),
         Subject::new(seen(&lawful_ball), MANY),
         Subject::new(marked(&hanging), MANY),
+        Subject::new(seen(&slipping_cells), MANY),
+        // What is lost depends on differences of strains, which in a slow step leave three digits.
+        loose(Subject::new(marked(&slipping_tets), MANY), 1e-3),
+        Subject::new(seen(&spinning_cells), MANY),
+        loose(Subject::new(marked(&short(spinning())), MANY), 5e-4),
+        // A body that folds does not forget rounding.
+        loose(Subject::new(seen(&crushed), MANY), 5e-3),
+        loose(Subject::new(seen(&crushed), FREE), 5e-3),
     ]
 }
 
@@ -207,8 +268,9 @@ fn a_kernel_that_is_wrong_is_found_out() {
             let seen = |gpu: &Arc<Gpu>| (first..subjects.len()).find_map(|k| subjects[k].told(gpu).into_iter().next());
             let Some(caught) = with_wrong(&mut gpu, pass, wrong, seen) else { continue };
             made += 1;
-            println!("{}: {kind} in `{line}`: {}", source.name, caught.as_deref().unwrap_or("NOT SEEN"));
-            if caught.is_none() {
+            let reason = EQUIVALENT.iter().find(|e| e.0 == source.name && e.1 == *line).map(|e| e.2);
+            println!("{}: {kind} in `{line}`: {}", source.name, caught.as_deref().or(reason).unwrap_or("NOT SEEN"));
+            if caught.is_none() && reason.is_none() {
                 survivors.push(format!("{}: {kind} in `{line}`", source.name));
             }
         }
@@ -268,7 +330,9 @@ fn small() -> Vec<(Subject, usize)> {
         (close(Subject::new(plan.clone(), tuning)), smallest.unwrap_or_else(|| panic!("a body has cells")))
     };
     let of_tets = (close(Subject::new(marked(&tets), MANY)), 0);
-    vec![of_cells(&plain, MANY), of_cells(&plain, FREE), of_cells(&lawful_one, MANY), of_tets, of_cells(&late, MANY)]
+    let mut two = of_cells(&plain, MANY);
+    two.0 = close(Subject::of_members(two.0.plan.clone(), MANY, 2));
+    vec![two, of_cells(&plain, FREE), of_cells(&lawful_one, MANY), of_tets, of_cells(&late, MANY)]
 }
 
 /// Whether a kernel does more than declare how stiff an element is, or note it for a cell (`shared/corner`).
