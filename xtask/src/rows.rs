@@ -46,14 +46,20 @@ pub enum Measured {
 impl Measured {
     fn paths(self) -> Vec<&'static str> {
         // Tests move no figure either: folders of them, and files whose name ends so.
-        // Neither do imports: a fit reads what they wrote.
-        const NEITHER: [&str; 9] = [
+        // Neither do imports and tracking: a fit reads what they wrote.
+        const NEITHER: [&str; 15] = [
             "crates",
             ":!crates/palpate-gpu",
             ":!crates/palpate-import",
             ":!crates/palpate/src/commands/import.rs",
             ":!crates/palpate/src/results/import.rs",
             ":!crates/palpate/src/report",
+            ":!crates/palpate-cpu/src/tracking",
+            ":!crates/palpate-engine/src/tracking.rs",
+            ":!crates/palpate-io/src/scene/track.rs",
+            ":!crates/palpate/src/tracking.rs",
+            ":!crates/palpate/src/commands/track.rs",
+            ":!crates/palpate/src/results/tracking.rs",
             ":!crates/*/src/tests",
             ":!crates/*/tests/*",
             ":!crates/*tests.rs",

@@ -229,7 +229,8 @@ impl Temperature {
 /// Least temperature over the first guess: a frame at rest says little of the motion that follows.
 const COLDEST: f64 = 1e-4;
 
-/// Tracks the frames, by rising time, and hands each to `visit`; ends when that breaks. `draws` are standard normal `[S, N]`.
+/// Tracks the frames, by rising time, and hands each to `visit`; ends when that breaks. `draws` are standard normal `[S, N]`. A frame that is
+/// lost is looked for once more without correspondences, from the last frame that was not.
 ///
 /// # Errors
 /// The start or a solve fails.
@@ -241,64 +242,26 @@ pub fn track(
     draws: &[Vec<DVec3>],
     mut visit: impl FnMut(Tracked) -> ControlFlow<()>,
 ) -> Result<(), Failure> {
-    let mut pose = body.start()?;
-    let mut now = start;
-    let mut learnt = Temperature::default();
-    let mut first = settings.temperature;
-    let mut energy: Option<f64> = None;
+    let pose = body.start()?;
+    let mut course = Course {
+        settings,
+        draws,
+        usual: usual(frames),
+        pose,
+        now: start,
+        energy: None,
+        first: None,
+        learnt: Temperature::default(),
+    };
     for &(frame, time) in frames {
-        let length = interval(frames, frame, time - now);
-        let prior = match settings.dynamic {
-            false => Prior::Equilibrium,
-            true if time > now => Prior::Step(&pose, length),
-            true => Prior::Held(&pose, length),
-        };
-        let guess = guess(body, settings, &pose, frame, time - now);
-        let hottest = match first {
-            Some(t) => t,
-            None => *first.insert(loose(body, settings, Problem { frame, prior, temperature: 1.0 }, &guess, draws)?),
-        };
-        let own = settings.temperature.or_else(|| learnt.now().map(|t| t.max(COLDEST * hottest)));
-        let mut problem = Problem { frame, prior, temperature: own.unwrap_or(hottest) };
-        let mut u = guess;
-        let (mut steps, cold) = settle(body, settings, &problem, &mut u)?;
-        let band = last_band(settings);
-        let mut certainty = body.certainty(&problem, band, &u, draws)?;
-        if settings.temperature.is_none() {
-            for _ in 0..REHEATS {
-                let Some(wanted) = own_temperature(&certainty).map(|t| t.max(COLDEST * hottest)) else { break };
-                let cools = own.is_none() && wanted * HOTTER < problem.temperature;
-                if wanted < HOTTER * problem.temperature && !cools {
-                    break;
-                }
-                problem.temperature = wanted;
-                steps += surface(body, settings, &problem, &mut u)?;
-                certainty = body.certainty(&problem, band, &u, draws)?;
+        let mut found = course.find(body, frame, time, false)?;
+        if found.is_lost() && !found.cold {
+            let again = course.find(body, frame, time, true)?;
+            if (again.doubts.len(), again.met.cost) < (found.doubts.len(), found.met.cost) {
+                found = again;
             }
-            learnt.learn(&certainty);
         }
-        let met = body.look(frame, &u, band);
-        let velocity = match (settings.dynamic || time > now, time > now) {
-            (true, true) => u.iter().zip(&pose.displacement).map(|(new, old)| (*new - *old) / (time - now)).collect(),
-            _ => pose.velocity.clone(),
-        };
-        let found = Tracked {
-            frame,
-            time,
-            met,
-            seen: body.seen(frame, &u),
-            doubts: doubts(body, settings, frame, &u, &met, (&certainty, problem.temperature, energy)),
-            temperature: problem.temperature,
-            steps,
-            cold,
-            pose: Pose { displacement: u, velocity },
-            certainty,
-        };
-        energy = Some(found.certainty.energy);
-        if found.met.readings > 0 {
-            pose = found.pose.clone();
-            now = time;
-        }
+        course.learn(&found);
         if visit(found).is_break() {
             break;
         }
@@ -306,14 +269,97 @@ pub fn track(
     Ok(())
 }
 
-/// Seconds of the prior's step: what has passed, or where that is nothing the mean distance of frames.
-fn interval(frames: &[(usize, f64)], frame: usize, passed: f64) -> f64 {
-    if passed > 0.0 {
-        return passed;
+impl Tracked {
+    /// True where the body is not where it was found.
+    fn is_lost(&self) -> bool {
+        self.doubts.iter().any(|d| matches!(d, Doubt::Far(_) | Doubt::Pierced(_) | Doubt::Jumped(_)))
     }
-    let (first, last) = (frames[0].1, frames[frames.len() - 1].1);
-    debug_assert!(frames.iter().any(|f| f.0 == frame));
-    if last > first { (last - first) / (frames.len() - 1) as f64 } else { 1.0 / 30.0 }
+}
+
+/// Where the body is on its way through the frames.
+struct Course<'a> {
+    settings: &'a Settings,
+    draws: &'a [Vec<DVec3>],
+    /// Mean time between frames [s].
+    usual: f64,
+    /// Of the last frame that was met.
+    pose: Pose,
+    /// Its time [s].
+    now: f64,
+    /// Its elastic energy [J].
+    energy: Option<f64>,
+    /// The first guess of the temperature [J].
+    first: Option<f64>,
+    learnt: Temperature,
+}
+
+impl Course<'_> {
+    /// Finds the body in a frame; `afresh` without trusting any correspondence.
+    fn find(&mut self, body: &mut dyn Follow, frame: usize, time: f64, afresh: bool) -> Result<Tracked, Failure> {
+        let (settings, draws, passed) = (self.settings, self.draws, time - self.now);
+        let prior = match settings.dynamic {
+            false => Prior::Equilibrium,
+            true if passed > 0.0 => Prior::Step(&self.pose, passed),
+            true => Prior::Held(&self.pose, self.usual),
+        };
+        let mut u = guess(body, settings, &self.pose, frame, passed);
+        let first = match settings.temperature.or(self.first) {
+            Some(t) => t,
+            None => *self.first.insert(loose(body, settings, Problem { frame, prior, temperature: 1.0 }, &u, draws)?),
+        };
+        let coldest = |t: f64| t.max(COLDEST * first);
+        let own = settings.temperature.or_else(|| self.learnt.now().map(coldest));
+        let mut problem = Problem { frame, prior, temperature: own.unwrap_or(first) };
+        let (mut steps, cold) = settle(body, settings, &problem, afresh, &mut u)?;
+        let band = last_band(settings);
+        let mut certainty = body.certainty(&problem, band, &u, draws)?;
+        for _ in 0..REHEATS {
+            let Some(wanted) = own_temperature(&certainty).map(coldest).filter(|_| settings.temperature.is_none()) else { break };
+            let cools = own.is_none() && wanted * HOTTER < problem.temperature;
+            if wanted < HOTTER * problem.temperature && !cools {
+                break;
+            }
+            problem.temperature = wanted;
+            steps += surface(body, settings, &problem, &mut u)?;
+            certainty = body.certainty(&problem, band, &u, draws)?;
+        }
+        let met = body.look(frame, &u, band);
+        let velocity = match passed > 0.0 {
+            true => u.iter().zip(&self.pose.displacement).map(|(new, old)| (*new - *old) / passed).collect(),
+            false => self.pose.velocity.clone(),
+        };
+        Ok(Tracked {
+            frame,
+            time,
+            met,
+            seen: body.seen(frame, &u),
+            doubts: doubts(body, settings, frame, &u, &met, (&certainty, problem.temperature, self.energy)),
+            temperature: problem.temperature,
+            steps,
+            cold,
+            pose: Pose { displacement: u, velocity },
+            certainty,
+        })
+    }
+
+    /// Goes on from a frame, unless nothing was seen in it or the body was lost.
+    fn learn(&mut self, found: &Tracked) {
+        if found.met.readings == 0 || found.is_lost() {
+            return;
+        }
+        self.learnt.learn(&found.certainty);
+        self.pose = found.pose.clone();
+        self.now = found.time;
+        self.energy = Some(found.certainty.energy);
+    }
+}
+
+/// Mean time between frames [s]; of one frame that of usual cameras.
+fn usual(frames: &[(usize, f64)]) -> f64 {
+    match (frames.first(), frames.last()) {
+        (Some(first), Some(last)) if last.1 > first.1 => (last.1 - first.1) / (frames.len() - 1) as f64,
+        _ => 1.0 / 30.0,
+    }
 }
 
 /// Where the frame before leads, or that frame where it meets the readings better.
@@ -351,9 +397,15 @@ fn last_band(settings: &Settings) -> f64 {
 }
 
 /// Both phases; the steps they took, and whether the first was needed.
-fn settle(body: &mut dyn Follow, settings: &Settings, problem: &Problem, u: &mut Vec<DVec3>) -> Result<(usize, bool), Failure> {
+fn settle(
+    body: &mut dyn Follow,
+    settings: &Settings,
+    problem: &Problem,
+    afresh: bool,
+    u: &mut Vec<DVec3>,
+) -> Result<(usize, bool), Failure> {
     let met = body.look(problem.frame, u, settings.widest);
-    let cold = met.readings > 0 && met.share() < NEAR - settings.outliers;
+    let cold = met.readings > 0 && (afresh || met.share() < NEAR - settings.outliers);
     let mut steps = 0;
     if cold {
         // As wide as the body at most: beyond, every place draws alike.
@@ -426,4 +478,165 @@ fn doubts(
         doubts.push(Doubt::Jumped(certainty.energy / before));
     }
     doubts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point on a spring: readings draw it from its place, and the mixture reaches farther than the surface.
+    struct Point {
+        readings: Vec<Option<f64>>,
+        asked: Vec<(usize, Pull)>,
+        pierced: Vec<f64>,
+    }
+
+    const STIFFNESS: f64 = 1.0;
+    const REACH: f64 = 0.3;
+
+    impl Follow for Point {
+        fn start(&mut self) -> Result<Pose, Failure> {
+            Ok(Pose { displacement: vec![DVec3::ZERO], velocity: vec![DVec3::ZERO] })
+        }
+
+        fn approach(&mut self, problem: &Problem, pull: Pull, u: &mut Vec<DVec3>) -> Result<f64, Failure> {
+            self.asked.push((problem.frame, pull));
+            let from = match problem.prior {
+                Prior::Step(pose, _) | Prior::Held(pose, _) => pose.displacement[0].x,
+                Prior::Equilibrium => 0.0,
+            };
+            let near = |goal: f64| match pull {
+                Pull::Mixture { .. } => true,
+                Pull::Surface { band } => (goal - u[0].x).abs() < band.min(REACH),
+            };
+            let goal = self.readings[problem.frame].filter(|g| near(*g));
+            let weight = problem.temperature * 1e4;
+            let best = goal.map_or(from, |g| (STIFFNESS * from + weight * g) / (STIFFNESS + weight));
+            let fall = 0.5 * (best - u[0].x).powi(2) * 1e4;
+            u[0].x = best;
+            Ok(fall)
+        }
+
+        fn look(&mut self, frame: usize, u: &[DVec3], band: f64) -> Met {
+            let Some(goal) = self.readings[frame] else { return Met::default() };
+            let away = (goal - u[0].x).abs();
+            let matched = usize::from(away < band.min(REACH));
+            Met { readings: 1, matched, rms: away * matched as f64, cost: 0.5e4 * away.min(band).powi(2) }
+        }
+
+        fn certainty(&mut self, p: &Problem, _: f64, _: &[DVec3], _: &[Vec<DVec3>]) -> Result<Certainty, Failure> {
+            let prior = vec![vec![DVec3::splat((p.temperature / STIFFNESS).sqrt())]];
+            Ok(Certainty { posterior: prior.clone(), prior, determined: 1.0, excess: 0.5 * p.temperature, energy: 0.0 })
+        }
+
+        fn pierced(&mut self, frame: usize, _: &[DVec3]) -> f64 {
+            let cold = self.asked.iter().any(|(f, pull)| *f == frame && matches!(pull, Pull::Mixture { .. }));
+            if cold { 0.0 } else { self.pierced[frame] }
+        }
+
+        fn seen(&mut self, frame: usize, _: &[DVec3]) -> Vec<bool> {
+            vec![self.readings[frame].is_some()]
+        }
+    }
+
+    fn followed(mut body: Point) -> (Vec<Tracked>, Vec<(usize, Pull)>) {
+        let settings = Settings {
+            dynamic: true,
+            temperature: None,
+            outliers: 0.0,
+            spread: None,
+            widest: 0.1,
+            spacing: 0.01,
+            noise: 0.01,
+            size: 1.0,
+        };
+        let frames: Vec<(usize, f64)> = (0..body.readings.len()).map(|k| (k, 0.1 * k as f64)).collect();
+        let mut all = Vec::new();
+        let visit = |t: Tracked| {
+            all.push(t);
+            ControlFlow::Continue(())
+        };
+        track(&mut body, &settings, &frames, 0.0, &[vec![DVec3::ONE]], visit).unwrap();
+        (all, body.asked)
+    }
+
+    fn mixtures(asked: &[(usize, Pull)], frame: usize) -> usize {
+        asked.iter().filter(|(f, pull)| *f == frame && matches!(pull, Pull::Mixture { .. })).count()
+    }
+
+    #[test]
+    fn near_frames_need_no_mixture_and_far_ones_do() {
+        let readings = vec![Some(0.0), Some(0.02), Some(0.8)];
+        let (all, asked) = followed(Point { pierced: vec![0.0; 3], readings, asked: Vec::new() });
+        assert_eq!([0, 1, 2].map(|f| mixtures(&asked, f) > 0), [false, false, true]);
+        assert_eq!(all.iter().map(|t| t.cold).collect::<Vec<_>>(), [false, false, true]);
+        // What draws has the weight 1e4 of a noise of 1 cm.
+        assert!((all[1].pose.displacement[0].x - 0.02).abs() < 0.011, "{:?}", all[1].pose);
+        assert!(
+            (all[1].pose.velocity[0].x - all[1].pose.displacement[0].x / 0.1 + all[0].pose.displacement[0].x / 0.1).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn a_frame_without_readings_is_the_priors_and_the_next_goes_on_from_the_one_before() {
+        let readings = vec![Some(0.0), None, Some(0.02)];
+        let (all, _) = followed(Point { pierced: vec![0.0; 3], readings, asked: Vec::new() });
+        assert_eq!(all[1].doubts, [Doubt::Unseen]);
+        // Two intervals passed since the last frame that was met.
+        let moved = all[2].pose.displacement[0].x - all[0].pose.displacement[0].x;
+        assert!((all[2].pose.velocity[0].x - moved / 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_lost_frame_is_looked_for_afresh() {
+        let readings = vec![Some(0.0), Some(0.02)];
+        let (all, asked) = followed(Point { pierced: vec![0.0, 0.5], readings, asked: Vec::new() });
+        assert!(mixtures(&asked, 1) > 0 && all[1].cold && all[1].doubts.is_empty(), "{:?}", all[1].doubts);
+    }
+
+    #[test]
+    fn what_stays_lost_moves_nothing() {
+        let readings = vec![Some(0.0), Some(0.02), Some(0.0)];
+        struct Hopeless(Point);
+        impl Follow for Hopeless {
+            fn start(&mut self) -> Result<Pose, Failure> {
+                self.0.start()
+            }
+            fn approach(&mut self, problem: &Problem, pull: Pull, u: &mut Vec<DVec3>) -> Result<f64, Failure> {
+                self.0.approach(problem, pull, u)
+            }
+            fn look(&mut self, frame: usize, u: &[DVec3], band: f64) -> Met {
+                self.0.look(frame, u, band)
+            }
+            fn certainty(&mut self, p: &Problem, band: f64, u: &[DVec3], d: &[Vec<DVec3>]) -> Result<Certainty, Failure> {
+                self.0.certainty(p, band, u, d)
+            }
+            fn pierced(&mut self, frame: usize, _: &[DVec3]) -> f64 {
+                if frame == 1 { 0.4 } else { 0.0 }
+            }
+            fn seen(&mut self, frame: usize, u: &[DVec3]) -> Vec<bool> {
+                self.0.seen(frame, u)
+            }
+        }
+        let mut body = Hopeless(Point { pierced: vec![0.0; 3], readings, asked: Vec::new() });
+        let settings = Settings {
+            dynamic: true,
+            temperature: Some(1.0),
+            outliers: 0.0,
+            spread: Some(0.2),
+            widest: 0.1,
+            spacing: 0.01,
+            noise: 0.01,
+            size: 1.0,
+        };
+        let mut all = Vec::new();
+        let visit = |t: Tracked| {
+            all.push(t);
+            ControlFlow::Continue(())
+        };
+        track(&mut body, &settings, &[(0, 0.0), (1, 0.1), (2, 0.2)], 0.0, &[vec![DVec3::ONE]], visit).unwrap();
+        assert_eq!(all[1].doubts, [Doubt::Pierced(0.4)]);
+        let moved = all[2].pose.displacement[0].x - all[0].pose.displacement[0].x;
+        assert!((all[2].pose.velocity[0].x - moved / 0.2).abs() < 1e-12, "{:?}", all[2].pose);
+    }
 }

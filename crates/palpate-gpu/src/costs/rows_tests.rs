@@ -105,7 +105,7 @@ fn markers_that_sit_elsewhere_are_those_of_the_cpu() {
     assert!(apart(&wrong, &lin, &plan)[0] > 1e-3);
 }
 
-pub(super) fn effect(kind: &str, values: &[(usize, f64)]) -> Effect {
+pub(crate) fn effect(kind: &str, values: &[(usize, f64)]) -> Effect {
     let mut effect = Effect::absent(find(kind).unwrap_or_else(|| panic!("{kind}")));
     values.iter().for_each(|(slot, v)| effect.values[*slot] = Some(*v));
     effect

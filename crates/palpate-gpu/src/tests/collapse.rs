@@ -71,7 +71,7 @@ fn passes_agree_where_the_barrier_acts_and_one_percent_shows() {
 
 /// A block held at its bottom, whose upper part is driven down through it, askew: the layer between is turned inside out however soft
 /// or stiff it is, so that there is one solution only.
-fn pressed() -> Scene {
+pub(super) fn pressed() -> Scene {
     let mut s = ball(0.03);
     let (min, max) = (DVec3::new(0.003, 0.004, 0.002), DVec3::new(0.085, 0.08, 0.088));
     s.object.source = BodySource::Analytic(Analytic::Box { min, max });
@@ -97,7 +97,7 @@ fn pressed() -> Scene {
 }
 
 /// The plan of a scene of which every node was seen at every step, a third of a millimetre off.
-fn measured(scene: &Scene) -> Plan {
+pub(super) fn measured(scene: &Scene) -> Plan {
     let bare = plan(scene);
     let moments = states(&CpuBackend, &bare, std::slice::from_ref(&bare.theta)).0;
     let count = moments.iter().filter(|m| guarded(&bare, &m[0].0) > 0).count();
@@ -154,7 +154,7 @@ fn evaluations_of_a_body_pressed_inside_out_agree_and_one_percent_shows() {
 }
 
 /// A soft block of some thirty cells thrown at the ground, which crushes it.
-pub(super) fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
+fn thrown(youngs_modulus: f64, steps: usize) -> Scene {
     let mut s = ball(0.03);
     let (min, max) = (DVec3::new(0.0, 0.0, 0.01), DVec3::new(0.1, 0.08, 0.09));
     s.object.source = BodySource::Analytic(Analytic::Box { min, max });
