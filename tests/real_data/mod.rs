@@ -2,3 +2,4 @@
 
 mod fits;
 mod reading;
+mod tracking;
