@@ -1,5 +1,6 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
+use crate::bench::counts;
 use crate::coverage;
 use crate::paper::real2sim;
 use crate::real::report::Report;
@@ -117,9 +118,11 @@ fn generated(root: &Path, found: &mut Vec<String>) {
     let coverage = coverage::report::stored(root).map(|lines| coverage::report::markdown(&lines));
     let real2sim = real2sim::stored(root).map(|rows| real2sim::acceptance::markdown(&rows));
     let pairs = real2sim::stored(root).map(|rows| real2sim::acceptance::side_by_side(&rows));
+    let counts = counts::stored(root).map(|rows| counts::markdown(&rows));
     for (page, name, table, verb) in [
         ("suite", "suite", suite, "suite --report"),
         ("coverage", "coverage", coverage, "coverage --report"),
+        ("gpu", "counts", counts, "bench --gpu --counts --only torus"),
         (real2sim::NAME, real2sim::NAME, real2sim, "paper --only real2sim --report"),
         (real2sim::NAME, real2sim::PAIRS, pairs, "paper --only real2sim --report"),
     ] {

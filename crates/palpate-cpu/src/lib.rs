@@ -12,6 +12,7 @@ mod local_bodies;
 #[cfg(test)]
 mod local_tests;
 mod memory;
+pub mod modes;
 mod newton;
 #[cfg(test)]
 mod product_tests;

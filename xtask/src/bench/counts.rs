@@ -21,6 +21,7 @@ use palpate_model::shape::Shape;
 use palpate_model::space::body::Body;
 use palpate_model::space::stuffing::stuff;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Steps that are counted: the bodies land in the third or fourth. Of large bodies as many as reach the ground.
 const STEPS: [usize; 2] = [5, 4];
@@ -145,7 +146,7 @@ fn subjects() -> Vec<Subject> {
 /// There is no device, or a body cannot be built.
 pub fn run(only: Option<&str>) -> Result<(), String> {
     let gpu = Gpu::open(&Choice::from_env()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
-    let mut rows: Vec<Row> = table::stored(&table::root(), "counts")?;
+    let mut rows = stored(&table::root())?;
     let made = Made::now()?;
     let long = |name: &str| matches!(name, "dragon × 64" | "ball 100k");
     for s in subjects() {
@@ -174,6 +175,7 @@ pub fn run(only: Option<&str>) -> Result<(), String> {
         rows.push(row);
         table::save("counts", &rows)?;
     }
+    table::replace("docs/gpu.md", "counts", &markdown(&rows))?;
     print(&rows);
     Ok(())
 }
@@ -193,24 +195,43 @@ fn of_cpu(plan: &Plan) -> Result<[f64; 3], String> {
     Ok([e.newton, e.linear, e.adjoint].map(|n| n as f64 / plan.clock.steps as f64))
 }
 
+/// Heading of the table.
+const HEADING: [&str; 14] = [
+    "workload",
+    "nodes",
+    "members",
+    "steps",
+    "Newton GPU/CPU",
+    "CG",
+    "ratio",
+    "adjoint CG",
+    "ratio",
+    "recorded",
+    "live",
+    "host ms",
+    "MB a member",
+    "H100 ms a member",
+];
+
+/// The rows as a table of a page.
+pub fn markdown(rows: &[Row]) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let mut text = line(&HEADING.map(String::from));
+    text += &line(&HEADING.map(|_| "---".to_string()));
+    rows.iter().for_each(|r| text += &line(&r.cells()));
+    text
+}
+
+/// What is counted and stored.
+///
+/// # Errors
+/// The file is there and holds something else.
+pub fn stored(root: &Path) -> Result<Vec<Row>, String> {
+    table::stored(root, "counts")
+}
+
 fn print(rows: &[Row]) {
-    let heading = [
-        "workload",
-        "nodes",
-        "members",
-        "steps",
-        "Newton GPU/CPU",
-        "CG",
-        "ratio",
-        "adjoint CG",
-        "ratio",
-        "recorded",
-        "live",
-        "host ms",
-        "MB a member",
-        "H100 ms a member",
-    ];
-    let mut all = vec![heading.map(String::from).to_vec()];
+    let mut all = vec![HEADING.map(String::from).to_vec()];
     all.extend(rows.iter().map(Row::cells));
     table::print("a step on the device (many workgroups a member) beside the CPU's", &all);
 }
