@@ -53,7 +53,7 @@ enum Verb {
         #[arg(long, requires = "gpu")]
         fit: bool,
         /// With --gpu: instead of times, what steps come to, beside the CPU's: iterations, dispatches, bytes, and a model of a graphics
-        /// processor; without --only all but "dragon × 64" and "ball 100k"; rows are kept in bench/counts.json
+        /// processor; without --only all but "dragon × 60" and "ball 100k"; rows are kept in bench/counts.json
         #[arg(long, requires = "gpu", conflicts_with = "fit")]
         counts: bool,
         /// Only compare two results of earlier runs

@@ -130,7 +130,8 @@ fn subjects() -> Vec<Subject> {
         of("ball", 1, Box::new(ball(8.6))),
         of("dragon", 1, Box::new(whole)),
         Subject { stays: true, ..of("dragon, staying", 1, Box::new(whole)) },
-        of("dragon × 64", 64, Box::new(whole)),
+        // With 64 a software adapter has no room for the blocks of their matrices in one binding.
+        of("dragon × 60", 60, Box::new(whole)),
         of("dragon clamped", 1, Box::new(clamped_dragon)),
         of("beam clamped", 1, Box::new(beam)),
         of("ball 10k", 1, Box::new(ball(24.0))),
@@ -148,7 +149,7 @@ pub fn run(only: Option<&str>) -> Result<(), String> {
     let gpu = Gpu::open(&Choice::from_env()).map_err(|e| format!("{e} (hint: {})", e.hint()))?;
     let mut rows = stored(&table::root())?;
     let made = Made::now()?;
-    let long = |name: &str| matches!(name, "dragon × 64" | "ball 100k");
+    let long = |name: &str| matches!(name, "dragon × 60" | "ball 100k");
     for s in subjects() {
         if !only.map_or(!long(s.name), |o| s.name == o) {
             continue;

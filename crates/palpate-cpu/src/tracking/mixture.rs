@@ -134,7 +134,7 @@ mod tests {
         let (places, seen) = (sheet(0.0), points(&sheet(0.007)));
         let weights: Vec<f64> = (0..places.len()).map(|k| if k % 7 == 0 { 0.0 } else { 1.0 + 0.1 * (k % 3) as f64 }).collect();
         let (spread, w) = (0.015, 0.1);
-        let found = shares(&seen, &places, &[weights.clone()], spread, w);
+        let found = shares(&seen, &places, std::slice::from_ref(&weights), spread, w);
         let at = seen.iter().map(|p| p.position);
         let (low, high) = at.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         let side = (high - low).max(DVec3::splat(spread));
