@@ -55,7 +55,7 @@ impl Measured {
             ":!crates/palpate/src/results/import.rs",
             ":!crates/palpate/src/report",
             ":!crates/palpate-cpu/src/tracking",
-            ":!crates/palpate-engine/src/tracking.rs",
+            ":!crates/palpate-engine/src/tracking",
             ":!crates/palpate-io/src/scene/track.rs",
             ":!crates/palpate/src/tracking.rs",
             ":!crates/palpate/src/commands/track.rs",
