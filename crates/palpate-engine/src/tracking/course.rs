@@ -37,11 +37,17 @@ struct Temperature {
 }
 
 impl Temperature {
+    /// That of one frame by itself.
+    fn of(c: &Certainty) -> Temperature {
+        Temperature { excess: c.excess, determined: c.determined }
+    }
+
     fn learn(&mut self, c: &Certainty) {
         self.excess = MEMORY * self.excess + c.excess;
         self.determined = MEMORY * self.determined + c.determined;
     }
 
+    /// That of the largest evidence [J].
     fn now(&self) -> Option<f64> {
         (self.determined > 0.0).then(|| 2.0 * self.excess / self.determined)
     }
@@ -135,7 +141,9 @@ impl Course<'_> {
         let band = last_band(settings);
         let mut certainty = body.certainty(&problem, band, &u, draws)?;
         for _ in 0..REHEATS {
-            let Some(wanted) = own_temperature(&certainty).map(coldest).filter(|_| settings.temperature.is_none()) else { break };
+            let Some(wanted) = Temperature::of(&certainty).now().map(coldest).filter(|_| settings.temperature.is_none()) else {
+                break;
+            };
             let cools = own.is_none() && wanted * HOTTER < problem.temperature;
             if wanted < HOTTER * problem.temperature && !cools {
                 break;
@@ -207,10 +215,6 @@ fn loose(body: &mut dyn Follow, settings: &Settings, unit: Problem, u: &[DVec3],
         return Err(Failure::new(FailureKind::Unsupported, 0.0, detail));
     }
     Ok((LOOSE * settings.noise).powi(2) * (3 * count) as f64 / sum)
-}
-
-fn own_temperature(c: &Certainty) -> Option<f64> {
-    (c.determined > 0.0).then(|| 2.0 * c.excess / c.determined)
 }
 
 fn last_band(settings: &Settings) -> f64 {

@@ -99,7 +99,7 @@ pub struct Certainty {
     pub determined: f64,
     /// ΔV: potential of the prior above its least value [J], to second order.
     pub excess: f64,
-    /// Potential of elasticity, loads and contact [J].
+    /// Elastic energy, up to a constant [J].
     pub energy: f64,
 }
 
@@ -137,7 +137,7 @@ pub struct Settings {
     pub temperature: Option<f64>,
     /// Share of points that belong to nothing.
     pub outliers: f64,
-    /// Spread at which the first phase begins [m]; `None` = by how far the readings are away.
+    /// Spread at which the first phase begins [m]; `None` = half the body.
     pub spread: Option<f64>,
     /// Half width of the band at its widest [m]: that of the plan.
     pub widest: f64,
