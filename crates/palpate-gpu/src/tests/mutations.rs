@@ -35,7 +35,7 @@ const WATCHED: [(&str, &str); 3] = [
 ];
 
 /// Lines that may be wrong without any result being so, and why.
-const EQUIVALENT: [(&str, &str, &str); 9] = [
+const EQUIVALENT: [(&str, &str, &str); 6] = [
     ("begin_solve", "n.scale = f.x + f.y + f.z + f.w;", "says when Newton's method ends, which passes its tolerance by far"),
     ("invert_diagonal", "mass += mass_values[p.member * shape.masses + s] * w * w;", "a preconditioner"),
     (
@@ -46,9 +46,6 @@ const EQUIVALENT: [(&str, &str, &str); 9] = [
     ("place_next", "w = (exp2(-f32(n.trial)) - 1.0) * (shape.dt * v + fall);", "a guess"),
     ("press_elastic", "energy += 0.5 * mix.rate * contract(g, linear_stress(g, lame));", "compared where a step is judged alone"),
     ("pull_holds", "let poses = extractBits(call.extra, POSES_AT, MATRICES_AT - POSES_AT);", "more bits of a small number"),
-    ("push_holds", "let poses = extractBits(call.extra, POSES_AT, MATRICES_AT - POSES_AT);", "likewise"),
-    ("look_cg", "n.trial += 1u;", "counts"),
-    ("couple_old", "shift += turn;", "a rigid motion of both states"),
 ];
 
 /// A plan, how it is solved, what is asked of it, and what the CPU makes of it.
