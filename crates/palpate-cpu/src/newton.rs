@@ -193,7 +193,7 @@ fn direction(
     effort: &mut Effort,
     mut kept: Option<TangentStiffness>,
 ) -> Result<(Option<Nodes>, f64, TangentStiffness), Reason> {
-    for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
+    for curvature in EVER_TAMER {
         let last = curvature == Curvature::Convex;
         let mut tangent = match kept.take() {
             Some(tangent) => tangent,
@@ -295,6 +295,31 @@ fn line_search(
     }
     let norm = diagonal.norm(&residual);
     (residual, norm)
+}
+
+/// Curvatures from the exact one to the one that is positive definite for certain.
+pub const EVER_TAMER: [Curvature; 3] = [Curvature::Exact, Curvature::Tamed, Curvature::Convex];
+
+/// Hands the tangent stiffness at u to `f`, made ready for solves as that of a static problem: by the first of these curvatures for which it is
+/// positive definite; `None` where it is for none. The residual has been computed there.
+pub fn with_tangent<T>(
+    equation: &Equation,
+    solvers: &Solvers,
+    u: &[DVec3],
+    curvatures: &[Curvature],
+    f: impl FnOnce(&Matrix, &Prepared) -> T,
+) -> Option<T> {
+    let (body, pattern) = (&equation.context.plan.body, equation.context.pattern);
+    for curvature in curvatures {
+        let mut matrix = Matrix::default();
+        equation.tangent(u, *curvature, &mut matrix);
+        let Ok(diagonal) = BlockJacobi::new(&pattern.blocks, &matrix) else { continue };
+        let (mut level, purpose, digits) = (None, Purpose::Static, Digits::All);
+        let task = Task { body, pattern, matrix: &matrix, diagonal: &diagonal, u, purpose, digits, inertia: 0.0 };
+        let Ok(prepared) = solvers.prepare(task, &mut level) else { continue };
+        return Some(f(&matrix, &prepared));
+    }
+    None
 }
 
 /// Solves A x = b with the exact tangent at a converged state, for derivatives; the iterations that took. The residual has been computed

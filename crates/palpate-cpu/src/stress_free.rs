@@ -8,14 +8,12 @@
 //!
 //! J is not symmetric, and close to minus the tangent stiffness, whose factor preconditions it.
 
-use crate::linear::jacobi::BlockJacobi;
-use crate::linear::matrix::Matrix;
+use crate::linear::gmres;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
-use crate::linear::{Digits, Purpose, Task, gmres};
-use crate::newton::Reason;
+use crate::newton::{self, EVER_TAMER, Reason};
 use crate::simulate::{Start, equation};
 use crate::terms::altered::Altered;
-use crate::terms::{Curvature, Equation, zeros};
+use crate::terms::{Equation, zeros};
 use crate::world::{Gradient, Member, Shared};
 use glam::DVec3;
 use palpate_engine::{FailureKind, number};
@@ -83,29 +81,18 @@ fn with_stiffness<T>(
     exact: bool,
     solve: impl FnOnce(&dyn Fn(&[DVec3]) -> Nodes) -> T,
 ) -> Result<T, Reason> {
-    let (body, pattern) = (&shared.plan.body, balance.equation.context.pattern);
-    for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
-        if exact && curvature != Curvature::Exact {
-            break;
-        }
-        let mut matrix = Matrix::default();
-        balance.equation.tangent(&balance.still, curvature, &mut matrix);
-        let Ok(diagonal) = BlockJacobi::new(&pattern.blocks, &matrix) else { continue };
-        let (purpose, digits) = (Purpose::Static, Digits::All);
-        let (matrix, diagonal, u) = (&matrix, &diagonal, &balance.still[..]);
-        let mut level = None;
-        let task = Task { body, pattern, matrix, diagonal, u, purpose, digits, inertia: 0.0 };
-        let Ok(prepared) = shared.solvers.prepare(task, &mut level) else { continue };
-        return Ok(solve(&|b: &[DVec3]| {
+    let curvatures = if exact { &EVER_TAMER[..1] } else { &EVER_TAMER[..] };
+    let made = newton::with_tangent(&balance.equation, &shared.solvers, &balance.still, curvatures, |_, prepared| {
+        solve(&|b: &[DVec3]| {
             let mut x = b.to_vec();
             // Whether the whole has converged is seen outside.
             if prepared.solve(&mut x, 1e-12, 0.0).is_err() {
                 return vec![DVec3::NAN; b.len()];
             }
             x
-        }));
-    }
-    Err(unstable())
+        })
+    });
+    made.ok_or_else(unstable)
 }
 
 fn unstable() -> Reason {
@@ -151,7 +138,7 @@ pub(crate) fn solve(shared: &Shared, member: &mut Member) -> Result<(), Reason> 
     let (mut share, mut step) = (0.0, 1.0f64);
     while share < 1.0 {
         let next = (share + step).min(1.0);
-        match newton(shared, member, &w, &load, next) {
+        match approached(shared, member, &w, &load, next) {
             Ok(found) => {
                 (w, share, step) = (found, next, 2.0 * step);
             }
@@ -186,7 +173,7 @@ fn refused(member: &Member, share: f64, (kind, detail): Reason) -> Reason {
 }
 
 /// W at a share of the load, from that at a smaller one.
-fn newton(shared: &Shared, member: &mut Member, from: &Nodes, load: &[DVec3], share: f64) -> Result<Nodes, Reason> {
+fn approached(shared: &Shared, member: &mut Member, from: &Nodes, load: &[DVec3], share: f64) -> Result<Nodes, Reason> {
     let size = shared.plan.body.size();
     let mut w = from.clone();
     let mut last = f64::INFINITY;

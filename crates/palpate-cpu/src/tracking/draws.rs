@@ -37,12 +37,12 @@ pub fn certainty(
     draws: &[Vec<DVec3>],
     energy: f64,
 ) -> Certainty {
-    let inverse = |b: &[DVec3]| solved(&k.prepared, b);
+    let inverse = |b: &[DVec3]| solved(k.prepared, b);
     let spectrum = spectrum(&inverse, |v| scaled(temperature, &pulls.product(v)), draws.first().map_or(&[][..], |d| d));
     let excess = inverse(residual).map_or(0.0, |x| 0.5 * dot(&x, residual));
     let determined = determined(&spectrum.values);
     let (mut posterior, mut prior) = (Vec::new(), Vec::new());
-    if let Prepared::Direct(factor) = &k.prepared {
+    if let Prepared::Direct(factor) = k.prepared {
         let root = temperature.sqrt();
         for draw in draws {
             let mut x = factor.solve_half(draw);

@@ -12,14 +12,13 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use crate::linear::Prepared;
 use crate::linear::conjugate_gradient::{self, CgEnd, Precondition};
-use crate::linear::jacobi::BlockJacobi;
-use crate::linear::matrix::{Matrix, Operator, Packed};
+use crate::linear::matrix::{Operator, Packed};
 use crate::linear::vector::{Nodes, add_scaled, dot, is_finite};
-use crate::linear::{Digits, Prepared, Purpose, Task};
-use crate::newton::{self, Reason};
+use crate::newton::{self, EVER_TAMER, Reason};
 use crate::simulate::{self, Start, equation};
-use crate::terms::{Curvature, Equation, zeros};
+use crate::terms::{Equation, zeros};
 use crate::world::{Member, MemberState, Shared, World};
 use glam::DVec3;
 use mixture::Mixture;
@@ -70,7 +69,7 @@ impl Tracker {
     }
 }
 
-/// The prior's equation at a frame; `state` is the past it starts from.
+/// The prior's equation at a frame, from where it starts.
 fn prior<'a>(shared: &'a Shared, member: &'a Member, problem: &Problem, start: &'a Start<'a>) -> Equation<'a> {
     let time = shared.plan.observation.frames[problem.frame].time - member.first_stamp();
     equation(shared, member, stage(problem, time).as_ref(), start)
@@ -110,7 +109,7 @@ fn balance(problem: &Problem, equation: &mut Equation) -> Option<Nodes> {
 /// The prior's tangent stiffness K and its factor or preconditioner at a displacement.
 struct Stiffness<'a> {
     matrix: Packed<'a, f64>,
-    prepared: Prepared<'a>,
+    prepared: &'a Prepared<'a>,
 }
 
 impl Precondition for Prepared<'_> {
@@ -132,21 +131,14 @@ fn with_stiffness<T>(
     u: &[DVec3],
     f: impl FnOnce(&Stiffness) -> Result<T, Reason>,
 ) -> Result<T, Reason> {
-    let (body, pattern) = (&shared.plan.body, equation.context.pattern);
-    for curvature in [Curvature::Exact, Curvature::Tamed, Curvature::Convex] {
-        let mut matrix = Matrix::default();
-        equation.tangent(u, curvature, &mut matrix);
-        let Ok(diagonal) = BlockJacobi::new(&pattern.blocks, &matrix) else { continue };
-        let mut level = None;
-        let (purpose, digits) = (Purpose::Static, Digits::All);
-        let task = Task { body, pattern, matrix: &matrix, diagonal: &diagonal, u, purpose, digits, inertia: 0.0 };
-        let Ok(prepared) = shared.solvers.prepare(task, &mut level) else { continue };
-        return f(&Stiffness { matrix: Packed::new(&pattern.blocks, &matrix, |v| v), prepared });
-    }
-    Err((
-        FailureKind::LinearSolve,
-        "the prior's stiffness is not positive definite; a clamp, or track.prior = \"dynamic\", holds it".into(),
-    ))
+    let rows = &equation.context.pattern.blocks;
+    newton::with_tangent(equation, &shared.solvers, u, &EVER_TAMER, |matrix, prepared| {
+        f(&Stiffness { matrix: Packed::new(rows, matrix, |v| v), prepared })
+    })
+    .ok_or_else(|| {
+        let detail = "the prior's stiffness is not positive definite; a clamp, or track.prior = \"dynamic\", holds it";
+        (FailureKind::LinearSolve, detail.into())
+    })?
 }
 
 /// K + η JᵀWJ.
@@ -184,7 +176,7 @@ fn step(
     let mut direction = zeros(u.len());
     with_stiffness(shared, equation, u, |k| {
         let total = Total { stiffness: &k.matrix, temperature, pulls };
-        match conjugate_gradient::solve(&total, &k.prepared, &minus, &mut direction, DIRECTION, 0.0, ITERATIONS) {
+        match conjugate_gradient::solve(&total, k.prepared, &minus, &mut direction, DIRECTION, 0.0, ITERATIONS) {
             // What is left after so many iterations is a direction that leads down all the same.
             CgEnd::Converged(_) | CgEnd::Unconverged(_) if is_finite(&direction) => Ok(()),
             _ => Err((FailureKind::LinearSolve, "no direction for a tracked frame".into())),
