@@ -167,11 +167,17 @@ fn frame(surface: &Embedding, patches: &[usize], t: Tracked) -> TrackedFrame {
     }
 }
 
+/// The middle of those that are finite; `None` of none.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut all: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
+}
+
 /// Frames with far fewer matched readings than the others.
 fn doubt_the_sparse(frames: &mut [TrackedFrame]) {
-    let mut shares: Vec<f64> = frames.iter().filter(|f| f.met.readings > 0).map(|f| f.met.share()).collect();
-    shares.sort_by(f64::total_cmp);
-    let Some(median) = shares.get(shares.len() / 2).copied() else { return };
+    let shares = frames.iter().filter(|f| f.met.readings > 0).map(|f| f.met.share());
+    let Some(median) = median(shares) else { return };
     for f in frames.iter_mut().filter(|f| f.met.readings > 0 && f.met.share() < FEW * median) {
         f.doubts.push(Doubt::Unmatched(f.met.share()));
     }

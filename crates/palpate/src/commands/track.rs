@@ -6,7 +6,7 @@ use crate::experiment::{Experiment, short};
 use crate::options::out_folder;
 use crate::results::tracking::{FrameRow, TrackingDocument};
 use crate::results::{self, finite};
-use crate::tracking::{TrackedBody, TrackedFrame, noise, track};
+use crate::tracking::{TrackedBody, TrackedFrame, median, noise, track};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_engine::number;
@@ -66,12 +66,6 @@ fn words(doubt: &Doubt) -> String {
         Doubt::Jumped(factor) => format!("the elastic energy rose {:.0} times from the frame before", factor),
         Doubt::Unseen => "has no reading".into(),
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut all: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
 }
 
 fn row(f: &TrackedFrame) -> FrameRow {
