@@ -15,6 +15,7 @@ mod priors;
 mod problem;
 mod settings;
 mod uncertainty;
+mod vibrations;
 
 pub use chart::{AtBound, Chart};
 pub use expected::{Expected, expected};
@@ -25,6 +26,7 @@ pub use optimise::{Outcome, Sample, Search, Status, Stop, want};
 pub use priors::{FieldPosterior, FieldPrior, Hyper, Mean, Tried};
 pub use problem::{FitScene, FreeParameter, Problem, Slot, Want};
 pub use settings::{ErrorModel, RpropSteps, Settings, Tolerance, Walk};
+pub use vibrations::{Vibration, vibrations};
 
 #[cfg(test)]
 mod tests;
