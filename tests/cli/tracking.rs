@@ -146,6 +146,107 @@ fn a_bar_that_is_far_from_where_it_is_thought_is_found() {
     assert!(moved > 0.1 && miss < 0.003, "{miss} {moved}");
 }
 
+/// The bar with two free numbers, begun at this modulus and without a word on damping.
+fn fitted_from(young: f64, warm: &str) -> String {
+    let fit = "\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nbounds = [1e2, 1e8]\n\n[[fit.parameter]]\npath = \
+               \"material.stiffness_damping\"\nstart = 1e-4\nbounds = [1e-6, 0.1]\n";
+    BAR.replace("5.0e4", &format!("{young:e}")) + OBSERVED + &format!("\n[fit]\nwarm_start = \"{warm}\"\n") + fit
+}
+
+fn value(result: &serde_json::Value, i: usize) -> f64 {
+    result["parameters"][i]["value"].as_f64().unwrap()
+}
+
+#[test]
+fn vibrations_start_a_fit_from_a_hundredth_and_a_hundred_times_the_modulus() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    std::fs::write(file("bar.toml"), BAR.replace("duration = 0.3", "duration = 0.8")).unwrap();
+    npy(&file("places.npy"), &places());
+    succeed(&[
+        "observe",
+        arg(&file("bar.toml")),
+        "--points",
+        arg(&file("places.npy")),
+        "--fps",
+        "30",
+        "--out",
+        arg(&file("seen")),
+    ]);
+    let scene =
+        |young: f64| fitted_from(young, "modal").replace("duration = 0.3", "duration = 0.8").replace("sparse-surface", "points");
+    for young in [5e2, 5e6] {
+        std::fs::write(file("fit.toml"), scene(young)).unwrap();
+        succeed(&["fit", arg(&file("fit.toml")), "--out", arg(&file("found")), "--no-grid-check"]);
+        let result = json(file("found/result.json"));
+        let start = result["runs"][0]["start"]["material.youngs_modulus"].as_f64().unwrap();
+        println!("from {young}: start {start}, {}", result["notes"]);
+        // It swings through two thirds of its length, where it is slower than a small vibration by some percent.
+        assert!((start / 5e4 - 1.0).abs() < 0.1, "{start}");
+        // Tracks without noise, by the same cells and steps.
+        assert!((value(&result, 0) / 5e4 - 1.0).abs() < 1e-3 && (value(&result, 1) / 0.002 - 1.0).abs() < 1e-2, "{result}");
+    }
+    // What says nothing is said, and the fit begins as stated.
+    std::fs::write(file("fit.toml"), scene(4e4).replace("duration = 0.8", "duration = 0.8\nstart = 0.7")).unwrap();
+    succeed(&["fit", arg(&file("fit.toml")), "--out", arg(&file("found")), "--no-grid-check", "--iterations", "0"]);
+    let result = json(file("found/result.json"));
+    assert!(result["notes"][0].as_str().unwrap().contains("no start by vibrations"), "{}", result["notes"]);
+}
+
+#[test]
+fn a_fit_of_depth_images_from_far_off_is_led_by_tracking() {
+    let folder = observed();
+    let file = |name: &str| folder.path().join(name);
+    // A band of one cell sees half of what it should see.
+    let scene = |young, start: &str| {
+        let narrow = fitted_from(young, "tracked").replace("cost = \"sparse-surface\"", "cost = \"sparse-surface\"\nband = 1.0");
+        narrow.replace("start = 1e-4", start)
+    };
+    std::fs::write(file("far.toml"), scene(1e6, "start = 1e-4")).unwrap();
+    let told = succeed(&["fit", arg(&file("far.toml")), "--out", arg(&file("found")), "--no-grid-check"]);
+    let result = json(file("found/result.json"));
+    println!("{}", told.out);
+    // Within what cells of twice the edge change, as without tracking from near by.
+    assert!((value(&result, 0) / 5e4 - 1.0).abs() < 0.1, "{result}");
+    assert!(result["notes"][0].as_str().unwrap().contains("it was tracked"), "{}", result["notes"]);
+    let tracks = &result["from_tracks"][0];
+    assert!(tracks["distance"].as_f64().is_some() && tracks["path"] == "material.youngs_modulus", "{tracks}");
+    // From near by nothing is tracked.
+    std::fs::write(file("near.toml"), scene(5.2e4, "start = 2e-3")).unwrap();
+    let near = file("near");
+    succeed(&["fit", arg(&file("near.toml")), "--out", arg(&near), "--no-grid-check"]);
+    let direct = json(near.join("result.json"));
+    assert!(direct["notes"][0].as_str().unwrap().contains("start as stated"), "{}", direct["notes"]);
+    assert!(direct.get("from_tracks").is_none());
+    // Both ways lead to the same minimum.
+    assert!((value(&direct, 0) / value(&result, 0) - 1.0).abs() < 1e-3, "{} {}", value(&direct, 0), value(&result, 0));
+}
+
+#[test]
+fn tracking_and_fitting_in_turns_settles() {
+    let folder = observed();
+    let file = |name: &str| folder.path().join(name);
+    std::fs::write(file("far.toml"), fitted_from(5e5, "none")).unwrap();
+    let out = file("out");
+    let told = succeed(&["track", arg(&file("far.toml")), "--out", arg(&out), "--refine", "4"]);
+    println!("{}", told.out);
+    let rows = json(out.join("tracked.json"));
+    let rounds = rows["rounds"].as_array().unwrap();
+    let young = |k: usize| rounds[k]["values"][0]["value"].as_f64().unwrap();
+    let last = rounds.len() - 1;
+    assert!(rows["verdict"] == "tracked" && rounds[last]["moved"].as_f64().unwrap() < 0.3, "{rows}");
+    assert!((young(last) / 5e4 - 1.0).abs() < 0.1, "{rounds:?}");
+    // The prior is wrong by less than before.
+    let temperature = |k: usize| rounds[k]["temperature"].as_f64().unwrap();
+    assert!(temperature(last) < temperature(0), "{rounds:?}");
+    // A fit of the depth images goes on from there.
+    let told = succeed(&["fit", arg(&file("far.toml")), "--from", arg(&out), "--out", arg(&file("found")), "--no-grid-check"]);
+    assert!(told.out.contains("by tracked points alone"), "{}", told.out);
+    let (a, b) = (json(file("found/result.json")), palpate(&["fit", arg(&file("far.toml")), "--from", arg(folder.path())]));
+    assert!((value(&a, 0) / 5e4 - 1.0).abs() < 0.1, "{a}");
+    assert!(b.code == 2 && b.err.contains("--from") && b.err.contains("palpate track"), "{}", b.err);
+}
+
 #[test]
 fn what_cannot_be_tracked_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
@@ -160,4 +261,5 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     refused(BAR.to_string() + "[track]\ntemperature = -1.0\n", &["track.temperature", "auto"]);
     refused(BAR.to_string() + "[track]\noutliers = 1.5\n", &["track.outliers", "[0, 0.9)"]);
     refused(BAR.to_string() + "[track]\nsoft_stat = 1.5\n", &["soft_stat", "soft_start"]);
+    refused(BAR.to_string() + "[fit]\nwarm_start = \"cold\"\n", &["fit.warm_start", "modal", "tracked"]);
 }

@@ -96,7 +96,7 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "fit",
             Schema {
-                keys: &["optimizer", "iterations", "starts", "seed", "threads"],
+                keys: &["optimizer", "iterations", "starts", "seed", "threads", "warm_start"],
                 tables: &[("parameter", table(&["path", "start", "bounds", "known", "per_scene"]))],
             },
         ),

@@ -4,7 +4,7 @@
 mod fit;
 mod in_code;
 
-pub use fit::{FitParameter, FitSpec, Optimizer};
+pub use fit::{FitParameter, FitSpec, Optimizer, WarmStart};
 
 use crate::effects::Effect;
 use crate::materials::Model;

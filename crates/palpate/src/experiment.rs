@@ -94,18 +94,43 @@ impl Experiment {
     ///
     /// # Errors
     /// As [`Experiment::open`].
-    pub fn new(mut scene: Scene, text: String, mut warnings: Vec<String>) -> Result<Experiment, Error> {
-        let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
-        let shape = shape_of(&scene.object);
+    pub fn new(scene: Scene, text: String, warnings: Vec<String>) -> Result<Experiment, Error> {
         let mut recording = None;
-        let (mut observation, mut rest) = (Observation::default(), Vec::new());
         if let Some(spec) = &scene.observation {
             let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
             if !place.exists() {
                 let message = format!("there is no recording at {}", place.display());
-                return Err(fault("observation.recording", message));
+                return Err(scene_error(&scene.path, &text, "observation.recording", message).into());
             }
-            let read = read_recording(place)?;
+            recording = Some(Arc::new(read_recording(place)?));
+        }
+        Experiment::of(scene, text, recording, warnings)
+    }
+
+    /// The same experiment with another measurement, all of which is used in every way that its readings can be compared.
+    ///
+    /// # Errors
+    /// [`Error::File`] when the recording lies nowhere near the object or does not go with the scene.
+    pub fn measured(&self, recording: Recording) -> Result<Experiment, Error> {
+        let costs = recording.kinds();
+        let band = self.scene.observation.as_ref().map(|o| o.band);
+        let spec = ObservationSpec::new(recording.path.clone(), costs);
+        let observation = ObservationSpec { band: band.unwrap_or(spec.band), ..spec };
+        let scene = Scene { observation: Some(observation), ..self.scene.clone() };
+        Experiment::of(scene, self.text.clone(), Some(Arc::new(recording)), Vec::new())
+    }
+
+    /// A scene with its recording, where it names one.
+    fn of(
+        mut scene: Scene,
+        text: String,
+        recording: Option<Arc<Recording>>,
+        mut warnings: Vec<String>,
+    ) -> Result<Experiment, Error> {
+        let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
+        let shape = shape_of(&scene.object);
+        let (mut observation, mut rest) = (Observation::default(), Vec::new());
+        if let (Some(spec), Some(read)) = (&scene.observation, &recording) {
             warnings.extend(read.warnings.iter().cloned());
             (observation, rest) = read.observation(spec, &mut warnings).map_err(|e| match e {
                 ObservationError::Recording(e) => Error::from(e),
@@ -113,7 +138,6 @@ impl Experiment {
             })?;
             let (min, max) = shape.bounds();
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
-            recording = Some(Arc::new(read));
         }
         if !scene.targets.is_empty() {
             observation = Observation::of_targets(&scene.targets);

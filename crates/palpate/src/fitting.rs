@@ -13,6 +13,7 @@ use crate::scatter::Excess;
 use palpate_engine::{FailureKind, MOST_SENSITIVITIES, Stop};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
 use palpate_io::InputError;
+use palpate_io::recording::Recording;
 use palpate_model::observation::ReadingKind;
 use palpate_model::plan::Plan;
 use palpate_model::plan::join::Joint;
@@ -24,6 +25,7 @@ mod counted;
 mod free;
 mod lead;
 mod verdict;
+mod warm;
 
 /// Standard errors from the optimum up to which what finer cells do is asked.
 const ARRIVED: f64 = 1.0;
@@ -35,6 +37,7 @@ pub use answer::{Headline, Parts};
 use counted::Counted;
 pub(crate) use free::free_parameters;
 use verdict::verdict;
+pub use warm::FromTracks;
 
 /// How to run a fit; what is `None` is taken from the (first) scene's `[fit]` table.
 #[derive(Default)]
@@ -61,6 +64,10 @@ pub struct FitOptions<'a> {
     pub hurried: bool,
     /// Journal of evaluations, and whether to go on with what it holds.
     pub journal: Option<(PathBuf, bool)>,
+    /// Tracked points of each scene, from which start values follow; none = as the scenes' `fit.warm_start` says.
+    pub tracked: Vec<Recording>,
+    /// Hears in words what is done before the search.
+    pub on_stage: Option<&'a mut (dyn FnMut(&str) + Send)>,
     /// Hears of every iteration of every start.
     pub on_iteration: Option<&'a mut (dyn FnMut(&Progress) + Send)>,
 }
@@ -90,8 +97,11 @@ pub struct Fitted {
     pub free: Vec<FreeNumber>,
     /// The free fields of many values, in the order of `result.fields`.
     pub fields: Vec<FreeNumber>,
-    /// Why the optimiser is not the usual one, where nobody named one.
-    pub chosen: Option<String>,
+    /// What was chosen for this fit and why, in sentences: the optimiser, where it is not the usual one and nobody named it, and start values
+    /// that were not stated.
+    pub notes: Vec<String>,
+    /// What a fit of tracked points found, by free number; empty where nothing was tracked.
+    pub tracked: Vec<FromTracks>,
     /// θ of every scene at the first start.
     pub theta_start: Vec<Vec<f64>>,
     /// Optimiser used.
@@ -212,7 +222,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         tolerance: Tolerance { cost: options.tolerance.unwrap_or(stated.cost), ..stated },
         ..Settings::new(Optimizer::GaussNewton)
     };
-    let (numbers, free, mut warnings) = free_parameters(experiments)?;
+    let (numbers, mut free, mut warnings) = free_parameters(experiments)?;
+    let warm = warm::warm(experiments, &numbers, &mut free, &mut options)?;
     let asked = options.optimizer.or(spec.optimizer);
     let plans: Vec<&Plan> = experiments.iter().map(Experiment::plan).collect();
     let trial = demand(&free, 0, asked.unwrap_or_else(|| usual(&free)), settings.starts);
@@ -303,7 +314,8 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         backend: backend.name(),
         free,
         fields,
-        chosen,
+        notes: chosen.into_iter().chain(warm.notes).collect(),
+        tracked: warm.tracked,
         theta_start,
         optimizer: settings.optimizer,
         result,

@@ -1,5 +1,9 @@
 //! Tracking as people ask for it: a scene with a recording in, the moving body out.
 
+mod refine;
+
+pub use refine::{Refined, Round, RoundValue, refine};
+
 use crate::embed::Embedding;
 use crate::error::Error;
 use crate::experiment::Experiment;

@@ -23,7 +23,7 @@ use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded};
 use crate::keys::{RECORDING, suggest};
 use crate::scene::{check_format, marker_rest};
-use palpate_model::observation::MarkerRest;
+use palpate_model::observation::{MarkerRest, ReadingKind};
 use rayon::prelude::*;
 use std::path::{Component, Path, PathBuf};
 
@@ -51,6 +51,19 @@ pub struct Recording {
     pub displacements: Option<RecordedDisplacements>,
     /// What looks suspicious without being wrong.
     pub warnings: Vec<String>,
+}
+
+impl Recording {
+    /// Kinds of readings that it holds.
+    pub fn kinds(&self) -> Vec<ReadingKind> {
+        let has = |kind: &ReadingKind| match kind {
+            ReadingKind::Depth => !self.frames.is_empty(),
+            ReadingKind::Marker => self.markers.is_some(),
+            ReadingKind::Track => self.points.is_some(),
+            ReadingKind::Displacement => self.displacements.is_some(),
+        };
+        ReadingKind::ALL.into_iter().filter(has).collect()
+    }
 }
 
 /// What one camera saw at one time.

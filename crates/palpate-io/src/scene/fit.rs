@@ -7,7 +7,7 @@ use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
 use palpate_model::params::{ParamKey, Transform, is_component};
 use palpate_model::plan::PlaneSite;
-use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene};
+use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, WarmStart};
 
 /// One number of a scene that can be fitted.
 struct Target {
@@ -121,6 +121,7 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
         starts: t.optional_count("starts", 1..=1_000_000)?.unwrap_or(1) as usize,
         seed: t.optional_count("seed", 0..=u64::MAX)?.unwrap_or(1),
         threads: t.optional_count("threads", 0..=4096)?.unwrap_or(0) as usize,
+        warm_start: t.optional_choice("warm_start", &WarmStart::ALL)?.unwrap_or_default(),
         parameters,
     }))
 }

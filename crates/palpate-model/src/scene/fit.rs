@@ -13,8 +13,33 @@ pub struct FitSpec {
     pub seed: u64,
     /// Threads; 0 = all.
     pub threads: usize,
+    /// Where starts come from.
+    pub warm_start: WarmStart,
     /// Free parameters.
     pub parameters: Vec<FitParameter>,
+}
+
+/// Where a fit's start values come from, beside what the scene says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WarmStart {
+    /// From nowhere else.
+    #[default]
+    Stated,
+    /// Stiffness and damping from the frequencies at which markers or tracked points vibrate.
+    Modal,
+    /// The same from tracking the body, and a fit to what was tracked; where the scene's own values are near enough, from these.
+    Tracked,
+}
+
+impl WarmStart {
+    /// All by their names in files.
+    pub const ALL: [(&'static str, WarmStart); 3] =
+        [("none", WarmStart::Stated), ("modal", WarmStart::Modal), ("tracked", WarmStart::Tracked)];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        WarmStart::ALL.iter().find(|w| w.1 == self).map_or("", |w| w.0)
+    }
 }
 
 /// Optimisers.

@@ -168,7 +168,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         let scenes = [scene.to_path_buf()];
         let experiments = std::slice::from_ref(&experiment);
         let may_write = || lock.check();
-        let fitted = run_in(&scenes, &a.choices, backend, experiments, &folder, resume, &may_write, &mut track, &mut quiet);
+        let fitted = run_in(&scenes, &[], &a.choices, backend, experiments, &folder, resume, &may_write, &mut track, &mut quiet);
         track.finish();
         let (fitted, result) = fitted?;
         quiet.warn(&fitted.warnings);

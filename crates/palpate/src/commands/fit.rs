@@ -16,8 +16,11 @@ use clap::{Args, ValueEnum};
 use palpate_engine::Stop;
 use palpate_fit::Progress;
 use palpate_io::output::{make_folder, write_file};
+use palpate_io::read_recording;
+use palpate_io::recording::Recording;
 use palpate_model::scene::Optimizer;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -25,11 +28,15 @@ Examples:
   palpate fit beam.toml --starts 20 --optimizer rprop --out found
   palpate fit a.toml b.toml --out joint        the same body recorded twice; parameters with the same path are shared
   palpate fit beam.toml --out found --resume   go on with an interrupted fit
+  palpate fit beam.toml --from seen            start from what `palpate track beam.toml --out seen` found
 
 What is free, and where starts are drawn from, is said by [[fit.parameter]] in the scene. The folder gets result.json
 (format fit/2), model.toml (the scene with the values found; of several scenes model-1.toml, model-2.toml, … in their
 order), history.csv, report.html and journal.jsonl. Results that are already there are moved to previous-1,
 previous-2, … in the same folder.
+
+Start values far from the truth lead depth images astray. warm_start = \"modal\" in [fit] reads stiffness and damping off the
+vibrations of markers or tracked points; \"tracked\" tracks the body first where the stated values leave readings unmet.
 
 What is printed, result.json and the report begin with a verdict: converged, interrupted, at-a-bound or
 not-to-be-trusted, and why. ± holds noise, what the recording calls systematic, and what an evaluation on finer cells
@@ -53,6 +60,9 @@ pub struct Arguments {
     /// Go on with the journal of an interrupted fit in the output folder
     #[arg(long)]
     resume: bool,
+    /// What `palpate track` wrote: start from a fit of its points (several scenes: one folder each, in their order)
+    #[arg(long, value_name = "DIR")]
+    from: Vec<PathBuf>,
     #[command(flatten)]
     choices: Choices,
 }
@@ -137,7 +147,7 @@ fn keep_previous(folder: &Path, scenes: usize, resume: bool) -> Result<Option<Pa
 }
 
 /// The command line that gives the same result.
-fn command(scenes: &[PathBuf], a: &Choices, fitted: &Fitted) -> String {
+fn command(scenes: &[PathBuf], from: &[Recording], a: &Choices, fitted: &Fitted) -> String {
     let quote = |p: &Path| {
         let s = p.display().to_string();
         if s.contains(|c: char| c.is_whitespace() || "'\"\\$`;&|<>()*?!#".contains(c)) {
@@ -148,6 +158,7 @@ fn command(scenes: &[PathBuf], a: &Choices, fitted: &Fitted) -> String {
     };
     let mut words = vec!["palpate fit".to_string()];
     words.extend(scenes.iter().map(|s| quote(s)));
+    words.extend(from.iter().filter_map(|r| r.path.parent()?.parent()).map(|f| format!("--from {}", quote(f))));
     words.push(format!("--backend {}", fitted.backend));
     let mut option = |name: &str, value: Option<String>| words.extend(value.map(|v| format!("--{name} {v}")));
     option("starts", a.starts.map(|n| n.to_string()));
@@ -171,6 +182,7 @@ fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, c
 
 fn write_all(
     scenes: &[PathBuf],
+    from: &[Recording],
     a: &Choices,
     folder: &Path,
     experiments: &[Experiment],
@@ -210,7 +222,7 @@ fn write_all(
         curves: &result.curves,
         pictures,
         scale,
-        command: command(scenes, a, fitted),
+        command: command(scenes, from, a, fitted),
     });
     text("report.html", &page)?;
     Ok(result)
@@ -225,18 +237,39 @@ fn warn_of_twins(paths: &[PathBuf], experiments: &mut [Experiment]) {
     }
 }
 
+/// What `palpate track` wrote into these folders.
+fn tracked(folders: &[PathBuf], scenes: usize) -> Result<Vec<Recording>, Error> {
+    if !folders.is_empty() && folders.len() != scenes {
+        let message = format!("{} folders are given for {scenes} scenes; give one for each, in their order", folders.len());
+        return Err(Error::option("from", folders[0].display(), message));
+    }
+    let read = |f: &PathBuf| {
+        let place = f.join("recording");
+        if !place.exists() {
+            return Err(Error::option(
+                "from",
+                f.display(),
+                "holds no recording/: give what `palpate track --out` wrote".to_string(),
+            ));
+        }
+        Ok(read_recording(place)?)
+    };
+    folders.iter().map(read).collect()
+}
+
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     // Before anything that takes time.
     let mut track = console.progress(0, "fitting");
     track.on(0, "reading");
     let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     warn_of_twins(&a.scenes, &mut experiments);
+    let from = tracked(&a.from, a.scenes.len())?;
     let (backend, note) = choose(&a.choices, &experiments, &mut track)?;
     track.aside(|| note.iter().for_each(|n| console.note(n)));
     let folder = out_folder(&a.out, &a.scenes[0], "-fit");
     let may_write = || Ok(());
     let (fitted, result) =
-        run_in(&a.scenes, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
+        run_in(&a.scenes, &from, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
     track.finish();
     console.warn(&fitted.warnings);
     if console.json() {
@@ -274,10 +307,11 @@ fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
     iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
-/// Fits and writes everything into a folder, unless `may_write` then says that it is another's by now; the progress goes to `track`. Returns
+/// Fits, beginning with what was tracked where anything was, and writes everything into a folder, unless `may_write` then says that it is another's by now; the progress goes to `track`. Returns
 /// the fit and its `result.json`.
 pub fn run_in(
     scenes: &[PathBuf],
+    from: &[Recording],
     a: &Choices,
     backend: Backend,
     experiments: &[Experiment],
@@ -308,10 +342,19 @@ pub fn run_in(
     if !resume {
         make_room(track, console)?;
     }
+    // The two that are told take turns, but the compiler cannot know.
+    let shared = Mutex::new(track);
+    let mut say = |text: &str| {
+        if let Ok(mut track) = shared.lock() {
+            track.on(0, text);
+        }
+    };
     let mut best = f64::INFINITY;
     let mut hear = |p: &Progress| {
         best = best.min(p.cost);
-        track.on(u64::from(p.iteration > 0), &format!("best cost {best:.4}"));
+        if let Ok(mut track) = shared.lock() {
+            track.on(u64::from(p.iteration > 0), &format!("best cost {best:.4}"));
+        }
     };
     let mut fitted = fit(
         experiments,
@@ -327,9 +370,12 @@ pub fn run_in(
             interrupt: console.interrupt.clone(),
             hurried: false,
             journal: Some((journal, resume)),
+            tracked: from.to_vec(),
+            on_stage: Some(&mut say),
             on_iteration: Some(&mut hear),
         },
     )?;
+    let track = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     may_write()?;
     if resume {
         make_room(track, console)?;
@@ -339,6 +385,6 @@ pub fn run_in(
         fitted.check_grid(experiments, backend, &console.interrupt);
     }
     may_write()?;
-    let result = write_all(scenes, a, folder, experiments, &fitted, backend)?;
+    let result = write_all(scenes, from, a, folder, experiments, &fitted, backend)?;
     Ok((fitted, result))
 }

@@ -1,14 +1,16 @@
 //! `palpate track`: the moving body in every frame of a recording.
 
 use crate::cli::{Console, INTERRUPTED};
+use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::{Experiment, short};
-use crate::options::out_folder;
-use crate::results::tracking::{FrameRow, TrackingDocument};
+use crate::options::{count, out_folder};
+use crate::results::tracking::{FrameRow, RoundNumber, RoundRow, TrackingDocument};
 use crate::results::{self, finite};
-use crate::tracking::{TrackedBody, TrackedFrame, median, noise, track};
+use crate::tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, median, noise, refine, track};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use palpate_diagnose::stated;
 use palpate_engine::number;
 use palpate_engine::tracking::Doubt;
 use palpate_io::npy::{Array, write_npz};
@@ -24,6 +26,8 @@ Examples:
   palpate track leaf.toml --out seen                 arrays, verdicts and a recording of points in seen/
   palpate track leaf.toml --out seen --format ply    the surface of every frame as well
   palpate track leaf.toml --out seen && palpate fit seen/scene.toml
+  palpate track leaf.toml --out seen --refine 4      track, fit the scene's free numbers to that, track again, until nothing moves
+  palpate fit leaf.toml --from seen                  fit the depth readings themselves, from where the tracked points lead
 
 The scene's recording says where its cameras or markers saw the body; no forces need to be known. Every frame is the most probable shape
 between what the material allows and what was measured, with the uncertainty of each place. [track] in the scene chooses: prior
@@ -44,6 +48,9 @@ pub struct Arguments {
     /// Output folder [default: out/SCENE-tracked]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Track and fit in turns, with N fits at most: ends when no number of [fit] moves by 0.3 standard errors
+    #[arg(long, value_name = "N", value_parser = count(1..=100), allow_negative_numbers = true)]
+    refine: Option<u64>,
     /// Files per frame, separated by commas
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<Format>,
@@ -86,8 +93,23 @@ fn row(f: &TrackedFrame) -> FrameRow {
     }
 }
 
+fn round(r: &Round) -> RoundRow {
+    let number = |v: &RoundValue| RoundNumber {
+        path: v.path.clone(),
+        value: finite(v.value),
+        standard_error: v.standard_error.and_then(finite),
+    };
+    RoundRow {
+        values: r.values.iter().map(number).collect(),
+        moved: r.moved.and_then(finite),
+        rms: finite(r.rms),
+        temperature: finite(r.temperature),
+    }
+}
+
 /// The verdict and why.
-fn verdict(t: &TrackedBody) -> (&'static str, String) {
+fn verdict(r: &Refined) -> (&'static str, String) {
+    let t: &TrackedBody = &r.tracked;
     let doubted = t.frames.len() - t.sound();
     let first = t.frames.iter().find(|f| !f.doubts.is_empty());
     let why = first.map_or(String::new(), |f| {
@@ -97,7 +119,13 @@ fn verdict(t: &TrackedBody) -> (&'static str, String) {
         (true, _) => {
             ("interrupted", format!("{} of {} frames were tracked. {why}", t.frames.len(), t.recorded).trim_end().to_string())
         }
-        (false, 0) => ("tracked", String::new()),
+        (false, 0) if r.settled => ("tracked", String::new()),
+        (false, 0) => match r.rounds.last().and_then(|r| r.moved) {
+            Some(moved) => {
+                ("doubtful", format!("after {} rounds a number still moved by {} standard errors", r.rounds.len(), number(moved)))
+            }
+            None => ("doubtful", "one round does not say whether its numbers would move in another".into()),
+        },
         _ => ("doubtful", why),
     }
 }
@@ -166,17 +194,24 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let clock = Instant::now();
     let mut progress = console.progress(experiment.plan().observation.frames.len() as u64, "tracking");
     let interrupt = console.interrupt.clone();
-    let tracked = track(&experiment, |done| {
-        progress.at(done as u64, "");
-        if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
+    let refined = match a.refine {
+        Some(most) => refine(&experiment, most as usize, Backend::Cpu, &interrupt, &folder, |text| progress.on(0, text))?,
+        None => {
+            let tracked = track(&experiment, |done| {
+                progress.at(done as u64, "");
+                if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })?;
+            Refined { tracked, text: experiment.text().into(), experiment, rounds: Vec::new(), settled: true }
+        }
+    };
+    let Refined { tracked, experiment, text, rounds, .. } = &refined;
     progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
-    write_arrays(&folder, &experiment, &tracked)?;
-    write_frames(&folder, &experiment, &tracked, &a.format)?;
-    let (verdict, reason) = verdict(&tracked);
+    write_arrays(&folder, experiment, tracked)?;
+    write_frames(&folder, experiment, tracked, &a.format)?;
+    let (verdict, reason) = verdict(&refined);
     let document = TrackingDocument {
-        scene: experiment.scene().path.display().to_string(),
+        scene: a.scene.display().to_string(),
         verdict: verdict.into(),
         reason: reason.clone(),
         prior: if tracked.dynamic { "dynamic" } else { "elastic" }.into(),
@@ -184,13 +219,14 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         nodes: experiment.plan().body.nodes.len(),
         places: tracked.surface.rest.len(),
         seconds,
+        rounds: rounds.iter().map(round).collect(),
         frames: tracked.frames.iter().map(row).collect(),
     };
-    match tracked.recording(&experiment.scene().title, noise(&experiment)) {
+    match tracked.recording(&experiment.scene().title, noise(experiment)) {
         Ok(recording) => {
             palpate_io::write_recording(folder.join("recording"), &recording)?;
-            let text = palpate_io::scene_of_tracks(experiment.text(), experiment.scene(), "recording", &folder)?;
-            write_file(folder.join("scene.toml"), |w| w.write_all(text.as_bytes()))?;
+            let scene = palpate_io::scene_of_tracks(text, experiment.scene(), "recording", &folder)?;
+            write_file(folder.join("scene.toml"), |w| w.write_all(scene.as_bytes()))?;
         }
         // The frames say what is wrong; nothing of them is to be fitted.
         Err(e) => console.warn(&[e.to_string()]),
@@ -207,6 +243,17 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
 fn print(console: &mut Console, d: &TrackingDocument, folder: &Path) {
     let because = if d.reason.is_empty() { String::new() } else { format!(": {}", d.reason) };
     console.print(&format!("{}{because}", d.verdict));
+    for (k, r) in d.rounds.iter().enumerate() {
+        let one = |v: &RoundNumber| format!("{} {}", v.path, stated(v.value.unwrap_or(f64::NAN), v.standard_error));
+        let moved = r.moved.map_or(String::new(), |m| format!("; moved by {} standard errors at most", number(m)));
+        let rms = r.rms.unwrap_or(f64::NAN);
+        console.print(&format!(
+            "round {}: readings lay {} m from the tracked body; {}{moved}",
+            k + 1,
+            number(rms),
+            r.values.iter().map(one).collect::<Vec<_>>().join(", ")
+        ));
+    }
     let worst = |of: fn(&FrameRow) -> Option<f64>| d.frames.iter().filter_map(of).fold(0.0, f64::max);
     console.print(&format!(
         "{}: {} of {} frames, {} nodes, {:.2} s a frame; readings lie at most {} m (rms) from the body; ± of a place that was seen at most {} m, \

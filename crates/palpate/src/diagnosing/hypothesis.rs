@@ -9,7 +9,7 @@ use palpate_fit::{FreeParameter, Slot};
 use palpate_model::effects::field::{Field, Spot};
 use palpate_model::effects::{ALL, Site, Unstated};
 use palpate_model::params::{ParamKey, Transform};
-use palpate_model::scene::{FitParameter, FitSpec, Inertia};
+use palpate_model::scene::{FitParameter, FitSpec, Inertia, WarmStart};
 
 /// Changed experiments and their free numbers: those of the scenes first, then change by change.
 pub(super) struct Prepared {
@@ -146,7 +146,15 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
     }
     let middle = 0.0f64.clamp(bounds.0, bounds.1);
     let parameter = FitParameter { path, start: (middle, middle), bounds, known: None, per_scene };
-    let empty = || FitSpec { optimizer: None, iterations: 50, starts: 1, seed: 1, threads: 0, parameters: Vec::new() };
+    let empty = || FitSpec {
+        optimizer: None,
+        iterations: 50,
+        starts: 1,
+        seed: 1,
+        threads: 0,
+        warm_start: WarmStart::Stated,
+        parameters: Vec::new(),
+    };
     e.scene.fit.get_or_insert_with(empty).parameters.push(parameter);
 }
 

@@ -1,10 +1,12 @@
 //! The numbers of a fit for its result file, as CSV and as a short table.
 
 use crate::experiment::Experiment;
-use crate::fitting::{Fitted, FreeNumber, total};
+use crate::fitting::{Fitted, FreeNumber, FromTracks, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
-use crate::results::fit::{Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run};
+use crate::results::fit::{
+    Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run, Tracked,
+};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;
@@ -98,6 +100,8 @@ pub fn fit_document(
         residual_before: before.map(|b| ResidualBefore { rms: finite(total(&b, |r| r.rms)) }),
         best: r.best,
         runs: r.runs.iter().map(|r| run(fitted, r)).collect(),
+        notes: fitted.notes.clone(),
+        from_tracks: from_tracks(fitted),
         warnings: fitted.warnings.clone(),
         evaluations: r.evaluations,
         seconds: r.seconds,
@@ -227,6 +231,32 @@ pub(super) fn grid_line(fitted: &Fitted) -> String {
     }
 }
 
+/// What a fit of tracked points found, and how far that is from what was found at last, in standard errors of the difference.
+pub(super) fn from_tracks(fitted: &Fitted) -> Vec<Tracked> {
+    let one = |(i, t): (usize, &FromTracks)| {
+        let now = &fitted.result.parameters[i];
+        let error = now.standard_error.zip(t.standard_error).map(|(a, b)| a.hypot(b));
+        Tracked {
+            path: fitted.free[i].path.clone(),
+            scene: fitted.free[i].scene,
+            value: finite(t.value),
+            standard_error: t.standard_error.and_then(finite),
+            distance: error.and_then(|e| finite((now.value - t.value).abs() / e)),
+        }
+    };
+    fitted.tracked.iter().enumerate().map(one).collect()
+}
+
+/// The same in a line, where there is any.
+pub(super) fn other_way(fitted: &Fitted) -> Option<String> {
+    let all = from_tracks(fitted);
+    let text = |t: &Tracked| {
+        let far = t.distance.map_or(String::new(), |d| format!(", {d:.1} standard errors away"));
+        format!("{} {}{far}", t.path, stated(t.value.unwrap_or(f64::NAN), t.standard_error))
+    };
+    (!all.is_empty()).then(|| format!("by tracked points alone: {}", all.iter().map(text).collect::<Vec<_>>().join("; ")))
+}
+
 /// Short table for the terminal.
 pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     let width = fitted.free.iter().map(|n| n.label().chars().count()).max().unwrap_or(0);
@@ -242,7 +272,8 @@ pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     text.extend(fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row));
     let lines = |f: &FieldReference| [vec![field_line(f)], posterior_lines(f)].concat();
     fields.iter().flat_map(lines).for_each(|line| text += &format!("  {line}\n"));
-    text += &fitted.chosen.as_ref().map_or(String::new(), |c| format!("  {c}\n"));
+    fitted.notes.iter().for_each(|n| text += &format!("  {n}\n"));
+    text += &other_way(fitted).map_or(String::new(), |l| format!("  {l}\n"));
     let (rms, noise, points) = fitted.residual();
     let before: Option<Vec<ResidualSummary>> = fitted.before.iter().cloned().collect();
     let before = before.map_or(String::new(), |b| format!("{:.3} mm before, ", total(&b, |r| r.rms) * 1e3));

@@ -49,6 +49,12 @@ pub struct FitDocument {
     pub best: usize,
     /// One search per start.
     pub runs: Vec<Run>,
+    /// What was chosen for this fit and why, in sentences.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// What a fit of tracked points found, from which this one started.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub from_tracks: Vec<Tracked>,
     /// What deserves attention, in sentences.
     pub warnings: Vec<String>,
     /// Simulations of all searches together.
@@ -59,6 +65,21 @@ pub struct FitDocument {
 
 impl Document for FitDocument {
     const FORMAT: &'static str = "fit/2";
+}
+
+/// A number as tracked points alone give it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tracked {
+    /// Path in the scene file.
+    pub path: String,
+    /// Number of its scene, where scenes do not share it.
+    pub scene: Option<usize>,
+    /// Value in SI.
+    pub value: Option<f64>,
+    /// Its standard error, by noise alone.
+    pub standard_error: Option<f64>,
+    /// How far it is from what was found at last, in standard errors of the difference.
+    pub distance: Option<f64>,
 }
 
 /// A curve of stiffness.
@@ -374,6 +395,14 @@ mod tests {
                 evaluations: 7,
                 products: 3,
                 status: "stalled".into(),
+            }],
+            notes: vec!["starts by vibrations".into()],
+            from_tracks: vec![Tracked {
+                path: "material.youngs_modulus".into(),
+                scene: None,
+                value: Some(5.1e4),
+                standard_error: Some(300.0),
+                distance: Some(0.3),
             }],
             warnings: vec!["mind the ±".into()],
             evaluations: 7,

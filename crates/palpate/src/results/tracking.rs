@@ -22,8 +22,35 @@ pub struct TrackingDocument {
     pub places: usize,
     /// Wall-clock time [s].
     pub seconds: f64,
+    /// Fits to what was tracked, where they were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<RoundRow>,
     /// Every tracked frame.
     pub frames: Vec<FrameRow>,
+}
+
+/// A fit to what was tracked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoundRow {
+    /// The numbers found.
+    pub values: Vec<RoundNumber>,
+    /// By how many standard errors the one moved that moved most; nothing in the first round.
+    pub moved: Option<f64>,
+    /// Root mean square of the readings' residuals before it [m].
+    pub rms: Option<f64>,
+    /// Mean temperature of the prior before it [J].
+    pub temperature: Option<f64>,
+}
+
+/// A number of a round.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoundNumber {
+    /// Path in the scene file.
+    pub path: String,
+    /// Value in SI.
+    pub value: Option<f64>,
+    /// Its standard error, by noise alone.
+    pub standard_error: Option<f64>,
 }
 
 /// One frame.
@@ -89,11 +116,17 @@ mod tests {
             nodes: 45,
             places: 90,
             seconds: 0.5,
+            rounds: vec![RoundRow {
+                values: vec![RoundNumber { path: "material.youngs_modulus".into(), value: Some(1e4), standard_error: None }],
+                moved: Some(0.1),
+                rms: Some(1e-3),
+                temperature: Some(2e-3),
+            }],
             frames: vec![row],
         });
         assert_eq!(
             keys(&file),
-            ["format", "frames", "nodes", "places", "prior", "reason", "recorded", "scene", "seconds", "verdict"]
+            ["format", "frames", "nodes", "places", "prior", "reason", "recorded", "rounds", "scene", "seconds", "verdict"]
         );
     }
 }

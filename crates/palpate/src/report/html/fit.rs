@@ -3,7 +3,7 @@
 use super::{Column, figure, heads, over_time, page, plot, reproduce, unit};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
-use crate::report::fit::{beforehand, field_line, grid_line, number, parts, posterior_lines, worth};
+use crate::report::fit::{beforehand, field_line, grid_line, number, other_way, parts, posterior_lines, worth};
 use crate::report::pictures::FramePicture;
 use crate::report::plots::Curve;
 use crate::residuals::ResidualSummary;
@@ -113,8 +113,8 @@ fn fields(input: &ReportInput) -> Markup {
             }
             (evidence(f))
         }
-        @if let Some(why) = &input.fitted.chosen {
-            p { (why) "." }
+        @for note in input.fitted.notes.iter().cloned().chain(other_way(input.fitted)) {
+            p { (note) "." }
         }
     }
 }
