@@ -24,11 +24,11 @@ enum Verb {
         /// Coarser cells, fewer starts and cases
         #[arg(long)]
         quick: bool,
-        /// One table alone: torus, finer, ball, gravity, cameras, image, band, optimiser or gradient; or real2sim, fields
-        /// of stiffness with priors, of which one case alone is real2sim-NAME and what this commit has measured is not run again
+        /// One table alone: torus, finer, ball, gravity, cameras, image, band, optimiser or gradient; or a study,
+        /// real2sim or capture, of which one case alone is real2sim-NAME and what this commit has measured is not run again
         #[arg(long, value_name = "TABLE")]
         only: Option<String>,
-        /// With --only real2sim: print what was measured and write the table of docs/real2sim.md, and run nothing
+        /// With --only and a study: print what was measured and write the tables of its page, and run nothing
         #[arg(long, requires = "only")]
         report: bool,
     },
@@ -187,9 +187,10 @@ enum Verb {
 
 fn run(verb: Verb) -> Result<(), String> {
     match verb {
-        Verb::Paper { only: Some(only), report: true, .. } if paper::real2sim::is_asked(&only) => paper::real2sim::report()?,
-        Verb::Paper { only: Some(only), .. } if paper::real2sim::is_asked(&only) => paper::real2sim::run(&only)?,
-        Verb::Paper { quick, only, .. } => {
+        Verb::Paper { quick, only, report } => {
+            if let Some((set, only)) = only.as_ref().and_then(|o| Some((paper::SETS.iter().find(|s| s.is_asked(o))?, o))) {
+                return if report { set.report() } else { set.run(only) };
+            }
             let suffix = only.as_ref().map_or_else(String::new, |t| format!("-{t}"));
             let report = paper::tables::all(quick, only).map_err(|e| e.to_string())?;
             report.print();

@@ -2,7 +2,7 @@
 
 use crate::bench::counts;
 use crate::coverage;
-use crate::paper::real2sim;
+use crate::paper;
 use crate::real::report::Report;
 use crate::real::{diagnoses, models};
 use crate::suite::report as suite;
@@ -116,21 +116,23 @@ fn measured(root: &Path, found: &mut Vec<String>) {
 fn generated(root: &Path, found: &mut Vec<String>) {
     let suite = suite::stored(root).map(|lines| suite::markdown(&lines));
     let coverage = coverage::report::stored(root).map(|lines| coverage::report::markdown(&lines));
-    let real2sim = real2sim::stored(root).map(|rows| real2sim::acceptance::markdown(&rows));
-    let pairs = real2sim::stored(root).map(|rows| real2sim::acceptance::side_by_side(&rows));
     let counts = counts::stored(root).map(|rows| counts::markdown(&rows));
-    for (page, name, table, verb) in [
-        ("suite", "suite", suite, "suite --report"),
-        ("coverage", "coverage", coverage, "coverage --report"),
-        ("gpu", "counts", counts, "bench --gpu --counts --only torus"),
-        (real2sim::NAME, real2sim::NAME, real2sim, "paper --only real2sim --report"),
-        (real2sim::NAME, real2sim::PAIRS, pairs, "paper --only real2sim --report"),
-    ] {
-        let text = fs::read_to_string(root.join(format!("docs/{page}.md"))).unwrap_or_default();
+    let mut check = |page: &str, name: &str, table: Result<String, String>, verb: &str| {
+        let text = fs::read_to_string(root.join(page)).unwrap_or_default();
         match table {
             Ok(table) if text.split(&mark(name)).nth(1) == Some(&table) => {}
-            Ok(_) => found.push(format!("docs/{page}.md: the table of {name} is not what bench/ holds; cargo xtask {verb}")),
+            Ok(_) => found.push(format!("{page}: the table of {name} is not what bench/ holds; cargo xtask {verb}")),
             Err(e) => found.push(e),
+        }
+    };
+    check("docs/suite.md", "suite", suite, "suite --report");
+    check("docs/coverage.md", "coverage", coverage, "coverage --report");
+    check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
+    for set in paper::SETS {
+        let verb = format!("paper --only {} --report", set.name);
+        match set.stored(root) {
+            Ok(rows) => set.tables(&rows).into_iter().for_each(|(name, table)| check(set.page, name, Ok(table), &verb)),
+            Err(e) => check(set.page, set.name, Err(e), &verb),
         }
     }
 }

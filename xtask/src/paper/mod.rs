@@ -1,6 +1,9 @@
 //! The published experiments of Weiss et al., Sparse Surface Constraints (CVPR 2020), repeated: synthetic recordings give
 //! their parameters back.
 
+pub mod acceptance;
+pub mod capture;
+pub mod cases;
 pub mod finer;
 pub mod gradient;
 pub mod real2sim;
@@ -8,3 +11,6 @@ pub mod scenes;
 pub mod several;
 pub mod study;
 pub mod tables;
+
+/// Studies of other papers' methods.
+pub const SETS: [&cases::Set; 2] = [&real2sim::SET, &capture::SET];

@@ -1,60 +1,9 @@
-//! What was promised of the published results, beside what the last rows say: the table of `docs/real2sim.md`.
+//! What was promised of the published results, and bodies of cells and of tetrahedra side by side.
 
-use super::{Figures, Row};
-use Bound::{Around, AtLeast, AtMost, Below, Between};
-use Figure::{Of, Over};
-
-/// Where a line's number comes from.
-enum Figure {
-    /// The figure of this name.
-    Of(&'static str),
-    /// The first over the second.
-    Over(&'static str, &'static str),
-}
-
-impl Figure {
-    fn of(&self, figures: &Figures) -> Option<f64> {
-        match self {
-            Of(name) => figures.get(*name).copied(),
-            Over(a, b) => Some(figures.get(*a)? / figures.get(*b)?),
-        }
-    }
-}
-
-/// What is aimed at.
-enum Bound {
-    Below(f64),
-    AtMost(f64),
-    AtLeast(f64),
-    /// A middle, and how far on either side.
-    Around(f64, f64),
-    Between(f64, f64),
-}
-
-impl Bound {
-    fn holds(&self, x: f64) -> bool {
-        match *self {
-            Below(most) => x < most,
-            AtMost(most) => x <= most,
-            AtLeast(least) => x >= least,
-            Around(middle, by) => (x - middle).abs() <= by,
-            Between(low, high) => (low..=high).contains(&x),
-        }
-    }
-
-    fn text(&self) -> String {
-        match self {
-            Below(most) => format!("< {most}"),
-            AtMost(most) => format!("≤ {most}"),
-            AtLeast(least) => format!("≥ {least}"),
-            Around(middle, by) => format!("{middle} ± {by}"),
-            Between(low, high) => format!("{low} to {high}"),
-        }
-    }
-}
-
-/// Acceptance, what is looked at, case, figure, the paper's own number, and what is aimed at.
-type Aim = (&'static str, &'static str, &'static str, Figure, &'static str, Bound);
+use crate::paper::acceptance::Aim;
+use crate::paper::acceptance::Bound::{Around, AtLeast, AtMost, Below, Between};
+use crate::paper::acceptance::Figure::{Of, Over};
+use crate::paper::cases::Row;
 
 const MISS: &str = "miss [mm]";
 const COARSENED: &str = "after over before";
@@ -68,7 +17,8 @@ const SOFT: &str = "clamped half of the bar: E, geometric mean [kPa]";
 const KNOWN: &str = "their share with error < 20 %";
 const INSIDE: &str = "cells inside their 95 % band";
 
-const AIMS: &[Aim] = &[
+/// What was promised.
+pub const AIMS: &[Aim] = &[
     ("A6", "disk, homogeneous: miss [mm]", "disk-homogeneous", Of(MISS), "0.81", Below(0.81)),
     ("A6", "disk, curves of 5 corners: miss [mm]", "disk-curve-5", Of(MISS), "0.45", Below(0.45)),
     ("A6", "disk, curves of 17 corners: miss [mm]", "disk-curve-17", Of(MISS), "0.42 (21)", Below(0.42)),
@@ -139,23 +89,6 @@ const AIMS: &[Aim] = &[
         AtMost(1.1),
     ),
 ];
-
-/// The table in Markdown; cases without a row stand with a dash.
-pub fn markdown(rows: &[Row]) -> String {
-    let mut out = String::from("| | | paper | aim | here | | measured |\n|---|---|---|---|---|---|---|\n");
-    for (id, what, case, figure, paper, bound) in AIMS {
-        let row = rows.iter().rev().find(|r| r.case == *case);
-        let (here, met, measured) = match row.and_then(|r| Some((r, figure.of(&r.figures)?))) {
-            Some((r, x)) => {
-                let word = if bound.holds(x) { "met" } else { "missed" };
-                (format!("{x:.3}"), word, format!("{}, {}, {:.0} s", r.made.date, r.made.commit, r.seconds))
-            }
-            None => ("–".into(), "–", "–".into()),
-        };
-        out += &format!("| {id} | {what} | {paper} | {} | {here} | {met} | {measured} |\n", bound.text());
-    }
-    out
-}
 
 /// The same bodies of cells and of tetrahedra: the two cases, and the figures that stand side by side.
 const PAIRS: &[(&str, &str, &[&str])] = &[
@@ -239,14 +172,14 @@ pub fn side_by_side(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::CASES;
+    use super::super::SET;
     use super::*;
 
     #[test]
     fn every_aim_is_one_of_a_case() {
-        let known = |case: &str| CASES.iter().any(|c| c.0 == case);
+        let known = |case: &str| SET.cases.iter().any(|c| c.0 == case);
         assert!(AIMS.iter().all(|a| known(a.2)));
-        let lines = markdown(&[]);
+        let lines = crate::paper::acceptance::markdown(AIMS, &[]);
         assert_eq!(lines.lines().count(), AIMS.len() + 2);
         assert!(PAIRS.iter().all(|p| known(p.0) && known(p.1)));
     }

@@ -10,52 +10,21 @@ mod disk;
 mod hanging;
 mod many;
 
-use crate::real::report::Made;
-use crate::rows::{self, Measured};
-use crate::table;
+use crate::paper::cases::{Case, Figures, Set};
+use crate::rows::Measured;
 use palpate::{Experiment, Fitted};
 use palpate_fit::FieldPosterior;
 use palpate_model::plan::Plan;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::Path;
-use std::time::Instant;
 
-/// Name under which `cargo xtask paper --only` runs all cases; a case alone is `real2sim-NAME`.
-pub const NAME: &str = "real2sim";
-
-/// The page that has the table of aims, and one of bodies of cells and of tetrahedra side by side.
-pub const PAGE: &str = "docs/real2sim.md";
-/// Name of the latter.
-pub const PAIRS: &str = "real2sim-pairs";
-
-/// What one case came to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// When, and by what.
-    #[serde(flatten)]
-    pub made: Made,
-    /// Name of the case.
-    pub case: String,
-    /// Its figures by name.
-    pub figures: BTreeMap<String, f64>,
-    /// Wall-clock time [s].
-    pub seconds: f64,
-}
-
-/// Figures of one case.
-type Figures = BTreeMap<String, f64>;
-
-/// All rows of a workspace.
-///
-/// # Errors
-/// A line is no row.
-pub fn stored(root: &Path) -> Result<Vec<Row>, String> {
-    rows::load(&root.join("bench").join(format!("{NAME}.jsonl")))
-}
-
-/// A case, from the folder of measured recordings and one to work in.
-type Case = fn(&Path, &Path) -> Result<Figures, String>;
+/// The study.
+pub const SET: Set = Set {
+    name: "real2sim",
+    page: "docs/real2sim.md",
+    cases: &CASES,
+    aims: acceptance::AIMS,
+    more: &[("real2sim-pairs", acceptance::side_by_side)],
+    measured: Measured::Fits,
+};
 
 const CASES: [(&str, Case); 24] = [
     ("bar-two-clamps", |_, folder| bar::run(folder, bar::Held::Both, "matern")),
@@ -83,62 +52,6 @@ const CASES: [(&str, Case); 24] = [
     ("moldstar-cells", |data, _| beams::moldstar(data, beams::Made::Cells)),
     ("moldstar-tet10", |data, _| beams::moldstar(data, beams::Made::Tetrahedra)),
 ];
-
-/// True where a table's name asks for these cases.
-pub fn is_asked(only: &str) -> bool {
-    only.starts_with(NAME)
-}
-
-/// Runs the cases that a name asks for and this code has not run yet, appends a row each, and prints the last row of every case.
-///
-/// # Errors
-/// No case has the name, one cannot be run, or a file cannot be read or written.
-pub fn run(only: &str) -> Result<(), String> {
-    let wanted = only.strip_prefix(NAME).unwrap_or("").trim_start_matches('-');
-    if !CASES.iter().any(|c| c.0.starts_with(wanted)) {
-        let names = CASES.map(|c| format!("{NAME}-{}", c.0)).join(", ");
-        return Err(format!("nothing begins with {only}; there are {NAME}, {names}"));
-    }
-    let path = rows::path(NAME);
-    let made = rows::measured(Measured::Fits)?;
-    let data = std::env::var("PALPATE_DATA").unwrap_or_else(|_| table::root().join("../shared/data").display().to_string());
-    for (name, case) in CASES.iter().filter(|c| c.0.starts_with(wanted)) {
-        let known: Vec<Row> = rows::load(&path)?;
-        if known.iter().any(|r| r.case == *name && r.made.is_same(&made)) {
-            continue;
-        }
-        let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
-        let clock = Instant::now();
-        let mut figures = case(Path::new(&data), folder.path()).map_err(|e| format!("{name}: {e}"))?;
-        // What could not be found is left out: JSON has no word for it.
-        figures.retain(|_, x| x.is_finite());
-        let row = Row { made: made.clone(), case: (*name).into(), figures, seconds: clock.elapsed().as_secs_f64() };
-        rows::append(&path, &row)?;
-    }
-    report()
-}
-
-/// Prints the last row of every case, and writes the table of the page.
-///
-/// # Errors
-/// A file cannot be read or written.
-pub fn report() -> Result<(), String> {
-    let all = stored(&table::root())?;
-    print(&all);
-    table::replace(PAGE, NAME, &acceptance::markdown(&all))?;
-    table::replace(PAGE, PAIRS, &acceptance::side_by_side(&all))
-}
-
-/// The last row of every case.
-fn print(all: &[Row]) {
-    for (name, _) in CASES {
-        let Some(row) = all.iter().rev().find(|r| r.case == name) else { continue };
-        let head = vec!["figure".to_string(), "value".to_string()];
-        let figures = row.figures.iter().map(|(name, x)| vec![name.clone(), format!("{x:.4}")]);
-        let rows: Vec<Vec<String>> = std::iter::once(head).chain(figures).collect();
-        table::print(&format!("{name} ({}, {}, {:.0} s)", row.made.date, row.made.commit, row.seconds), &rows);
-    }
-}
 
 /// The posterior of a fit's only field.
 fn posterior(fitted: &Fitted) -> Result<&FieldPosterior, String> {
