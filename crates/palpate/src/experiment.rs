@@ -15,7 +15,7 @@ use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::plan::locking::locking;
-use palpate_model::scene::{InitialShape, ObservationSpec, Resolution, Scene};
+use palpate_model::scene::{FitSpec, InitialShape, ObservationSpec, Resolution, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
 use std::path::Path;
 use std::sync::Arc;
@@ -347,7 +347,16 @@ impl Experiment {
             scene.time.step *= scene.time.steps as f64 / steps as f64;
             scene.time.steps = steps;
         }
-        Experiment::new(scene, self.text.clone(), Vec::new())
+        // What was measured is not read again: it may be from no file.
+        let recording = self.recording.clone().filter(|_| scene.observation.is_some());
+        Experiment::of(scene, self.text.clone(), recording, Vec::new())
+    }
+
+    /// The same experiment with another search.
+    pub(crate) fn searched(&self, change: impl FnOnce(&mut FitSpec)) -> Experiment {
+        let mut other = self.clone();
+        other.scene.fit.as_mut().map(change);
+        other
     }
 
     /// Up in the world: against gravity, z without it.

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted, check};
 use crate::interrupt::Interrupt;
-use palpate_model::scene::{Scene, WarmStart};
+use palpate_model::scene::WarmStart;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -109,7 +109,7 @@ pub fn refine(
     let (mut rounds, mut settled) = (Vec::<Round>::new(), false);
     while rounds.len() < most && !settled && !tracked.interrupted {
         let recording = tracked.recording(&at.scene().title, noise(&at))?;
-        let fitted = started(&at, rounds.is_empty(), rounds.last())?.measured(recording)?.fit(FitOptions {
+        let fitted = started(&at, rounds.last()).measured(recording)?.fit(FitOptions {
             backend,
             interrupt: interrupt.clone(),
             hurried: true,
@@ -131,14 +131,15 @@ pub fn refine(
 }
 
 /// The experiment with starts of the round: vibrations in the first one, what was found before in the others.
-fn started(e: &Experiment, first: bool, before: Option<&Round>) -> Result<Experiment, Error> {
-    let mut scene: Scene = e.scene().clone();
-    if let Some(f) = &mut scene.fit {
-        f.warm_start = if first { WarmStart::Modal } else { WarmStart::Stated };
-        f.starts = if first { f.starts } else { 1 };
-        for (p, v) in f.parameters.iter_mut().zip(before.iter().flat_map(|r| &r.values)) {
-            p.start = (v.value, v.value);
+fn started(e: &Experiment, before: Option<&Round>) -> Experiment {
+    e.searched(|f| {
+        let Some(before) = before else {
+            f.warm_start = WarmStart::Modal;
+            return;
+        };
+        (f.warm_start, f.starts) = (WarmStart::Stated, 1);
+        for v in &before.values {
+            f.parameters.iter_mut().filter(|p| p.path == v.path).for_each(|p| p.start = (v.value, v.value));
         }
-    }
-    Experiment::new(scene, e.text().to_string(), Vec::new())
+    })
 }

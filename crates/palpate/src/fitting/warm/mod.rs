@@ -134,11 +134,7 @@ fn least_share(e: &Experiment, backend: Backend, interrupt: &Interrupt) -> f64 {
 
 /// The experiment with tracked points as its measurement, which a fit begins by their vibrations.
 fn of_points(e: &Experiment, recording: Recording) -> Result<Experiment, Error> {
-    let mut scene = e.scene().clone();
-    if let Some(f) = &mut scene.fit {
-        f.warm_start = WarmStart::Modal;
-    }
-    Experiment::new(scene, e.text().to_string(), Vec::new())?.measured(recording)
+    e.searched(|f| f.warm_start = WarmStart::Modal).measured(recording)
 }
 
 /// Starts by a fit of what was tracked.
