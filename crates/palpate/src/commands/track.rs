@@ -2,15 +2,15 @@
 
 use crate::cli::{Console, INTERRUPTED};
 use crate::error::Error;
-use crate::experiment::{Experiment, short};
+use crate::experiment::Experiment;
 use crate::options::out_folder;
+use crate::report::tracking_document;
+use crate::results;
 use crate::results::tracking::{FrameRow, TrackingDocument};
-use crate::results::{self, finite};
-use crate::tracking::{TrackedBody, TrackedFrame, median, noise, track};
+use crate::tracking::{TrackedBody, track};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_engine::number;
-use palpate_engine::tracking::Doubt;
 use palpate_io::npy::{Array, write_npz};
 use palpate_io::output::{make_folder, write_file};
 use palpate_io::vtk::{Elements, Values, write_vtu};
@@ -55,51 +55,6 @@ enum Format {
     Ply,
     /// The elements with displacement, velocity and share of data, and a .pvd for the series
     Vtu,
-}
-
-/// What is wrong, in words.
-fn words(doubt: &Doubt) -> String {
-    match doubt {
-        Doubt::Unmatched(share) => format!("only {:.0} % of the readings meet the body", 100.0 * share),
-        Doubt::Far(rms) => format!("the body lies {} m from its readings", number(*rms)),
-        Doubt::Pierced(share) => format!("{:.1} % of the rays pass through the body", 100.0 * share),
-        Doubt::Jumped(factor) => format!("the elastic energy rose {:.0} times from the frame before", factor),
-        Doubt::Unseen => "has no reading".into(),
-    }
-}
-
-fn row(f: &TrackedFrame) -> FrameRow {
-    let of = |seen: bool| median(f.deviation.iter().zip(&f.seen).filter(|(_, s)| **s == seen).map(|(d, _)| *d));
-    FrameRow {
-        time: f.time,
-        readings: f.met.readings,
-        matched: f.met.matched,
-        rms: finite(f.met.rms),
-        deviation_seen: of(true),
-        deviation_hidden: of(false),
-        seen: f.seen.iter().filter(|s| **s).count(),
-        determined: finite(f.determined),
-        temperature: finite(f.temperature),
-        steps: f.steps,
-        cold: f.cold,
-        doubts: f.doubts.iter().map(words).collect(),
-    }
-}
-
-/// The verdict and why.
-fn verdict(t: &TrackedBody) -> (&'static str, String) {
-    let doubted = t.frames.len() - t.sound();
-    let first = t.frames.iter().find(|f| !f.doubts.is_empty());
-    let why = first.map_or(String::new(), |f| {
-        format!("{doubted} of {} frames are doubted, first at {} s: {}", t.frames.len(), short(f.time), words(&f.doubts[0]))
-    });
-    match (t.interrupted, doubted) {
-        (true, _) => {
-            ("interrupted", format!("{} of {} frames were tracked. {why}", t.frames.len(), t.recorded).trim_end().to_string())
-        }
-        (false, 0) => ("tracked", String::new()),
-        _ => ("doubtful", why),
-    }
 }
 
 fn array(shape: &[usize], values: impl Iterator<Item = f64>) -> Array {
@@ -174,19 +129,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let seconds = clock.elapsed().as_secs_f64();
     write_arrays(&folder, &experiment, &tracked)?;
     write_frames(&folder, &experiment, &tracked, &a.format)?;
-    let (verdict, reason) = verdict(&tracked);
-    let document = TrackingDocument {
-        scene: experiment.scene().path.display().to_string(),
-        verdict: verdict.into(),
-        reason: reason.clone(),
-        prior: if tracked.dynamic { "dynamic" } else { "elastic" }.into(),
-        recorded: tracked.recorded,
-        nodes: experiment.plan().body.nodes.len(),
-        places: tracked.surface.rest.len(),
-        seconds,
-        frames: tracked.frames.iter().map(row).collect(),
-    };
-    match tracked.recording(&experiment.scene().title, noise(&experiment)) {
+    let document = tracking_document(&experiment, &tracked, seconds);
+    match tracked.recording(&experiment.scene().title, tracked.noise) {
         Ok(recording) => {
             palpate_io::write_recording(folder.join("recording"), &recording)?;
             let text = palpate_io::scene_of_tracks(experiment.text(), experiment.scene(), "recording", &folder)?;
