@@ -5,9 +5,10 @@ use crate::embed::Embedding;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::fitting::{self, FitOptions, Fitted};
+use crate::interrupt::Interrupt;
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
-use palpate_engine::{Snapshot, Stop, number};
+use palpate_engine::{FailureKind, FrameResiduals, Snapshot, Stop, number};
 use palpate_io::recording::{ObservationError, Recording};
 use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_error};
 use palpate_model::effects::sensors::Sensors;
@@ -15,10 +16,12 @@ use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::plan::locking::locking;
-use palpate_model::scene::{FitSpec, InitialShape, ObservationSpec, Resolution, Scene};
+use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+mod changed;
 
 /// A time [s]: four decimals, or few digits where it is none that anything moves in.
 pub(crate) fn short(t: f64) -> String {
@@ -95,42 +98,25 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::open`].
     pub fn new(scene: Scene, text: String, warnings: Vec<String>) -> Result<Experiment, Error> {
-        let mut recording = None;
-        if let Some(spec) = &scene.observation {
-            let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
-            if !place.exists() {
-                let message = format!("there is no recording at {}", place.display());
-                return Err(scene_error(&scene.path, &text, "observation.recording", message).into());
-            }
-            recording = Some(Arc::new(read_recording(place)?));
-        }
-        Experiment::of(scene, text, recording, warnings)
+        Experiment::build(scene, text, warnings, None)
     }
 
-    /// The same experiment with another measurement, all of which is used in every way that its readings can be compared.
-    ///
-    /// # Errors
-    /// [`Error::File`] when the recording lies nowhere near the object or does not go with the scene.
-    pub fn measured(&self, recording: Recording) -> Result<Experiment, Error> {
-        let costs = recording.kinds();
-        let band = self.scene.observation.as_ref().map(|o| o.band);
-        let spec = ObservationSpec::new(recording.path.clone(), costs);
-        let observation = ObservationSpec { band: band.unwrap_or(spec.band), ..spec };
-        let scene = Scene { observation: Some(observation), ..self.scene.clone() };
-        Experiment::of(scene, self.text.clone(), Some(Arc::new(recording)), Vec::new())
-    }
-
-    /// A scene with its recording, where it names one.
-    fn of(
+    /// The same with the recording that the scene's `[observation]` means, where it is at hand.
+    fn build(
         mut scene: Scene,
         text: String,
-        recording: Option<Arc<Recording>>,
         mut warnings: Vec<String>,
+        known: Option<Arc<Recording>>,
     ) -> Result<Experiment, Error> {
         let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
         let shape = shape_of(&scene.object);
+        let mut recording = None;
         let (mut observation, mut rest) = (Observation::default(), Vec::new());
-        if let (Some(spec), Some(read)) = (&scene.observation, &recording) {
+        if let Some(spec) = &scene.observation {
+            let read = match known {
+                Some(known) => known,
+                None => Arc::new(read_recording(place_of(spec).map_err(|e| fault("observation.recording", e))?)?),
+            };
             warnings.extend(read.warnings.iter().cloned());
             (observation, rest) = read.observation(spec, &mut warnings).map_err(|e| match e {
                 ObservationError::Recording(e) => Error::from(e),
@@ -138,6 +124,7 @@ impl Experiment {
             })?;
             let (min, max) = shape.bounds();
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
+            recording = Some(read);
         }
         if !scene.targets.is_empty() {
             observation = Observation::of_targets(&scene.targets);
@@ -239,8 +226,8 @@ impl Experiment {
     }
 
     /// The recording, where the scene names one.
-    pub fn recording(&self) -> Option<&Recording> {
-        self.recording.as_deref()
+    pub fn recording(&self) -> Option<&Arc<Recording>> {
+        self.recording.as_ref()
     }
 
     /// What the scene left open and was chosen for it: key, value in SI units, and why.
@@ -287,13 +274,34 @@ impl Experiment {
     /// # Errors
     /// [`Error::Simulation`] when it fails: what happened, when, and what may help.
     pub fn simulate(&self, backend: Backend) -> Result<Simulation, Error> {
-        let mut snapshots = Vec::new();
-        backend.visit(&self.plan, &self.plan.theta, |_, s, _| {
+        Ok(self.simulate_until(backend, &Interrupt::default(), |_, _| {})?.0)
+    }
+
+    /// The same, with how far every reading of the recording lies from the simulation, frame by frame in the order of their times. `hear` is told
+    /// the number of every state, the initial one 0, and how many there will be.
+    ///
+    /// # Errors
+    /// As [`Experiment::simulate`], and [`Error::Interrupted`] where it was stopped.
+    pub fn simulate_until(
+        &self,
+        backend: Backend,
+        interrupt: &Interrupt,
+        mut hear: impl FnMut(usize, usize),
+    ) -> Result<(Simulation, Vec<FrameResiduals>), Error> {
+        let (mut snapshots, mut frames) = (Vec::new(), Vec::new());
+        let visited = backend.visit_until(&self.plan, &self.plan.theta, interrupt.at_once(), |k, s, residuals| {
+            hear(k, self.plan.clock.steps);
             snapshots.push(s);
+            frames.extend(residuals);
             std::ops::ControlFlow::Continue(())
-        })?;
+        });
+        match visited {
+            Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => return Err(Error::Interrupted),
+            other => other?,
+        };
+        frames.sort_by_key(|f| f.frame);
         let (surface, triangles) = self.surface(0.5 * self.plan.body.length);
-        Ok(Simulation { snapshots, surface, triangles })
+        Ok((Simulation { snapshots, surface, triangles }, frames))
     }
 
     /// How far the measurement lies from a simulation with parameters θ `[P]`.
@@ -312,57 +320,16 @@ impl Experiment {
         fitting::fit(std::slice::from_ref(self), options)
     }
 
-    /// The same experiment with cells and time step divided by `factor`, and without its recording.
-    ///
-    /// # Errors
-    /// [`Error::File`] when the finer grid cannot be built.
-    pub fn refined(&self, factor: f64) -> Result<Experiment, Error> {
-        self.with_finer_grid(factor, factor, None)
-    }
-
-    /// The same experiment with cells and time step divided by `factor`, compared with its recording in the same band.
-    ///
-    /// # Errors
-    /// [`Error::File`] when the finer grid cannot be built or the recording is gone.
-    pub fn finer(&self, factor: f64, step: f64) -> Result<Experiment, Error> {
-        let observation = self.scene.observation.clone().map(|o| ObservationSpec { band: o.band * factor, ..o });
-        self.with_finer_grid(factor, step, observation)
-    }
-
-    /// The same experiment with cells and time step divided by factors, compared as this says.
-    pub(crate) fn with_finer_grid(
-        &self,
-        factor: f64,
-        step: f64,
-        observation: Option<ObservationSpec>,
-    ) -> Result<Experiment, Error> {
-        let mut scene = Scene { observation, ..self.scene.clone() };
-        scene.object.resolution = match scene.object.resolution {
-            Resolution::Own => Resolution::Own,
-            Resolution::Edge(edge) => Resolution::Edge(edge / factor),
-            _ => Resolution::CellSize(self.plan.body.length / factor),
-        };
-        let steps = (scene.time.steps as f64 * step).round() as usize;
-        if steps > 0 {
-            scene.time.step *= scene.time.steps as f64 / steps as f64;
-            scene.time.steps = steps;
-        }
-        // What was measured is not read again: it may be from no file.
-        let recording = self.recording.clone().filter(|_| scene.observation.is_some());
-        Experiment::of(scene, self.text.clone(), recording, Vec::new())
-    }
-
-    /// The same experiment with another search.
-    pub(crate) fn searched(&self, change: impl FnOnce(&mut FitSpec)) -> Experiment {
-        let mut other = self.clone();
-        other.scene.fit.as_mut().map(change);
-        other
-    }
-
     /// Up in the world: against gravity, z without it.
     pub fn up(&self) -> DVec3 {
         (-self.scene.gravity).try_normalize().unwrap_or(DVec3::Z)
     }
+}
+
+/// The file of the recording that an `[observation]` names.
+fn place_of(spec: &ObservationSpec) -> Result<PathBuf, String> {
+    let place = if spec.recording.is_dir() { spec.recording.join(&spec.file) } else { spec.recording.clone() };
+    if place.exists() { Ok(place) } else { Err(format!("there is no recording at {}", place.display())) }
 }
 
 /// A fault found while the plan is built, where its key stands: in the scene, or in the recording for what only that states.

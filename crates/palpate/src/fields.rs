@@ -78,27 +78,40 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
     own
 }
 
+/// Names of a scene's file of the grid, and of one of its fields.
+fn file_names(scenes: usize, scene: usize, field: usize) -> (String, String) {
+    let ending = if scenes == 1 { String::new() } else { format!("-scene-{}", scene + 1) };
+    (format!("fields{ending}.vtu"), format!("field-{field}{ending}.npz"))
+}
+
 /// Writes the fields of a fit into a folder, an NPZ file each and a VTU file a scene, and says where they are.
 ///
 /// # Errors
 /// A file cannot be written.
 pub(crate) fn write_fields(folder: &Path, experiments: &[Experiment], fitted: &Fitted) -> Result<Vec<FieldReference>, Error> {
-    let mut references = Vec::new();
     for (scene, e) in experiments.iter().enumerate() {
         let found = found(e, fitted, scene);
-        if found.is_empty() {
-            continue;
-        }
-        let ending = if experiments.len() == 1 { String::new() } else { format!("-scene-{}", scene + 1) };
-        let grid = format!("fields{ending}.vtu");
-        write_grid(&folder.join(&grid), e, &fitted.result.theta[scene], &found)?;
-        for f in found {
-            let file = format!("field-{}{ending}.npz", f.field);
+        for (k, f) in found.iter().enumerate() {
+            let (grid, file) = file_names(experiments.len(), scene, f.field);
+            if k == 0 {
+                write_grid(&folder.join(&grid), e, &fitted.result.theta[scene], &found)?;
+            }
             f.write(&folder.join(&file))?;
-            references.push(f.reference(file, grid.clone()));
         }
     }
-    Ok(references)
+    Ok(references(experiments, fitted))
+}
+
+/// What a result says of the fields of a fit.
+pub(crate) fn references(experiments: &[Experiment], fitted: &Fitted) -> Vec<FieldReference> {
+    let mut references = Vec::new();
+    for (scene, e) in experiments.iter().enumerate() {
+        for f in found(e, fitted, scene) {
+            let (grid, file) = file_names(experiments.len(), scene, f.field);
+            references.push(f.reference(file, grid));
+        }
+    }
+    references
 }
 
 /// For every field by cells or nodes of a scene, its number, file and array.

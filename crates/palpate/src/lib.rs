@@ -53,6 +53,7 @@ mod identify;
 mod interrupt;
 mod memory;
 mod motions;
+mod objective;
 mod options;
 mod progress;
 pub mod render;
@@ -74,6 +75,7 @@ pub use fitting::{FitOptions, Fitted, FreeNumber, FromTracks, Headline, Parts, f
 pub use grid::{GridCheck, GridEffect, grid_check};
 pub use host::host;
 pub use interrupt::{Clock, Interrupt};
+pub use objective::{Coordinates, Objective};
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};
 pub use tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, refine, track};

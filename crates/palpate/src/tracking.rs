@@ -72,6 +72,8 @@ pub struct TrackedBody {
     pub recorded: usize,
     /// True where the prior is a step from the frame before.
     pub dynamic: bool,
+    /// The finest noise of the readings [m].
+    pub noise: f64,
 }
 
 /// Root mean square of one coordinate.
@@ -138,11 +140,11 @@ pub fn track(experiment: &Experiment, mut progress: impl FnMut(usize) -> Control
     };
     tracking::track(&mut body, &settings, &frames, experiment.scene().time.start, &draws, visit)?;
     doubt_the_sparse(&mut done);
-    Ok(TrackedBody { surface, triangles, frames: done, interrupted, recorded: frames.len(), dynamic })
+    Ok(TrackedBody { surface, triangles, frames: done, interrupted, recorded: frames.len(), dynamic, noise: settings.noise })
 }
 
 /// The finest noise of an experiment's readings [m].
-pub(crate) fn noise(experiment: &Experiment) -> f64 {
+fn noise(experiment: &Experiment) -> f64 {
     experiment.plan().observation.channels.iter().map(|c| c.noise).fold(f64::INFINITY, f64::min)
 }
 

@@ -73,22 +73,21 @@ pub(super) fn cameras(root: &Table) -> Result<Vec<RecordedCamera>, InputError> {
             noise_sigma: noise(&t, "noise_sigma")?,
             noise_systematic: noise(&t, "noise_systematic")?.unwrap_or(0.0),
         };
-        // The corners are farthest from the axis: where they can be undistorted, every pixel can.
-        let (u, v) = (camera.width as f64 - 1.0, camera.height as f64 - 1.0);
-        for [u, v] in [[0.0, 0.0], [u, 0.0], [0.0, v], [u, v]] {
-            if camera.ray(u, v).is_none() {
-                return Err(t.error(
-                    "distortion",
-                    format!("cannot be inverted at pixel ({u}, {v}); are the coefficients k1 k2 p1 p2 k3?"),
-                ));
-            }
-        }
+        camera.check_distortion().map_err(|e| t.error("distortion", e))?;
         cameras.push(camera);
     }
     Ok(cameras)
 }
 
 impl RecordedCamera {
+    /// Refuses a distortion that cannot be removed everywhere.
+    pub(super) fn check_distortion(&self) -> Result<(), String> {
+        // The corners are farthest from the axis: where they can be undistorted, every pixel can.
+        let (right, low) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
+        let lost = [[0.0, 0.0], [right, 0.0], [0.0, low], [right, low]].into_iter().find(|[u, v]| self.ray(*u, *v).is_none());
+        lost.map_or(Ok(()), |[u, v]| Err(format!("cannot be inverted at pixel ({u}, {v}); are the coefficients k1 k2 p1 p2 k3?")))
+    }
+
     /// Centre of projection in the world [m].
     pub fn position(&self) -> DVec3 {
         self.world_from_camera.translation

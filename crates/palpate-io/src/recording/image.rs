@@ -67,36 +67,46 @@ const NEAREST: f64 = 0.02;
 /// Refuses cameras whose median depth cannot be in metres.
 pub(super) fn check_depth_unit(root: &Table, cameras: &[RecordedCamera], frames: &[RecordedFrame]) -> Result<(), InputError> {
     for (i, (camera, table)) in cameras.iter().zip(root.tables("camera")?).enumerate() {
-        let mut counts: Vec<u16> = (frames.iter().filter(|f| f.camera == i)).flat_map(|f| f.readings().map(|r| r.2)).collect();
-        if counts.is_empty() {
-            continue;
-        }
-        let middle = counts.len() / 2;
-        let median = *counts.select_nth_unstable(middle).1;
-        let depth = camera.depth(median);
-        if !(NEAREST..=FARTHEST).contains(&depth) {
-            let fits = |s: &&f64| (0.1..=10.0).contains(&(f64::from(median) * **s + camera.depth_offset));
-            let hint = match [0.001, 0.0001, 0.00025, 0.01, 0.00001].iter().find(fits) {
-                Some(s) => format!("; depth_scale = {s} would make it {:.3} m", f64::from(median) * s + camera.depth_offset),
-                None => String::new(),
-            };
-            let text = format!(
-                "the median depth of camera \"{}\" is {depth:.6} m ({median} counts), expected {NEAREST} to {FARTHEST} m{hint}",
-                camera.name
-            );
-            // Counts that are right by themselves are spoiled by what is added.
-            let plain = depth - camera.depth_offset;
-            if (NEAREST..=FARTHEST).contains(&plain) {
-                let text = format!(
-                    "adds {} m to the readings of camera \"{}\", whose median depth is then {depth:.6} m instead of {plain:.6} m; expected \
-                     {NEAREST} to {FARTHEST} m",
-                    number(camera.depth_offset),
-                    camera.name
-                );
-                return Err(table.error("depth_offset", text));
-            }
-            return Err(table.error("depth_scale", text));
-        }
+        let own = frames.iter().filter(|f| f.camera == i);
+        median_depth(camera, own).map_err(|(key, text)| table.error(key, text))?;
     }
     Ok(())
+}
+
+/// Refuses a camera whose median depth over its frames cannot be in metres: the key that is at fault, and why.
+pub(super) fn median_depth<'a>(
+    camera: &RecordedCamera,
+    frames: impl Iterator<Item = &'a RecordedFrame>,
+) -> Result<(), (&'static str, String)> {
+    let mut counts: Vec<u16> = frames.flat_map(|f| f.readings().map(|r| r.2)).collect();
+    if counts.is_empty() {
+        return Ok(());
+    }
+    let middle = counts.len() / 2;
+    let median = *counts.select_nth_unstable(middle).1;
+    let depth = camera.depth(median);
+    if (NEAREST..=FARTHEST).contains(&depth) {
+        return Ok(());
+    }
+    // Counts that are right by themselves are spoiled by what is added.
+    let plain = depth - camera.depth_offset;
+    if (NEAREST..=FARTHEST).contains(&plain) {
+        let text = format!(
+            "adds {} m to the readings of camera \"{}\", whose median depth is then {depth:.6} m instead of {plain:.6} m; expected \
+             {NEAREST} to {FARTHEST} m",
+            number(camera.depth_offset),
+            camera.name
+        );
+        return Err(("depth_offset", text));
+    }
+    let fits = |s: &&f64| (0.1..=10.0).contains(&(f64::from(median) * **s + camera.depth_offset));
+    let hint = match [0.001, 0.0001, 0.00025, 0.01, 0.00001].iter().find(fits) {
+        Some(s) => format!("; depth_scale = {s} would make it {:.3} m", f64::from(median) * s + camera.depth_offset),
+        None => String::new(),
+    };
+    let text = format!(
+        "the median depth of camera \"{}\" is {depth:.6} m ({median} counts), expected {NEAREST} to {FARTHEST} m{hint}",
+        camera.name
+    );
+    Err(("depth_scale", text))
 }

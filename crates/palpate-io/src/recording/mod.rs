@@ -1,5 +1,6 @@
 //! Format `recording/1`: a folder of depth images, masks, markers and arrays ↔ [`Recording`].
 
+mod arrays;
 mod c3d;
 mod camera;
 mod image;
@@ -11,6 +12,7 @@ mod sequence;
 mod tests;
 mod write;
 
+pub use arrays::{DepthStack, Noise, Tracks};
 pub use camera::RecordedCamera;
 pub use image::DepthImage;
 pub use markers::{MarkerSample, RecordedMarkers};
@@ -25,6 +27,7 @@ use crate::keys::{RECORDING, suggest};
 use crate::scene::{check_format, marker_rest};
 use palpate_model::observation::{MarkerRest, ReadingKind};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
 
 /// The recording format this version reads and writes.
@@ -51,19 +54,6 @@ pub struct Recording {
     pub displacements: Option<RecordedDisplacements>,
     /// What looks suspicious without being wrong.
     pub warnings: Vec<String>,
-}
-
-impl Recording {
-    /// Kinds of readings that it holds.
-    pub fn kinds(&self) -> Vec<ReadingKind> {
-        let has = |kind: &ReadingKind| match kind {
-            ReadingKind::Depth => !self.frames.is_empty(),
-            ReadingKind::Marker => self.markers.is_some(),
-            ReadingKind::Track => self.points.is_some(),
-            ReadingKind::Displacement => self.displacements.is_some(),
-        };
-        ReadingKind::ALL.into_iter().filter(has).collect()
-    }
 }
 
 /// What one camera saw at one time.
@@ -236,6 +226,19 @@ fn frames(
     Ok(frames)
 }
 
+impl Recording {
+    /// What kinds of readings it holds, in a fixed order.
+    pub fn kinds(&self) -> Vec<ReadingKind> {
+        let holds = |kind: &ReadingKind| match kind {
+            ReadingKind::Depth => self.frames.iter().any(|f| f.depth.is_some()),
+            ReadingKind::Marker => self.markers.is_some(),
+            ReadingKind::Track => self.points.is_some(),
+            ReadingKind::Displacement => self.displacements.is_some(),
+        };
+        ReadingKind::ALL.into_iter().filter(holds).collect()
+    }
+}
+
 impl RecordedFrame {
     /// Pixels (column u, row v) of the object with a reading, and their counts, row by row.
     pub fn readings(&self) -> impl Iterator<Item = (usize, usize, u16)> + '_ {
@@ -280,10 +283,16 @@ fn markers(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<
     }))
 }
 
-/// A noise in metres. Costs divide by its square: zero would be an infinite weight, and less than a nanometre is no measurement.
-fn noise(t: &Table, key: &str) -> Result<Option<f64>, InputError> {
+/// What a noise in metres may be, and how that is said. Costs divide by its square: zero would be an infinite weight, and less than a
+/// nanometre is no measurement.
+fn noise_range(key: &str) -> (RangeInclusive<f64>, &'static str) {
     match key {
-        "noise_sigma" => t.f64_where(key, |x| (1e-9..=10.0).contains(&x), "is not allowed: must lie in [1e-9, 10] (m)"),
-        _ => t.f64_where(key, |x| (0.0..=10.0).contains(&x), "is not allowed: must lie in [0, 10] (m)"),
+        "noise_sigma" => (1e-9..=10.0, "is not allowed: must lie in [1e-9, 10] (m)"),
+        _ => (0.0..=10.0, "is not allowed: must lie in [0, 10] (m)"),
     }
+}
+
+fn noise(t: &Table, key: &str) -> Result<Option<f64>, InputError> {
+    let (range, allowed) = noise_range(key);
+    t.f64_where(key, |x| range.contains(&x), allowed)
 }

@@ -153,20 +153,8 @@ impl<'a> Reader<'a> {
 
     /// World vectors of an array whose last axis has three coordinates; NaN where all three are.
     fn vectors(&self, key: &str, array: &Array, place: impl Fn(DVec3) -> DVec3) -> Result<Vec<DVec3>, InputError> {
-        let infinite = array.values.iter().filter(|x| x.is_infinite()).count();
-        if infinite > 0 {
-            let text = format!("{infinite} of {} numbers are infinite; NaN marks what was not seen", array.values.len());
-            return Err(self.table.error(key, text));
-        }
         let all = || array.values.chunks_exact(3).map(DVec3::from_slice);
-        let partly = |v: &DVec3| v.is_nan() && !(v.x.is_nan() && v.y.is_nan() && v.z.is_nan());
-        let broken = all().filter(partly).count();
-        if let Some(first) = all().position(|v| partly(&v)) {
-            let text = format!(
-                "{broken} vectors are NaN in part only, the first is number {first}; what was not seen is NaN in x, y and z"
-            );
-            return Err(self.table.error(key, text));
-        }
+        check_vectors(all()).map_err(|e| self.table.error(key, e))?;
         Ok(all().map(|v| if v.is_nan() { DVec3::NAN } else { place(self.unit * v) }).collect())
     }
 
@@ -193,12 +181,7 @@ impl<'a> Reader<'a> {
             }
             _ => t.optional_numbers("times", frames)?.unwrap_or_default(),
         };
-        if times.len() != frames {
-            return Err(t.error("times", format!("holds {} times for {frames} frames", times.len())));
-        }
-        if let Some(k) = (0..frames).find(|k| !times[*k].is_finite() || (*k > 0 && times[*k] <= times[k - 1])) {
-            return Err(t.error("times", format!("{} of frame {k} is not finite, or not after the one before", number(times[k]))));
-        }
+        check_times(&times, frames).map_err(|e| t.error("times", e))?;
         Ok(times)
     }
 
@@ -233,6 +216,28 @@ impl<'a> Reader<'a> {
             n => Err(self.table.error(key, format!("{n} of {count} places are NaN"))),
         }
     }
+}
+
+/// Refuses infinite numbers, and vectors that were seen in part.
+pub(super) fn check_vectors(all: impl Iterator<Item = DVec3> + Clone) -> Result<(), String> {
+    let infinite = all.clone().flat_map(|v| v.to_array()).filter(|x| x.is_infinite()).count();
+    if infinite > 0 {
+        return Err(format!("{infinite} of {} numbers are infinite; NaN marks what was not seen", 3 * all.count()));
+    }
+    let partly = |v: &DVec3| v.is_nan() && !(v.x.is_nan() && v.y.is_nan() && v.z.is_nan());
+    let broken = all.clone().filter(partly).count();
+    all.clone().position(|v| partly(&v)).map_or(Ok(()), |first| {
+        Err(format!("{broken} vectors are NaN in part only, the first is number {first}; what was not seen is NaN in x, y and z"))
+    })
+}
+
+/// Refuses times that do not rise, or are not one a frame.
+pub(super) fn check_times(times: &[f64], frames: usize) -> Result<(), String> {
+    if times.len() != frames {
+        return Err(format!("holds {} times for {frames} frames", times.len()));
+    }
+    let wrong = (0..frames).find(|k| !times[*k].is_finite() || (*k > 0 && times[*k] <= times[k - 1]));
+    wrong.map_or(Ok(()), |k| Err(format!("{} of frame {k} is not finite, or not after the one before", number(times[k]))))
 }
 
 fn is_array(path: &std::path::Path) -> bool {

@@ -161,3 +161,18 @@ fn a_clamp_has_a_box_or_a_group() {
     let scene = read("[[clamp]]\ngroup = \"base\"\n").unwrap().value;
     assert_eq!(scene.clamps[0].region, ClampRegion::Group("base".into()));
 }
+
+#[test]
+fn other_values_are_as_if_somebody_had_typed_them() {
+    let fit = "[fit]\nstarts = 3\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = [1e4, 1e6]\n";
+    let text = format!("{BASE}{fit}");
+    let scene = parse_scene(&text, "some/scene.toml").unwrap().value;
+    let values = [("material.youngs_modulus".to_string(), 3.0e4), ("world.gravity.x".to_string(), 0.5)];
+    let again = scene_with_values(&text, &scene, &values).unwrap();
+    assert!(!again.contains("fitted, was") && again.contains("start = [1e4, 1e6]"), "{again}");
+    let changed = parse_scene(&again, "some/scene.toml").unwrap().value;
+    assert_eq!((changed.material.youngs_modulus, changed.gravity.x), (3.0e4, 0.5));
+    assert_eq!((changed.gravity.y, changed.material.poisson_ratio), (scene.gravity.y, scene.material.poisson_ratio));
+    let refused = scene_with_values(&text, &scene, &[("plane.3.height".to_string(), 0.0)]).unwrap_err().to_string();
+    assert_eq!(refused, "some/scene.toml: plane.3.height: not a number of this scene");
+}

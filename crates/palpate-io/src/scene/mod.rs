@@ -18,7 +18,7 @@ mod track;
 mod write;
 
 pub use rework::{recast_scene, scene_of_tracks};
-pub use write::{append_effects, name_field_files, write_scene};
+pub use write::{append_effects, name_field_files, scene_with_values, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};

@@ -18,9 +18,32 @@ use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
 /// # Errors
 /// A template that is no TOML, a path that the scene does not have, a value that is not finite.
 pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], folder: &Path) -> Result<String, InputError> {
-    let mut doc: DocumentMut = template
-        .parse()
-        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
+    let before = document(template, scene)?;
+    let mut doc = before.clone();
+    put(&mut doc, scene, values)?;
+    start_there(&mut doc, values);
+    note_changes(doc.as_table_mut(), before.as_table());
+    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    Ok(doc.to_string())
+}
+
+/// The text of `scene` with other `values` (dotted path, value in SI units), as somebody would type them: starts of a fit and paths stay.
+///
+/// # Errors
+/// As [`write_scene`].
+pub fn scene_with_values(template: &str, scene: &Scene, values: &[(String, f64)]) -> Result<String, InputError> {
+    let mut doc = document(template, scene)?;
+    put(&mut doc, scene, values)?;
+    Ok(doc.to_string())
+}
+
+fn document(template: &str, scene: &Scene) -> Result<DocumentMut, InputError> {
+    let wrong = |e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message()));
+    template.parse().map_err(wrong)
+}
+
+/// Puts values into a scene's text.
+fn put(doc: &mut DocumentMut, scene: &Scene, values: &[(String, f64)]) -> Result<(), InputError> {
     let mut planes: Vec<Option<[Option<f64>; 3]>> = vec![None; scene.planes.len()];
     for (path, value) in values {
         let wrong = |message: String| InputError { key: path.clone(), ..InputError::file(&scene.path, message) };
@@ -38,24 +61,24 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
             }
             ["mass", i, "mass"] => {
                 let i: usize = i.parse().map_err(|_| unknown())?;
-                set(row(&mut doc, "mass", i).ok_or_else(unknown)?, "mass", Value::from(*value));
+                set(row(doc, "mass", i).ok_or_else(unknown)?, "mass", Value::from(*value));
             }
             ["field", i, k] if region(scene, i, k).is_some() => {
                 let (i, k) = region(scene, i, k).ok_or_else(unknown)?;
-                let table = row(&mut doc, "field", i).ok_or_else(unknown)?;
+                let table = row(doc, "field", i).ok_or_else(unknown)?;
                 set(entry(table, "regions", k).ok_or_else(unknown)?, "value", Value::from(*value));
             }
             // Values of cells and nodes go into a file, which `name_field_files` names.
             ["field", i] | ["field", i, _] if i.parse().is_ok_and(|i: usize| i < scene.fields.len()) => {}
             ["effect", i, key] => {
                 let i: usize = i.parse().map_err(|_| unknown())?;
-                set(row(&mut doc, "effect", i).ok_or_else(unknown)?, key, Value::from(*value));
+                set(row(doc, "effect", i).ok_or_else(unknown)?, key, Value::from(*value));
             }
             ["effect", i, key, a] => {
                 let (i, a) = (i.parse::<usize>().map_err(|_| unknown())?, axis(a).ok_or_else(unknown)?);
                 let effect = scene.effects.get(i).ok_or_else(unknown)?;
                 let slot = effect.law().params.iter().position(|p| p.key == key && p.axis == Some(0)).ok_or_else(unknown)?;
-                let table = row(&mut doc, "effect", i).ok_or_else(unknown)?;
+                let table = row(doc, "effect", i).ok_or_else(unknown)?;
                 if !table.contains_key(key) {
                     // Components that are not written keep what the scene means by leaving them out.
                     let known = |k: usize| values.iter().find(|(p, _)| *p == format!("effect.{i}.{key}.{}", ["x", "y", "z"][k]));
@@ -76,7 +99,7 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                     "angular_velocity" => scene.initial.angular_velocity,
                     _ => return Err(unknown()),
                 };
-                let table = section(&mut doc, group).ok_or_else(unknown)?;
+                let table = section(doc, group).ok_or_else(unknown)?;
                 if !table.contains_key(name) {
                     set(table, name, vector(before));
                 }
@@ -84,11 +107,11 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 replace(array.get_mut(a).ok_or_else(unknown)?, Value::from(*value));
             }
             ["material", inner @ "viscosity", name] => {
-                let table = section(&mut doc, "material").and_then(|t| t.get_mut(inner)?.as_table_like_mut());
+                let table = section(doc, "material").and_then(|t| t.get_mut(inner)?.as_table_like_mut());
                 set(table.ok_or_else(unknown)?, name, Value::from(*value));
             }
             ["material", curve @ ("stretch_curve" | "volume_curve"), "factors", k] => {
-                let table = section(&mut doc, "material").and_then(|t| t.get_mut(curve)?.as_table_like_mut());
+                let table = section(doc, "material").and_then(|t| t.get_mut(curve)?.as_table_like_mut());
                 let table = table.ok_or_else(unknown)?;
                 if !table.contains_key("factors") {
                     let known = if curve == "stretch_curve" { &scene.curves.stretch } else { &scene.curves.volume };
@@ -99,7 +122,7 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
                 replace(array.get_mut(k).ok_or_else(unknown)?, Value::from(*value));
             }
             [group @ ("material" | "time" | "object"), name] => {
-                let table = section(&mut doc, group).ok_or_else(unknown)?;
+                let table = section(doc, group).ok_or_else(unknown)?;
                 match name {
                     "density" => drop(table.remove("mass")),
                     "mass" => drop(table.remove("density")),
@@ -114,15 +137,11 @@ pub fn write_scene(template: &str, scene: &Scene, values: &[(String, f64)], fold
         let Some(change) = change else { continue };
         let (point, normal) = moved_plane(scene.planes[i].point, scene.planes[i].normal, *change);
         let missing = || InputError { key: format!("plane.{i}"), ..InputError::file(&scene.path, "not in the file") };
-        let table = row(&mut doc, "plane", i).ok_or_else(missing)?;
+        let table = row(doc, "plane", i).ok_or_else(missing)?;
         set(table, "point", vector(point));
         set(table, "normal", vector(normal));
     }
-    start_there(&mut doc, values);
-    let before: DocumentMut = template.parse().expect("it was parsed above");
-    note_changes(doc.as_table_mut(), before.as_table());
-    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
-    Ok(doc.to_string())
+    Ok(())
 }
 
 /// Lets the next fit start where this one ended: a `start` that is written becomes the value found. One that could not say it, of a field or
@@ -163,8 +182,7 @@ fn region(scene: &Scene, field: &str, place: &str) -> Option<(usize, usize)> {
 /// A text that is no TOML or lacks the field.
 pub fn name_field_files(text: &str, scene: &Scene, files: &[(usize, String, &str)]) -> Result<String, InputError> {
     let wrong = |key: String, message: String| InputError { key, ..InputError::file(&scene.path, message) };
-    let mut doc: DocumentMut =
-        text.parse().map_err(|e: toml_edit::TomlError| wrong(String::new(), format!("not valid TOML: {}", e.message())))?;
+    let mut doc = document(text, scene)?;
     for (i, file, array) in files {
         let table = row(&mut doc, "field", *i).ok_or_else(|| wrong(format!("field.{i}"), "not in the file".into()))?;
         set(table, "file", Value::from(file.as_str()));

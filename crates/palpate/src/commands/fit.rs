@@ -1,21 +1,19 @@
 //! `palpate fit`: parameters that explain a recording.
 
 use crate::cli::{Console, INTERRUPTED};
-use crate::curves;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fields::{self, files_of, write_fields};
+use crate::fields;
 use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters, usual};
 use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
-use crate::report::{FramePicture, ReportInput, fit_document, fit_html, history_csv, pictures, summary};
+use crate::report::{summary, write_fit, write_report};
 use crate::results;
 use crate::results::fit::{FitDocument, FitStatus};
 use clap::{Args, ValueEnum};
-use palpate_engine::Stop;
 use palpate_fit::Progress;
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::make_folder;
 use palpate_io::read_recording;
 use palpate_io::recording::Recording;
 use palpate_model::scene::Optimizer;
@@ -168,64 +166,6 @@ fn command(scenes: &[PathBuf], from: &[Recording], a: &Choices, fitted: &Fitted)
     option("seed", a.seed.map(|n| n.to_string()));
     words.extend(a.no_grid_check.then(|| "--no-grid-check".to_string()));
     words.join(" ")
-}
-
-/// Pictures of one scene before and after; a start that cannot be simulated has none.
-type Pair = (Vec<FramePicture>, Vec<FramePicture>);
-
-fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, count: usize, scale: f64) -> Result<Pair, Error> {
-    let theta = &fitted.theta_start[s];
-    let stop = Stop::default();
-    let before = pictures(e, backend, theta, count, scale, &stop).unwrap_or_default();
-    Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale, &stop)?))
-}
-
-fn write_all(
-    scenes: &[PathBuf],
-    from: &[Recording],
-    a: &Choices,
-    folder: &Path,
-    experiments: &[Experiment],
-    fitted: &Fitted,
-    backend: Backend,
-) -> Result<FitDocument, Error> {
-    let text = |name: &str, content: &str| write_file(folder.join(name), |w| w.write_all(content.as_bytes()));
-    let found = write_fields(folder, experiments, fitted)?;
-    // What was found stands without them.
-    let curves = curves::found(experiments, fitted, backend).unwrap_or_default();
-    let result = fit_document(fitted, experiments, found, curves);
-    // Results first: a report that fails must not cost them.
-    results::write(folder.join("result.json"), &result)?;
-    text("history.csv", &history_csv(fitted))?;
-    for (s, e) in experiments.iter().enumerate() {
-        let mut values = fitted.values_of(s, e);
-        // What was chosen for this fit is what its values belong to.
-        values.extend(e.chosen().iter().map(|(key, value, _)| (key.to_string(), *value)));
-        let model = palpate_io::write_scene(e.text(), e.scene(), &values, folder)?;
-        let model = palpate_io::name_field_files(&model, e.scene(), &files_of(&result.fields, s, e))?;
-        let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
-        text(&name, &model)?;
-    }
-    let (rms, noise, _) = fitted.residual();
-    let scale = if rms.is_finite() { 2.0 * rms.max(noise) } else { noise.max(1e-3) };
-    // Whoever interrupts does not want to wait for pictures, and a device that failed would make none.
-    let count = if fitted.status() == FitStatus::Complete { a.pictures } else { 0 };
-    let pictures = experiments.iter().enumerate().map(|(s, e)| match count {
-        0 => Ok((Vec::new(), Vec::new())),
-        n => scene_pictures(e, fitted, s, backend, n, scale),
-    });
-    let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
-    let page = fit_html(&ReportInput {
-        fitted,
-        experiments,
-        fields: &result.fields,
-        curves: &result.curves,
-        pictures,
-        scale,
-        command: command(scenes, from, a, fitted),
-    });
-    text("report.html", &page)?;
-    Ok(result)
 }
 
 /// A scene that is given twice counts twice: its noise is taken for less than it is.
@@ -385,6 +325,9 @@ pub fn run_in(
         fitted.check_grid(experiments, backend, &console.interrupt);
     }
     may_write()?;
-    let result = write_all(scenes, from, a, folder, experiments, &fitted, backend)?;
+    let result = write_fit(folder, experiments, &fitted, backend)?;
+    // Whoever interrupts does not want to wait for pictures, and a device that failed would make none.
+    let pictures = if fitted.status() == FitStatus::Complete { a.pictures } else { 0 };
+    write_report(folder, experiments, &fitted, &result, backend, pictures, command(scenes, from, a, &fitted))?;
     Ok((fitted, result))
 }

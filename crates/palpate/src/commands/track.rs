@@ -3,16 +3,16 @@
 use crate::cli::{Console, INTERRUPTED};
 use crate::engine::Backend;
 use crate::error::Error;
-use crate::experiment::{Experiment, short};
+use crate::experiment::Experiment;
 use crate::options::{count, out_folder};
-use crate::results::tracking::{FrameRow, RoundNumber, RoundRow, TrackingDocument};
-use crate::results::{self, finite};
-use crate::tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, median, noise, refine, track};
+use crate::report::tracking_document;
+use crate::results;
+use crate::results::tracking::{FrameRow, RoundNumber, TrackingDocument};
+use crate::tracking::{Refined, TrackedBody, refine, track};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_diagnose::stated;
 use palpate_engine::number;
-use palpate_engine::tracking::Doubt;
 use palpate_io::npy::{Array, write_npz};
 use palpate_io::output::{make_folder, write_file};
 use palpate_io::vtk::{Elements, Values, write_vtu};
@@ -62,72 +62,6 @@ enum Format {
     Ply,
     /// The elements with displacement, velocity and share of data, and a .pvd for the series
     Vtu,
-}
-
-/// What is wrong, in words.
-fn words(doubt: &Doubt) -> String {
-    match doubt {
-        Doubt::Unmatched(share) => format!("only {:.0} % of the readings meet the body", 100.0 * share),
-        Doubt::Far(rms) => format!("the body lies {} m from its readings", number(*rms)),
-        Doubt::Pierced(share) => format!("{:.1} % of the rays pass through the body", 100.0 * share),
-        Doubt::Jumped(factor) => format!("the elastic energy rose {:.0} times from the frame before", factor),
-        Doubt::Unseen => "has no reading".into(),
-    }
-}
-
-fn row(f: &TrackedFrame) -> FrameRow {
-    let of = |seen: bool| median(f.deviation.iter().zip(&f.seen).filter(|(_, s)| **s == seen).map(|(d, _)| *d));
-    FrameRow {
-        time: f.time,
-        readings: f.met.readings,
-        matched: f.met.matched,
-        rms: finite(f.met.rms),
-        deviation_seen: of(true),
-        deviation_hidden: of(false),
-        seen: f.seen.iter().filter(|s| **s).count(),
-        determined: finite(f.determined),
-        temperature: finite(f.temperature),
-        steps: f.steps,
-        cold: f.cold,
-        doubts: f.doubts.iter().map(words).collect(),
-    }
-}
-
-fn round(r: &Round) -> RoundRow {
-    let number = |v: &RoundValue| RoundNumber {
-        path: v.path.clone(),
-        value: finite(v.value),
-        standard_error: v.standard_error.and_then(finite),
-    };
-    RoundRow {
-        values: r.values.iter().map(number).collect(),
-        moved: r.moved.and_then(finite),
-        rms: finite(r.rms),
-        temperature: finite(r.temperature),
-    }
-}
-
-/// The verdict and why.
-fn verdict(r: &Refined) -> (&'static str, String) {
-    let t: &TrackedBody = &r.tracked;
-    let doubted = t.frames.len() - t.sound();
-    let first = t.frames.iter().find(|f| !f.doubts.is_empty());
-    let why = first.map_or(String::new(), |f| {
-        format!("{doubted} of {} frames are doubted, first at {} s: {}", t.frames.len(), short(f.time), words(&f.doubts[0]))
-    });
-    match (t.interrupted, doubted) {
-        (true, _) => {
-            ("interrupted", format!("{} of {} frames were tracked. {why}", t.frames.len(), t.recorded).trim_end().to_string())
-        }
-        (false, 0) if r.settled => ("tracked", String::new()),
-        (false, 0) => match r.rounds.last().and_then(|r| r.moved) {
-            Some(moved) => {
-                ("doubtful", format!("after {} rounds a number still moved by {} standard errors", r.rounds.len(), number(moved)))
-            }
-            None => ("doubtful", "one round does not say whether its numbers would move in another".into()),
-        },
-        _ => ("doubtful", why),
-    }
 }
 
 fn array(shape: &[usize], values: impl Iterator<Item = f64>) -> Array {
@@ -201,28 +135,16 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
                 progress.at(done as u64, "");
                 if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;
-            Refined { tracked, text: experiment.text().into(), experiment, rounds: Vec::new(), settled: true }
+            Refined::once(experiment, tracked)
         }
     };
-    let Refined { tracked, experiment, text, rounds, .. } = &refined;
+    let Refined { tracked, experiment, text, .. } = &refined;
     progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
     write_arrays(&folder, experiment, tracked)?;
     write_frames(&folder, experiment, tracked, &a.format)?;
-    let (verdict, reason) = verdict(&refined);
-    let document = TrackingDocument {
-        scene: a.scene.display().to_string(),
-        verdict: verdict.into(),
-        reason: reason.clone(),
-        prior: if tracked.dynamic { "dynamic" } else { "elastic" }.into(),
-        recorded: tracked.recorded,
-        nodes: experiment.plan().body.nodes.len(),
-        places: tracked.surface.rest.len(),
-        seconds,
-        rounds: rounds.iter().map(round).collect(),
-        frames: tracked.frames.iter().map(row).collect(),
-    };
-    match tracked.recording(&experiment.scene().title, noise(experiment)) {
+    let document = tracking_document(&refined, seconds);
+    match tracked.recording(&experiment.scene().title, tracked.noise) {
         Ok(recording) => {
             palpate_io::write_recording(folder.join("recording"), &recording)?;
             let scene = palpate_io::scene_of_tracks(text, experiment.scene(), "recording", &folder)?;

@@ -75,6 +75,17 @@ pub struct Diagnosed {
     pub seconds: f64,
 }
 
+impl Diagnosed {
+    /// The experiment number s, which was `given`, with the effects and values that were found in its text.
+    ///
+    /// # Errors
+    /// The text cannot hold them, or what it says then is refused.
+    pub fn corrected(&self, s: usize, given: &Experiment) -> Result<Experiment, Error> {
+        let extended = palpate_io::append_effects(given.text(), given.scene(), &self.added)?;
+        given.reworded(palpate_io::scene_with_values(&extended, self.experiments[s].scene(), &self.values[s])?)
+    }
+}
+
 /// What a round of a diagnosis asks of its backend at the same time: candidates of every scene, with derivatives by what is free in the baseline.
 ///
 /// # Errors

@@ -1,6 +1,9 @@
 //! The numbers of a fit for its result file, as CSV and as a short table.
 
+use crate::curves;
+use crate::engine::Backend;
 use crate::experiment::Experiment;
+use crate::fields;
 use crate::fitting::{Fitted, FreeNumber, FromTracks, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
@@ -61,6 +64,14 @@ fn run(fitted: &Fitted, run: &palpate_fit::Run) -> Run {
         products: run.products,
         status: run.status.name().into(),
     }
+}
+
+/// What `result.json` says of a fit of these experiments, for whoever keeps fields in memory: their files have names as if they were written.
+/// What was found is simulated once more where it is a curve.
+pub fn whole_document(fitted: &Fitted, experiments: &[Experiment], backend: Backend) -> FitDocument {
+    // What was found stands without them.
+    let curves = curves::found(experiments, fitted, backend).unwrap_or_default();
+    fit_document(fitted, experiments, fields::references(experiments, fitted), curves)
 }
 
 /// What `result.json` says of a fit of these experiments, whose fields lie beside it, with the curves found.

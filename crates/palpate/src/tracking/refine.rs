@@ -5,7 +5,7 @@
 //! settled:  max_i |v_i − v_i of the round before| / standard error_i < SETTLED
 //! ```
 
-use super::{TrackedBody, noise, track};
+use super::{TrackedBody, track};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -55,6 +55,13 @@ pub struct Refined {
     pub rounds: Vec<Round>,
     /// True where the last round moved nothing that counts.
     pub settled: bool,
+}
+
+impl Refined {
+    /// A body that was tracked once, in an experiment's recording.
+    pub fn once(experiment: Experiment, tracked: TrackedBody) -> Refined {
+        Refined { tracked, text: experiment.text().into(), experiment, rounds: Vec::new(), settled: true }
+    }
 }
 
 /// The largest move from one round to the next, in standard errors.
@@ -108,7 +115,7 @@ pub fn refine(
     let mut tracked = look(&at, 1)?;
     let (mut rounds, mut settled) = (Vec::<Round>::new(), false);
     while rounds.len() < most && !settled && !tracked.interrupted {
-        let recording = tracked.recording(&at.scene().title, noise(&at))?;
+        let recording = tracked.recording(&at.scene().title, tracked.noise)?;
         let fitted = started(&at, rounds.last()).measured(recording)?.fit(FitOptions {
             backend,
             interrupt: interrupt.clone(),

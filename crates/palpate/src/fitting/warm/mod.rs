@@ -184,7 +184,7 @@ fn by_tracking(
                     frames,
                     frames - tracked.sound()
                 ));
-                tracked.recording(&e.scene().title, tracking::noise(e))?
+                tracked.recording(&e.scene().title, tracked.noise)?
             }
         };
         points.push(of_points(e, recording)?);
