@@ -84,7 +84,8 @@ fn mean(path: &Path, beyond: f64) -> [f64; 3] {
 
 #[test]
 fn hands_wind_blows_and_balls_move_a_body_and_the_scene_written_moves_it_again() {
-    let f = folder(&[("bar.toml", format!("{BAR}{ACTING}")), ("lift.csv", "time,x,y,z\n0,0.4,0.05,0\n0.4,0.39,0.05,0.1\n".into())]);
+    let f =
+        folder(&[("bar.toml", format!("{BAR}{ACTING}")), ("lift.csv", "time,x,y,z\n0,0.4,0.05,0\n0.4,0.39,0.05,0.1\n".into())]);
     let (scene, out, again) = (f.path().join("bar.toml"), f.path().join("a/out"), f.path().join("again"));
     let said = succeed(&["synthesize", arg(&scene), "--out", arg(&out)]);
     assert!(said.out.contains("20 steps"), "{}", said.out);

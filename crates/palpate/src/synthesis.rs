@@ -177,8 +177,7 @@ impl Search {
         interrupt: &Interrupt,
         hear: &mut (dyn FnMut(&Progress) + Send),
     ) -> Result<Led, Error> {
-        let options =
-            FitOptions { backend, interrupt: interrupt.clone(), on_iteration: Some(hear), ..FitOptions::default() };
+        let options = FitOptions { backend, interrupt: interrupt.clone(), on_iteration: Some(hear), ..FitOptions::default() };
         let fitted = fit(std::slice::from_ref(&self.experiment), options)?;
         let plan = self.experiment.plan();
         let theta = &fitted.result.theta[0];
@@ -220,9 +219,8 @@ impl Search {
     /// The course of the forces as CSV: at every step time and the three components of each free handle, named by its number in the scene.
     pub(crate) fn csv(&self, led: &Led) -> String {
         let (scene, clock) = (self.experiment.scene(), &self.experiment.plan().clock);
-        let names: Vec<String> = (self.handles.iter())
-            .flat_map(|h| ["x", "y", "z"].map(|axis| format!("handle{h}_{axis}")))
-            .collect();
+        let names: Vec<String> =
+            (self.handles.iter()).flat_map(|h| ["x", "y", "z"].map(|axis| format!("handle{h}_{axis}"))).collect();
         let mut text = format!("time,{}\n", names.join(","));
         for k in 0..=clock.steps {
             let time = scene.time.start + k as f64 * clock.step;

@@ -125,9 +125,8 @@ fn five_keyframes_are_met_and_the_scene_written_repeats_the_motion() {
 
 #[test]
 fn a_loop_ends_as_it_begins() {
-    let text = |closed: &str| {
-        format!("{HANDLE}[synthesize]\nknots = 14\nforce = 50\n{closed}{}", keyframes(&[(0.2, [0.03, 0.01])]))
-    };
+    let text =
+        |closed: &str| format!("{HANDLE}[synthesize]\nknots = 14\nforce = 50\n{closed}{}", keyframes(&[(0.2, [0.03, 0.01])]));
     let close = |closed: &str| {
         let base = bar(8, 0.5, &text(closed));
         let search = search(&base);

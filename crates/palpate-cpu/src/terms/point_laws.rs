@@ -6,9 +6,7 @@
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
-use palpate_model::effects::law::{
-    Asks, COMMON, Followed, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY,
-};
+use palpate_model::effects::law::{Asks, COMMON, Followed, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
 use palpate_model::effects::{Law, Site};
 use palpate_model::mechanics::contact;
 use palpate_model::mechanics::normal::Turned;

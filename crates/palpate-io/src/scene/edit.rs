@@ -48,7 +48,8 @@ fn whole_key(key: &str) -> Result<Vec<String>, String> {
         match homes[..] {
             [home] => parts.insert(0, home.to_string()),
             [] => {
-                let known: Vec<&str> = SCENE.tables.iter().flat_map(|(t, s)| [*t].into_iter().chain(s.keys.iter().copied())).collect();
+                let known: Vec<&str> =
+                    SCENE.tables.iter().flat_map(|(t, s)| [*t].into_iter().chain(s.keys.iter().copied())).collect();
                 return Err(format!("unknown key; {}", suggest(name, &known)));
             }
             _ => return Err(format!("is a key of several tables ({}); say which, like {}.{name}", homes.join(", "), homes[0])),

@@ -33,7 +33,8 @@ fn effect(t: &Table) -> Result<Effect, InputError> {
     }
     if follows {
         let path = path(t, "path")?;
-        out.path = Some(path.ok_or_else(|| t.missing("path", "the name of a CSV file time,x,y,z, or rows [[time, x, y, z], …]"))?);
+        out.path =
+            Some(path.ok_or_else(|| t.missing("path", "the name of a CSV file time,x,y,z, or rows [[time, x, y, z], …]"))?);
     }
     Ok(out)
 }

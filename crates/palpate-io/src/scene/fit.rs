@@ -23,7 +23,8 @@ struct Target {
 fn targets(scene: &Scene) -> Vec<Target> {
     let mut out = Vec::new();
     // Handles are no [[effect]] of the file: their numbers have no path that could be written back.
-    let of_handle = |key: ParamKey| scene.synthesis.handles.iter().any(|h| h.follows.is_some_and(|e| key.on() == On::Effect(e as u16)));
+    let of_handle =
+        |key: ParamKey| scene.synthesis.handles.iter().any(|h| h.follows.is_some_and(|e| key.on() == On::Effect(e as u16)));
     for key in scene.layout().keys.into_iter().filter(|k| !is_choice(*k) && !of_handle(*k)) {
         let spec = key.spec();
         let (path, stated, lower, upper) = match (key, scene.material.inertia) {

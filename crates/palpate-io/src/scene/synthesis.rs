@@ -33,12 +33,17 @@ pub(super) fn synthesis(root: &Table, time: &Time, effects: &mut Vec<Effect>) ->
         out.iterations = t.optional_count("iterations", 0..=1_000_000)?.map_or(out.iterations, |n| n as usize);
     }
     if let (Some(i), true) = (free, out.keyframes.is_empty() && !out.closed) {
-        return Err(tables[i].error("path", "is missing: a handle follows a path, or has [[keyframe]] tables to find its force for"));
+        return Err(
+            tables[i].error("path", "is missing: a handle follows a path, or has [[keyframe]] tables to find its force for")
+        );
     }
     if let (Some(_), None) = (free, out.force) {
         let at = settings.as_ref().unwrap_or(root);
         let key = if settings.is_some() { "force" } else { "synthesize" };
-        return Err(at.error(key, "is missing; expected force, a number > 0 (N): the size of force that costs as much as a miss of one sigma"));
+        return Err(at.error(
+            key,
+            "is missing; expected force, a number > 0 (N): the size of force that costs as much as a miss of one sigma",
+        ));
     }
     if free.is_none() && (!out.keyframes.is_empty() || out.closed) {
         let what = if out.closed { "loop = true closes" } else { "[[keyframe]] leads" };
@@ -61,7 +66,8 @@ fn one_handle(t: &Table, all: &mut Vec<Effect>) -> Result<Handle, InputError> {
         }
         return Ok(Handle { point, radius, follows: None });
     };
-    let stiffness = stiffness.ok_or_else(|| t.missing("stiffness", "a number > 0 (N/m): how firmly the body is held to the path"))?;
+    let stiffness =
+        stiffness.ok_or_else(|| t.missing("stiffness", "a number > 0 (N/m): how firmly the body is held to the path"))?;
     let law = effects::find(handle::KIND).expect("the law is in the table");
     let values = [stiffness, point.x, point.y, point.z, radius].map(Some).to_vec();
     all.push(Effect { values, path: Some(followed), ..Effect::absent(law) });

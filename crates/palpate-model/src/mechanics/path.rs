@@ -41,12 +41,7 @@ impl Between {
         Between::Cubic {
             first,
             value: [2.0 * s3 - 3.0 * s2 + 1.0, (s3 - 2.0 * s2 + s) * span, -2.0 * s3 + 3.0 * s2, (s3 - s2) * span],
-            rate: [
-                (6.0 * s2 - 6.0 * s) / span,
-                3.0 * s2 - 4.0 * s + 1.0,
-                (6.0 * s - 6.0 * s2) / span,
-                3.0 * s2 - 2.0 * s,
-            ],
+            rate: [(6.0 * s2 - 6.0 * s) / span, 3.0 * s2 - 4.0 * s + 1.0, (6.0 * s - 6.0 * s2) / span, 3.0 * s2 - 2.0 * s],
         }
     }
 }

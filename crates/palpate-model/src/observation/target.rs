@@ -24,7 +24,12 @@ impl Observation {
         for t in targets {
             let markers = t.positions.iter().enumerate();
             let markers = markers.map(|(k, position)| ObservedMarker { site: (first + k) as u32, position: *position }).collect();
-            o.frames.push(Frame { time: t.time, markers, noise: Some(t.tolerance).filter(|own| Some(*own) != common), ..Frame::default() });
+            o.frames.push(Frame {
+                time: t.time,
+                markers,
+                noise: Some(t.tolerance).filter(|own| Some(*own) != common),
+                ..Frame::default()
+            });
             first += t.points.len();
         }
         o.tracks = TrackRest { places: targets.iter().flat_map(|t| t.points.iter().copied()).collect(), tolerance: None };

@@ -179,7 +179,10 @@ fn check_effects(scene: &Scene, body: &Body) -> Result<(), PlanError> {
         let kind = effect.law().kind;
         let key = |name: &str| format!("effect.{i}.{name}");
         if effect.law().asks() == Asks::Path && effect.path.is_none() {
-            return Err(error(key("path"), format!("is missing: a \"{kind}\" follows a path, the name of a CSV file or rows [time, x, y, z]")));
+            return Err(error(
+                key("path"),
+                format!("is missing: a \"{kind}\" follows a path, the name of a CSV file or rows [time, x, y, z]"),
+            ));
         }
         if kind == impulse::KIND && scene.time.steps > 0 {
             check_impulse(effect, scene.time.step).map_err(|message| error(key("duration"), message))?;

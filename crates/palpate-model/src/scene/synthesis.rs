@@ -23,15 +23,7 @@ pub struct Synthesis {
 
 impl Default for Synthesis {
     fn default() -> Synthesis {
-        Synthesis {
-            handles: Vec::new(),
-            keyframes: Vec::new(),
-            knots: 8,
-            force: None,
-            closed: false,
-            gap: None,
-            iterations: 50,
-        }
+        Synthesis { handles: Vec::new(), keyframes: Vec::new(), knots: 8, force: None, closed: false, gap: None, iterations: 50 }
     }
 }
 

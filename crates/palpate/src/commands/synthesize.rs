@@ -121,7 +121,13 @@ fn lines(d: &SearchDocument) -> Vec<String> {
         d.coefficients, d.evaluations, d.seconds, d.optimizer, d.backend, d.largest_force
     )];
     for k in &d.keyframes {
-        out.push(format!("  keyframe at {:.4} s: {} points, off by {} (rms), {} at most", k.time, k.points, mm(k.rms), mm(k.worst)));
+        out.push(format!(
+            "  keyframe at {:.4} s: {} points, off by {} (rms), {} at most",
+            k.time,
+            k.points,
+            mm(k.rms),
+            mm(k.worst)
+        ));
     }
     if let Some(c) = &d.closed {
         let speed = c.speed.map_or("?".to_string(), |v| format!("{v:.3e} m/s"));
