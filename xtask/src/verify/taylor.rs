@@ -98,6 +98,7 @@ fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
             } else {
                 ObservedDisplacement::of_all(u.iter().map(moved))
             },
+            ..Frame::default()
         }
     };
     let frames = [0.0253, 0.0437, 0.0581].map(frame).into();
