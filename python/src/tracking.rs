@@ -143,8 +143,8 @@ pub fn track(py: Python<'_>, scene: &Bound<'_, Scene>, progress: Option<&Bound<'
         return Err(fault);
     }
     let body = done.map_err(|e| errors::of_scene(py, &e, Some(&experiment.scene().path)))?;
-    let refined = Refined::once(experiment, body);
+    let refined = Refined::once((*experiment).clone(), body);
     let document = tracking_document(&refined, clock.elapsed().as_secs_f64());
-    let Refined { experiment, tracked: body, .. } = refined;
+    let body = refined.tracked;
     Ok(Track { result: loads(py, &results::line(&document))?, experiment, body })
 }

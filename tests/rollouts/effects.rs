@@ -5,10 +5,13 @@ use super::gradients::{ball, observed};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{self, ALL, Family};
+use palpate_model::mechanics::path::Path;
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Clamp, InitialShape};
+use std::sync::Arc;
 
 /// The ball with one effect, every amplitude at a size that matters.
 pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
@@ -18,6 +21,12 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         if let Some(v) = value {
             *v = (*v + 0.3 * p.typical).clamp(p.lower, p.upper);
         }
+    }
+    if ALL[law].asks() == Asks::Path {
+        // Into the side of the ball, and on.
+        let at = |t: f64| DVec3::new(0.072 - 0.1 * t, 0.004 * (30.0 * t).sin(), 0.055);
+        let times = vec![0.0, 0.03, 0.07];
+        effect.path = Some(Arc::new(Path { points: times.iter().map(|t| at(*t)).collect(), times }));
     }
     scene.effects = vec![effect];
     if ALL[law].family == Family::Contact {

@@ -74,6 +74,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
                 points,
                 markers: vec![ObservedMarker { site: 0, position: DVec3::new(0.001, 0.012, 0.11) }],
                 displacements: ObservedDisplacement::of_all(u.iter().map(|u| *u + DVec3::new(1e-4, -2e-4, 3e-4))),
+                ..Frame::default()
             }
         })
         .collect();

@@ -54,6 +54,7 @@ pub(crate) fn scene(youngs_modulus: f64) -> Scene {
         solver: Solver::default(),
         observation: None,
         targets: Vec::new(),
+        synthesis: Synthesis::default(),
         tracking: palpate_model::scene::Tracking::default(),
         fit: None,
     }

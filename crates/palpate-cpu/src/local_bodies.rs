@@ -1,18 +1,21 @@
 //! Bodies that the tests of local derivatives go through: clamped by a clamp that moves, in contact, with a point mass, of every kind.
 
 use glam::{DAffine3, DVec3};
-use palpate_model::effects::{ALL, Effect, Site};
+use palpate_model::effects::law::Asks;
+use palpate_model::effects::{ALL, Effect, Site, find};
 use palpate_model::materials;
 use palpate_model::materials::curve::Curve;
 use palpate_model::materials::principal_stretch::PrincipalStretch;
 use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::mechanics::motion::RigidMotion;
+use palpate_model::mechanics::path::Path;
 use palpate_model::observation::Observation;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use palpate_model::space::points::TetMesh;
+use std::sync::Arc;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
 pub fn altering() -> Vec<Effect> {
@@ -30,6 +33,25 @@ pub fn altering() -> Vec<Effect> {
         effect
     };
     (0..ALL.len()).filter(|l| alters(&ALL[*l].site)).map(make).collect()
+}
+
+/// Every effect that acts by a path, a course in time or turning normals.
+pub fn leading() -> Vec<Effect> {
+    let make = |kind: &str, values: &[f64], points: [DVec3; 3]| {
+        let mut effect = Effect::absent(find(kind).unwrap());
+        effect.values.iter_mut().zip(values).for_each(|(v, x)| *v = Some(*x));
+        let path = Path { times: vec![-1.0, 0.06, 1.0], points: points.to_vec() };
+        effect.path = (effect.law().asks() == Asks::Path).then(|| Arc::new(path));
+        effect
+    };
+    let none = [DVec3::ZERO; 3];
+    vec![
+        make("impulse", &[0.02, -0.01, 0.03, 0.01, 0.0, 0.06, 0.02, 0.02, 0.12], none),
+        make("wind", &[3.0, -2.0, 1.0, 1.0, 2.0, 0.0, 3.0, 0.5, 0.1, 4.0, 0.6, 0.1, 20.0], none),
+        make("handle", &[20.0, 0.03, 0.01, 0.05, 0.02], [DVec3::ZERO, DVec3::new(0.04, 0.0, 0.06), DVec3::Z]),
+        // Moving, and some millimetres within the ball.
+        make("push", &[1.3, 0.03], [DVec3::X, DVec3::new(0.075, 0.002, 0.05), DVec3::new(-0.5, 0.2, 0.0)]),
+    ]
 }
 
 /// The box of the ball as cubes of six tetrahedra each, so many along every edge.
@@ -119,6 +141,7 @@ impl Made {
             solver: Solver { tetrahedron: self.tetrahedron, ..Solver::default() },
             observation: None,
             targets: Vec::new(),
+            synthesis: Synthesis::default(),
             tracking: palpate_model::scene::Tracking::default(),
             fit: None,
         }

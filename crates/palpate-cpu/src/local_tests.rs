@@ -2,7 +2,7 @@
 //! products.
 
 use crate::linear::matrix::{Operator, Packed};
-use crate::local_bodies::{Made, altering, ball, curved, fields, flowing, plan, tetrahedra};
+use crate::local_bodies::{Made, altering, ball, curved, fields, flowing, leading, plan, tetrahedra};
 use crate::simulate::{self, Start};
 use crate::terms::elastic_cells::corners;
 use crate::terms::{Curvature, PastChange, zeros};
@@ -98,6 +98,9 @@ fn everywhere(check: impl Fn(&At)) {
     for (model, effects) in models.chain([(&materials::ALL[0], altering()), (&materials::ALL[1], altering())]) {
         check_all(Plan { model, ..plan(effects) }, &check);
     }
+    // Laws that follow paths, have a course in time or turn with the surface.
+    check_all(plan(leading()), &check);
+    check_all(Made::of(tetrahedra(1), leading()).plan(), &check);
     // A material of curves, and a viscosity, each beside a law of cells that dissipates and a stress-free shape of its own.
     let few = || -> Vec<Effect> {
         altering().into_iter().filter(|e| ["structural-damping", "rest-shape"].contains(&e.law().kind)).collect()

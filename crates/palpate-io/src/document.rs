@@ -265,16 +265,34 @@ impl<'a> Table<'a> {
         self.optional_vec3(key)?.ok_or_else(|| self.missing(key, "[x, y, z]"))
     }
 
+    /// Rows of `N` numbers each, `[[…], …]`.
+    pub fn optional_rows<const N: usize>(&self, key: &str) -> Result<Option<Vec<[f64; N]>>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let names = match N {
+            3 => "[x, y, z], three".to_string(),
+            4 => "[time, x, y, z], four".to_string(),
+            n => format!("rows of {n}"),
+        };
+        let wrong = || self.wrong(key, &format!("an array of {names} numbers each"), item);
+        let row = |v: &Value| {
+            let v = v.as_array().filter(|a| a.len() == N).ok_or_else(wrong)?;
+            let mut row = [0.0; N];
+            for (out, x) in row.iter_mut().zip(v) {
+                *out = self.value_f64(key, x)?;
+            }
+            Ok(row)
+        };
+        item.as_array().ok_or_else(wrong)?.iter().map(row).collect::<Result<_, _>>().map(Some)
+    }
+
     /// An array of vectors `[[x, y, z], …]`.
     pub fn optional_points(&self, key: &str) -> Result<Option<Vec<DVec3>>, InputError> {
-        let Some(item) = self.get(key) else { return Ok(None) };
-        let wrong = || self.wrong(key, "an array of [x, y, z], three numbers each", item);
-        let point = |v: &Value| {
-            let v = v.as_array().filter(|a| a.len() == 3).ok_or_else(wrong)?;
-            let numbers: Vec<f64> = v.iter().map(|x| self.value_f64(key, x)).collect::<Result<_, _>>()?;
-            Ok(DVec3::from_slice(&numbers))
-        };
-        item.as_array().ok_or_else(wrong)?.iter().map(point).collect::<Result<_, _>>().map(Some)
+        Ok(self.optional_rows::<3>(key)?.map(|rows| rows.into_iter().map(DVec3::from_array).collect()))
+    }
+
+    /// True where the key holds a string.
+    pub fn is_str(&self, key: &str) -> bool {
+        self.get(key).is_some_and(Item::is_str)
     }
 
     /// A 4 × 4 matrix, row by row.

@@ -93,6 +93,9 @@ pub(crate) const SCENE: Schema = Schema {
         ),
         ("track", table(&["prior", "temperature", "outliers", "soft_start"])),
         ("target", table(&["time", "tolerance", "points", "positions", "file"])),
+        ("handle", table(&["point", "radius", "stiffness", "path"])),
+        ("keyframe", table(&["time", "points", "positions", "sigma"])),
+        ("synthesize", table(&["knots", "force", "loop", "gap", "iterations"])),
         (
             "fit",
             Schema {

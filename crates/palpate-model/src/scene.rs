@@ -3,8 +3,10 @@
 
 mod fit;
 mod in_code;
+mod synthesis;
 
 pub use fit::{FitParameter, FitSpec, Optimizer, WarmStart};
+pub use synthesis::{Handle, Keyframe, Synthesis};
 
 use crate::effects::Effect;
 use crate::materials::Model;
@@ -57,6 +59,8 @@ pub struct Scene {
     pub observation: Option<ObservationSpec>,
     /// Where points of the body shall be, of a scene that is compared with a wish instead of a recording.
     pub targets: Vec<Target>,
+    /// Who pulls at the body, and where it shall be led, of a scene that a motion is made for.
+    pub synthesis: Synthesis,
     /// How it is tracked.
     pub tracking: Tracking,
     /// What is to be found out, if anything.

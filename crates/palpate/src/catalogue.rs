@@ -2,6 +2,7 @@
 
 use crate::results::effects::{EffectKey, EffectLaw, EffectsDocument};
 use crate::results::finite;
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{ALL, EffectParam, Family, Law, Trial, Unstated};
 
 const HEAD: &str = "\
@@ -91,6 +92,9 @@ pub fn markdown() -> String {
                 let unit = if p.unit == "1" { "–" } else { p.unit };
                 let vector = if p.axis.is_some() { "vector: " } else { "" };
                 text += &format!("\n| `{}` | {unit} | {} | {} | {vector}{} |", p.key, allowed(p), default(p), p.doc);
+            }
+            if law.asks() == Asks::Path {
+                text += "\n| `path` | s, m | times increasing | – | what it follows: a CSV file `time,x,y,z`, or rows `[[time, x, y, z], …]`; not fitted |";
             }
         }
     }

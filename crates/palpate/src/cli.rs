@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, track};
+use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, synthesize, track};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -21,6 +21,7 @@ A first session:
   palpate fit      scene.toml --out found      parameters, errors and a report in found/
   palpate track    scene.toml --out seen       the moving body in every frame of its recording
   palpate simulate found/model.toml            the scene with the found values
+  palpate synthesize found/model.toml          a motion that nobody has seen: pulls, wind, keyframes, edits
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
 
 Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted (Ctrl-C; the best so far is written).";
@@ -38,6 +39,7 @@ struct Cli {
 enum Command {
     Import(Box<import::Arguments>),
     Simulate(simulate::Arguments),
+    Synthesize(synthesize::Arguments),
     Observe(observe::Arguments),
     Track(track::Arguments),
     Fit(fit::Arguments),
@@ -130,6 +132,7 @@ pub fn run<A: Into<OsString> + Clone>(
     let done = match &cli.command {
         Command::Import(a) => import::run(a, &mut console),
         Command::Simulate(a) => simulate::run(a, &mut console),
+        Command::Synthesize(a) => synthesize::run(a, &mut console),
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Track(a) => track::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),

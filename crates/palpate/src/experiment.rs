@@ -12,7 +12,7 @@ use palpate_engine::{FailureKind, FrameResiduals, Snapshot, Stop, number};
 use palpate_io::recording::{ObservationError, Recording};
 use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_error};
 use palpate_model::effects::sensors::Sensors;
-use palpate_model::observation::Observation;
+use palpate_model::observation::{MarkerRest, Observation};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::{PlanError, build_plan};
 use palpate_model::plan::locking::locking;
@@ -102,12 +102,7 @@ impl Experiment {
     }
 
     /// The same with the recording that the scene's `[observation]` means, where it is at hand.
-    fn build(
-        mut scene: Scene,
-        text: String,
-        mut warnings: Vec<String>,
-        known: Option<Arc<Recording>>,
-    ) -> Result<Experiment, Error> {
+    fn build(scene: Scene, text: String, mut warnings: Vec<String>, known: Option<Arc<Recording>>) -> Result<Experiment, Error> {
         let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
         let shape = shape_of(&scene.object);
         let mut recording = None;
@@ -129,6 +124,24 @@ impl Experiment {
         if !scene.targets.is_empty() {
             observation = Observation::of_targets(&scene.targets);
         }
+        Experiment::made(scene, text, shape, (observation, rest, recording), warnings)
+    }
+
+    /// The same scene, changed by hand, compared with something that no recording holds.
+    ///
+    /// # Errors
+    /// The scene gives no plan.
+    pub(crate) fn compared(&self, scene: Scene, observation: Observation) -> Result<Experiment, Error> {
+        Experiment::made(scene, self.text.clone(), self.shape.clone(), (observation, Vec::new(), None), Vec::new())
+    }
+
+    fn made(
+        mut scene: Scene,
+        text: String,
+        shape: Arc<dyn Shape>,
+        (observation, rest, recording): (Observation, Vec<MarkerRest>, Option<Arc<Recording>>),
+        warnings: Vec<String>,
+    ) -> Result<Experiment, Error> {
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
         let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
@@ -336,7 +349,8 @@ fn place_of(spec: &ObservationSpec) -> Result<PathBuf, String> {
 fn plan_fault(scene: &Scene, text: &str, recording: Option<&Recording>, e: PlanError) -> Error {
     let (Some(spec), Some(recording)) = (&scene.observation, recording) else {
         // Points of targets are tracked ones.
-        let key = if e.key == "points.rest" { "target.0.points" } else { &e.key };
+        let of_points = if scene.targets.is_empty() { "keyframe.0.points" } else { "target.0.points" };
+        let key = if e.key == "points.rest" { of_points } else { &e.key };
         return scene_error(&scene.path, text, key, e.message).into();
     };
     let in_recording = |key: &str| {

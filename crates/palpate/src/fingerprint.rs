@@ -34,8 +34,12 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
         let unequal: Vec<f64> = (0..f.count).map(|k| 1.0 + (k % 7) as f64).collect();
         f.factors(&unequal).iter().for_each(|x| eat(x.to_bits()));
     }
+    for path in plan.followed.iter().flatten() {
+        path.times.iter().chain(path.points.iter().flat_map(|p| p.as_ref())).for_each(|x| eat(x.to_bits()));
+    }
     for f in &o.frames {
         eat(f.time.to_bits());
+        f.noise.iter().chain(&f.drift).for_each(|x| eat(x.to_bits()));
         for p in &f.points {
             p.position.to_array().iter().for_each(|x| eat(x.to_bits()));
             eat(u64::from(p.camera));

@@ -62,6 +62,7 @@ mod residuals;
 pub mod results;
 mod scatter;
 mod suited;
+mod synthesis;
 pub mod synthetic;
 mod tracking;
 

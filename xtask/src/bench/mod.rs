@@ -13,7 +13,8 @@ use glam::{DAffine3, DVec3};
 use palpate_cpu::{CpuBackend, World};
 use palpate_engine::{Backend, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
-use palpate_model::effects::{self, Effect, Family};
+use palpate_model::effects::law::Asks;
+use palpate_model::effects::{self, Effect, Family, Law};
 use palpate_model::materials::{ALL, Model, find};
 use palpate_model::observation::{Camera, Channel, Frame, Observation, ObservedPoint, ReadingKind};
 use palpate_model::params::{Layout, ParamKey};
@@ -156,9 +157,10 @@ pub(crate) fn data() -> Option<std::path::PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// Every effect that needs nothing but a body and a plane.
+/// Every effect that needs nothing but a body and a plane, and that both backends have.
 fn effects() -> Vec<usize> {
-    (0..effects::ALL.len()).filter(|k| !matches!(effects::ALL[*k].family, Family::Measurement)).collect()
+    let serves = |l: &Law| !matches!(l.family, Family::Measurement) && l.asks() == Asks::Nothing;
+    (0..effects::ALL.len()).filter(|k| serves(&effects::ALL[*k])).collect()
 }
 
 /// A body that is dropped from just above the ground and, where it has a band, watched in every step, with effects of these laws, all of them absent.
@@ -194,6 +196,8 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     };
     Plan {
         fields: Vec::new(),
+        followed: Vec::new(),
+        frames: Default::default(),
         model: &ALL[0],
         curves: Default::default(),
         theta,

@@ -308,12 +308,12 @@ pub fn answered(c: &Case, folder: &Path, budget: Duration) -> Result<Row, palpat
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::effects::{ALL, Family};
+    use palpate_model::effects::{ALL, Trial};
 
     #[test]
     fn every_effect_is_hidden_in_two_scenes_strong_and_weak_and_names_are_unique() {
         let all = List::read().unwrap().cases().unwrap();
-        for law in ALL.iter().filter(|l| l.family != Family::Slack) {
+        for law in ALL.iter().filter(|l| l.trial != Trial::Never) {
             for group in ["strong", "weak"] {
                 let hides = |c: &&Case| c.group == group && c.hidden.iter().any(|h| h.what == law.kind);
                 let mut scenes: Vec<&str> = all.iter().filter(hides).map(|c| c.scene.as_str()).collect();

@@ -8,7 +8,9 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{ALL, Effect, Law, Site, Unstated};
+use palpate_model::mechanics::path::Path;
 use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker};
 use palpate_model::observation::{ObservedPoint, ReadingKind};
 use palpate_model::params::ParamKey;
@@ -16,6 +18,7 @@ use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Vari
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, Clamp, PointMass, Scene};
+use std::sync::Arc;
 
 /// Sizes of ε over the parameter's own: each a quarter of the last, from a twentieth on.
 const STEPS: usize = 9;
@@ -95,6 +98,7 @@ fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
             } else {
                 ObservedDisplacement::of_all(u.iter().map(moved))
             },
+            ..Frame::default()
         }
     };
     let frames = [0.0253, 0.0437, 0.0581].map(frame).into();
@@ -188,6 +192,11 @@ fn at_work(number: usize, law: &Law) -> Effect {
         if let (true, Some(axis)) = (p.is_direction(), p.axis) {
             *value = Some([0.8, 0.5, 0.4][usize::from(axis)]);
         }
+    }
+    if law.asks() == Asks::Path {
+        // Into the side of the ball, and on.
+        let points = vec![DVec3::new(0.067, 0.0, 0.055), DVec3::new(0.06, 0.004, 0.053)];
+        effect.path = Some(Arc::new(Path { times: vec![0.0, 0.07], points }));
     }
     effect
 }

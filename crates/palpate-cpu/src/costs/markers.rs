@@ -88,7 +88,7 @@ impl Residuals for Offsets {
 }
 
 fn noise(look: Look, m: &ObservedMarker) -> f64 {
-    look.observation.noise(look.observation.markers[m.site as usize].kind)
+    look.observation.noise_in(look.seen(), look.observation.markers[m.site as usize].kind)
 }
 
 /// A marker's site as its offset has it, and the marker at displacement `u`.

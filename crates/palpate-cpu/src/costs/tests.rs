@@ -56,7 +56,7 @@ pub(crate) fn seen() -> Plan {
         markers.extend((1..).zip(&tracks).map(|(site, p)| at(&mut noise, site, *p)));
         let node = |noise: &mut Noise, node: u32| ObservedDisplacement { node, value: 1e-3 * noise.vector() };
         let displacements = (0..body.nodes.len() as u32).step_by(5).map(|n| node(&mut noise, n)).collect();
-        Frame { time: s.time.start + step * s.time.step, points, markers, displacements }
+        Frame { time: s.time.start + step * s.time.step, points, markers, displacements, ..Frame::default() }
     });
     let observation = Observation {
         channels: vec![

@@ -6,13 +6,16 @@
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
-use palpate_model::effects::law::{COMMON, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
+use palpate_model::effects::law::{Asks, COMMON, Followed, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
 use palpate_model::effects::{Law, Site};
 use palpate_model::mechanics::contact;
+use palpate_model::mechanics::normal::Turned;
+use palpate_model::mechanics::path::Path;
 use palpate_model::mechanics::plane::PlaneNow;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::space::stencil::Stencil;
+use std::sync::Arc;
 
 /// An effect of one member with its parameters, ready to act.
 #[derive(Clone)]
@@ -24,6 +27,8 @@ pub struct Acting {
     shares: Option<(Vec<f64>, Vec<Vec<f64>>)>,
     /// It does nothing with these parameters; only derivatives by its amplitudes are not zero.
     absent: bool,
+    /// What it follows.
+    path: Option<Arc<Path>>,
 }
 
 impl std::fmt::Debug for Acting {
@@ -34,14 +39,15 @@ impl std::fmt::Debug for Acting {
 
 /// The effects of a member.
 pub fn acting(plan: &Plan, physics: &Physics) -> Vec<Acting> {
-    let make = |((law, _), values): ((&'static Law, _), &Vec<f64>)| {
+    let make = |(number, ((law, _), values)): (usize, ((&'static Law, _), &Vec<f64>))| {
         let shares = match law.site {
             Site::Nodes(point) => point.shares(&plan.body.nodes, &plan.body.node_volume, values),
             _ => None,
         };
-        Acting { law, values: values.clone(), shares, absent: law.is_absent(values) }
+        let path = plan.followed.get(number).cloned().flatten();
+        Acting { law, values: values.clone(), shares, absent: law.is_absent(values), path }
     };
-    plan.layout.effects().zip(&physics.effects).map(make).collect()
+    plan.layout.effects().zip(&physics.effects).enumerate().map(make).collect()
 }
 
 /// One point that an effect acts on, at one instant.
@@ -56,6 +62,8 @@ struct At<'a> {
     patch: Option<usize>,
     /// Number of the plane for effects of contact.
     plane: Option<usize>,
+    /// How the body deforms there, and the normal in the old state, of laws that ask for it.
+    turned: Option<(Stencil<'a>, Turned)>,
 }
 
 impl At<'_> {
@@ -65,6 +73,20 @@ impl At<'_> {
 
     fn add(&self, f: [f64; 3], out: &mut [DVec3]) {
         self.stencil.spread(DVec3::from_array(f), out);
+    }
+
+    /// Change of the old normal for a change of the past displacement; zero where nobody asks for it.
+    fn normal_along(&self, u: &[DVec3]) -> DVec3 {
+        self.turned.as_ref().map_or(DVec3::ZERO, |(frame, turned)| turned.along(frame.gradient_of(u)))
+    }
+
+    /// Its transpose, for derivatives `w` by the normal.
+    fn pull_normal(&self, w: DVec3, out: &mut [DVec3]) {
+        let Some((frame, turned)) = &self.turned else { return };
+        let by_f = turned.pull(w);
+        for (n, g) in frame.nodes.iter().zip(frame.gradient) {
+            out[*n as usize] += by_f * *g;
+        }
     }
 }
 
@@ -84,6 +106,11 @@ impl<'a> PointLaws<'a> {
         self.c.effects.iter().filter(|a| !a.absent)
     }
 
+    /// Those whose force depends on a state.
+    fn felt(&self) -> impl Iterator<Item = &'a Acting> + use<'a> {
+        self.present().filter(|a| !a.law.is_load())
+    }
+
     /// Visits every point of an effect that is not idle.
     fn points(&self, acting: &Acting, u1: &[DVec3], mut visit: impl FnMut(&At)) {
         let (body, k, past) = (&self.c.plan.body, acting.values.len(), &self.c.past);
@@ -93,14 +120,16 @@ impl<'a> PointLaws<'a> {
         put(z, GRAVITY, self.c.physics().gravity);
         z[TIME] = self.c.time;
         z[STIFFNESS] = contact::DEFAULT_STIFFNESS * self.c.physics().youngs_modulus / body.length;
+        let rate = self.c.inertia.map_or(0.0, |t| t.rate);
         let place = Place {
             rest: DVec3::ZERO,
             normal: DVec3::ZERO,
             measure: 0.0,
             width: contact::WIDTH * body.length,
-            rate: self.c.inertia.map_or(0.0, |t| t.rate),
+            rate,
             inertia: self.c.inertia.map_or(0.0, |t| t.displacement),
             momentum: self.c.inertia.map_or(0.0, |t| t.velocity),
+            followed: acting.path.as_ref().map_or(Followed::default(), |path| Followed::of(path, self.c.time, rate)),
         };
         let mut patches = |point: &'static dyn Point, plane: Option<(usize, &PlaneNow)>, z: &mut [f64]| {
             for (number, (patch, stencil)) in body.patches.iter().zip(body.surface.iter()).enumerate() {
@@ -108,14 +137,20 @@ impl<'a> PointLaws<'a> {
                 put(z, 0, patch.point + at(u1));
                 put(z, OLD, patch.point + at(past.u));
                 put(z, VELOCITY, at(past.v));
+                let turned = (point.asks() == Asks::Normal).then(|| {
+                    let frame = self.c.plan.frames.get(number);
+                    (frame, Turned::new(patch.normal, DMat3::IDENTITY + frame.gradient_of(past.u)))
+                });
+                turned.iter().for_each(|t| put(z, PLANE, t.1.normal));
                 let place = Place { rest: patch.point, normal: patch.normal, measure: patch.area, ..place };
                 if !point.skips(&place, z) {
                     let (plane, patch) = (plane.map(|p| p.0), Some(number));
-                    visit(&At { point, place, z, stencil, node: 0, patch, plane });
+                    visit(&At { point, place, z, stencil, node: 0, patch, plane, turned });
                 }
             }
         };
         match acting.law.site {
+            Site::Surface(point) | Site::Nodes(point) if point.sleeps(&place, z) => {}
             Site::Surface(point) => patches(point, None, z),
             Site::Contact(point) => {
                 for (i, plane) in self.c.planes.iter().enumerate() {
@@ -133,7 +168,7 @@ impl<'a> PointLaws<'a> {
                     let place = Place { rest: *x, measure, ..place };
                     if !point.skips(&place, z) {
                         let stencil = Stencil { nodes: &[i as u32], value: &[1.0], gradient: &[] };
-                        visit(&At { point, place, z, stencil, node: i, patch: None, plane: None });
+                        visit(&At { point, place, z, stencil, node: i, patch: None, plane: None, turned: None });
                     }
                 }
             }
@@ -202,7 +237,7 @@ impl Term for PointLaws<'_> {
     }
 
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
-        for a in self.present() {
+        for a in self.felt() {
             self.points(a, u1, |at| {
                 let h = at.point.hessian(&at.place, at.z);
                 let h = DMat3::from_cols_array_2d(&h);
@@ -224,22 +259,28 @@ impl Term for PointLaws<'_> {
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
         let mut d = [0.0; COMMON + MOST];
-        for a in self.present() {
+        for a in self.felt() {
             self.points(a, u1, |at| {
                 put(&mut d, OLD, at.mean(change.u));
                 put(&mut d, VELOCITY, at.mean(change.v));
+                put(&mut d, PLANE, at.normal_along(change.u));
                 at.add(at.point.along(&at.place, at.z, &d), out);
             });
         }
     }
 
     fn by_past_transposed(&self, u1: &[DVec3], z: &[DVec3], out: &mut PastGradient) {
-        for a in self.present() {
+        for a in self.felt() {
             self.points(a, u1, |at| {
-                let mut row = [0.0; 6];
-                at.point.transposed(&at.place, at.z, at.mean(z).to_array(), OLD..OLD + 6, &mut row);
+                let (mut row, w) = ([0.0; 6], at.mean(z).to_array());
+                at.point.transposed(&at.place, at.z, w, OLD..OLD + 6, &mut row);
                 at.add([row[0], row[1], row[2]], &mut out.u);
                 at.add([row[3], row[4], row[5]], &mut out.v);
+                if at.turned.is_some() {
+                    let mut by_normal = [0.0; 3];
+                    at.point.transposed(&at.place, at.z, w, PLANE..PLANE + 3, &mut by_normal);
+                    at.pull_normal(DVec3::from_array(by_normal), &mut out.u);
+                }
             });
         }
     }

@@ -31,7 +31,6 @@ impl Agenda {
     /// most `slots` in a round.
     pub(crate) fn new(plan: &Plan, views: &[Viewed], starts: &[f64], firsts: &[u32], slots: usize) -> Agenda {
         let mut agenda = Agenda::default();
-        let weights: Vec<[f32; 4]> = views.iter().map(weights).collect();
         for k in 0..plan.clock.steps.max(1) {
             let of_member: Vec<Vec<Look>> = views
                 .iter()
@@ -44,7 +43,7 @@ impl Agenda {
                         pad: 0,
                         value: at.value.map(|f| f as f32),
                         rate: at.rate.map(|f| f as f32),
-                        weights: weights[member],
+                        weights: weights(viewed, at.frame),
                     };
                     viewed.instants(plan.clock.step, starts[member], k).iter().map(look).collect()
                 })
@@ -64,11 +63,11 @@ impl Agenda {
     }
 }
 
-/// 1/(n σ²) of every kind of readings [1/m²]: depth points, markers, tracked points, displacements.
-fn weights(viewed: &Viewed) -> [f32; 4] {
+/// 1/(n σ²) of every kind of readings in a frame [1/m²]: depth points, markers, tracked points, displacements.
+fn weights(viewed: &Viewed, frame: usize) -> [f32; 4] {
     let kinds = [ReadingKind::Depth, ReadingKind::Marker, ReadingKind::Track, ReadingKind::Displacement];
     kinds.map(|kind| {
-        let noise = viewed.observation().noise(kind);
+        let noise = viewed.observation().noise_in(&viewed.observation().frames[frame], kind);
         (viewed.scale() / (noise * noise)) as f32
     })
 }

@@ -110,7 +110,7 @@ impl<'a> Downloaded<'a> {
 
     /// Its scalar residuals, with their places among the rows.
     pub(super) fn coordinates(&self, sensor: Sensor, item: u32, rest: DVec3, vector: usize) -> [(ResidualRow, usize); 3] {
-        let noise = self.observation.noise(sensor.kind());
+        let noise = self.observation.noise_in(self.seen(), sensor.kind());
         [0u8, 1, 2].map(|axis| {
             let row = self.row(vector, axis.into());
             let value = self.values[row][0].into();

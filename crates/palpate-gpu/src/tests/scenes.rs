@@ -84,6 +84,7 @@ pub fn ball(h: f64) -> Scene {
         solver: Solver::default(),
         observation: None,
         targets: Vec::new(),
+        synthesis: Synthesis::default(),
         tracking: palpate_model::scene::Tracking::default(),
         fit: None,
     }

@@ -1,8 +1,10 @@
 //! `[[effect]]`: laws beyond the material. The keys of each kind come from the table of laws.
 
+use super::path::path;
 use crate::document::Table;
 use crate::error::InputError;
 use crate::keys::suggest;
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{self, Effect, EffectParam, Unstated};
 use palpate_model::params::unit_behind;
 
@@ -18,6 +20,8 @@ fn effect(t: &Table) -> Result<Effect, InputError> {
         effects::find(kind).ok_or_else(|| t.error("kind", format!("\"{kind}\" is not an effect; {}", suggest(kind, &kinds))))?;
     let mut known = vec!["kind"];
     known.extend(effects::ALL[law].params.iter().filter(|p| p.axis.unwrap_or(0) == 0).map(|p| p.key));
+    let follows = effects::ALL[law].asks() == Asks::Path;
+    known.extend(follows.then_some("path"));
     if let Some(unknown) = t.names().into_iter().find(|k| !known.contains(k)) {
         return Err(t.error(unknown, format!("unknown key of \"{kind}\"; {}", suggest(unknown, &known))));
     }
@@ -26,6 +30,11 @@ fn effect(t: &Table) -> Result<Effect, InputError> {
         if let Some(stated) = stated(t, p)? {
             *value = Some(stated);
         }
+    }
+    if follows {
+        let path = path(t, "path")?;
+        out.path =
+            Some(path.ok_or_else(|| t.missing("path", "the name of a CSV file time,x,y,z, or rows [[time, x, y, z], …]"))?);
     }
     Ok(out)
 }

@@ -5,7 +5,7 @@ use crate::error::{InputError, number};
 use crate::keys::suggest;
 use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
-use palpate_model::params::{ParamKey, Transform, is_component};
+use palpate_model::params::{On, ParamKey, Transform, is_component};
 use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, WarmStart};
 
@@ -22,7 +22,10 @@ struct Target {
 /// The numbers of this scene that can be fitted, in the order of its layout.
 fn targets(scene: &Scene) -> Vec<Target> {
     let mut out = Vec::new();
-    for key in scene.layout().keys.into_iter().filter(|k| !is_choice(*k)) {
+    // Handles are no [[effect]] of the file: their numbers have no path that could be written back.
+    let of_handle =
+        |key: ParamKey| scene.synthesis.handles.iter().any(|h| h.follows.is_some_and(|e| key.on() == On::Effect(e as u16)));
+    for key in scene.layout().keys.into_iter().filter(|k| !is_choice(*k) && !of_handle(*k)) {
         let spec = key.spec();
         let (path, stated, lower, upper) = match (key, scene.material.inertia) {
             (ParamKey::Density, Inertia::Mass(m)) => ("material.mass".to_string(), m, 1e-9, 1e6),

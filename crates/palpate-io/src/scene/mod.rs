@@ -2,23 +2,27 @@
 
 #[cfg(test)]
 mod answer_tests;
+mod edit;
 mod effects;
 mod fields;
 mod fit;
 mod material;
 mod motion;
 mod object;
+mod path;
 mod rework;
 mod rows;
 pub(crate) mod scale;
+mod synthesis;
 mod target;
 #[cfg(test)]
 mod tests;
 mod track;
 mod write;
 
+pub use edit::edit_scene;
 pub use rework::{recast_scene, scene_of_tracks};
-pub use write::{append_effects, name_field_files, scene_with_values, write_scene};
+pub use write::{append_effects, name_field_files, scene_with_values, without_wishes, write_scene};
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
@@ -81,6 +85,8 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         None => None,
     };
     let initial = initial(&root, object::is_given(&root)?)?;
+    let (time, mut effects) = (time(&root, initial.state)?, effects::effects(&root)?);
+    let synthesis = synthesis::synthesis(&root, &time, &mut effects)?;
     let mut scene = Scene {
         path: source.path.clone(),
         title: root.optional_str("title")?.unwrap_or_default().to_string(),
@@ -91,13 +97,14 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         clamps: clamps(&root)?,
         planes: planes(&root)?,
         masses: masses(&root)?,
-        effects: effects::effects(&root)?,
+        effects,
         fields: fields::fields(&root)?,
-        time: time(&root, initial.state)?,
+        time,
         initial,
         solver: solver(&root, of_tets)?,
         observation: observation(&root)?,
         targets: target::targets(&root)?,
+        synthesis,
         tracking: track::tracking(&root)?,
         fit: None,
     };

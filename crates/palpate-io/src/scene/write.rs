@@ -220,6 +220,33 @@ pub fn append_effects(text: &str, scene: &Scene, effects: &[Effect]) -> Result<S
     Ok(doc.to_string())
 }
 
+/// The text of a scene without what a motion is to be found for: keyframes, how to find it, and handles whose force is free.
+///
+/// # Errors
+/// A text that is no TOML.
+pub fn without_wishes(text: &str, scene: &Scene) -> Result<String, InputError> {
+    let mut doc: DocumentMut = text
+        .parse()
+        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
+    doc.remove("keyframe");
+    doc.remove("synthesize");
+    let left = match doc.get_mut("handle") {
+        Some(Item::ArrayOfTables(all)) => {
+            all.retain(|t| t.contains_key("path"));
+            all.len()
+        }
+        Some(Item::Value(Value::Array(all))) => {
+            all.retain(|t| t.as_inline_table().is_some_and(|t| t.contains_key("path")));
+            all.len()
+        }
+        _ => 0,
+    };
+    if left == 0 {
+        doc.remove("handle");
+    }
+    Ok(doc.to_string())
+}
+
 /// A plane's point and unit normal with a new height, θ or φ; the point moves as little as the new plane allows.
 fn moved_plane(point: DVec3, normal: DVec3, [height, theta, phi]: [Option<f64>; 3]) -> (DVec3, DVec3) {
     let site = PlaneSite { polar_axis: PlaneSite::polar_axis_for(normal), stiffness: None };
@@ -320,7 +347,7 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
         fix(t, "recording");
     }
-    for (rows, key) in [("clamp", "motion"), ("field", "file"), ("target", "file")] {
+    for (rows, key) in [("clamp", "motion"), ("field", "file"), ("target", "file"), ("effect", "path"), ("handle", "path")] {
         let mut i = 0;
         while let Some(t) = row(doc, rows, i) {
             fix(t, key);

@@ -26,6 +26,12 @@ pub fn material_point(body: &Body, lookup: &NodeLookup, place: DVec3, radius: f6
     }
 }
 
+/// A place that belongs to a cell, which may lie beside it: its field continued there.
+pub fn in_cell(body: &Body, cell: u32, place: DVec3) -> StencilBuf {
+    let (cell, grid) = (&body.cells()[cell as usize], &body.cut().grid);
+    cell.stencil((place - grid.position(cell.lattice)) / grid.h, grid.h)
+}
+
 /// What lies on the body or beside it: interpolated in its cell, or at the nearest place of the nearest cell; and how far away that is [m].
 pub fn beside(body: &Body, point: DVec3) -> (StencilBuf, f64) {
     let (grid, h) = (&body.cut().grid, body.cut().grid.h);

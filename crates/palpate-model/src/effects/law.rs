@@ -7,6 +7,7 @@
 //! matrix. Derivatives come from hyper-dual numbers (Fike & Alonso, AIAA 2011-886), exact to rounding.
 
 use crate::mechanics::contact;
+use crate::mechanics::path::Path;
 use glam::DVec3;
 use num_dual::{DualNum, HyperDual64};
 
@@ -26,7 +27,8 @@ pub const VELOCITY: usize = 6;
 pub const GRAVITY: usize = 9;
 /// Place of the default contact stiffness, 20 E/h [Pa/m].
 pub const STIFFNESS: usize = 12;
-/// Place of the plane's unit normal (3), height [m] and penalty stiffness [Pa/m]; zero where there is no plane.
+/// Place of the plane's unit normal (3), height [m] and penalty stiffness [Pa/m]; zero where there is no plane. Laws that ask for
+/// [`Asks::Normal`] find the patch's own outward normal in the old state there.
 pub const PLANE: usize = 13;
 /// Place of the time of the new state on the recording's clock [s].
 pub const TIME: usize = 18;
@@ -51,9 +53,63 @@ pub struct Place {
     pub inertia: f64,
     /// Factor 1/(θΔt) of −velocity in the acceleration; 0 in a static problem.
     pub momentum: f64,
+    /// The point that the law follows, where it asks for one.
+    pub followed: Followed,
+}
+
+/// What a law needs that the kernels of a device do not have: only the CPU backend has such laws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asks {
+    /// Nothing.
+    Nothing,
+    /// A path that the scene states beside its numbers.
+    Path,
+    /// The patch's normal in the old state.
+    Normal,
+}
+
+/// A point on a path, at both ends of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Followed {
+    /// Time of the new state on the recording's clock [s].
+    pub time: f64,
+    /// Place [m] and velocity [m/s] then.
+    pub new: [DVec3; 2],
+    /// The same in the old state.
+    pub old: [DVec3; 2],
+}
+
+impl Followed {
+    /// On a path, at the end `time` [s] of a step of `rate` = 1/Δt; a static problem, of rate 0, has one state.
+    pub fn of(path: &Path, time: f64, rate: f64) -> Followed {
+        let before = if rate > 0.0 { time - 1.0 / rate } else { time };
+        Followed { time, new: path.at(time), old: path.at(before) }
+    }
+
+    /// Place in the new state [m]; `time` is that of the new state, and carries the derivative by where the clock starts.
+    pub fn new<D: Number>(&self, time: D) -> [D; 3] {
+        self.moved(self.new, time)
+    }
+
+    /// Place in the old state [m], likewise.
+    pub fn old<D: Number>(&self, time: D) -> [D; 3] {
+        self.moved(self.old, time)
+    }
+
+    /// To first order in time, which is all that first derivatives by it need.
+    fn moved<D: Number>(&self, [place, velocity]: [DVec3; 2], time: D) -> [D; 3] {
+        let late = time - self.time;
+        let (place, velocity): ([D; 3], [D; 3]) = (constant(place), constant(velocity));
+        std::array::from_fn(|i| place[i] + velocity[i] * late)
+    }
 }
 
 impl Place {
+    /// How long before the new state forces of a step that are taken between both states act [s].
+    pub fn lead(&self) -> f64 {
+        if self.rate > 0.0 { (1.0 - self.theta()) / self.rate } else { 0.0 }
+    }
+
     /// Weight θ of the new state in the θ-scheme; 1 in a static problem.
     pub fn theta(&self) -> f64 {
         if self.momentum == 0.0 { 1.0 } else { self.rate / self.momentum }
@@ -64,12 +120,19 @@ impl Place {
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a, D> {
     z: &'a [D],
+    /// Derivatives by more than x are taken.
+    beyond: bool,
 }
 
 impl<'a, D: Number> Input<'a, D> {
     /// Wraps an input of [`COMMON`] numbers and the law's parameters.
     pub fn new(z: &'a [D]) -> Self {
-        Input { z }
+        Input { z, beyond: false }
+    }
+
+    /// True where derivatives by more than x are taken; else everything that does not depend on x may be computed as plain numbers.
+    pub fn is_moved(&self) -> bool {
+        self.beyond
     }
 
     fn three(&self, at: usize) -> [D; 3] {
@@ -167,11 +230,22 @@ pub fn constant<D: Number>(v: DVec3) -> [D; 3] {
 
 /// A law of points. Implement this; everything else follows.
 pub trait PointLaw: Sync {
+    /// What it needs beside its input.
+    const ASKS: Asks = Asks::Nothing;
+
+    /// Its force depends on neither state: it has no stiffness, and remembers nothing.
+    const IS_LOAD: bool = false;
+
     /// Potential of the point [J], up to anything that does not depend on x; proportional to `place.measure`.
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D;
 
     /// True when the potential of this input is constant around it, so that the point can be skipped.
     fn idle(&self, _place: &Place, _z: &[f64]) -> bool {
+        false
+    }
+
+    /// True when it does nothing at any point, whatever that does: of `place` and input it looks at step and time alone.
+    fn asleep(&self, _place: &Place, _z: &[f64]) -> bool {
         false
     }
 
@@ -194,6 +268,12 @@ pub trait Point: Sync {
     fn along(&self, place: &Place, z: &[f64], d: &[f64]) -> [f64; 3];
     /// wᵀ ∂²Π/∂x∂z for the entries `range` of the input, written to `out`.
     fn transposed(&self, place: &Place, z: &[f64], w: [f64; 3], range: std::ops::Range<usize>, out: &mut [f64]);
+    /// As [`PointLaw::ASKS`].
+    fn asks(&self) -> Asks;
+    /// As [`PointLaw::IS_LOAD`].
+    fn is_load(&self) -> bool;
+    /// As [`PointLaw::asleep`].
+    fn sleeps(&self, place: &Place, z: &[f64]) -> bool;
     /// As [`PointLaw::idle`].
     fn skips(&self, place: &Place, z: &[f64]) -> bool;
     /// Share of a node, with its derivatives by the parameters.
@@ -228,11 +308,12 @@ pub trait Point: Sync {
 struct Lifted {
     z: [HyperDual64; COMMON + MOST],
     len: usize,
+    beyond: bool,
 }
 
 impl Lifted {
     fn new(z: &[f64]) -> Lifted {
-        let mut lifted = Lifted { z: [HyperDual64::from(0.0); COMMON + MOST], len: z.len() };
+        let mut lifted = Lifted { z: [HyperDual64::from(0.0); COMMON + MOST], len: z.len(), beyond: false };
         for (h, v) in lifted.z.iter_mut().zip(z) {
             h.re = *v;
         }
@@ -240,13 +321,13 @@ impl Lifted {
     }
 
     fn evaluate(&self, law: &impl PointLaw, place: &Place) -> HyperDual64 {
-        law.potential(place, Input { z: &self.z[..self.len] })
+        law.potential(place, Input { z: &self.z[..self.len], beyond: self.beyond })
     }
 }
 
 impl<L: PointLaw> Point for L {
     fn value(&self, place: &Place, z: &[f64]) -> f64 {
-        self.potential(place, Input { z })
+        self.potential(place, Input::new(z))
     }
 
     fn gradient(&self, place: &Place, z: &[f64]) -> [f64; 3] {
@@ -278,6 +359,7 @@ impl<L: PointLaw> Point for L {
         for (h, d) in h.z.iter_mut().zip(d) {
             h.eps2 = *d;
         }
+        h.beyond = true;
         std::array::from_fn(|i| {
             h.z[X + i].eps1 = 1.0;
             let v = h.evaluate(self, place).eps1eps2;
@@ -291,11 +373,24 @@ impl<L: PointLaw> Point for L {
         for i in 0..3 {
             h.z[X + i].eps1 = w[i];
         }
+        h.beyond = true;
         for (j, o) in range.zip(out) {
             h.z[j].eps2 = 1.0;
             *o = h.evaluate(self, place).eps1eps2;
             h.z[j].eps2 = 0.0;
         }
+    }
+
+    fn asks(&self) -> Asks {
+        L::ASKS
+    }
+
+    fn is_load(&self) -> bool {
+        L::IS_LOAD
+    }
+
+    fn sleeps(&self, place: &Place, z: &[f64]) -> bool {
+        self.asleep(place, z)
     }
 
     fn skips(&self, place: &Place, z: &[f64]) -> bool {

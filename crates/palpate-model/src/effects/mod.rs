@@ -6,6 +6,8 @@
 
 pub mod cell;
 pub mod field;
+pub mod handle;
+pub mod impulse;
 pub mod law;
 pub mod reading;
 pub mod sensors;
@@ -22,11 +24,13 @@ mod depth_bias_part;
 mod depth_scale;
 mod marker_offset;
 mod point_mass;
+mod push;
 mod second_plane;
 mod slack;
 mod tether;
 mod time_offset;
 mod uniform_force;
+mod wind;
 
 mod clamp_edge;
 mod clamp_slip;
@@ -44,12 +48,14 @@ mod structural_damping;
 mod transverse_anisotropy;
 mod two_part_stiffness;
 
+use crate::mechanics::path::Path;
 use crate::params::Transform;
 use crate::params::changes::HOLD;
 use cell::Cell;
 use field::Field;
-use law::Point;
+use law::{Asks, Point};
 use reading::Reading;
+use std::sync::Arc;
 
 /// An effect: what it is called, what it needs, where it acts.
 pub struct Law {
@@ -135,6 +141,8 @@ pub enum Numbered {
     Camera,
     /// A marker of the recording.
     Marker,
+    /// One of endlessly many draws of chance.
+    Seed,
 }
 
 /// How a diagnosis tries an effect.
@@ -190,10 +198,14 @@ pub static ALL: &[Law] = &[
     second_plane::LAW,
     contact_stiffness::LAW,
     contact_dissipation::LAW,
+    push::LAW,
     uniform_force::LAW,
     point_mass::LAW,
     tether::LAW,
     air_drag::LAW,
+    wind::LAW,
+    impulse::LAW,
+    handle::LAW,
     stiffness_gradient::LAW,
     two_part_stiffness::LAW,
     inclusion::LAW,
@@ -277,6 +289,22 @@ impl Law {
         amplitudes.peek().is_some() && amplitudes.all(|at_rest| at_rest)
     }
 
+    /// What a law of points needs beside its numbers.
+    pub fn asks(&self) -> Asks {
+        match self.site {
+            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) => point.asks(),
+            _ => Asks::Nothing,
+        }
+    }
+
+    /// True of a law of points whose force depends on neither state.
+    pub fn is_load(&self) -> bool {
+        match self.site {
+            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) => point.is_load(),
+            _ => false,
+        }
+    }
+
     /// True where bodies of tetrahedra cannot have it: it moves the edge of what is held within a cell, and of them whole faces are held.
     pub fn needs_cells(&self) -> bool {
         matches!(self.site, Site::Edges(_))
@@ -290,12 +318,16 @@ pub struct Effect {
     pub law: usize,
     /// Values of its parameters in the order of [`Law::params`]; `None` = the body's centre of mass, known once the body is.
     pub values: Vec<Option<f64>>,
+    /// What it follows, of laws that ask for a path.
+    pub path: Option<Arc<Path>>,
 }
 
 impl Effect {
-    /// An effect with every parameter at its default.
+    /// An effect with every parameter at its default; what it follows stays at the origin.
     pub fn absent(law: usize) -> Effect {
-        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect() }
+        let follows = ALL[law].asks() == Asks::Path;
+        let path = follows.then(|| Arc::new(Path { times: vec![0.0], points: vec![glam::DVec3::ZERO] }));
+        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect(), path }
     }
 
     /// Its law.
@@ -320,6 +352,7 @@ pub fn check_choices(effects: &[Effect], cameras: usize, markers: usize) -> Resu
             let (count, noun) = match of {
                 Numbered::Camera => (cameras, "camera"),
                 Numbered::Marker => (markers, "marker"),
+                Numbered::Seed => continue,
             };
             let number = value.unwrap_or(0.0);
             if number >= count as f64 {

@@ -47,6 +47,8 @@ const PARAMS: [EffectParam; 17] = [
 struct Slack;
 
 impl PointLaw for Slack {
+    const IS_LOAD: bool = true;
+
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
         let s = (at.time() - at.p(15)) / at.p(16);
         if s.re().abs() >= 1.0 {

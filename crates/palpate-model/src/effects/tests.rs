@@ -1,6 +1,6 @@
 //! Every law of the table against central differences, at random states.
 
-use super::law::{COMMON, PLANE, Place, Point, STIFFNESS, TIME};
+use super::law::{Asks, COMMON, Followed, PLANE, Place, Point, STIFFNESS, TIME};
 use super::{ALL, Law, Site, Unstated};
 use crate::mechanics::rotation::tests::Noise;
 use glam::DVec3;
@@ -21,7 +21,7 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
     let across = normal.cross(noise.vector(1.0));
     let old = normal * (height + width * noise.uniform(-2.0, 0.8)) + across * 0.02;
     let x = old + 2e-4 * noise.vector(1.0);
-    let place = Place {
+    let mut place = Place {
         rest: old + 0.01 * noise.vector(1.0),
         normal: noise.vector(1.0).normalize(),
         measure: noise.uniform(0.5, 2.0),
@@ -29,6 +29,7 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
         rate: 100.0,
         inertia: 1e4 / 0.6,
         momentum: 1e2 / 0.55,
+        followed: Followed::default(),
     };
     let mut z = vec![0.0; COMMON + law.params.len()];
     let velocity = noise.vector(1.0);
@@ -46,6 +47,13 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
             }
             _ => (p.typical * noise.uniform(0.3, 1.5)).clamp(p.lower.max(-1e9), p.upper.min(1e9)),
         };
+    }
+    if law.asks() == Asks::Path {
+        // A ball that the point is about to touch, moving.
+        let side = noise.vector(1.0).normalize() * z[COMMON + 1].min(0.05);
+        let near = |x: DVec3, noise: &mut Noise| x - side * (1.0 + noise.uniform(-0.01, 0.003));
+        let new = [near(x, noise), noise.vector(0.5)];
+        place.followed = Followed { time: z[TIME], new, old: [near(old, noise), noise.vector(0.5)] };
     }
     (place, z)
 }
@@ -107,6 +115,11 @@ fn derivatives_match_central_differences() {
             for i in 0..3 {
                 let h: f64 = (0..3).map(|j| hessian[i][j] * dx[j]).sum();
                 assert!((h - product[i]).abs() <= 1e-12 * size, "{}: Hessian", law.kind);
+            }
+            if point.is_load() {
+                let mut past = [0.0; 6];
+                point.transposed(&place, &z, [1.0, -0.7, 0.4], 3..9, &mut past);
+                assert!(hessian == [[0.0; 3]; 3] && past == [0.0; 6], "{}: a load depends on states", law.kind);
             }
             let w = noise.vector(1.0).to_array();
             let mut row = vec![0.0; z.len()];

@@ -23,6 +23,8 @@ const PARAMS: [EffectParam; 3] = [
 struct UniformForce;
 
 impl PointLaw for UniformForce {
+    const IS_LOAD: bool = true;
+
     fn potential<D: Number>(&self, place: &Place, at: Input<D>) -> D {
         -dot(at.vector(0), at.x()) * place.measure
     }

@@ -1,7 +1,9 @@
-//! Small laws and the geometry they need: contact pressure, Lamé parameters, rotations, rigid motions, planes.
+//! Small laws and the geometry they need: contact pressure, Lamé parameters, rotations, normals, rigid motions, paths, planes.
 
 pub mod contact;
 pub mod lame;
 pub mod motion;
+pub mod normal;
+pub mod path;
 pub mod plane;
 pub mod rotation;

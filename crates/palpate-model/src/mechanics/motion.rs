@@ -1,5 +1,6 @@
 //! Prescribed rigid motion of a clamp: a smooth curve through sampled poses.
 
+use super::path::{Between, chord};
 use glam::{DMat3, DQuat, DVec3};
 
 /// A rigid motion x ↦ R(t) x + b(t) about the world origin, sampled at increasing times.
@@ -16,32 +17,24 @@ pub struct RigidMotion {
 impl RigidMotion {
     /// Rotation matrix and translation [m] at a time: cubic (Catmull–Rom) between samples, held outside them.
     pub fn at(&self, t: f64) -> (DMat3, DVec3) {
-        let n = self.times.len();
-        if n == 0 {
+        if self.times.is_empty() {
             return (DMat3::IDENTITY, DVec3::ZERO);
         }
-        let k = self.times.partition_point(|&s| s <= t);
-        if k == 0 || k == n {
-            let i = k.saturating_sub(1).min(n - 1);
-            return (DMat3::from_quat(self.rotations[i].normalize()), self.translations[i]);
-        }
-        let (i, j) = (k - 1, k);
-        let dt = self.times[j] - self.times[i];
-        let s = (t - self.times[i]) / dt;
-        // Neighbouring samples' quaternions are brought to the same hemisphere; q and −q are the same rotation.
-        let q0 = self.rotations[i];
-        let near = |q: DQuat| if q.dot(q0) < 0.0 { -q } else { q };
-        let slope = |m: usize| -> (DVec3, DQuat) {
-            let (a, b) = (m.saturating_sub(1), (m + 1).min(n - 1));
-            let span = self.times[b] - self.times[a];
-            let dq = (near(self.rotations[b]) - near(self.rotations[a])) * (1.0 / span);
-            ((self.translations[b] - self.translations[a]) / span, dq)
+        let (first, f) = match Between::at(&self.times, t) {
+            Between::Held(m) => return (DMat3::from_quat(self.rotations[m].normalize()), self.translations[m]),
+            Between::Cubic { first, value, .. } => (first, value),
         };
-        let ((vi, wi), (vj, wj)) = (slope(i), slope(j));
-        let (s2, s3) = (s * s, s * s * s);
-        let (h0, h1, h2, h3) = (2.0 * s3 - 3.0 * s2 + 1.0, (s3 - 2.0 * s2 + s) * dt, -2.0 * s3 + 3.0 * s2, (s3 - s2) * dt);
-        let b = self.translations[i] * h0 + vi * h1 + self.translations[j] * h2 + vj * h3;
-        let q = q0 * h0 + wi * h1 + near(self.rotations[j]) * h2 + wj * h3;
+        // Neighbouring samples' quaternions are brought to the same hemisphere; q and −q are the same rotation.
+        let q0 = self.rotations[first];
+        let near = |m: usize| if self.rotations[m].dot(q0) < 0.0 { -self.rotations[m] } else { self.rotations[m] };
+        let slope = |m: usize| -> (DVec3, DQuat) {
+            let (a, b, span) = chord(&self.times, m);
+            ((self.translations[b] - self.translations[a]) / span, (near(b) - near(a)) * (1.0 / span))
+        };
+        let next = first + 1;
+        let ((vi, wi), (vj, wj)) = (slope(first), slope(next));
+        let b = self.translations[first] * f[0] + vi * f[1] + self.translations[next] * f[2] + vj * f[3];
+        let q = q0 * f[0] + wi * f[1] + near(next) * f[2] + wj * f[3];
         (DMat3::from_quat(q.normalize()), b)
     }
 }

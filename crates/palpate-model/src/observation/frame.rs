@@ -30,6 +30,10 @@ pub struct Frame {
     pub markers: Vec<ObservedMarker>,
     /// Displacements of simulation nodes, by rising node.
     pub displacements: Vec<ObservedDisplacement>,
+    /// Standard deviation of its markers and tracked points [m], where it is not that of their channel.
+    pub noise: Option<f64>,
+    /// Time [s] that velocities are multiplied by, of a frame that compares the way a point makes in it instead of its displacement.
+    pub drift: Option<f64>,
 }
 
 impl Frame {

@@ -32,6 +32,9 @@ pub fn instants(recording: &Recording, dt: f64, start: f64, k: usize) -> Vec<Ins
     (first..last)
         .map(|frame| {
             let s = place(frames[frame].time).1;
+            if let Some(drift) = frames[frame].drift {
+                return drifting(frame, s, dt, drift);
+            }
             if s < 0.0 {
                 return Instant { frame, value: [1.0, 0.0, 0.0, 0.0], rate: [0.0; 4] };
             }
@@ -46,4 +49,42 @@ pub fn instants(recording: &Recording, dt: f64, start: f64, k: usize) -> Vec<Ins
             }
         })
         .collect()
+}
+
+/// A frame that compares velocities, `drift` seconds of them, at s of a step; what is held does not move.
+fn drifting(frame: usize, s: f64, dt: f64, drift: f64) -> Instant {
+    if !(0.0..=1.0).contains(&s) {
+        return Instant { frame, value: [0.0; 4], rate: [0.0; 4] };
+    }
+    let value = [(6.0 * s * s - 6.0 * s) / dt, 3.0 * s * s - 4.0 * s + 1.0, (6.0 * s - 6.0 * s * s) / dt, 3.0 * s * s - 2.0 * s];
+    let rate = [(12.0 * s - 6.0) / (dt * dt), (6.0 * s - 4.0) / dt, (6.0 - 12.0 * s) / (dt * dt), (6.0 * s - 2.0) / dt];
+    Instant { frame, value: value.map(|v| drift * v), rate: rate.map(|r| drift * r) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Frame, Observation};
+    use std::sync::Arc;
+
+    #[test]
+    fn a_drifting_frame_sees_the_velocity_of_the_cubic() {
+        let dt = 0.1;
+        let frame = |time: f64, drift| Frame { time, drift, ..Frame::default() };
+        let times = [0.13, 0.15, 0.2];
+        let mut frames: Vec<Frame> = times.iter().map(|t| frame(*t, Some(0.4))).collect();
+        frames.push(frame(0.9, Some(0.4)));
+        let recording = Recording { observation: Arc::new(Observation { frames, ..Observation::default() }), steps: 4 };
+        // u = t³ in the second step, from 0.1 s to 0.2 s.
+        let [a, b] = [0.1f64, 0.2];
+        let ends = [a.powi(3), 3.0 * a * a, b.powi(3), 3.0 * b * b];
+        let seen = |f: [f64; 4]| -> f64 { f.iter().zip(ends).map(|(f, u)| f * u).sum() };
+        let all = instants(&recording, dt, 0.0, 1);
+        assert_eq!(all.len(), 3);
+        for (i, t) in all.iter().zip(times) {
+            assert!((seen(i.value) - 0.4 * 3.0 * t * t).abs() < 1e-14, "{t}");
+            assert!((seen(i.rate) - 0.4 * 6.0 * t).abs() < 1e-13, "{t}");
+        }
+        assert_eq!(instants(&recording, dt, 0.0, 3)[0].value, [0.0; 4]);
+    }
 }

@@ -59,6 +59,12 @@ impl Observation {
         self.channel(kind).map_or(f64::INFINITY, |c| c.noise)
     }
 
+    /// The same for markers and tracked points of a frame, which may have its own.
+    pub fn noise_in(&self, frame: &Frame, kind: ReadingKind) -> f64 {
+        let of_points = matches!(kind, ReadingKind::Marker | ReadingKind::Track);
+        frame.noise.filter(|_| of_points).unwrap_or_else(|| self.noise(kind))
+    }
+
     /// Size of errors of a kind that do not average out [m]; 0 without such a channel.
     pub fn systematic(&self, kind: ReadingKind) -> f64 {
         self.channel(kind).map_or(0.0, |c| c.systematic)

@@ -11,7 +11,8 @@ use crate::cutcells::clamp_cell::held_cells;
 use crate::cutcells::clamp_edge::Edge;
 use crate::cutcells::cut::ClipBox;
 use crate::cutcells::shadow::shadow;
-use crate::effects::{Site, check_choices};
+use crate::effects::law::Asks;
+use crate::effects::{Effect, Site, check_choices, impulse};
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
@@ -107,6 +108,7 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     if !observation.frames.is_empty() {
         check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
     }
+    check_effects(scene, &body)?;
     let planes = scene
         .planes
         .iter()
@@ -127,6 +129,8 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         planes,
         clamps,
         masses,
+        followed: scene.effects.iter().map(|e| e.path.clone()).collect(),
+        frames: Arc::new(sites::frames(scene.effects.iter().any(|e| e.law().asks() == Asks::Normal), &body)),
         clock: Clock { step: scene.time.step, steps: scene.time.steps, theta: scene.time.theta, scheme: scene.time.scheme },
         initial: scene.initial.state,
         pivot: scene.initial.pivot.unwrap_or(body.center),
@@ -167,6 +171,49 @@ fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64
         ParamKey::Field { field, index } => fields[usize::from(field)][index as usize],
     };
     layout.keys.iter().map(value).collect()
+}
+
+/// What effects need of body and clock.
+fn check_effects(scene: &Scene, body: &Body) -> Result<(), PlanError> {
+    for (i, effect) in scene.effects.iter().enumerate() {
+        let kind = effect.law().kind;
+        let key = |name: &str| format!("effect.{i}.{name}");
+        if effect.law().asks() == Asks::Path && effect.path.is_none() {
+            return Err(error(
+                key("path"),
+                format!("is missing: a \"{kind}\" follows a path, the name of a CSV file or rows [time, x, y, z]"),
+            ));
+        }
+        if kind == impulse::KIND && scene.time.steps > 0 {
+            check_impulse(effect, scene.time.step).map_err(|message| error(key("duration"), message))?;
+        }
+    }
+    for (i, handle) in scene.synthesis.handles.iter().enumerate() {
+        let away = body.nodes.iter().map(|x| x.distance(handle.point)).fold(f64::INFINITY, f64::min);
+        let allowed = GRASP * body.length;
+        if away > allowed {
+            let message = format!(
+                "{} m lies {away:.4} m from the nearest node of the body; a handle holds on to it, within two cells ({allowed:.4} m)",
+                handle.point
+            );
+            return Err(error(format!("handle.{i}.point"), message));
+        }
+    }
+    Ok(())
+}
+
+/// How far a handle may be from the nearest node, in cells.
+const GRASP: f64 = 2.0;
+
+/// An impulse must be seen by as many steps as its spline takes to sum to one.
+fn check_impulse(effect: &Effect, step: f64) -> Result<(), String> {
+    let duration = effect.values[impulse::DURATION].unwrap_or_default();
+    let least = impulse::LEAST_STEPS * step;
+    // Times are rounded.
+    if duration >= least * (1.0 - 1e-9) {
+        return Ok(());
+    }
+    Err(format!("{duration} s is shorter than {} steps ({least} s), so that steps would miss part of it", impulse::LEAST_STEPS))
 }
 
 /// A shape that is given as the equilibrium needs something that holds it, and leaves no choice of a stress-free one.

@@ -39,6 +39,7 @@ fn scene() -> Scene {
         solver: Solver::default(),
         observation: None,
         targets: Vec::new(),
+        synthesis: Synthesis::default(),
         tracking: crate::scene::Tracking::default(),
         fit: None,
     }

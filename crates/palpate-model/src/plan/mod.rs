@@ -12,6 +12,7 @@ use crate::materials::curve::Curve;
 use crate::materials::principal_stretch::PrincipalStretch;
 use crate::materials::viscosity::Viscosity;
 use crate::mechanics::motion::RigidMotion;
+use crate::mechanics::path::Path;
 use crate::observation::{Observation, Recording, View, Viewed};
 use crate::params::fields::Field;
 use crate::params::{Layout, ParamKey};
@@ -48,6 +49,10 @@ pub struct Plan {
     pub masses: Stencils,
     /// Fields on the body.
     pub fields: Vec<Field>,
+    /// The path of every effect that follows one.
+    pub followed: Vec<Option<Arc<Path>>>,
+    /// How the body deforms at every patch of the surface, where some effect asks for normals that turn with it; else empty.
+    pub frames: Arc<Stencils>,
     /// Time steps.
     pub clock: Clock,
     /// Shape at the start.

@@ -22,6 +22,7 @@ impl Scene {
             solver: Solver::default(),
             observation: None,
             targets: Vec::new(),
+            synthesis: Synthesis::default(),
             tracking: Tracking::default(),
             fit: None,
         }

@@ -1,25 +1,14 @@
 //! `palpate simulate`: a scene's motion as files.
 
+use super::frames::{Output, Written, write_motion};
 use crate::cli::{Console, INTERRUPTED};
-use crate::embed::Embedding;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fields::{OnGrid, named};
-use crate::options::{BackendName, count, out_folder};
-use crate::render::{Pinhole, shade};
+use crate::options::{BackendName, out_folder};
 use crate::results::simulation::SimulationDocument;
 use crate::results::{self, finite};
-use clap::{Args, ValueEnum};
-use glam::DVec3;
-use palpate_cpu::CpuBackend;
-use palpate_engine::Snapshot;
-use palpate_io::output::{make_folder, write_file};
-use palpate_io::vtk::{Elements, Values, write_vtu};
-use palpate_model::scene::InitialShape;
-use palpate_model::shape::TriMesh;
-use std::ops::ControlFlow;
+use clap::Args;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -43,120 +32,8 @@ pub struct Arguments {
     /// What computes
     #[arg(long, value_enum, default_value = "auto")]
     backend: BackendName,
-    /// What to write, separated by commas
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "obj")]
-    format: Vec<Format>,
-    /// Write every N-th state
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1..=u64::MAX), allow_negative_numbers = true)]
-    every: u64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
-    Obj,
-    Ply,
-    Vtu,
-    Png,
-}
-
-impl Format {
-    fn ending(self) -> &'static str {
-        match self {
-            Format::Obj => "obj",
-            Format::Ply => "ply",
-            Format::Vtu => "vtu",
-            Format::Png => "png",
-        }
-    }
-}
-
-fn frame_name(number: usize, format: Format) -> String {
-    format!("frame_{number:05}.{}", format.ending())
-}
-
-/// Removes the frames of an earlier simulation that this one, with its frames `numbers`, does not replace: whoever plays the folder would
-/// see both. Returns how many there were. Series without a frame 0, which every simulation writes, come from elsewhere and stay.
-fn remove_stale(folder: &Path, format: Format, numbers: &[usize]) -> Result<usize, Error> {
-    let list = std::fs::read_dir(folder).map_err(|e| Error::write(folder, e))?;
-    let number = |name: &str| {
-        let n = name.strip_prefix("frame_")?.strip_suffix(format.ending())?.strip_suffix('.')?.parse().ok()?;
-        (frame_name(n, format) == name).then_some(n)
-    };
-    let there: Vec<usize> = list
-        .filter_map(|e| e.ok().filter(|e| e.file_type().is_ok_and(|t| t.is_file()))?.file_name().to_str().and_then(number))
-        .collect();
-    if !there.contains(&0) {
-        return Ok(0);
-    }
-    let stale: Vec<usize> = there.into_iter().filter(|n| !numbers.contains(n)).collect();
-    for n in &stale {
-        let path = folder.join(frame_name(*n, format));
-        std::fs::remove_file(&path).map_err(|e| Error::Failed(format!("{}: cannot be removed: {e}", path.display())))?;
-    }
-    Ok(stale.len())
-}
-
-/// Writes frames of one simulation.
-struct Writer<'a> {
-    experiment: &'a Experiment,
-    folder: PathBuf,
-    formats: Vec<Format>,
-    surface: Embedding,
-    triangles: Vec<[u32; 3]>,
-    elements: Elements,
-    fields: OnGrid,
-    /// Displacement of the stress-free shape, where the shape given is the equilibrium [m].
-    stress_free: Option<Vec<DVec3>>,
-    camera: Pinhole,
-    series: Vec<(f64, String)>,
-    files: usize,
-}
-
-impl Writer<'_> {
-    fn write(&mut self, number: usize, state: &Snapshot) -> Result<(), Error> {
-        let vertices = self.surface.deform(&state.displacement);
-        let time = self.experiment.scene().time.start + state.time;
-        for format in self.formats.clone() {
-            let file = self.folder.join(frame_name(number, format));
-            match format {
-                Format::Obj | Format::Ply => {
-                    let mesh = TriMesh { vertices: vertices.clone(), triangles: self.triangles.clone() };
-                    match format {
-                        Format::Obj => palpate_io::write_obj(file, &mesh)?,
-                        _ => palpate_io::write_ply(file, &mesh)?,
-                    }
-                }
-                Format::Vtu => {
-                    let body = &self.experiment.plan().body;
-                    let points: Vec<DVec3> = body.nodes.iter().zip(&state.displacement).map(|(x, u)| *x + *u).collect();
-                    let fractions: Vec<f64> = body.cells().iter().map(|c| c.fraction).collect();
-                    let mut of_nodes = named(&self.fields.nodes);
-                    of_nodes.push(("displacement", Values::Vectors(&state.displacement)));
-                    of_nodes.push(("velocity", Values::Vectors(&state.velocity)));
-                    of_nodes.extend(self.stress_free.iter().map(|w| ("stress_free", Values::Vectors(w))));
-                    let mut of_elements = named(&self.fields.elements);
-                    if body.cut.is_some() {
-                        of_elements.push(("fraction", Values::Numbers(&fractions)));
-                    }
-                    write_vtu(file, &points, &self.elements, &of_nodes, &of_elements)?;
-                    self.series.push((time, frame_name(number, format)));
-                }
-                Format::Png => {
-                    let blue = |_| DVec3::new(0.45, 0.62, 0.85);
-                    let picture = shade(&self.camera, &vertices, &self.triangles, self.experiment.up(), blue);
-                    write_file(file, |w| w.write_all(&picture.png()))?;
-                }
-            }
-            self.files += 1;
-        }
-        Ok(())
-    }
-}
-
-/// A camera that sees the surface in all states, given by their bounding boxes.
-fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
-    let (lo, hi) = boxes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
-    Pinhole::framing(lo, hi, experiment.up(), 640, 480)
+    #[command(flatten)]
+    output: Output,
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
@@ -168,111 +45,40 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         note.iter().for_each(|n| console.note(n));
     });
     let folder = out_folder(&a.out, &a.scene, "");
-    make_folder(&folder)?;
-    let clock = Instant::now();
-    let plan = experiment.plan();
-    let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
-    let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
-
-    // States first, files afterwards: the pictures' camera frames the whole motion. An interrupt ends the simulation, not the
-    // writing of what it has.
-    track.measure(plan.clock.steps as u64);
-    let mut states: Vec<(usize, Snapshot)> = Vec::new();
-    let (mut farthest, mut reached): (f64, usize) = (0.0, 0);
-    let mut extent: Vec<(DVec3, DVec3)> = Vec::new();
-    let interrupt = console.interrupt.clone();
-    backend.visit(plan, &plan.theta, |k, s, _| {
-        farthest = s.displacement.iter().map(|u| u.length()).fold(farthest, f64::max);
-        if keep(k) {
-            let points = surface.deform(&s.displacement);
-            extent.push(points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p))));
-            states.push((k, s));
-        }
-        track.at(k as u64, "");
-        reached = k;
-        if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    let interrupted = interrupt.is_raised();
-    track.finish();
-    let seconds = clock.elapsed().as_secs_f64();
-
-    let mut formats = a.format.clone();
-    formats.dedup();
-    let numbers: Vec<usize> = states.iter().map(|(k, _)| *k).collect();
-    let stale = formats.iter().map(|f| remove_stale(&folder, *f, &numbers)).sum::<Result<usize, Error>>()?;
-    if stale > 0 {
-        console.note(&format!("removed from {}: {stale} frames of an earlier simulation", folder.display()));
-    }
-    let given = experiment.scene().initial.state == InitialShape::Given;
-    let stress_free = given.then(|| CpuBackend.stress_free(plan, &plan.theta)).transpose()?;
-    let mut writer = Writer {
-        stress_free,
-        camera: camera(&experiment, &extent),
-        elements: Elements::of(&plan.body),
-        fields: OnGrid::new(plan, &plan.theta, &(0..plan.fields.len()).collect::<Vec<_>>()),
-        experiment: &experiment,
-        folder: folder.clone(),
-        formats,
-        surface,
-        triangles,
-        series: Vec::new(),
-        files: 0,
-    };
-    let mut track = console.progress(states.len() as u64, "writing");
-    let mut written = 0;
-    for (k, state) in &states {
-        writer.write(*k, state)?;
-        written += 1;
-        track.on(1, "");
-    }
-    track.finish();
-    if !writer.series.is_empty() {
-        palpate_io::write_pvd(folder.join("series.pvd"), &writer.series)?;
-    }
-    report(
-        console,
-        &experiment,
-        &folder,
-        (backend.name(), seconds, interrupted.then_some(reached)),
-        farthest,
-        written,
-        writer.files,
-    );
-    Ok(if interrupted { INTERRUPTED } else { 0 })
+    let written = write_motion(&experiment, backend, &folder, &a.output, track, console)?;
+    let document = document(&experiment, &folder, backend.name(), &written);
+    console.print(&if console.json() { results::line(&document) } else { sentence(&document) });
+    Ok(if written.interrupted.is_some() { INTERRUPTED } else { 0 })
 }
 
-fn report(
-    console: &mut Console,
-    experiment: &Experiment,
-    folder: &Path,
-    (backend, seconds, interrupted): (&str, f64, Option<usize>),
-    farthest: f64,
-    frames: usize,
-    files: usize,
-) {
-    let plan = experiment.plan();
-    if console.json() {
-        console.print(&results::line(&SimulationDocument {
-            scene: experiment.scene().path.display().to_string(),
-            backend: backend.into(),
-            steps: plan.clock.steps,
-            interrupted,
-            nodes: plan.body.nodes.len(),
-            frames,
-            files,
-            out: folder.display().to_string(),
-            largest_displacement: finite(farthest),
-            seconds,
-        }));
-    } else {
-        let first = interrupted.map_or(String::new(), |reached| format!("interrupted after step {reached}: "));
-        console.print(&format!(
-            "{first}{}: {} steps of {} nodes in {seconds:.2} s ({backend}), largest displacement {:.4} m; {files} files in {}",
-            experiment.scene().path.display(),
-            plan.clock.steps,
-            plan.body.nodes.len(),
-            farthest,
-            folder.display()
-        ));
+/// What was simulated and written.
+pub fn document(experiment: &Experiment, folder: &Path, backend: &str, written: &Written) -> SimulationDocument {
+    SimulationDocument {
+        scene: experiment.scene().path.display().to_string(),
+        backend: backend.into(),
+        steps: experiment.plan().clock.steps,
+        interrupted: written.interrupted,
+        nodes: experiment.plan().body.nodes.len(),
+        frames: written.frames,
+        files: written.files,
+        out: folder.display().to_string(),
+        largest_displacement: finite(written.farthest),
+        seconds: written.seconds,
     }
+}
+
+/// The same in a sentence.
+pub fn sentence(d: &SimulationDocument) -> String {
+    let first = d.interrupted.map_or(String::new(), |reached| format!("interrupted after step {reached}: "));
+    format!(
+        "{first}{}: {} steps of {} nodes in {:.2} s ({}), largest displacement {:.4} m; {} files in {}",
+        d.scene,
+        d.steps,
+        d.nodes,
+        d.seconds,
+        d.backend,
+        d.largest_displacement.unwrap_or(f64::NAN),
+        d.files,
+        d.out
+    )
 }

@@ -18,6 +18,7 @@ pub mod inspection;
 pub mod lock;
 pub mod observation;
 pub mod simulation;
+pub mod synthesis;
 pub mod tracking;
 
 use crate::error::Error;

@@ -16,6 +16,7 @@ use crate::device::{Arena, GpuError};
 use crate::layout::EffectSite;
 use crate::world::mass::MassTable;
 use palpate_model::effects::cell::{ENERGY, Part};
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{Law, Site};
 use palpate_model::params::changes::{self, Changes};
 use palpate_model::params::fields::Varied;
@@ -68,6 +69,15 @@ impl Effects {
         let mut e = Effects { steps: plan.clock.stages().len(), viscous: plan.layout.is_viscous(), ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
+            let asks = match law.asks() {
+                Asks::Nothing => None,
+                Asks::Path => Some("follows a path"),
+                Asks::Normal => Some("turns with the surface"),
+            };
+            if let Some(asks) = asks {
+                let what = format!("the effect \"{}\", which {asks} and which the CPU backend has", law.kind);
+                return Err(GpuError::Plan { what });
+            }
             let mut row = None;
             let site = match law.site {
                 Site::Nodes(_) => Some(AT_NODES),

@@ -2,11 +2,11 @@
 
 use super::{PlanError, error};
 use crate::cutcells::extension::{NodeLookup, affine_weights};
-use crate::cutcells::places::{beside, material_point};
+use crate::cutcells::places::{beside, in_cell, material_point};
 use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, TrackRest};
 use crate::shape::Shape;
 use crate::space::body::Body;
-use crate::space::stencil::StencilBuf;
+use crate::space::stencil::{StencilBuf, Stencils};
 use crate::space::tets::TetLookup;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -112,6 +112,22 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
         stalk: DVec3::ZERO,
     };
     Ok(tracks.places.par_iter().enumerate().map(site).collect())
+}
+
+/// How the body deforms at every patch of its surface, where that is `asked`.
+pub(super) fn frames(asked: bool, body: &Body) -> Stencils {
+    let mut frames = Stencils::default();
+    if asked {
+        let lookup = Lookup::new(body);
+        for p in &body.patches {
+            let stencil = match &lookup {
+                Lookup::Cells(_) => in_cell(body, p.cell, p.point),
+                Lookup::Tets(tets) => tets.carry(p.point).0,
+            };
+            frames.push_with_gradient(&stencil.nodes, &stencil.value, &stencil.gradient);
+        }
+    }
+    frames
 }
 
 /// Where a point mass sits: on the body or within one element of it.
