@@ -119,7 +119,7 @@ fn components(data: &Mat<f64>) -> Option<Mat<f64>> {
     let eigen = product.self_adjoint_eigen(Side::Lower).ok()?;
     let n = product.nrows();
     let largest = eigen.S()[n - 1];
-    if !(largest > 0.0) {
+    if largest <= 0.0 || largest.is_nan() {
         return None;
     }
     let kept = (0..n).rev().take(MOST_COMPONENTS).take_while(|k| eigen.S()[*k] > FAINT * FAINT * largest).count();

@@ -217,7 +217,7 @@ pub fn errors(times: &[f64], pairs: &[Pair], data: &Mat<f64>) -> Vec<f64> {
     let of = |i: usize| {
         let unit: Vec<f64> = (0..q).map(|k| f64::from(u8::from(k == i))).collect();
         let relative = solve(&a, &unit).map_or(f64::INFINITY, |x| (x[i] * squares / freedom).sqrt());
-        relative * if i % 2 == 0 { pairs[i / 2].frequency } else { pairs[i / 2].damping }
+        relative * if i.is_multiple_of(2) { pairs[i / 2].frequency } else { pairs[i / 2].damping }
     };
     (0..q).map(of).collect()
 }

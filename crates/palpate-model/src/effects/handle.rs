@@ -42,7 +42,7 @@ impl PointLaw for Handle {
         let (followed, theta) = (&place.followed, place.theta());
         // Every node of the region is pulled by the displacement that the anchor asks of the place, so that the region is not squeezed.
         let stretch = |x: [D; 3], anchor: [D; 3]| -> [D; 3] { std::array::from_fn(|i| x[i] - rest[i] + point[i] - anchor[i]) };
-        let new = stretch(at.x(), followed.new(at.time()));
+        let new = stretch(at.x(), followed.now(at.time()));
         let old = stretch(at.old(), followed.old(at.time()));
         // The old state's force has a linear potential.
         let energy = dot(new, new) * (0.5 * theta) + dot(old, at.x()) * (1.0 - theta);

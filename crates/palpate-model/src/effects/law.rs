@@ -87,7 +87,7 @@ impl Followed {
     }
 
     /// Place in the new state [m]; `time` is that of the new state, and carries the derivative by where the clock starts.
-    pub fn new<D: Number>(&self, time: D) -> [D; 3] {
+    pub fn now<D: Number>(&self, time: D) -> [D; 3] {
         self.moved(self.new, time)
     }
 

@@ -26,7 +26,7 @@ struct Push;
 
 /// Old and new distance from the ball [m].
 fn gaps<D: Number>(place: &Place, at: &Input<D>) -> [D; 2] {
-    let ends = [(at.old(), place.followed.old(at.time())), (at.x(), place.followed.new(at.time()))];
+    let ends = [(at.old(), place.followed.old(at.time())), (at.x(), place.followed.now(at.time()))];
     ends.map(|(x, center)| {
         let d = sub(x, center);
         // The square of far less than any length keeps the root smooth at the centre.
