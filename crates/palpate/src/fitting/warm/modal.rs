@@ -174,7 +174,7 @@ pub fn told(e: &Experiment, asked: Asked, fields: bool) -> Result<Told, String> 
     }
     let seen = vibrations(&record.times, &record.rows, MOST)?;
     let strongest = seen.first().ok_or("nothing in the record vibrates")?;
-    let backend = CpuBackend::default();
+    let backend = CpuBackend;
     let at = |plan: &Plan, factor: f64| -> Result<(Modes, usize, f64), String> {
         let modes = backend.modes(plan, &scaled(plan, factor, fields), MODES).map_err(|f| f.to_string())?;
         let (k, alike) = best(strongest, &modes, o, &record.things);
