@@ -30,6 +30,9 @@ pub type Figures = BTreeMap<String, f64>;
 /// A case, from the folder of measured recordings and one to work in.
 pub type Case = fn(&Path, &Path) -> Result<Figures, String>;
 
+/// A table of a page, in Markdown, from all rows.
+pub type Table = fn(&[Row]) -> String;
+
 /// A study.
 pub struct Set {
     /// Name under which `cargo xtask paper --only` runs all cases, and of its rows in `bench`; a case alone is `NAME-CASE`.
@@ -41,7 +44,7 @@ pub struct Set {
     /// What was promised.
     pub aims: &'static [Aim],
     /// Further tables of the page by name.
-    pub more: &'static [(&'static str, fn(&[Row]) -> String)],
+    pub more: &'static [(&'static str, Table)],
     /// What moves the figures.
     pub measured: Measured,
 }

@@ -90,6 +90,11 @@ const AIMS: &[Aim] = &[
     ("G", "94 %: starts that found the vibration", "vibrations-94", Of("starts that found it"), "–", AtLeast(3.0)),
 ];
 
+/// How far a value is from the truth [%].
+fn off(value: f64, truth: f64) -> f64 {
+    100.0 * (value / truth - 1.0).abs()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,9 +103,4 @@ mod tests {
     fn every_aim_is_one_of_a_case() {
         assert!(AIMS.iter().all(|a| CASES.iter().any(|c| c.0 == a.2)));
     }
-}
-
-/// How far a value is from the truth [%].
-fn off(value: f64, truth: f64) -> f64 {
-    100.0 * (value / truth - 1.0).abs()
 }

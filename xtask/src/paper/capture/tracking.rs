@@ -105,8 +105,11 @@ fn text(e: &dyn std::fmt::Display) -> String {
     e.to_string()
 }
 
+/// Where each place was [m], by time [µs] and number of the place.
+type Truth = BTreeMap<(u64, usize), DVec3>;
+
 /// The motion, and where the places were at every frame.
-fn moved(body: Body, folder: &Path) -> Result<(Motion, BTreeMap<(u64, usize), DVec3>), String> {
+fn moved(body: Body, folder: &Path) -> Result<(Motion, Truth), String> {
     let scene = Experiment::from_toml(&body.scene(1.0), folder.join("truth.toml")).map_err(|e| text(&e))?;
     let times: Vec<f64> = (1..=(RATE * DURATION) as usize).map(|k| k as f64 / RATE).collect();
     let fine = Resolution { fine: 2, substeps: 2 };
@@ -156,7 +159,7 @@ impl Sum {
 }
 
 /// What was seen and what was hidden, over all frames.
-fn compare(body: Body, own: &Experiment, tracked: &TrackedBody, truth: &BTreeMap<(u64, usize), DVec3>) -> [Sum; 2] {
+fn compare(body: Body, own: &Experiment, tracked: &TrackedBody, truth: &Truth) -> [Sum; 2] {
     let places = body.places();
     let rest = &tracked.surface.rest;
     let near: Vec<usize> = places

@@ -19,7 +19,7 @@ fn bar(modulus: f64, damping: f64) -> String {
     format!(
         "format = \"scene/1\"\ntitle = \"Drooping bar\"\n\n[object]\nshape = {{ box = {{ min = [0, -0.02, -0.02], max = [0.2, 0.02, 0.02] }} }}\ncell_size = 0.01\n\n\
          [material]\ndensity = 1000.0\nyoungs_modulus = {modulus:e}\npoisson_ratio = 0.4\nstiffness_damping = {damping}\n\n[[clamp]]\n\
-         box = {{ min = [-0.01, -0.1, -0.1], max = [0.0001, 0.1, 0.1] }}\n\n[initial]\nstate = \"static-equilibrium\"\nangular_velocity = [0, 1.0, 0]\n\
+         box = {{ min = [-0.01, -0.1, -0.1], max = [0.0001, 0.1, 0.1] }}\n\n[initial]\nstate = \"static-equilibrium\"\nangular_velocity = [0, 0.4, 0]\n\
          pivot = [0, 0, 0]\n\n[time]\nstep = {}\nduration = {DURATION}\n",
         1.0 / 120.0
     )
