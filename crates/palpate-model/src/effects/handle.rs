@@ -1,6 +1,6 @@
 //! A hand that holds the body at a place and moves: a spring from there to a point that follows a path.
 //!
-//! The law of [`super::tether`], with an anchor that the scene states as a path instead of a fixed point: energy ½ k |x − a(t)|² of the
+//! The law of `tether`, with an anchor that the scene states as a path instead of a fixed point: energy ½ k |x − a(t)|² of the
 //! place, where x is what it has become, spread over the nodes around it by their shares. The stiffer the spring, the closer the body
 //! follows. Between samples the path is cubic, outside them the anchor is held. Weighted θ and 1 − θ in time like the cells. In a static
 //! problem the anchor is where it is at the start.
