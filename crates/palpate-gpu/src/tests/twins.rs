@@ -1,6 +1,7 @@
 //! Numbers that a law and its twin in WGSL both state are the same. Probes of both at random states would not tell: what keeps a root
 //! smooth is far smaller than what it is added to.
 
+use palpate_model::effects::law::Asks;
 use palpate_model::effects::{ALL, Law, Site};
 use std::collections::BTreeMap;
 use std::fs;
@@ -59,7 +60,7 @@ fn differences(kind: &str, law: &str, twin: &str) -> Vec<String> {
 }
 
 fn has_twin(law: &Law) -> bool {
-    matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_) | Site::Cells(_))
+    matches!(law.site, Site::Nodes(_) | Site::Surface(_) | Site::Contact(_) | Site::Cells(_)) && law.asks() == Asks::Nothing
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::{EffectParam, Family, Law, Site, Trial, Unstated, component, number};
 use glam::DVec3;
 
 /// Fewest steps that an impulse may take: a spline that is sampled less often does not sum to one (by a third with two samples).
-pub const LEAST_STEPS: f64 = 4.0;
+pub const LEAST_STEPS: u32 = 4;
 
 /// Kind of this law in scene files.
 pub const KIND: &str = "impulse";

@@ -208,7 +208,7 @@ const GRASP: f64 = 2.0;
 /// An impulse must be seen by as many steps as its spline takes to sum to one.
 fn check_impulse(effect: &Effect, step: f64) -> Result<(), String> {
     let duration = effect.values[impulse::DURATION].unwrap_or_default();
-    let least = impulse::LEAST_STEPS * step;
+    let least = f64::from(impulse::LEAST_STEPS) * step;
     // Times are rounded.
     if duration >= least * (1.0 - 1e-9) {
         return Ok(());
