@@ -88,8 +88,8 @@ fn the_gradient_by_controls_is_that_of_differences() {
 }
 
 /// Acceptance J of the deformation capture notes, on their bar of 20 × 5 × 5 cells and 756 nodes.
-// Minutes: 756 nodes, 30 coefficients, tens of evaluations.
 #[test]
+// Minutes: 756 nodes, 30 coefficients, tens of evaluations.
 #[ignore = "slow: cargo xtask test --full"]
 fn five_keyframes_are_met_and_the_scene_written_repeats_the_motion() {
     let wishes = keyframes(&[

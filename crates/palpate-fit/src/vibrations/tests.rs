@@ -1,3 +1,5 @@
+//! Records of known vibrations.
+
 use super::{Vibration, vibrations};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
