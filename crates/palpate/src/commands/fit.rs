@@ -247,8 +247,8 @@ fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
     iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
-/// Fits, beginning with what was tracked where anything was, and writes everything into a folder, unless `may_write` then says that it is another's by now; the progress goes to `track`. Returns
-/// the fit and its `result.json`.
+/// Fits, beginning with what was tracked where anything was, and writes everything into a folder, unless `may_write` then says that it is
+/// another's by now; the progress goes to `track`. Returns the fit and its `result.json`.
 pub fn run_in(
     scenes: &[PathBuf],
     from: &[Recording],
