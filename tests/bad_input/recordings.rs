@@ -39,6 +39,7 @@ fn wall() -> Recording {
         source: String::new(),
         cameras: vec![camera],
         frames: vec![frame(0.0), frame(0.05)],
+        clouds: Vec::new(),
         markers: None,
         points: None,
         displacements: None,

@@ -9,6 +9,7 @@ mod error;
 mod keys;
 mod rigid;
 
+pub mod cloud;
 pub mod mesh;
 pub mod npy;
 pub mod output;

@@ -63,6 +63,7 @@ mod scatter;
 mod suited;
 pub mod synthetic;
 mod tracking;
+mod viewers;
 
 pub use coarsen::{CoarsenOptions, Coarsened, coarsen, usual_numbers};
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};

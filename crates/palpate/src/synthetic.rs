@@ -118,6 +118,7 @@ pub fn observe(
             })
             .collect(),
         frames,
+        clouds: Vec::new(),
         markers: (!observers.markers.is_empty()).then(|| recorded_markers(observers, samples)),
         points: (!observers.points.is_empty()).then(|| RecordedPoints {
             track: Sequence { file: PathBuf::from("points.npz"), ..tracked_points },
@@ -195,7 +196,7 @@ pub(crate) fn read_depths(
     let mut exact = rasterise(pinhole, vertices, triangles);
     if !sensors.exact_points() {
         let pose = pinhole.world_from_camera;
-        let truly = Camera { center: pose.translation, axis: pose.matrix3.z_axis };
+        let truly = Camera::Pinhole { center: pose.translation, axis: pose.matrix3.z_axis };
         let width = exact.width;
         for (i, z) in exact.depth.iter_mut().enumerate().filter(|(_, z)| z.is_finite()) {
             *z = sensors.read(&truly, number, pinhole.unproject((i % width) as f64, (i / width) as f64, *z));

@@ -72,6 +72,7 @@ pub fn record(motion: &Motion, change: &Change, w: &Watchers) -> Result<Recordin
         source: "Quadratic tetrahedra".into(),
         cameras: w.cameras.iter().enumerate().map(|(i, c)| stated(c, i, change, &stated_sensor)).collect(),
         frames,
+        clouds: Vec::new(),
         markers: (!w.markers.is_empty()).then(|| tracked(w, change, motion, &mut rng)),
         points: None,
         displacements: None,

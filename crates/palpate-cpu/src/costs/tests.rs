@@ -65,7 +65,7 @@ pub(crate) fn seen() -> Plan {
             Channel::new(ReadingKind::Track, 3e-3),
             Channel::new(ReadingKind::Displacement, 4e-3),
         ],
-        cameras: vec![Camera { center: DVec3::new(0.05, -0.6, 0.5), axis: DVec3::new(0.0, 0.6, -0.36).normalize() }],
+        cameras: vec![Camera::Pinhole { center: DVec3::new(0.05, -0.6, 0.5), axis: DVec3::new(0.0, 0.6, -0.36).normalize() }],
         frames: frames.to_vec(),
         tracks: TrackRest { places: tracks, tolerance: None },
         ..Observation::default()

@@ -7,6 +7,7 @@ use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
 use palpate_model::effects::{Effect, Unstated, find};
+use palpate_model::observation::Sensor;
 use palpate_model::params::Transform;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -191,7 +192,7 @@ impl Bench {
                 value += d.iter().zip(values).zip(&offsets).map(|((d, v), o)| d * (v - o)).sum::<f64>();
                 let row = ResidualRow {
                     frame,
-                    source: Source::point(i as u32, 0),
+                    source: Source::point(i as u32, Sensor::Camera(0)),
                     value: Some(value),
                     noise: NOISE,
                     weight: 1.0,

@@ -38,6 +38,7 @@ pub fn depth(capture: &mut Capture, o: &Options, said: &mut Said, watch: &mut Wa
         source: String::new(),
         cameras: Vec::new(),
         frames: Vec::new(),
+        clouds: Vec::new(),
         markers: None,
         points: None,
         displacements: None,

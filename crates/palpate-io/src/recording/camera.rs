@@ -144,6 +144,12 @@ impl RecordedCamera {
         Some((uv, p.z))
     }
 
+    /// True where a world point [m] falls into the image.
+    pub fn holds(&self, world: DVec3) -> bool {
+        let size = [self.width as f64, self.height as f64];
+        self.project(world).is_some_and(|(uv, _)| (0..2).all(|a| (-0.5..size[a] - 0.5).contains(&uv[a])))
+    }
+
     /// World point of a pixel whose depth along the axis is `z` [m]; `None` where the distortion cannot be inverted.
     pub fn point(&self, u: f64, v: f64, z: f64) -> Option<DVec3> {
         let [x, y] = self.ray(u, v)?;

@@ -1,7 +1,8 @@
-//! Format `recording/1`: a folder of depth images, masks, markers and arrays ↔ [`Recording`].
+//! Format `recording/1`: a folder of depth images, masks, clouds, markers and arrays ↔ [`Recording`].
 
 mod c3d;
 mod camera;
+mod clouds;
 mod image;
 mod markers;
 mod observation;
@@ -12,6 +13,7 @@ mod tests;
 mod write;
 
 pub use camera::RecordedCamera;
+pub use clouds::{RecordedCloud, SeenFrom};
 pub use image::DepthImage;
 pub use markers::{MarkerSample, RecordedMarkers};
 pub use observation::ObservationError;
@@ -43,6 +45,8 @@ pub struct Recording {
     pub cameras: Vec<RecordedCamera>,
     /// Images, ordered by time.
     pub frames: Vec<RecordedFrame>,
+    /// Point clouds, ordered by time.
+    pub clouds: Vec<RecordedCloud>,
     /// Markers.
     pub markers: Option<RecordedMarkers>,
     /// Tracked points of the body.
@@ -85,11 +89,12 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     let mut warnings = Vec::new();
     let cameras = camera::cameras(&root)?;
     let frames = frames(&source, &root, &cameras, &mut warnings)?;
+    let clouds = clouds::clouds(&source, &root, &cameras, &mut warnings)?;
     let markers = markers(&source, &root, &mut warnings)?;
     let points = sequence::points(&source, &root)?;
     let displacements = sequence::displacements(&source, &root)?;
-    if frames.is_empty() && markers.is_none() && points.is_none() && displacements.is_none() {
-        let text = "holds neither a [[frame]] nor [markers], [points] or [displacements]: nothing was measured";
+    if frames.is_empty() && clouds.is_empty() && markers.is_none() && points.is_none() && displacements.is_none() {
+        let text = "holds neither a [[frame]] nor [[cloud]], [markers], [points] or [displacements]: nothing was measured";
         return Err(root.own_error(text));
     }
     image::check_depth_unit(&root, &cameras, &frames)?;
@@ -99,6 +104,7 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
         path: source.path.clone(),
         cameras,
         frames,
+        clouds,
         markers,
         points,
         displacements,

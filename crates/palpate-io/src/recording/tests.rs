@@ -38,6 +38,7 @@ fn sample() -> Recording {
         source: "made up".into(),
         cameras: vec![camera("left"), camera("right one")],
         frames: vec![frame(0, -0.1), frame(1, -0.1), frame(0, 0.1), silhouette],
+        clouds: Vec::new(),
         markers: Some(RecordedMarkers {
             file: PathBuf::new(),
             names: vec!["a".into(), "b".into()],

@@ -1,6 +1,7 @@
 //! Synthetic recordings, in the format that is read.
 
-use super::{FORMAT, RecordedDisplacements, RecordedMarkers, RecordedPoints, Recording, Sequence};
+use super::{FORMAT, RecordedDisplacements, RecordedMarkers, RecordedPoints, Recording, SeenFrom, Sequence};
+use crate::cloud::{ending, write_cloud};
 use crate::error::OutputError;
 use crate::npy::{Array, write_npz};
 use crate::output::{make_folder, write_file};
@@ -9,7 +10,8 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `markers.csv`, `points.npz`, `displacements.npz`. [`super::read_recording`] gives it back.
+/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `cloud/`, `markers.csv`, `points.npz`,
+/// `displacements.npz`. [`super::read_recording`] gives it back.
 ///
 /// # Errors
 /// The file that could not be written and why.
@@ -39,6 +41,7 @@ pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Resul
             let _ = writeln!(toml, "mask = \"{}\"", place("mask"));
         }
     }
+    write_clouds(folder, &mut toml, recording)?;
     if let Some(m) = &recording.markers {
         write_markers(folder, &mut toml, m)?;
     }
@@ -91,6 +94,35 @@ fn png(folder: &Path, place: &str, bytes: &[u8], (w, h): (u32, u32), color: Exte
         make_folder(parent)?;
     }
     write_file(&path, |out| PngEncoder::new(out).write_image(bytes, w, h, color).map_err(std::io::Error::other))
+}
+
+/// Clouds, each in a file of the kind that it came from.
+fn write_clouds(folder: &Path, toml: &mut String, recording: &Recording) -> Result<(), OutputError> {
+    for (number, c) in recording.clouds.iter().enumerate() {
+        let kind = match ending(&c.file).as_str() {
+            "pcd" => "pcd",
+            "npz" | "npy" => "npz",
+            _ => "ply",
+        };
+        let place = format!("cloud/{number:06}.{kind}");
+        let _ = writeln!(toml, "\n[[cloud]]\nfile = \"{place}\"\ntime = {:?}", c.time);
+        match c.from {
+            SeenFrom::Camera(k) => writeln!(toml, "camera = {}", quoted(&recording.cameras[k].name)),
+            SeenFrom::Origin(o) => writeln!(toml, "origin = {}", vector(o)),
+            SeenFrom::Unknown => Ok(()),
+        }
+        .unwrap_or_default();
+        if let Some(s) = c.noise_sigma {
+            let _ = writeln!(toml, "noise_sigma = {s:?}");
+        }
+        let _ = writeln!(toml, "noise_systematic = {:?}", c.noise_systematic);
+        make_folder(&folder.join("cloud"))?;
+        match kind {
+            "npz" => write_npz(folder.join(place), &[("points", &array(&[c.points.len(), 3], &c.points))])?,
+            _ => write_cloud(folder.join(place), &c.points)?,
+        }
+    }
+    Ok(())
 }
 
 fn write_markers(folder: &Path, toml: &mut String, m: &RecordedMarkers) -> Result<(), OutputError> {

@@ -87,7 +87,7 @@ impl<'a> Lab<'a> {
             up: first.up(),
             places: regions.centers.iter().filter_map(nearest).collect(),
             spot: 0.5 * body.length,
-            cameras: most(|e| e.plan.observation.cameras.len()),
+            cameras: most(|e| e.plan.observation.camera_count()),
             markers: most(|e| e.plan.observation.marker_count()),
             cells: experiments.iter().all(|e| e.plan.body.cut.is_some()),
             held: held(experiments),
