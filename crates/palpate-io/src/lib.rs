@@ -10,6 +10,7 @@ mod keys;
 mod rigid;
 
 pub mod cloud;
+pub mod lens;
 pub mod mesh;
 pub mod npy;
 pub mod output;

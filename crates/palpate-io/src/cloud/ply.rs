@@ -5,6 +5,7 @@ use crate::error::InputError;
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -33,11 +34,33 @@ impl PropertyAccess for Element {
     }
 }
 
+/// Bytes that the crate reads: in text it knows numbers alone, and what writers print where there is none becomes one that is not finite.
+fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
+    const END: &[u8] = b"end_header";
+    let Some(end) = bytes.windows(END.len()).position(|w| w == END) else { return bytes.into() };
+    let (head, body) = bytes.split_at(end + END.len());
+    if !head.windows(12).any(|w| w == b"format ascii") {
+        return bytes.into();
+    }
+    let text = String::from_utf8_lossy(body);
+    let none = |word: &str| {
+        let bare = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
+        bare.starts_with("nan") || bare.starts_with("inf")
+    };
+    if !text.split_ascii_whitespace().any(none) {
+        return bytes.into();
+    }
+    let word = |w: &str| if none(w.trim_end()) { w.replace(w.trim_end(), "1e999") } else { w.to_string() };
+    let whole: String = text.split_inclusive([' ', '\t', '\n']).map(word).collect();
+    [head, whole.as_bytes()].concat().into()
+}
+
 /// The points of a file's bytes.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<CloudFile, InputError> {
     let wrong = |text: String| InputError::file(path, text);
-    let ply =
-        Parser::<Element>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| wrong(format!("not a readable PLY file: {e}")))?;
+    let ply = Parser::<Element>::new()
+        .read_ply(&mut Cursor::new(&readable(bytes)[..]))
+        .map_err(|e| wrong(format!("not a readable PLY file: {e}")))?;
     let vertices = ply.payload.get("vertex").ok_or_else(|| wrong("has no element \"vertex\"".into()))?;
     let point = |(i, v): (usize, &Element)| match v.0 {
         [Some(x), Some(y), Some(z)] => Ok(DVec3::new(x, y, z)),

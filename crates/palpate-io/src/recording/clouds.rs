@@ -46,6 +46,9 @@ const FARTHEST: f64 = 20.0;
 /// Fewer points in the image of a cloud's camera than this share are a wrong pose.
 const IN_VIEW: f64 = 0.1;
 
+/// Fewer than this are in the camera's axes, where nearly all would be seen from there.
+const MOSTLY_OUT: f64 = 0.5;
+
 /// Fewer than this are worth a word.
 const MOSTLY_IN_VIEW: f64 = 0.9;
 
@@ -211,7 +214,7 @@ fn check_unit(table: &Table, clouds: &[RecordedCloud], cameras: &[RecordedCamera
     let Some(size) = size.filter(|s| !(nearest..=FARTHEST).contains(s)) else { return Ok(()) };
     let fits = |f: &&(f64, &str)| (0.05..=10.0).contains(&(size * f.0));
     let hint = match [(0.001, "mm"), (0.01, "cm")].iter().find(fits) {
-        Some((f, unit)) => format!("; are they in another unit? unit = \"{unit}\" would make it {:.3} m", size * f),
+        Some((f, unit)) => format!("; are they in another unit? unit = \"{unit}\" would make it about {:.3} m", size * f),
         None => "; check unit, transform and where they were seen from".to_string(),
     };
     let text = format!("its points {what} by {size:.4} m (the median), expected {nearest} to {FARTHEST} m{hint}");
@@ -235,11 +238,11 @@ fn check_view(table: &Table, clouds: &[RecordedCloud], cameras: &[RecordedCamera
         return Ok(None);
     }
     let text = format!("only {:.0} % of its points lie in the image of camera \"{}\"", 100.0 * seen, camera.name);
-    if seen >= IN_VIEW {
+    let turned = share(&|p| camera.world_from_camera.transform_point3(p)) >= MOSTLY_IN_VIEW;
+    if seen >= if turned { MOSTLY_OUT } else { IN_VIEW } {
         return Ok(Some(table.error("camera", text).to_string()));
     }
-    let turned = share(&|p| camera.world_from_camera.transform_point3(p));
-    let hint = if turned > MOSTLY_IN_VIEW {
+    let hint = if turned {
         "; they seem to be in the camera's axes, and its world_from_camera as `transform` puts them into the world"
     } else {
         "; clouds are in world axes, `transform` turns others"

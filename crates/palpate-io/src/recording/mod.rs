@@ -9,12 +9,14 @@ mod observation;
 mod overlap;
 mod sequence;
 #[cfg(test)]
+mod surface_tests;
+#[cfg(test)]
 mod tests;
 mod write;
 
 pub use camera::RecordedCamera;
 pub use clouds::{RecordedCloud, SeenFrom};
-pub use image::DepthImage;
+pub use image::{DepthImage, DepthPixels, RawDepth};
 pub use markers::{MarkerSample, RecordedMarkers};
 pub use observation::ObservationError;
 pub use overlap::check_overlap;
@@ -230,13 +232,13 @@ fn frames(
 }
 
 impl RecordedFrame {
-    /// Pixels (column u, row v) of the object with a reading, and their counts, row by row.
-    pub fn readings(&self) -> impl Iterator<Item = (usize, usize, u16)> + '_ {
+    /// Pixels (column u, row v) of the object with a reading, and what is read there, row by row.
+    pub fn readings(&self) -> impl Iterator<Item = (usize, usize, RawDepth)> + '_ {
         let width = self.depth.as_ref().map_or(1, |d| d.width);
-        let counts = self.depth.as_ref().map_or(&[][..], |d| &d.counts[..]);
-        (counts.iter().enumerate())
-            .filter(|(i, c)| **c > 0 && self.mask.as_ref().is_none_or(|m| m[*i]))
-            .map(move |(i, c)| (i % width, i / width, *c))
+        let count = self.depth.as_ref().map_or(0, |d| d.pixels.count());
+        (0..count)
+            .filter(|i| self.mask.as_ref().is_none_or(|m| m[*i]))
+            .filter_map(move |i| Some((i % width, i / width, self.depth.as_ref()?.pixels.reading(i)?)))
     }
 }
 

@@ -1,6 +1,6 @@
 //! A recording as an [`Observation`]: pixels and clouds to points of the surface, markers to frames.
 
-use super::{RecordedFrame, RecordedMarkers, Recording, SeenFrom, Sequence};
+use super::{RawDepth, RecordedFrame, RecordedMarkers, Recording, SeenFrom, Sequence};
 use crate::error::{InputError, number};
 use glam::DVec3;
 use palpate_model::observation::{
@@ -211,8 +211,9 @@ impl Recording {
         };
         let seen = |t: f64| o.frames.iter().any(|f| (f.time - t).abs() < SAME_TIME);
         // Readings at the largest count, and all.
-        let count =
-            |i: &RecordedFrame| i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == u16::MAX), all + 1));
+        let count = |i: &RecordedFrame| {
+            i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == RawDepth::Count(u16::MAX)), all + 1))
+        };
         let images: Vec<(f64, (usize, usize))> =
             self.frames.iter().filter(|f| f.depth.is_some() && seen(f.time)).map(|f| (f.time, count(f))).collect();
         let times = |is: fn(usize, usize) -> bool| -> Vec<f64> {
