@@ -154,6 +154,9 @@ fn clouds_without_lines_of_sight_are_tracked() {
         }
         let told = Command::new(env!("CARGO_BIN_EXE_palpate")).arg("inspect").arg(folder.path().join(name)).output();
         let told = String::from_utf8_lossy(&told.unwrap_or_else(|e| panic!("{e}")).stdout).into_owned();
-        assert!(told.contains("9 from 0 s to 0.08 s") && told.contains("without lines of sight") == (name == "blind"), "{told}");
+        assert!(
+            told.contains("9 from 0.0000 s to 0.0800 s") && told.contains("without lines of sight") == (name == "blind"),
+            "{told}"
+        );
     }
 }

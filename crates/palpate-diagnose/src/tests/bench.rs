@@ -114,6 +114,7 @@ impl Bench {
             places: rest.iter().step_by(30).copied().collect(),
             spot: 0.01,
             cameras: 1,
+            sight: true,
             markers: 0,
             cells: true,
             held: held.clone(),

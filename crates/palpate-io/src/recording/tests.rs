@@ -286,5 +286,9 @@ fn a_recording_elsewhere_is_refused_with_numbers() {
     let far = c + DVec3::new(0.0, 0.0, 7.0);
     let e = check_overlap(&o, far - DVec3::splat(0.1), far + DVec3::splat(0.1)).unwrap_err();
     assert!(e.contains("nowhere near") && e.contains("diagonal of 0.3464 m") && e.contains("object.pose"), "{e}");
+    let mut large = o.clone();
+    large.frames.iter_mut().flat_map(|f| &mut f.points).for_each(|p| p.position *= 1000.0);
+    let e = check_overlap(&large, c - DVec3::splat(0.1), c + DVec3::splat(0.1)).unwrap_err();
+    assert!(e.ends_with("the units; in millimetres it would lie at the object"), "{e}");
     assert_eq!(check_overlap(&Observation::default(), far, far), Ok(()), "nothing measured is another error");
 }

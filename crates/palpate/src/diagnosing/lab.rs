@@ -88,6 +88,7 @@ impl<'a> Lab<'a> {
             places: regions.centers.iter().filter_map(nearest).collect(),
             spot: 0.5 * body.length,
             cameras: most(|e| e.plan.observation.camera_count()),
+            sight: experiments.iter().any(|e| e.plan.observation.has_sight()),
             markers: most(|e| e.plan.observation.marker_count()),
             cells: experiments.iter().all(|e| e.plan.body.cut.is_some()),
             held: held(experiments),
