@@ -133,7 +133,7 @@ class Recording:
         points [T, N, 3] are tracked points of the body, which lie at rest [N, 3] while it rests, at most tolerance [m] from its surface;
         markers [T, M, 3] have marker_rest [M, 3], and marker_surface [M, 3] where they are fixed to the surface;
         displacements [T, N, 3] are those of the scene's nodes [N, 3];
-        depth [T, H, W] of one camera is in metres (NaN or 0: no reading; kept as 16-bit counts), or in counts (whole numbers, 0: no reading).
+        depth [T, H, W] of one camera is in metres (NaN or 0: no reading), or in counts (whole numbers, 0: no reading).
         noise_sigma [m] is the standard deviation of one coordinate or depth, noise_systematic [m] the size of errors that do not average out.
         """
     def with_camera(self, times: npt.ArrayLike, depth: npt.ArrayLike, camera: Camera) -> Recording:

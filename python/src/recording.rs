@@ -2,7 +2,7 @@
 
 use crate::{arrays, errors, watch};
 use glam::{DAffine3, DVec3};
-use palpate_io::recording::{self as io, DepthStack, Noise, RecordedCamera, Tracks};
+use palpate_io::recording::{self as io, DepthPixels, DepthStack, Noise, RecordedCamera, Tracks};
 use palpate_model::observation::MarkerRest;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -80,26 +80,18 @@ fn depth(depths: &Bound<'_, PyAny>, camera: &Bound<'_, PyDict>, times: &[f64], n
     let offset = entry::<f64>(camera, "depth_offset")?.unwrap_or(0.0);
     let kind: String = py.import("numpy")?.call_method1("asarray", (depths,))?.getattr("dtype")?.getattr("kind")?.extract()?;
     let (shape, read) = arrays::numbers(depths, "depth", &wanted)?;
-    let (scale, counts) = match (kind.as_str(), entry::<f64>(camera, "depth_scale")?) {
+    let (scale, pixels) = match (kind.as_str(), entry::<f64>(camera, "depth_scale")?) {
         ("u" | "i", None) => {
             return Err(errors::argument(py, "camera.depth_scale", "is missing: metres per count of the depth images"));
         }
         ("u" | "i", Some(scale)) => match read.iter().find(|c| !(0.0..=MOST).contains(*c)) {
             Some(c) => return Err(errors::argument(py, "depth", format!("{c} is no count of 16 bits (0 to {MOST})"))),
-            None => (scale, read.iter().map(|c| *c as u16).collect::<Vec<u16>>()),
+            None => (Some(scale), DepthPixels::Counts(read.iter().map(|c| *c as u16).collect())),
         },
-        (_, None) if offset == 0.0 => {
-            let farthest = read.iter().copied().filter(|z| z.is_finite()).fold(0.0, f64::max);
-            if farthest <= 0.0 {
-                return Err(errors::argument(py, "depth", "holds not a single reading: all is NaN, or not above 0"));
-            }
-            let scale = farthest / MOST;
-            // NaN and 0: no reading.
-            let count = |z: &f64| if *z > 0.0 && z.is_finite() { (z / scale).round().max(1.0) as u16 } else { 0 };
-            (scale, read.iter().map(count).collect())
-        }
+        // No sensor resolves a ten-millionth of its distance.
+        (_, None) => (None, DepthPixels::Metres(read.iter().map(|z| *z as f32).collect())),
         _ => {
-            let text = "and depth_offset belong to counts (whole numbers); these depths are in metres";
+            let text = "belongs to counts (whole numbers); these depths are in metres";
             return Err(errors::argument(py, "camera.depth_scale", text));
         }
     };
@@ -107,7 +99,15 @@ fn depth(depths: &Bound<'_, PyAny>, camera: &Bound<'_, PyDict>, times: &[f64], n
     let size = [Some(shape[0]), Some(shape[1]), Some(shape[2])];
     let masks = masks.map(|m| arrays::flags(&m, "camera.masks", &size)).transpose()?;
     let distortion = camera.get_item("distortion")?.filter(|d| !d.is_none());
-    let distortion = distortion.map(|d| arrays::numbers(&d, "camera.distortion", &[Some(5)])).transpose()?;
+    let distortion = distortion.map(|d| arrays::numbers(&d, "camera.distortion", &[None])).transpose()?;
+    let mut coefficients = [0.0; 8];
+    if let Some((_, given)) = distortion {
+        if given.len() != 5 && given.len() != 8 {
+            let text = format!("must be 5 numbers (k1 k2 p1 p2 k3) or 8 (k4 k5 k6 as well), found {}", given.len());
+            return Err(errors::argument(py, "camera.distortion", text));
+        }
+        coefficients[..given.len()].copy_from_slice(&given);
+    }
     let row = |i: usize| [pose[4 * i], pose[4 * i + 1], pose[4 * i + 2], pose[4 * i + 3]];
     let camera = RecordedCamera {
         name: entry(camera, "name")?.unwrap_or_else(|| format!("cam{number}")),
@@ -115,14 +115,14 @@ fn depth(depths: &Bound<'_, PyAny>, camera: &Bound<'_, PyDict>, times: &[f64], n
         height: shape[1],
         focal: [k[0], k[4]],
         center: [k[2], k[5]],
-        distortion: distortion.map_or([0.0; 5], |(_, d)| [d[0], d[1], d[2], d[3], d[4]]),
+        distortion: coefficients,
         world_from_camera: DAffine3::IDENTITY,
-        depth_scale: Some(scale),
+        depth_scale: scale,
         depth_offset: offset,
         noise_sigma: entry(camera, "noise_sigma")?,
         noise_systematic: entry(camera, "noise_systematic")?.unwrap_or(0.0),
     };
-    Ok(DepthStack { camera, pose: [0, 1, 2, 3].map(row), times: times.to_vec(), counts, masks })
+    Ok(DepthStack { camera, pose: [0, 1, 2, 3].map(row), times: times.to_vec(), pixels, masks })
 }
 
 #[pymethods]
@@ -139,7 +139,7 @@ impl Recording {
     /// points [T, N, 3] are tracked points of the body, which lie at rest [N, 3] while it rests, at most tolerance [m] from its surface;
     /// markers [T, M, 3] have marker_rest [M, 3], and marker_surface [M, 3] where they are fixed to the surface;
     /// displacements [T, N, 3] are those of the scene's nodes [N, 3];
-    /// depth [T, H, W] of one camera is in metres (NaN or 0: no reading; kept as 16-bit counts), or in counts (whole numbers, 0: no reading).
+    /// depth [T, H, W] of one camera is in metres (NaN or 0: no reading), or in counts (whole numbers, 0: no reading).
     /// camera is a dictionary with K [3, 3] and world_from_camera [4, 4], and perhaps name, distortion, depth_scale, depth_offset, noise_sigma,
     /// noise_systematic and masks [T, H, W], true where the object is.
     /// noise_sigma [m] is the standard deviation of one coordinate or depth, noise_systematic [m] the size of errors that do not average out.

@@ -33,10 +33,11 @@ fn in_box(e: Hexahedron, y: vec3<f32>) -> bool {
     return all(y >= e.low) && all(y <= e.high);
 }
 
-// Direction from its camera to a point of `points`, zero for a camera in the point.
+// Direction from its camera to a point of `points`, zero for a camera in the point and where nobody knows from where it was seen.
 fn line_of_sight(p: vec4<f32>, shot: Shot) -> vec3<f32> {
     // Cameras are counted from the body's origin, points from the frame's.
-    let line = (p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - cameras[u32(p.w)].xyz;
+    let camera = cameras[u32(p.w)];
+    let line = ((p.xyz + shot.shift.xyz + shot.shift_rest.xyz) - camera.xyz) * camera.w;
     let size = length(line);
     return select(vec3(0.0), line / size, size > 0.0);
 }

@@ -2,7 +2,7 @@
 
 use super::{SCENE, after_place, changed, folder, refused, write};
 use glam::{DAffine3, DVec3};
-use palpate_io::recording::{DepthImage, RecordedCamera, RecordedFrame};
+use palpate_io::recording::{DepthImage, DepthPixels, RecordedCamera, RecordedFrame};
 use palpate_io::{Recording, write_recording};
 use std::path::{Path, PathBuf};
 use support::command::{arg, succeed};
@@ -20,7 +20,7 @@ fn wall() -> Recording {
         height,
         focal: [20.0, 20.0],
         center: [7.5, 5.5],
-        distortion: [0.0; 5],
+        distortion: [0.0; 8],
         world_from_camera: DAffine3::from_translation(DVec3::new(0.05, 0.015, -0.5)),
         depth_scale: Some(0.001),
         depth_offset: 0.0,
@@ -30,7 +30,7 @@ fn wall() -> Recording {
     let frame = |time| RecordedFrame {
         camera: 0,
         time,
-        depth: Some(DepthImage { width, height, counts: vec![500; width * height] }),
+        depth: Some(DepthImage { width, height, pixels: DepthPixels::Counts(vec![500; width * height]) }),
         mask: Some(vec![true; width * height]),
     };
     Recording {
@@ -39,6 +39,7 @@ fn wall() -> Recording {
         source: String::new(),
         cameras: vec![camera],
         frames: vec![frame(0.0), frame(0.05)],
+        clouds: Vec::new(),
         markers: None,
         points: None,
         displacements: None,

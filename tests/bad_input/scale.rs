@@ -80,6 +80,7 @@ fn marker(folder: &Path, places: [glam::DVec3; 2]) -> PathBuf {
         source,
         cameras: vec![],
         frames: vec![],
+        clouds: vec![],
         markers: Some(markers),
         points: None,
         displacements: None,

@@ -51,7 +51,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
     let body = &plain.body;
     // One on each side: every point is seen by the camera nearest to it.
     let sides = DVec3::AXES.into_iter().flat_map(|a| [a, -a]);
-    let cameras: Vec<Camera> = sides.map(|a| Camera { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a }).collect();
+    let cameras: Vec<Camera> = sides.map(|a| Camera::Pinhole { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a }).collect();
     let frames = times
         .iter()
         .map(|&time| {
@@ -64,7 +64,7 @@ pub(super) fn observed(scene: &Scene, times: &[f64]) -> Plan {
                     // A little off the surface, in and out.
                     let off = 0.002 * (1.0 + 40.0 * p.point.x).sin();
                     let position = p.point + moved + off * p.normal;
-                    let away = |c: &u32| cameras[*c as usize].center.distance(position);
+                    let away = |c: &u32| cameras[*c as usize].center().map_or(f64::INFINITY, |p| p.distance(position));
                     let camera = (0..6).min_by(|a, b| away(a).total_cmp(&away(b))).expect("there are six");
                     ObservedPoint { position, camera }
                 })

@@ -13,7 +13,7 @@ use std::sync::Arc;
 fn watched(scene: &Scene) -> Plan {
     let mut plan = observed(scene, &[0.027, 0.0437, 0.058]);
     let middle = DVec3::new(0.0, 0.0, 0.06);
-    let camera = |center: DVec3| Camera { center, axis: (middle + DVec3::new(0.02, 0.0, -0.01) - center).normalize() };
+    let camera = |center: DVec3| Camera::Pinhole { center, axis: (middle + DVec3::new(0.02, 0.0, -0.01) - center).normalize() };
     let observation = Arc::make_mut(&mut plan.observation);
     observation.cameras = vec![camera(DVec3::new(0.35, -0.3, 0.25)), camera(DVec3::new(-0.3, -0.4, 0.1))];
     let patches = &plan.body.patches;
@@ -22,7 +22,7 @@ fn watched(scene: &Scene) -> Plan {
         let mut kept = Vec::new();
         for (point, patch) in frame.points.iter().zip(patches) {
             for (number, c) in observation.cameras.iter().enumerate() {
-                if patch.normal.dot((c.center - point.position).normalize()) > 0.6 {
+                if patch.normal.dot(-c.line(point.position)) > 0.6 {
                     kept.push(palpate_model::observation::ObservedPoint { camera: number as u32, ..*point });
                 }
             }

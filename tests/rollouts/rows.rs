@@ -3,7 +3,7 @@
 use super::gradients::{ball, observed};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Source, Wanted};
-use palpate_model::observation::ObservedPoint;
+use palpate_model::observation::{ObservedPoint, Sensor};
 use palpate_model::params::ParamKey::*;
 use palpate_model::plan::Plan;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ fn rows_add_up_to_cost_gradient_and_curvature() {
     let rows = &lin.rows.residuals;
     assert_eq!((rows.len(), lin.rows.sensitivity.len()), (e.residuals, e.residuals * q));
     let missing: Vec<_> = rows.iter().filter(|r| r.value.is_none()).collect();
-    assert!(missing.iter().any(|r| r.frame == 1 && r.source == Source::point(1, 0)), "{missing:?}");
+    assert!(missing.iter().any(|r| r.frame == 1 && r.source == Source::point(1, Sensor::Camera(0))), "{missing:?}");
     assert_eq!(rows.iter().filter(|r| r.value.is_some()).count(), e.matched);
     let points = rows.iter().filter(|r| r.source.is_depth() && r.value.is_some()).count();
     assert!(points > 800, "{points} points meet something");

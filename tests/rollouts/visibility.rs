@@ -24,7 +24,7 @@ fn plate() -> Scene {
 /// Points seen by a camera in one frame.
 fn seen(points: &[DVec3], center: DVec3, time: f64) -> Observation {
     Observation {
-        cameras: vec![Camera { center, axis: -center.normalize() }],
+        cameras: vec![Camera::Pinhole { center, axis: -center.normalize() }],
         frames: vec![Frame {
             time,
             points: points.iter().map(|&position| ObservedPoint { position, camera: 0 }).collect(),

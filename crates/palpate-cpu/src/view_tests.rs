@@ -24,7 +24,7 @@ fn other(plan: &Plan) -> Plan {
     // Tracked points in another order: sites belong to a recording.
     let mut observation = Observation { frames, ..(**own).clone() };
     observation.markers.swap(1, 3);
-    observation.cameras.push(Camera { center: DVec3::new(-0.5, 0.1, 0.3), axis: DVec3::X });
+    observation.cameras.push(Camera::Pinhole { center: DVec3::new(-0.5, 0.1, 0.3), axis: DVec3::X });
     observation.channels.iter_mut().for_each(|c| c.noise *= 1.5);
     let mut plan = Plan { observation: observation.into(), ..plan.clone() };
     plan.clock.steps -= 1;

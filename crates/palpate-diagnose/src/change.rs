@@ -204,7 +204,8 @@ fn names(name: &str, path: &str) -> bool {
 /// Every hypothesis for a scene: the table of effects, and what the scene holds fixed.
 pub fn candidates(setting: &Setting) -> Vec<Candidate> {
     let mut out = Vec::new();
-    let tried = |l: &Law| l.trial != Trial::Never && l.family != Family::Slack && (setting.cells || !l.needs_cells());
+    let acts = |l: &Law| (setting.cells || !l.needs_cells()) && (setting.sight || !matches!(l.site, Site::Readings(_)));
+    let tried = |l: &Law| l.trial != Trial::Never && l.family != Family::Slack && acts(l);
     for (law, l) in ALL.iter().enumerate().filter(|(_, l)| tried(l)) {
         let choices = l.params.iter().find_map(|p| match p.default {
             Unstated::Choice(Numbered::Camera) => Some(setting.cameras),
@@ -358,6 +359,9 @@ mod tests {
         // What moves edges within cells is not tried where there are none.
         let edges = |setting: &Setting| candidates(setting).iter().filter(|c| c.kind() == "clamp-edge").count();
         assert_eq!((edges(&setting), edges(&Setting { cells: false, ..setting.clone() })), (1, 0));
+        // What moves readings along lines of sight is not tried where there are none.
+        let biases = |setting: &Setting| candidates(setting).iter().filter(|c| c.kind() == "depth-bias").count();
+        assert_eq!((biases(&setting), biases(&Setting { sight: false, ..setting.clone() })), (1, 0));
         // Without such planes it is tried all around.
         setting.walls.clear();
         assert!(candidates(&setting).iter().any(|c| c.kind() == "second-plane" && c.variants.len() > 8));

@@ -44,6 +44,8 @@ pub struct Setting {
     pub spot: f64,
     /// Number of cameras that saw the body.
     pub cameras: usize,
+    /// False where all that was seen are points of the surface without lines of sight: effects on depth readings change nothing then.
+    pub sight: bool,
     /// Number of markers.
     pub markers: usize,
     /// True where every body is made of cells, which some effects need.

@@ -56,7 +56,7 @@ impl Misfit {
 impl FrameResiduals {
     /// Depth points in the frame's order: signed distance [m], `None` where a point met nothing.
     pub fn distances(&self) -> impl Iterator<Item = Option<f64>> {
-        self.readings.iter().filter(|r| r.sensor.is_camera()).map(|r| match r.misfit {
+        self.readings.iter().filter(|r| r.sensor.is_depth()).map(|r| match r.misfit {
             Some(Misfit::Distance(d)) => Some(d),
             _ => None,
         })

@@ -16,12 +16,12 @@ pub struct Source {
 }
 
 impl Source {
-    /// A point of a depth image: its number in the frame, and its camera.
-    pub fn point(point: u32, camera: u32) -> Source {
-        Source { sensor: Sensor::Camera(camera), item: point, axis: 0 }
+    /// A point of the surface: its number in the frame, and what saw it.
+    pub fn point(point: u32, sensor: Sensor) -> Source {
+        Source { sensor, item: point, axis: 0 }
     }
 
-    /// True of a point of a depth image.
+    /// True of a point of the surface.
     pub fn is_depth(&self) -> bool {
         self.sensor.kind() == ReadingKind::Depth
     }
@@ -62,7 +62,7 @@ pub struct ResidualRow {
     /// Place of the measurement on the rest shape [m]; the measured place itself where it met nothing.
     pub rest: DVec3,
     /// Change of the residual per metre that the point moves away from its camera along the line of sight (1 for coordinates): noise
-    /// along the line of sight reaches the residual multiplied by it.
+    /// along the line of sight reaches the residual multiplied by it. Of a point without a line of sight, per metre in its worst direction.
     pub along_sight: f64,
     /// ∂r by the measured place in the world; zero for a point that met nothing.
     pub by_place: DVec3,

@@ -1,8 +1,9 @@
 //! Intrinsics of cameras in JSON, as the tools of camera makers and Open3D write them.
 
 use crate::error::{ImportError, read_text, refuse, refuse_key};
-use crate::lens::{Lens, Optics};
+use crate::lens::Optics;
 use crate::place::has_ending;
+use palpate_io::lens::Lens;
 use serde_json::Value;
 use std::path::Path;
 

@@ -72,7 +72,9 @@ pub struct Imported {
     pub cameras: usize,
     /// Depth images.
     pub images: usize,
-    /// Depth readings of the object.
+    /// Point clouds.
+    pub clouds: usize,
+    /// Depth readings of the object, points of clouds among them.
     pub depth_readings: usize,
     /// Readings of markers.
     pub marker_readings: usize,
@@ -115,11 +117,18 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     };
     let up = up(&capture, o, &mut said);
     let empty = add_background(&mut capture, o)?;
+    let mut kept = None;
     if !capture.clouds.is_empty() {
         let places = capture.clouds.iter().flat_map(|c| c.points.iter().copied());
-        let metres = points::unit(&capture, &place, places, "camera", o, &mut said)?;
-        let made = clouds::camera(&capture.clouds, capture.viewpoint, metres, o, &mut said, watch)?;
-        capture.cameras.push(made);
+        // A background is taken away pixel by pixel.
+        let as_images = o.background.is_some();
+        let metres = points::unit(&capture, &place, places, if as_images { "camera" } else { "cloud" }, o, &mut said)?;
+        if as_images {
+            let made = clouds::camera(&capture.clouds, capture.viewpoint, metres, o, &mut said, watch)?;
+            capture.cameras.push(made);
+        } else {
+            kept = Some(clouds::keep(&capture.clouds, capture.viewpoint, metres, o, &mut said)?);
+        }
     }
     let mut r = settle::depth(&mut capture, o, &mut said, watch)?;
     if let Some(m) = &capture.markers {
@@ -132,7 +141,11 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     }
     // The image without the object came along with the others, behind the last.
     let empty = empty.then(|| r.frames.pop().and_then(|f| f.depth)).flatten();
-    let plane = masks::apply(&mut r, o, empty, &mut said, watch)?;
+    let mut plane = masks::apply(&mut r, o, empty, &mut said, watch)?;
+    let mut sight = None;
+    if let Some(k) = kept {
+        (r.clouds, plane, sight) = (k.clouds, k.plane, k.sight);
+    }
     said.facts.extend(plane.as_ref().map(masks::describe));
     crop::apply(&mut r, &mut said);
     r.source = format!("imported by palpate from {} ({})", place.title(), format.name);
@@ -151,7 +164,7 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     // Where nothing was seen at rest, what is seen first.
     let at_rest = if at_rest.is_empty() { everything.clone() } else { at_rest };
     let Some(bounds) = masks::bounds(&at_rest) else { return refuse(&place.path, "holds no reading") };
-    let sight = (r.cameras.len() == 1 && !r.frames.is_empty()).then(|| r.cameras[0].axis());
+    let sight = sight.or((r.cameras.len() == 1 && !r.frames.is_empty()).then(|| r.cameras[0].axis()));
     let seen = Seen { points: &at_rest, bounds, sight, on_surface: r.markers.is_none() };
     let body = body::make(o, &seen, &mut said)?;
     let window = write::scene::window(motion, last, o, &mut said);
@@ -187,7 +200,8 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         scene: out.join("scene.toml"),
         cameras: r.cameras.len(),
         images: r.frames.len(),
-        depth_readings: r.frames.iter().map(|f| f.readings().count()).sum(),
+        clouds: r.clouds.len(),
+        depth_readings: r.frames.iter().map(|f| f.readings().count()).chain(r.clouds.iter().map(|c| c.points.len())).sum(),
         marker_readings: r.markers.as_ref().map_or(0, |m| m.samples.len()),
         tracked_readings: r.points.as_ref().map_or(0, |p| p.track.readings()),
         times: [first, last],
@@ -308,6 +322,7 @@ fn times(r: &Recording) -> Option<[f64; 2]> {
     let markers = r.markers.iter().flat_map(|m| m.samples.iter().map(|s| s.time));
     let tracks = r.points.iter().flat_map(|p| p.track.times.iter().copied());
     images
+        .chain(r.clouds.iter().map(|c| c.time))
         .chain(markers)
         .chain(tracks)
         .fold(None, |span: Option<[f64; 2]>, t| Some(span.map_or([t, t], |[a, b]| [a.min(t), b.max(t)])))
@@ -321,6 +336,9 @@ fn seen_points(r: &Recording, at: impl Fn(f64) -> bool) -> Vec<DVec3> {
         let every = (f.readings().count() / 5000).max(1);
         let some = f.readings().step_by(every);
         all.extend(some.filter_map(|(u, v, c)| camera.point(u as f64, v as f64, camera.depth(c))));
+    }
+    for c in r.clouds.iter().filter(|c| at(c.time)) {
+        all.extend(c.points.iter().step_by((c.points.len() / 5000).max(1)));
     }
     if let Some(m) = &r.markers {
         all.extend(m.samples.iter().filter(|s| at(s.time)).map(|s| s.position));

@@ -130,6 +130,23 @@ pub(crate) const RECORDING: Schema = Schema {
         ),
         ("frame", table(&["camera", "time", "depth", "mask"])),
         (
+            "cloud",
+            table(&[
+                "file",
+                "array",
+                "time",
+                "times",
+                "rate",
+                "start",
+                "camera",
+                "origin",
+                "unit",
+                "transform",
+                "noise_sigma",
+                "noise_systematic",
+            ]),
+        ),
+        (
             "points",
             table(&[
                 "file",

@@ -9,6 +9,8 @@ mod error;
 mod keys;
 mod rigid;
 
+pub mod cloud;
+pub mod lens;
 pub mod mesh;
 pub mod npy;
 pub mod output;

@@ -74,6 +74,14 @@ pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> 
 }
 
 /// The array in the bytes of an `.npy` file.
+///
+/// # Errors
+/// As [`read_array`].
+pub(crate) fn decode_array(path: &Path, bytes: &[u8]) -> Result<Array, InputError> {
+    decode(path, "", bytes)
+}
+
+/// The same, of one with a name.
 fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Array, InputError> {
     let which = if name.is_empty() { String::new() } else { format!("array \"{name}\": ") };
     let wrong = |text: String| InputError::file(path, format!("{which}{text}"));

@@ -102,7 +102,7 @@ mod tests {
     fn a_camera_that_is_moved_or_turned_is_another_recording() {
         let plan = ball();
         let with = |center: DVec3, axis: DVec3| {
-            let observation = Observation { cameras: vec![Camera { center, axis }], ..(*plan.observation).clone() };
+            let observation = Observation { cameras: vec![Camera::Pinhole { center, axis }], ..(*plan.observation).clone() };
             fingerprint(&Plan { observation: Arc::new(observation), ..plan.clone() })
         };
         let all = [with(DVec3::ZERO, DVec3::Y), with(DVec3::ZERO, DVec3::Z), with(DVec3::X, DVec3::Y)];

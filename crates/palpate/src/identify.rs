@@ -9,10 +9,10 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FreeNumber, check, errors, fingerprint, free_parameters};
 use crate::motions::{Motion, motions};
-use crate::render::Sensor;
-use crate::residuals::pinhole;
+use crate::render::{Pinhole, Sensor};
 use crate::results::inspection::{Expectation, Identification, Proposal};
 use crate::synthetic::{Observers, observe};
+use crate::viewers::viewers;
 use glam::DVec3;
 use palpate_fit::{Expected, FitScene, FreeParameter, Problem, expected};
 use palpate_model::observation::{Frame, Observation, ObservedDisplacement, ObservedMarker, ReadingKind};
@@ -196,12 +196,13 @@ fn trial(e: &Experiment, motion: &Motion, backend: Backend) -> Result<Experiment
     Ok(other)
 }
 
-/// Depth points of another motion as the recording's cameras would see them.
+/// Depth points of another motion as the recording's cameras and scanners would see them.
 fn depths(e: &Experiment, other: &Experiment, backend: Backend) -> Result<Observation, Error> {
     let own = &e.plan().observation;
     let times = own.frames.iter().filter(|f| !f.points.is_empty()).map(|f| f.time).collect();
+    let (numbers, cameras): (Vec<u32>, Vec<Pinhole>) = viewers(e).into_iter().unzip();
     let observers = Observers {
-        cameras: e.recording().iter().flat_map(|r| &r.cameras).map(pinhole).collect(),
+        cameras,
         markers: Vec::new(),
         points: Vec::new(),
         displacements: false,
@@ -213,7 +214,8 @@ fn depths(e: &Experiment, other: &Experiment, backend: Backend) -> Result<Observ
     let whole = ObservationSpec::new("", vec![ReadingKind::Depth]);
     let stride = e.scene().observation.as_ref().map_or(1, |o| o.pixel_stride);
     let spec = ObservationSpec { pixel_stride: stride, ..whole };
-    let (seen, _) = recording.observation(&spec, &mut Vec::new()).map_err(|why| Error::Failed(why.to_string()))?;
+    let (mut seen, _) = recording.observation(&spec, &mut Vec::new()).map_err(|why| Error::Failed(why.to_string()))?;
+    seen.frames.iter_mut().flat_map(|f| &mut f.points).for_each(|p| p.camera = numbers[p.camera as usize]);
     Ok(seen)
 }
 

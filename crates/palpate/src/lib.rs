@@ -65,6 +65,7 @@ mod suited;
 mod synthesis;
 pub mod synthetic;
 mod tracking;
+mod viewers;
 
 pub use coarsen::{CoarsenOptions, Coarsened, coarsen, usual_numbers};
 pub use diagnosing::{DiagnoseOptions, Diagnosed, diagnose};

@@ -3,7 +3,7 @@
 //! - `rms` is the root mean square *distance*: of every matched depth point to the simulated surface, and of every other
 //!   reading to the simulated place (3-vector); points that met nothing are counted apart.
 //! - `noise` is what would remain with the right model, `sqrt(measurement² + grid²)`, mean squares over the same points:
-//!   - a depth reading's error runs along the camera's axis, so its distance to a surface seen at an angle is shortened by the cosine
+//!   - a depth reading's error runs along the camera's axis (a scanner's along its ray), so its distance to a surface seen at an angle is shortened by the cosine
 //!     between axis and normal: `(σ² + systematic²) · mean cos²`, the mean taken from the simulated surface in the cameras;
 //!   - a coordinate's σ counts three times, and the systematic error (a length) once: `3 σ² + systematic²`;
 //!   - grid: root mean square of the band's interpolated distance at points of the true rest surface, where it should be 0.
@@ -12,11 +12,11 @@ use crate::embed::Embedding;
 use crate::engine::{Backend, between};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::render::{DepthImage, Pinhole, rasterise};
+use crate::render::{DepthImage, rasterise};
 use crate::scatter::{Excess, Scatter};
+use crate::viewers::viewer;
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Misfit, Snapshot, Stop};
-use palpate_io::recording::RecordedCamera;
 use palpate_model::cutcells::band_lookup::BandLookup;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{Observation, ReadingKind};
@@ -172,33 +172,23 @@ pub(crate) fn visit_frames(
     Ok(evaluation.cost)
 }
 
-/// The camera of a recording as one that can be rendered. Lens distortion is left out: it moves a pixel, hardly its normal.
-pub(crate) fn pinhole(c: &RecordedCamera) -> Pinhole {
-    Pinhole {
-        name: c.name.clone(),
-        width: c.width,
-        height: c.height,
-        fx: c.focal[0],
-        fy: c.focal[1],
-        cx: c.center[0],
-        cy: c.center[1],
-        world_from_camera: c.world_from_camera,
-    }
-}
-
-/// Sum and number of cos² between the camera's axis and the surface's normal, over the observed points of a frame that fall on
-/// the simulated surface.
+/// Sum and number of cos² between the direction of a reading's error and the surface's normal, over the observed points of a frame that fall on the
+/// simulated surface. Errors run along a camera's axis, or along a scanner's ray; those of points without a line of sight are not shortened.
 fn incidence(experiment: &Experiment, frame: usize, vertices: &[DVec3], triangles: &[[u32; 3]]) -> (f64, usize) {
-    let Some(recording) = experiment.recording() else { return (0.0, 0) };
-    let points = &experiment.plan().observation.frames[frame].points;
+    let o = &experiment.plan().observation;
+    let points = &o.frames[frame].points;
+    let bounds = vertices.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let (mut sum, mut n) = (0.0, 0);
-    for (number, camera) in recording.cameras.iter().enumerate() {
+    for (number, seen_from) in o.cameras.iter().enumerate() {
         let mine: Vec<DVec3> = points.iter().filter(|p| p.camera as usize == number).map(|p| p.position).collect();
         if mine.is_empty() {
             continue;
         }
-        let camera = pinhole(camera);
-        let axis = camera.world_from_camera.matrix3.z_axis;
+        let Some(camera) = viewer(experiment, number, bounds) else {
+            sum += mine.len() as f64;
+            n += mine.len();
+            continue;
+        };
         let image = rasterise(&camera, vertices, triangles);
         for p in mine {
             let q = camera.project(p);
@@ -212,7 +202,7 @@ fn incidence(experiment: &Experiment, frame: usize, vertices: &[DVec3], triangle
             }
             let [a, b, c] = triangles[t as usize].map(|k| vertices[k as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
-            sum += normal.dot(axis).powi(2);
+            sum += normal.dot(DVec3::from_array(seen_from.sees(p).axis)).powi(2);
             n += 1;
         }
     }

@@ -8,8 +8,8 @@ use crate::render::{self, Pinhole, Sensor, rasterise};
 use glam::DVec3;
 use palpate_engine::Snapshot;
 use palpate_io::recording::{
-    DepthImage, MarkerSample, RecordedCamera, RecordedDisplacements, RecordedFrame, RecordedMarkers, RecordedPoints, Recording,
-    Sequence,
+    DepthImage, DepthPixels, MarkerSample, RecordedCamera, RecordedDisplacements, RecordedFrame, RecordedMarkers, RecordedPoints,
+    Recording, Sequence,
 };
 use palpate_model::effects::check_choices;
 use palpate_model::effects::sensors::Sensors;
@@ -118,6 +118,7 @@ pub fn observe(
             })
             .collect(),
         frames,
+        clouds: Vec::new(),
         markers: (!observers.markers.is_empty()).then(|| recorded_markers(observers, samples)),
         points: (!observers.points.is_empty()).then(|| RecordedPoints {
             track: Sequence { file: PathBuf::from("points.npz"), ..tracked_points },
@@ -178,7 +179,7 @@ fn images(
         // Every image has its own random numbers; frames × cameras never meet.
         let image_number = (number * observers.cameras.len() + camera) as u64;
         let r = observers.sensor.read(&exact, image_number);
-        let depth = DepthImage { width: r.width, height: r.height, counts: r.counts };
+        let depth = DepthImage { width: r.width, height: r.height, pixels: DepthPixels::Counts(r.counts) };
         Some(RecordedFrame { camera, time, depth: Some(depth), mask: Some(r.mask) })
     };
     (0..observers.cameras.len()).into_par_iter().filter_map(one).collect()
@@ -195,7 +196,7 @@ pub(crate) fn read_depths(
     let mut exact = rasterise(pinhole, vertices, triangles);
     if !sensors.exact_points() {
         let pose = pinhole.world_from_camera;
-        let truly = Camera { center: pose.translation, axis: pose.matrix3.z_axis };
+        let truly = Camera::Pinhole { center: pose.translation, axis: pose.matrix3.z_axis };
         let width = exact.width;
         for (i, z) in exact.depth.iter_mut().enumerate().filter(|(_, z)| z.is_finite()) {
             *z = sensors.read(&truly, number, pinhole.unproject((i % width) as f64, (i / width) as f64, *z));
@@ -240,7 +241,7 @@ pub fn recorded_camera(c: &Pinhole, sensor: &Sensor) -> RecordedCamera {
         height: c.height,
         focal: [c.fx, c.fy],
         center: [c.cx, c.cy],
-        distortion: [0.0; 5],
+        distortion: [0.0; 8],
         world_from_camera: c.world_from_camera,
         depth_scale: Some(sensor.depth_scale),
         depth_offset: 0.0,

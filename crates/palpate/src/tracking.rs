@@ -250,6 +250,7 @@ impl TrackedBody {
             source: "tracked by palpate".into(),
             cameras: Vec::new(),
             frames: Vec::new(),
+            clouds: Vec::new(),
             markers: None,
             points: Some(RecordedPoints { track, rest: chosen.iter().map(|v| self.surface.rest[*v]).collect(), tolerance: None }),
             displacements: None,

@@ -189,7 +189,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     let points: Vec<ObservedPoint> = seen.map(|p| ObservedPoint { position: p.point, camera: 0 }).collect();
     let frame = |k: usize| Frame { time: 0.01 * k as f64, points: points.clone(), ..Frame::default() };
     let observation = Observation {
-        cameras: vec![Camera { center: camera, axis: DVec3::Y }],
+        cameras: vec![Camera::Pinhole { center: camera, axis: DVec3::Y }],
         frames: (1..=steps).map(frame).collect(),
         channels: vec![Channel::new(ReadingKind::Depth, 1e-3)],
         ..Observation::default()

@@ -36,9 +36,9 @@ pub fn watched(scene: &Scene, seen: Seen, times: &[f64]) -> Result<Plan, PlanErr
     let surface = shape_of(&scene.object).surface(SPACING * body.length).vertices;
     // One on each side: every point is seen by the camera nearest to it.
     let cameras: Vec<Camera> =
-        DVec3::AXES.into_iter().flat_map(|a| [a, -a]).map(|a| Camera { center: body.center + a, axis: -a }).collect();
+        DVec3::AXES.into_iter().flat_map(|a| [a, -a]).map(|a| Camera::Pinhole { center: body.center + a, axis: -a }).collect();
     let point = |place: DVec3| {
-        let away = |c: &u32| cameras[*c as usize].center.distance(place);
+        let away = |c: &u32| cameras[*c as usize].center().map_or(f64::INFINITY, |p| p.distance(place));
         ObservedPoint { position: place, camera: (0..6).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0) }
     };
     let frame = |&time: &f64| {

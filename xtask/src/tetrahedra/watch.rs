@@ -8,7 +8,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use palpate::Error;
 use palpate::render::{Pinhole, Sensor, rasterise};
 use palpate::synthetic::recorded_camera;
-use palpate_io::recording::{DepthImage, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
+use palpate_io::recording::{DepthImage, DepthPixels, MarkerSample, RecordedCamera, RecordedFrame, RecordedMarkers, Recording};
 use palpate_model::observation::MarkerRest;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ pub fn record(motion: &Motion, change: &Change, w: &Watchers) -> Result<Recordin
             }
             if exact.covered() > 0 {
                 let read = sensor.read(&exact, (k * w.cameras.len() + number) as u64);
-                let depth = DepthImage { width: read.width, height: read.height, counts: read.counts };
+                let depth = DepthImage { width: read.width, height: read.height, pixels: DepthPixels::Counts(read.counts) };
                 let time = now.time + change.clock;
                 frames.push(RecordedFrame { camera: number, time, depth: Some(depth), mask: Some(read.mask) });
             }
@@ -72,6 +72,7 @@ pub fn record(motion: &Motion, change: &Change, w: &Watchers) -> Result<Recordin
         source: "Quadratic tetrahedra".into(),
         cameras: w.cameras.iter().enumerate().map(|(i, c)| stated(c, i, change, &stated_sensor)).collect(),
         frames,
+        clouds: Vec::new(),
         markers: (!w.markers.is_empty()).then(|| tracked(w, change, motion, &mut rng)),
         points: None,
         displacements: None,

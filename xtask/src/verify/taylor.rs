@@ -76,7 +76,7 @@ fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
     let cameras: Vec<Camera> = DVec3::AXES
         .into_iter()
         .flat_map(|a| [a, -a])
-        .map(|a| Camera { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a })
+        .map(|a| Camera::Pinhole { center: DVec3::new(0.0, 0.0, 0.05) + a, axis: -a })
         .collect();
     let frame = |time: f64| {
         let k = ((time - scene.time.start) / scene.time.step).round() as usize;
@@ -85,7 +85,7 @@ fn observed(scene: &Scene, depth: bool) -> Result<Plan, String> {
             |(number, (patch, place)): (usize, (&palpate_model::space::body::Patch, palpate_model::space::stencil::Stencil))| {
                 let off = 0.002 * (1.0 + number as f64).sin();
                 let position = patch.point + place.at(u) + off * patch.normal;
-                let away = |c: &u32| cameras[*c as usize].center.distance(position);
+                let away = |c: &u32| cameras[*c as usize].center().map_or(f64::INFINITY, |p| p.distance(position));
                 ObservedPoint { position, camera: (0..6).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0) }
             };
         let moved = |u: &DVec3| *u + DVec3::new(1e-4, -2e-4, 3e-4);

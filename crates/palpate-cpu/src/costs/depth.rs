@@ -6,7 +6,7 @@ use crate::linear::vector::Nodes;
 use glam::DVec3;
 use palpate_engine::{Misfit, ReadingResidual, ResidualRow, Source};
 use palpate_model::cutcells::band_lookup::BandLookup;
-use palpate_model::observation::{Camera, Observation, ObservedPoint, ReadingKind, Sensor, kernel};
+use palpate_model::observation::{Camera, Observation, ObservedPoint, ReadingKind, kernel};
 use palpate_model::plan::Plan;
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ struct Distances {
 impl Residuals for Distances {
     fn readings(&self, look: Look) -> Vec<ReadingResidual> {
         let reading = |(item, p): (usize, &ObservedPoint)| ReadingResidual {
-            sensor: Sensor::Camera(p.camera),
+            sensor: look.observation.sensor_of_point(p),
             item: item as u32,
             place: p.position,
             misfit: None,
@@ -153,7 +153,7 @@ fn bare(look: Look, point: u32) -> ResidualRow {
     let seen = &look.seen().points[point as usize];
     ResidualRow {
         frame: look.frame,
-        source: Source::point(point, seen.camera),
+        source: Source::point(point, look.observation.sensor_of_point(seen)),
         value: None,
         noise: noise(look),
         weight: 0.0,
@@ -166,13 +166,15 @@ fn bare(look: Look, point: u32) -> ResidualRow {
 fn row(look: Look, m: &Match) -> ResidualRow {
     let band = &look.plan.body.band;
     let seen = &look.seen().points[m.point as usize];
-    let sight = DVec3::from_array(look.sensors.truth(camera(look, seen), seen).ray()).normalize_or_zero();
+    let (camera, gradient) = (camera(look, seen), m.place.gradient);
+    let sight = DVec3::from_array(look.sensors.truth(camera, seen).ray()).normalize_or_zero();
     ResidualRow {
         value: Some(m.place.phi),
         weight: kernel::weight(m.place.phi, look.plan.band),
         rest: band.grid.position(band.cells[m.cell as usize].lattice) + band.grid.h * m.place.xi,
-        along_sight: m.place.gradient.dot(sight),
-        by_place: m.place.gradient,
+        // Without a line of sight errors may have any direction.
+        along_sight: if *camera == Camera::Unknown { gradient.length() } else { gradient.dot(sight) },
+        by_place: gradient,
         ..bare(look, m.point)
     }
 }

@@ -129,7 +129,7 @@ pub struct Seen<'a> {
 }
 
 /// Matches a frame's points with the deformed band (extended displacements `u`). Of all cells that hold a point, those whose
-/// surface faces its camera come first; then the smallest |φ| wins, then the lowest cell number. A point nearest to a hidden side keeps
+/// surface faces its camera come first (all do without a line of sight); then the smallest |φ| wins, then the lowest cell number. A point nearest to a hidden side keeps
 /// it where a visible one is near (`noise` [m] of a reading), and belongs to the front otherwise, up to the `band` [m]. Ordered by point.
 pub fn match_points(
     body: &Body,
@@ -144,7 +144,7 @@ pub fn match_points(
     let corners = |nodes: &[u32; 8]| -> Corners { nodes.map(|a| rest(a) + u[a as usize]) };
     let line = |(points, cameras): (&[ObservedPoint], &[Camera]), p: u32| {
         let seen = &points[p as usize];
-        (seen.position - cameras[seen.camera as usize].center).normalize_or_zero()
+        cameras[seen.camera as usize].line(seen.position)
     };
     let moved = (seen.points, seen.cameras);
     let candidates: Vec<Vec<(bool, Match)>> = body

@@ -6,7 +6,7 @@ use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::{Effect, find};
 use palpate_model::observation::*;
 use palpate_model::plan::build::build_plan;
-use palpate_model::scene::{Analytic, BodySource};
+use palpate_model::scene::{Analytic, BodySource, ObservationSpec};
 
 /// Numbers in [-1, 1], reproducible.
 pub(crate) struct Noise(pub(crate) u64);
@@ -65,7 +65,7 @@ pub(crate) fn seen() -> Plan {
             Channel::new(ReadingKind::Track, 3e-3),
             Channel::new(ReadingKind::Displacement, 4e-3),
         ],
-        cameras: vec![Camera { center: DVec3::new(0.05, -0.6, 0.5), axis: DVec3::new(0.0, 0.6, -0.36).normalize() }],
+        cameras: vec![Camera::Pinhole { center: DVec3::new(0.05, -0.6, 0.5), axis: DVec3::new(0.0, 0.6, -0.36).normalize() }],
         frames: frames.to_vec(),
         tracks: TrackRest { places: tracks, tolerance: None },
         ..Observation::default()
@@ -180,4 +180,29 @@ fn products_are_those_with_the_gauss_newton_matrix() {
             assert!((found - right).abs() < 1e-11 * matrix[0].abs().max(matrix[8].abs()), "{v:?}: {found} and {right}");
         }
     }
+}
+
+#[test]
+fn without_a_line_of_sight_the_nearest_side_counts() {
+    let mut s = scene(5e4);
+    let h = build_plan(&s, Observation::default(), &[]).unwrap().body.length;
+    let (min, max) = (h * DVec3::new(-4.0, -4.0, -1.5), h * DVec3::new(4.0, 4.0, 0.0));
+    s.object.source = BodySource::Analytic(Analytic::Box { min, max });
+    s.observation = Some(ObservationSpec::new("", vec![ReadingKind::Depth]));
+    // A point a fifth of a cell above the bottom of a plate that is seen from above.
+    let distance = |camera: Camera| {
+        let points = vec![ObservedPoint { position: h * DVec3::new(0.1, 0.2, -1.3), camera: 0 }];
+        let frames = vec![Frame { time: s.time.start, points, ..Frame::default() }];
+        let channels = vec![Channel::new(ReadingKind::Depth, 0.01 * h)];
+        let observation = Observation { cameras: vec![camera], frames, channels, ..Observation::default() };
+        let plan = build_plan(&s, observation, &[]).unwrap_or_else(|e| panic!("{e}"));
+        let look = Look { plan: &plan, observation: &plan.observation, sensors: &Sensors::default(), frame: 0 };
+        let found = depth::Depth::new(&plan, &plan.observation).matches(look, &vec![DVec3::ZERO; plan.body.nodes.len()]);
+        found[0].place.phi / h
+    };
+    let center = h * DVec3::new(0.0, 0.0, 500.0);
+    let (front, back) = (distance(Camera::Pinhole { center, axis: DVec3::NEG_Z }), distance(Camera::Unknown));
+    // The band interpolates the distance within cells: exact where a plane is nearest, as here.
+    assert!((front + 1.3).abs() < 1e-3 && (back + 0.2).abs() < 1e-3, "{front} {back}");
+    assert_eq!(distance(Camera::Scanner { center }), front);
 }

@@ -37,8 +37,9 @@ pub struct Place {
 }
 
 /// What a camera sees, in pixels that are as wide as places are apart.
-struct Picture<'a> {
-    camera: &'a Camera,
+struct Picture {
+    center: DVec3,
+    axis: DVec3,
     right: DVec3,
     down: DVec3,
     /// Tangent of the angle that a pixel takes.
@@ -47,29 +48,39 @@ struct Picture<'a> {
     nearest: BTreeMap<(i64, i64), f64>,
 }
 
-impl<'a> Picture<'a> {
-    fn new(camera: &'a Camera, places: &[Place], spacing: f64) -> Picture<'a> {
-        let right = camera.axis.any_orthonormal_vector();
+impl Picture {
+    /// `None` where there are no lines of sight.
+    fn new(camera: &Camera, places: &[Place], spacing: f64) -> Option<Picture> {
+        let center = camera.center()?;
+        let axis = match camera {
+            Camera::Pinhole { axis, .. } => *axis,
+            // A scanner looks at the body.
+            _ => {
+                let middle = places.iter().map(|p| p.position).sum::<DVec3>() / places.len().max(1) as f64;
+                (middle - center).try_normalize()?
+            }
+        };
+        let right = axis.any_orthonormal_vector();
         let mut mean = 0.0;
-        places.iter().for_each(|p| mean += (p.position - camera.center).length() / places.len() as f64);
+        places.iter().for_each(|p| mean += (p.position - center).length() / places.len() as f64);
         let pixel = PIXEL * spacing / mean.max(spacing);
-        let mut picture = Picture { camera, right, down: camera.axis.cross(right), pixel, nearest: BTreeMap::new() };
+        let mut picture = Picture { center, axis, right, down: axis.cross(right), pixel, nearest: BTreeMap::new() };
         let facing = places.iter().filter(|p| picture.faces(p));
         let at: Vec<((i64, i64), f64)> = facing.filter_map(|p| picture.pixel_of(p.position)).collect();
         for (at, depth) in at {
             let nearest = picture.nearest.entry(at).or_insert(depth);
             *nearest = nearest.min(depth);
         }
-        picture
+        Some(picture)
     }
 
     fn faces(&self, p: &Place) -> bool {
-        p.normal.dot(p.position - self.camera.center) < 0.0
+        p.normal.dot(p.position - self.center) < 0.0
     }
 
     fn pixel_of(&self, p: DVec3) -> Option<((i64, i64), f64)> {
-        let away = p - self.camera.center;
-        let depth = away.dot(self.camera.axis);
+        let away = p - self.center;
+        let depth = away.dot(self.axis);
         let at = |side: DVec3| (away.dot(side) / depth / self.pixel).round() as i64;
         (depth > 0.0).then(|| ((at(self.right), at(self.down)), depth))
     }
@@ -113,24 +124,31 @@ impl Places {
         body.pieces().map(place).collect()
     }
 
-    /// For every camera which places it sees.
+    /// For every camera which places it sees; all, where there are no lines of sight.
     pub fn seen(&self, places: &[Place], cameras: &[Camera]) -> Vec<Vec<bool>> {
         let slack = BEHIND * self.spacing;
-        let of_camera = |c: &Camera| {
-            let picture = Picture::new(c, places, self.spacing);
-            places.iter().map(|p| picture.sees(p, slack)).collect()
+        let of_camera = |c: &Camera| match Picture::new(c, places, self.spacing) {
+            Some(picture) => places.iter().map(|p| picture.sees(p, slack)).collect(),
+            None => vec![true; places.len()],
         };
         cameras.iter().map(of_camera).collect()
     }
 
-    /// Which places at displacement u have one of the frame's readings on their line of sight.
+    /// Which places at displacement u have one of the frame's readings on their line of sight, or near them where there is none.
     pub fn read(&self, body: &Body, look: Look, u: &[DVec3]) -> Vec<bool> {
         let (points, cameras) = (&look.seen().points, &look.observation.cameras);
         let places = self.at(body, u);
         let mut read = vec![false; places.len()];
         for (c, camera) in cameras.iter().enumerate() {
-            let picture = Picture::new(camera, &places, self.spacing);
             let of_camera = points.iter().filter(|p| p.camera as usize == c);
+            let Some(picture) = Picture::new(camera, &places, self.spacing) else {
+                let all: Vec<DVec3> = of_camera.map(|p| p.position).collect();
+                let (reach, cubes) = (PIXEL * self.spacing, Cubes::new(&all, PIXEL * self.spacing));
+                for (read, place) in read.iter_mut().zip(&places).filter(|_| !all.is_empty()) {
+                    cubes.near(place.position, |k| *read |= (all[k] - place.position).length() <= reach);
+                }
+                continue;
+            };
             let filled: BTreeSet<(i64, i64)> = of_camera.filter_map(|p| Some(picture.pixel_of(p.position)?.0)).collect();
             for (read, place) in read.iter_mut().zip(&places) {
                 let at = picture.pixel_of(place.position).map(|p| p.0);
@@ -148,13 +166,13 @@ impl Places {
             return 0.0;
         }
         let places = self.at(body, u);
-        let pictures: Vec<Picture> = cameras.iter().map(|c| Picture::new(c, &places, self.spacing)).collect();
+        let pictures: Vec<Option<Picture>> = cameras.iter().map(|c| Picture::new(c, &places, self.spacing)).collect();
         let slack = BEHIND * self.spacing + THROUGH * look.observation.noise(ReadingKind::Depth);
         let all: Vec<DVec3> = places.iter().map(|p| p.position).collect();
         let cubes = Cubes::new(&all, slack);
         let (mut met, mut through) = (0usize, 0usize);
         for p in points {
-            let picture = &pictures[p.camera as usize];
+            let Some(picture) = &pictures[p.camera as usize] else { continue };
             let Some((at, depth)) = picture.pixel_of(p.position) else { continue };
             let Some(nearest) = picture.nearest.get(&at) else { continue };
             met += 1;

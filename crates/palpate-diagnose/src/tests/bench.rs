@@ -7,6 +7,7 @@ use crate::separation::Separation;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
 use palpate_model::effects::{Effect, Unstated, find};
+use palpate_model::observation::Sensor;
 use palpate_model::params::Transform;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -113,6 +114,7 @@ impl Bench {
             places: rest.iter().step_by(30).copied().collect(),
             spot: 0.01,
             cameras: 1,
+            sight: true,
             markers: 0,
             cells: true,
             held: held.clone(),
@@ -191,7 +193,7 @@ impl Bench {
                 value += d.iter().zip(values).zip(&offsets).map(|((d, v), o)| d * (v - o)).sum::<f64>();
                 let row = ResidualRow {
                     frame,
-                    source: Source::point(i as u32, 0),
+                    source: Source::point(i as u32, Sensor::Camera(0)),
                     value: Some(value),
                     noise: NOISE,
                     weight: 1.0,

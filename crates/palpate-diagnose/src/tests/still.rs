@@ -5,6 +5,7 @@ use crate::noise::neighbour_ratio;
 use crate::still::still_ratio;
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
+use palpate_model::observation::Sensor;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -35,7 +36,7 @@ fn seen(sd: f64, run: usize, motion: impl Fn(f64, usize) -> f64) -> Readings {
             let value = 1e-3 * (30.0 * x).sin() + noise + motion(x, frame);
             let row = ResidualRow {
                 frame,
-                source: Source::point(point, 0),
+                source: Source::point(point, Sensor::Camera(0)),
                 value: Some(value),
                 noise: STATED,
                 weight: 1.0,

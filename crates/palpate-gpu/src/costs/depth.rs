@@ -11,7 +11,7 @@ use crate::device::recorder::{Named, Recorder};
 use crate::layout::Sight;
 use glam::DVec3;
 use palpate_engine::{Misfit, ReadingResidual, ResidualRow, Source};
-use palpate_model::observation::{ReadingKind, Sensor, kernel};
+use palpate_model::observation::{Camera, ReadingKind, kernel};
 
 /// The cost.
 pub(super) struct Depth;
@@ -56,7 +56,7 @@ impl Cost for Depth {
         let reading = |(p, place): (usize, usize)| {
             let (seen, found) = (&d.seen().points[p], &d.found[place]);
             let misfit = (found.cell != NONE).then(|| Misfit::Distance(f64::from(found.phi)));
-            ReadingResidual { sensor: Sensor::Camera(seen.camera), item: p as u32, place: seen.position, misfit }
+            ReadingResidual { sensor: d.observation.sensor_of_point(seen), item: p as u32, place: seen.position, misfit }
         };
         order(d).into_iter().enumerate().map(reading).collect()
     }
@@ -76,7 +76,7 @@ fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
     let (seen, found) = (&d.seen().points[point], &d.found[place]);
     let bare = ResidualRow {
         frame: d.frame,
-        source: Source::point(point as u32, seen.camera),
+        source: Source::point(point as u32, obs.sensor_of_point(seen)),
         value: None,
         noise: obs.noise(ReadingKind::Depth),
         weight: 0.0,
@@ -85,7 +85,8 @@ fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
         by_place: DVec3::ZERO,
     };
     let Some(cell) = d.plan.body.band.cells.get(found.cell as usize) else { return bare };
-    let truth = d.sensors.truth(&obs.cameras[seen.camera as usize], seen);
+    let camera = &obs.cameras[seen.camera as usize];
+    let truth = d.sensors.truth(camera, seen);
     let sight = DVec3::from_array(truth.ray()).normalize_or_zero();
     let gradient = DVec3::from_array(found.gradient.map(f64::from));
     let value = f64::from(found.phi);
@@ -93,7 +94,8 @@ fn row(d: &Downloaded, point: usize, place: usize) -> ResidualRow {
         value: Some(value),
         weight: kernel::weight(value, d.plan.band),
         rest: grid.position(cell.lattice) + grid.h * DVec3::from_array(found.xi.map(f64::from)),
-        along_sight: gradient.dot(sight),
+        // Without a line of sight errors may have any direction.
+        along_sight: if *camera == Camera::Unknown { gradient.length() } else { gradient.dot(sight) },
         by_place: gradient,
         ..bare
     }

@@ -11,7 +11,7 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Linearised, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::Effect;
-use palpate_model::observation::{ReadingKind, kernel};
+use palpate_model::observation::{Camera, ReadingKind, kernel};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Analytic, BodySource, InitialShape};
@@ -104,4 +104,28 @@ fn fronts_with_a_camera_that_stood_elsewhere_are_those_of_the_cpu() {
     let turned = |k: &ParamKey| matches!(*k, ParamKey::Effect { slot: 6, .. });
     let keys: Vec<usize> = (0..plan.layout.len()).filter(|p| turned(&plan.layout.keys[*p])).collect();
     check(&plan, &keys);
+}
+
+/// Without lines of sight the nearest side is the one that counts, and no point belongs to a front.
+#[test]
+fn points_without_lines_of_sight_are_those_of_the_cpu() {
+    let Some(gpu) = device(None) else { return };
+    let sighted = plate(Vec::new());
+    let mut observation = (*sighted.observation).clone();
+    observation.cameras.fill(Camera::Unknown);
+    let plan = Plan { observation: observation.into(), ..sighted.clone() };
+    let speed = plan.layout.index(ParamKey::Velocity(0));
+    let mut row = plan.theta.clone();
+    row[speed] *= 0.5;
+    let directions = [plan.layout.index(ParamKey::YoungsModulus), speed];
+    let right = |p: &Plan| {
+        let mut cpu = Rollout::new(CpuBackend, p, 1).unwrap_or_else(|e| panic!("{e}"));
+        cpu.linearise(&row, &directions).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let mut rollout = Rollout::new(GpuBackend::on(gpu), &plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    let (found, exact) = (rollout.linearise(&row, &directions).unwrap_or_else(|e| panic!("{e}")), right(&plan));
+    assert!(fronts(&exact).is_empty() && !fronts(&right(&sighted)).is_empty());
+    // As above.
+    let d = apart(&found, &exact, &plan);
+    assert!(d.iter().all(|d| *d < 1e-3), "{d:?}");
 }

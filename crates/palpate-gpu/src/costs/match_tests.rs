@@ -29,7 +29,7 @@ const H: f64 = 1.0 / 32.0;
 /// The plan of a box (in cells) whose points (in cells) a camera sees from `eye` before anything moves.
 fn plan_of((min, max): (DVec3, DVec3), points: &[DVec3], eye: DVec3) -> Plan {
     let scene = scene(Analytic::Box { min: H * min, max: H * max }, H);
-    let cameras = vec![Camera { center: H * eye, axis: -eye.normalize() }];
+    let cameras = vec![Camera::Pinhole { center: H * eye, axis: -eye.normalize() }];
     let points = points.iter().map(|p| ObservedPoint { position: H * *p, camera: 0 }).collect();
     let frames = vec![Frame { time: scene.time.start - 0.01, points, ..Frame::default() }];
     let observation =
@@ -101,7 +101,7 @@ fn off(a: &[DVec3], b: &[DVec3]) -> f64 {
 fn holders(plan: &Plan, u: &[DVec3], point: &ObservedPoint) -> Vec<Holder> {
     let (body, all) = (&*plan.body, extend(&plan.body, u));
     let rest = |a: usize| if a < body.nodes.len() { body.nodes[a] } else { body.band.nodes[a - body.nodes.len()] };
-    let line = (point.position - plan.observation.cameras[0].center).normalize();
+    let line = plan.observation.cameras[0].line(point.position);
     let hold = |(c, cell): (usize, &palpate_model::cutcells::domain::BandCell)| {
         let place = pull_back(&cell.nodes.map(|a| rest(a as usize) + all[a as usize]), &cell.sdf, point.position)?;
         Some((c as u32, place.phi.abs(), place.gradient.dot(line) <= TURNED_AWAY * place.gradient.length()))

@@ -7,7 +7,7 @@ use crate::device::{Arena, GpuError, Maker};
 use palpate_engine::Direction;
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::effects::{Site, Unstated};
-use palpate_model::observation::{Observation, ObservedPoint};
+use palpate_model::observation::{Camera, Observation, ObservedPoint};
 use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use std::collections::HashMap;
@@ -76,7 +76,12 @@ pub(super) fn upload<M: Maker>(
     buffers: &mut HashMap<&'static str, M::Buffer>,
 ) -> Result<(), GpuError> {
     let cameras = takes.iter().flat_map(|(r, s)| s.cameras(&plan.recording(*r).observation.cameras));
-    let cameras: Vec<[f32; 4]> = cameras.map(|c| split(c.center - plan.body.center)[0]).collect();
+    // The fourth number says whether there are lines of sight.
+    let place = |c: Camera| {
+        let [x, y, z, _] = split(c.center().unwrap_or(plan.body.center) - plan.body.center)[0];
+        [x, y, z, f32::from(u8::from(c.center().is_some()))]
+    };
+    let cameras: Vec<[f32; 4]> = cameras.map(place).collect();
     let mut tables = Arena::new("shots_tables");
     tables.put("cameras", &cameras);
     tables.put("shots", &shots.shots);
@@ -103,7 +108,7 @@ fn recorded_lines(plan: &Plan, takes: &[Take], shots: &Shots) -> Vec<[f32; 4]> {
     let mut out = Vec::new();
     if !places(plan).is_empty() {
         each_point(plan, takes, shots, |_, recording, seen| {
-            out.push(split((seen.position - recording.cameras[seen.camera as usize].center).normalize_or_zero())[0]);
+            out.push(split(recording.cameras[seen.camera as usize].line(seen.position))[0]);
         });
     }
     out

@@ -50,7 +50,7 @@ pub(crate) fn seen_within(scene: &Scene, off: f64) -> Plan {
     };
     let mut cpu = Rollout::new(CpuBackend, &bare, 1).unwrap_or_else(|e| panic!("{e}"));
     cpu.visit(&theta, visit).unwrap_or_else(|e| panic!("{e}"));
-    let side = |x: f64| Camera { center: DVec3::new(x, 0.1, 0.2), axis: DVec3::new(-x.signum(), 0.0, 0.0) };
+    let side = |x: f64| Camera::Pinhole { center: DVec3::new(x, 0.1, 0.2), axis: DVec3::new(-x.signum(), 0.0, 0.0) };
     let cameras = vec![side(1.0), side(-1.0)];
     let h = body.length;
     let observation =

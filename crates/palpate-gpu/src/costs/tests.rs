@@ -59,7 +59,8 @@ pub(super) fn observed(scene: &Scene, rest: &[MarkerRest], per_patch: usize) -> 
     let body = &bare.body;
     let mut noise = Noise(7);
     let centers = [DVec3::new(2.3, 0.3, 1.2), DVec3::new(0.4, -0.9, 0.9), DVec3::new(1.2, 0.5, -0.7)];
-    let cameras = centers.map(|center| Camera { center, axis: (DVec3::new(1.3, -0.2, 0.4) - center).normalize() }).to_vec();
+    let cameras =
+        centers.map(|center| Camera::Pinhole { center, axis: (DVec3::new(1.3, -0.2, 0.4) - center).normalize() }).to_vec();
     let h = body.cut().grid.h;
     let points = |time: f64, noise: &mut Noise| -> Vec<ObservedPoint> {
         let at = time - 0.05;

@@ -34,7 +34,7 @@ fn other(scene: &Scene, plan: &Plan) -> Plan {
         f.markers.insert(0, more);
         f.displacements.truncate(7);
     }
-    observation.cameras.push(Camera { center: glam::DVec3::new(0.1, 1.0, 0.2), axis: -glam::DVec3::Y });
+    observation.cameras.push(Camera::Pinhole { center: glam::DVec3::new(0.1, 1.0, 0.2), axis: -glam::DVec3::Y });
     observation.channels.iter_mut().for_each(|c| c.noise *= 1.5);
     let observation = build_plan(scene, observation, &rest).unwrap_or_else(|e| panic!("{e}")).observation;
     let mut plan = Plan { observation, ..plan.clone() };

@@ -6,10 +6,11 @@ use crate::capture::Capture;
 use crate::error::{ImportError, refuse, refuse_key};
 use crate::images::read_depth;
 use crate::intrinsics::{Intrinsics, read_json};
-use crate::lens::{Lens, Optics};
+use crate::lens::Optics;
 use crate::options::Options;
 use crate::place::Place;
 use crate::times::of_files;
+use palpate_io::lens::Lens;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

@@ -6,11 +6,12 @@ use crate::Watch;
 use crate::capture::{Capture, DepthCamera, DepthFrame, Pixels};
 use crate::error::{ImportError, read as read_bytes, refuse, refuse_option};
 use crate::intrinsics::lens_of;
-use crate::lens::{Lens, Optics};
+use crate::lens::Optics;
 use crate::options::Options;
 use crate::place::{Place, has_ending, head};
 use image::{DynamicImage, ImageFormat};
 use mcap::MessageStream;
+use palpate_io::lens::Lens;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -7,12 +7,13 @@ use crate::capture::{Capture, DepthCamera, DepthFrame, Guess, Tracks};
 use crate::error::{ImportError, refuse, refuse_option};
 use crate::images::pixels;
 use crate::intrinsics::{check_center, lens_of};
-use crate::lens::{Lens, Optics};
+use crate::lens::Optics;
 use crate::options::{Options, rigid_of};
 use crate::place::{Place, head};
 use crate::times::rising;
 use glam::DVec3;
 use palpate_io::InputError;
+use palpate_io::lens::Lens;
 use std::path::{Path, PathBuf};
 
 /// See the file's head.

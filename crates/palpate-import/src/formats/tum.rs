@@ -5,12 +5,13 @@ use crate::Watch;
 use crate::capture::{Capture, Guess};
 use crate::error::{ImportError, read_text, refuse};
 use crate::intrinsics::Intrinsics;
-use crate::lens::{Lens, Optics};
+use crate::lens::Optics;
 use crate::options::{Options, rigid_of};
 use crate::place::{Place, head_text};
 use crate::times::{Times, rising};
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_io::InputError;
+use palpate_io::lens::Lens;
 use std::path::{Path, PathBuf};
 
 /// See the file's head.

@@ -1,12 +1,17 @@
-//! Point clouds as depth images: a recording holds no clouds, so that a camera is made up whose pixels are finer than the points are apart.
+//! Point clouds: kept as they are; or, where an image of the background is to be taken away from them, as depth images of a camera that is made up,
+//! whose pixels are finer than the points are apart.
 
-use super::settle::{Said, median};
+use super::masks::{ON_PLANE, check_range};
+use super::plane::{Plane, largest};
+use super::settle::{DEPTH_NOISE, Said, median};
 use crate::Watch;
 use crate::capture::{Cloud, DepthCamera, DepthFrame, Guess, Pixels};
-use crate::error::{ImportError, refuse};
-use crate::lens::{Lens, Optics};
+use crate::error::{ImportError, refuse, refuse_option};
+use crate::lens::Optics;
 use crate::options::Options;
 use glam::{DAffine3, DMat3, DVec3};
+use palpate_io::lens::Lens;
+use palpate_io::recording::{RecordedCloud, SeenFrom};
 
 /// Pixels a mean distance of points: a point is moved by an eighth of that at most, and few meet in one pixel.
 const FINE: f64 = 4.0;
@@ -17,6 +22,82 @@ const LONGEST: f64 = 4000.0;
 /// Rays are no steeper than this from the axis of a camera (x/z).
 const STEEPEST: f64 = 2.0;
 
+/// Clouds that are kept.
+pub struct Kept {
+    /// In metres, without what is not the object.
+    pub clouds: Vec<RecordedCloud>,
+    /// The plane that was taken away.
+    pub plane: Option<Plane>,
+    /// Which way they were looked at.
+    pub sight: Option<DVec3>,
+}
+
+/// Clouds in a unit of `metres` as a recording holds them, less what the user's ranges, box and plane take away.
+pub fn keep(clouds: &[Cloud], viewpoint: Option<DVec3>, metres: f64, o: &Options, said: &mut Said) -> Result<Kept, ImportError> {
+    check_range(o)?;
+    let pose = pose(clouds, viewpoint, metres, o, said, "cloud.0.origin");
+    let from = pose.map_or(SeenFrom::Unknown, |p| SeenFrom::Origin(p.translation));
+    if pose.is_none() {
+        let option = if o.near.is_some() { "near" } else { "far" };
+        if let Some(x) = o.near.or(o.far) {
+            return refuse_option(option, x, "needs to know from where the clouds were seen; --camera-pose says it");
+        }
+        let text = "nothing says from where the clouds were seen: they have no lines of sight, and which side of the body a point is of is not known";
+        said.facts.push(format!("{text}; --camera-pose gives them"));
+    }
+    let noise = o.noise.unwrap_or(DEPTH_NOISE);
+    if o.noise.is_none() {
+        let text = format!("{DEPTH_NOISE} m a point, that of common depth cameras at half a metre");
+        said.guesses.push(Guess::recording("noise", "cloud.0.noise_sigma", text, "--noise"));
+    }
+    let back = pose.map(|p| p.inverse());
+    let taken = |p: &DVec3| {
+        let z = back.map_or(0.0, |b| b.transform_point3(*p).z);
+        let in_range = o.near.is_none_or(|n| z >= n) && o.far.is_none_or(|n| z <= n);
+        in_range && o.within.is_none_or(|[low, high]| p.clamp(low, high) == *p)
+    };
+    let world = |c: &Cloud| c.points.iter().map(|p| *p * metres).filter(taken).collect::<Vec<_>>();
+    let mut all: Vec<Vec<DVec3>> = clouds.iter().map(world).collect();
+    let plane = match o.remove_plane.then(|| all.first().and_then(|first| largest(first, ON_PLANE * noise))) {
+        Some(None) => return refuse_option("remove-plane", "", "the first cloud holds no plane: too few points"),
+        Some(p) => p,
+        None => None,
+    };
+    if let Some(plane) = &plane {
+        all.iter_mut().for_each(|c| c.retain(|p| plane.height(*p) > ON_PLANE * noise));
+    }
+    let [before, after] = [clouds.iter().map(|c| c.points.len()).sum::<usize>(), all.iter().map(Vec::len).sum()];
+    if o.near.or(o.far).is_some() || o.within.is_some() || plane.is_some() {
+        said.facts.push(format!("masks: {after} of {before} points are taken for the object"));
+    } else {
+        said.facts
+            .push("masks: none, every point counts as the object; --far, --box or --remove-plane take the rest away".into());
+    }
+    let cloud = |(c, points): (&Cloud, Vec<DVec3>)| RecordedCloud {
+        file: c.file.clone(),
+        time: c.time,
+        from,
+        points,
+        noise_sigma: Some(noise),
+        noise_systematic: 0.0,
+    };
+    let mut kept: Vec<RecordedCloud> = clouds.iter().zip(all).map(cloud).collect();
+    kept.retain(|c| !c.points.is_empty());
+    if kept.is_empty() {
+        let used = [("near", o.near.is_some()), ("far", o.far.is_some()), ("box", o.within.is_some())];
+        let option = used.iter().find(|u| u.1).map_or("remove-plane", |u| u.0);
+        return refuse_option(option, "", "no point of any cloud is left");
+    }
+    if kept.len() < clouds.len() {
+        said.losses.push(format!(
+            "{} of {} clouds hold no point of the object and are left out",
+            clouds.len() - kept.len(),
+            clouds.len()
+        ));
+    }
+    Ok(Kept { clouds: kept, plane, sight: pose.map(|p| p.matrix3.z_axis) })
+}
+
 /// The made-up camera of clouds in a unit of `metres`.
 pub fn camera(
     clouds: &[Cloud],
@@ -26,7 +107,13 @@ pub fn camera(
     said: &mut Said,
     watch: &mut Watch,
 ) -> Result<DepthCamera, ImportError> {
-    let pose = pose(clouds, viewpoint, metres, o, said);
+    let key = "camera.0.world_from_camera";
+    let pose = pose(clouds, viewpoint, metres, o, said, key).unwrap_or_else(|| {
+        let (middle, size) = middle_and_size(clouds, metres);
+        let text = "clouds are looked at along y from outside, since they lie around their origin";
+        said.guesses.push(Guess::recording("pose", key, text, "--camera-pose"));
+        towards(middle - 3.0 * size.max(0.1) * DVec3::Y, middle)
+    });
     let back = pose.inverse();
     let local: Vec<Vec<DVec3>> =
         clouds.iter().map(|c| c.points.iter().map(|p| back.transform_point3(*p * metres)).collect()).collect();
@@ -100,30 +187,37 @@ fn visible(p: DVec3) -> bool {
     p.z > 1e-3 && (p.x / p.z).abs() < STEEPEST && (p.y / p.z).abs() < STEEPEST
 }
 
-/// Where the clouds were seen from, and which way the camera looked.
-fn pose(clouds: &[Cloud], viewpoint: Option<DVec3>, metres: f64, o: &Options, said: &mut Said) -> DAffine3 {
+/// Middle and diagonal of what clouds reach over [m].
+fn middle_and_size(clouds: &[Cloud], metres: f64) -> (DVec3, f64) {
+    let points = clouds.iter().flat_map(|c| c.points.iter().map(|p| *p * metres));
+    let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    (0.5 * (low + high), (high - low).length())
+}
+
+/// Where the clouds were seen from, and which way a camera there looked; `None` where nothing says it.
+fn pose(clouds: &[Cloud], viewpoint: Option<DVec3>, metres: f64, o: &Options, said: &mut Said, key: &str) -> Option<DAffine3> {
     if let Some(p) = o.camera_pose {
-        return p;
+        return Some(p);
     }
     let points = || clouds.iter().flat_map(|c| c.points.iter().map(|p| *p * metres));
     let front = points().filter(|p| visible(*p)).count();
     let all = points().count().max(1);
-    let (low, high) = points().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
-    let (middle, size) = (0.5 * (low + high), (high - low).length());
-    let key = "camera.0.world_from_camera";
+    let (middle, _) = middle_and_size(clouds, metres);
     let (eye, text) = match viewpoint {
         Some(v) => (v * metres, "clouds were seen from their VIEWPOINT"),
         None if 100 * front > 99 * all => {
             let text = "clouds were seen from their origin, along z, since they lie in front of it";
             said.guesses.push(Guess::recording("pose", key, text, "--camera-pose"));
-            return DAffine3::IDENTITY;
+            return Some(DAffine3::IDENTITY);
         }
-        None => (
-            middle - 3.0 * size.max(0.1) * DVec3::Y,
-            "clouds are looked at along y from outside, since they lie around their origin",
-        ),
+        None => return None,
     };
     said.guesses.push(Guess::recording("pose", key, text, "--camera-pose"));
+    Some(towards(eye, middle))
+}
+
+/// A camera that looks from one place at another.
+fn towards(eye: DVec3, middle: DVec3) -> DAffine3 {
     let z = (middle - eye).try_normalize().unwrap_or(DVec3::Z);
     let (x, y) = z.any_orthonormal_pair();
     // Right-handed: x × y = z.

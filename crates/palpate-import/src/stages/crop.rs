@@ -35,7 +35,7 @@ pub fn apply(r: &mut Recording, said: &mut Said) {
         let pixels: Vec<usize> = (0..w * h).map(|i| u0 + i % w + (v0 + i / w) * old).collect();
         for f in r.frames.iter_mut().filter(|f| f.camera == c) {
             if let Some(d) = &mut f.depth {
-                *d = DepthImage { width: w, height: h, counts: pixels.iter().map(|p| d.counts[*p]).collect() };
+                *d = DepthImage { width: w, height: h, pixels: d.pixels.pick(&pixels) };
             }
             if let Some(m) = &mut f.mask {
                 *m = pixels.iter().map(|p| m[*p]).collect();

@@ -7,14 +7,14 @@ use crate::error::{ImportError, refuse_option};
 use crate::options::{Background, Options};
 use glam::DVec3;
 use palpate_io::Recording;
-use palpate_io::recording::{DepthImage, RecordedFrame};
+use palpate_io::recording::{DepthImage, DepthPixels, RawDepth, RecordedFrame};
 use rayon::prelude::*;
 
 /// A reading is before the background where it is nearer by so many times its noise.
 const BEFORE: f64 = 5.0;
 
 /// A reading is of the plane where it is nearer to it than so many times its noise.
-const ON_PLANE: f64 = 4.0;
+pub const ON_PLANE: f64 = 4.0;
 
 /// Marks the object in every image, and drops images without it. Returns the plane that was removed. `empty` is the image that the user gave as background.
 pub fn apply(
@@ -27,16 +27,7 @@ pub fn apply(
     if r.frames.is_empty() {
         return Ok(None);
     }
-    for (option, value) in [("near", o.near), ("far", o.far)] {
-        if let Some(x) = value.filter(|x| !(*x >= 0.0 && x.is_finite())) {
-            return refuse_option(option, x, "must be ≥ 0 (m)");
-        }
-    }
-    if let (Some(near), Some(far)) = (o.near, o.far)
-        && near >= far
-    {
-        return refuse_option("near", near, format!("is not nearer than --far {far}"));
-    }
+    check_range(o)?;
     let noise = o.noise.unwrap_or(DEPTH_NOISE);
     let background = background(r, o, empty)?;
     let scene: Vec<DVec3> = if o.remove_plane { points(r, &r.frames[0], o) } else { Vec::new() };
@@ -53,13 +44,12 @@ pub fn apply(
         r.frames.par_iter_mut().for_each(|f| {
             let (camera, Some(depth)) = (&cameras[f.camera], &f.depth) else { return };
             let is = |i: usize| -> bool {
-                let count = depth.counts[i];
-                let z = camera.depth(count);
+                let Some(z) = depth.pixels.reading(i).map(|r| camera.depth(r)) else { return false };
                 let given = f.mask.as_ref().is_none_or(|m| m[i]);
-                if count == 0 || !given || o.near.is_some_and(|n| z < n) || o.far.is_some_and(|n| z > n) {
+                if !given || o.near.is_some_and(|n| z < n) || o.far.is_some_and(|n| z > n) {
                     return false;
                 }
-                let behind = |b: &DepthImage| b.counts[i] > 0 && z > camera.depth(b.counts[i]) - BEFORE * noise;
+                let behind = |b: &DepthImage| b.pixels.reading(i).is_some_and(|r| z > camera.depth(r) - BEFORE * noise);
                 if background.as_ref().is_some_and(behind) {
                     return false;
                 }
@@ -70,7 +60,7 @@ pub fn apply(
                 o.within.is_none_or(|[low, high]| p.clamp(low, high) == p)
                     && plane.as_ref().is_none_or(|plane| plane.height(p) > ON_PLANE * noise)
             };
-            let mask: Vec<bool> = (0..depth.counts.len()).map(is).collect();
+            let mask: Vec<bool> = (0..depth.pixels.count()).map(is).collect();
             f.mask = Some(if background.is_some() { without_specks(&mask, depth.width) } else { mask });
         });
         if let Some(Background::Frames(a, b)) = o.background {
@@ -100,7 +90,8 @@ pub fn apply(
     }
     if by_any {
         let [all, kept] = r.frames.iter().fold([0, 0], |[all, kept], f| {
-            let full = f.depth.as_ref().map_or(0, |d| d.counts.iter().filter(|c| **c > 0).count());
+            let read = |d: &DepthImage| (0..d.pixels.count()).filter(|i| d.pixels.reading(*i).is_some()).count();
+            let full = f.depth.as_ref().map_or(0, read);
             [all + full, kept + f.readings().count()]
         });
         said.facts.push(format!("masks: {kept} of {all} readings are taken for the object"));
@@ -111,6 +102,19 @@ pub fn apply(
         );
     }
     Ok(plane)
+}
+
+/// Refuses ranges of depth that are none.
+pub fn check_range(o: &Options) -> Result<(), ImportError> {
+    for (option, value) in [("near", o.near), ("far", o.far)] {
+        if let Some(x) = value.filter(|x| !(*x >= 0.0 && x.is_finite())) {
+            return refuse_option(option, x, "must be ≥ 0 (m)");
+        }
+    }
+    match (o.near, o.far) {
+        (Some(near), Some(far)) if near >= far => refuse_option("near", near, format!("is not nearer than --far {far}")),
+        _ => Ok(()),
+    }
 }
 
 /// World points of an image, as far as range and box leave them.
@@ -139,12 +143,22 @@ fn background(r: &Recording, o: &Options, empty: Option<DepthImage>) -> Result<O
     }
     let images: Vec<&DepthImage> = r.frames[a..=b].iter().filter_map(|f| f.depth.as_ref()).collect();
     let Some(first) = images.first() else { return Ok(None) };
-    let middle = |i: usize| {
-        let mut all: Vec<u16> = images.iter().map(|d| d.counts[i]).filter(|c| *c > 0).collect();
-        all.sort_unstable();
-        all.get(all.len() / 2).copied().unwrap_or(0)
+    // Counts and floats are ordered alike by their depth, whatever a count is.
+    let number = |r: RawDepth| match r {
+        RawDepth::Count(c) => f64::from(c),
+        RawDepth::Metres(z) => f64::from(z),
     };
-    Ok(Some(DepthImage { counts: (0..first.counts.len()).map(middle).collect(), ..(*first).clone() }))
+    let middle = |i: usize| {
+        let mut all: Vec<f64> = images.iter().filter_map(|d| d.pixels.reading(i)).map(number).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(0.0)
+    };
+    let all = (0..first.pixels.count()).map(middle);
+    let pixels = match first.pixels {
+        DepthPixels::Counts(_) => DepthPixels::Counts(all.map(|c| c as u16).collect()),
+        DepthPixels::Metres(_) => DepthPixels::Metres(all.map(|z| z as f32).collect()),
+    };
+    Ok(Some(DepthImage { pixels, ..(*first).clone() }))
 }
 
 /// A mask without pixels that have fewer than three of their eight neighbours: noise of the background passes for an object there.

@@ -57,6 +57,12 @@ fn way(r: &Recording) -> (Vec<f64>, Vec<f64>, f64) {
         let far = far.collect();
         return (p.track.times.clone(), far, MARKER_STIR);
     }
+    if !r.clouds.is_empty() {
+        let middle = |c: &palpate_io::recording::RecordedCloud| c.points.iter().sum::<DVec3>() / c.points.len().max(1) as f64;
+        let mut first = None;
+        let far = r.clouds.iter().map(middle).map(|p| p.distance(*first.get_or_insert(p))).collect();
+        return (r.clouds.iter().map(|c| c.time).collect(), far, DEPTH_STIR);
+    }
     let middle = |f: &palpate_io::recording::RecordedFrame| {
         let camera = &r.cameras[f.camera];
         let (mut sum, mut n) = (DVec3::ZERO, 0.0);

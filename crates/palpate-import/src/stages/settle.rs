@@ -7,7 +7,8 @@ use crate::lens::Straightened;
 use crate::options::Options;
 use glam::DAffine3;
 use palpate_io::Recording;
-use palpate_io::recording::{DepthImage, RecordedCamera, RecordedFrame};
+use palpate_io::lens::Lens;
+use palpate_io::recording::{DepthImage, DepthPixels, RecordedCamera, RecordedFrame};
 use rayon::prelude::*;
 
 /// Noise of a depth reading where nothing says it [m]: that of common depth cameras at half a metre.
@@ -38,6 +39,7 @@ pub fn depth(capture: &mut Capture, o: &Options, said: &mut Said, watch: &mut Wa
         source: String::new(),
         cameras: Vec::new(),
         frames: Vec::new(),
+        clouds: Vec::new(),
         markers: None,
         points: None,
         displacements: None,
@@ -160,10 +162,11 @@ fn add(camera: DepthCamera, o: &Options, said: &mut Said, r: &mut Recording, wat
     let key = format!("camera.{}", r.cameras.len());
     let metres = metres(&camera, &key, o, said)?;
     let poses = poses(&camera, &key, o, said);
-    let brown = camera.optics.lens.as_brown();
-    let straight = brown.is_none().then(|| Straightened::new(&camera.optics, camera.size));
-    // Counts that pass through no lens stay as they are.
-    let keep = straight.is_none() && matches!(camera.frames[0].pixels, Pixels::Counts(_));
+    let lens = camera.optics.lens.as_recorded();
+    let straight = lens.is_none().then(|| Straightened::new(&camera.optics, camera.size));
+    // Floats stay floats, and counts that pass through no lens stay as they are.
+    let floats = matches!(camera.frames[0].pixels, Pixels::Lengths(_));
+    let keep = floats || straight.is_none();
     let scale = if keep { metres } else { count_for(&camera, metres) };
     if let Some(s) = &straight {
         said.losses.push(format!(
@@ -190,9 +193,9 @@ fn add(camera: DepthCamera, o: &Options, said: &mut Said, r: &mut Recording, wat
             height,
             focal: camera.optics.focal,
             center: camera.optics.center,
-            distortion: brown.unwrap_or([0.0; 5]),
+            distortion: lens.unwrap_or([0.0; 8]),
             world_from_camera: *pose,
-            depth_scale: Some(scale),
+            depth_scale: (!floats).then_some(scale),
             depth_offset: 0.0,
             noise_sigma: Some(noise),
             noise_systematic: 0.0,
@@ -201,46 +204,60 @@ fn add(camera: DepthCamera, o: &Options, said: &mut Said, r: &mut Recording, wat
     if poses.len() > 1 {
         said.facts.push(format!("the camera moves: each of its {} images is a camera of its own", poses.len()));
     }
-    check_lens(&camera, &r.cameras[first])?;
+    if let Some(message) = r.cameras[first].folded() {
+        return refuse(&camera.frames[0].file, format!("its camera's distortion {message}"));
+    }
+    let blind = blind(&r.cameras[first]);
+    let mut unseen = 0;
     for (part, frames) in camera.frames.chunks(32).enumerate() {
         watch.at(part * 32, camera.frames.len(), "units and lenses")?;
-        let done: Vec<RecordedFrame> = frames
+        let done: Vec<(RecordedFrame, usize)> = frames
             .par_iter()
             .enumerate()
             .map(|(k, f)| {
                 let number = if poses.len() == 1 { first } else { first + part * 32 + k };
-                let counts = match (&f.pixels, &straight) {
-                    (Pixels::Counts(c), None) => c.clone(),
-                    (Pixels::Lengths(l), None) => l.iter().map(|x| count(f64::from(*x) * metres, scale)).collect(),
-                    (p, Some(s)) => {
-                        let at = |i: usize| match p {
-                            Pixels::Counts(c) => f32::from(c[i]),
-                            Pixels::Lengths(l) => l[i],
-                        };
-                        s.depth(at).into_iter().map(|x| count(f64::from(x) * metres, scale)).collect()
+                let at = |i: usize| match &f.pixels {
+                    Pixels::Counts(c) => f32::from(c[i]),
+                    Pixels::Lengths(l) => l[i],
+                };
+                let in_metres = |x: f32| (f64::from(x) * metres) as f32;
+                let mut pixels = match (&f.pixels, &straight) {
+                    (Pixels::Counts(c), None) if !floats => DepthPixels::Counts(c.clone()),
+                    (p, None) => DepthPixels::Metres((0..p.count()).map(|i| in_metres(at(i))).collect()),
+                    (_, Some(s)) if floats => DepthPixels::Metres(s.depth(at).into_iter().map(in_metres).collect()),
+                    (_, Some(s)) => {
+                        DepthPixels::Counts(s.depth(at).into_iter().map(|x| count(f64::from(x) * metres, scale)).collect())
                     }
                 };
+                let read: Vec<usize> = blind.iter().copied().filter(|i| pixels.reading(*i).is_some()).collect();
+                read.iter().for_each(|i| pixels.clear(*i));
                 let mask = f.mask.as_ref().map(|m| straight.as_ref().map_or_else(|| m.clone(), |s| s.mask(m)));
-                RecordedFrame { camera: number, time: f.time, depth: Some(DepthImage { width, height, counts }), mask }
+                (
+                    RecordedFrame { camera: number, time: f.time, depth: Some(DepthImage { width, height, pixels }), mask },
+                    read.len(),
+                )
             })
             .collect();
-        r.frames.extend(done);
+        for (frame, read) in done {
+            r.frames.push(frame);
+            unseen += read;
+        }
+    }
+    if unseen > 0 {
+        said.losses.push(format!(
+            "camera \"{}\": {unseen} readings lie at pixels for which its lens has no ray, and are left out",
+            camera.name
+        ));
     }
     Ok(())
 }
 
-/// Recordings refuse a lens that cannot be inverted at the corners; said here with the source's file.
-fn check_lens(camera: &DepthCamera, recorded: &RecordedCamera) -> Result<(), ImportError> {
-    let (u, v) = (camera.size[0] as f64 - 1.0, camera.size[1] as f64 - 1.0);
-    match [[0.0, 0.0], [u, 0.0], [0.0, v], [u, v]].iter().find(|p| recorded.ray(p[0], p[1]).is_none()) {
-        Some(p) => {
-            let text = format!(
-                "its camera's distortion cannot be inverted at pixel ({}, {}); are the coefficients k1 k2 p1 p2 k3?",
-                p[0], p[1]
-            );
-            refuse(&camera.frames[0].file, text)
-        }
-        None => Ok(()),
+/// Pixels of a rational lens that no ray falls on: the corners of wide images.
+fn blind(camera: &RecordedCamera) -> Vec<usize> {
+    let [w, h] = [camera.width, camera.height];
+    match camera.lens() {
+        Lens::Rational(_) => (0..w * h).filter(|i| camera.ray((i % w) as f64, (i / w) as f64).is_none()).collect(),
+        _ => Vec::new(),
     }
 }
 

@@ -24,9 +24,11 @@ pub struct Thinned {
 pub fn choose(r: &Recording, from: f64, to: f64, o: &Options, said: &mut Said) -> Thinned {
     let used: Vec<_> = r.frames.iter().filter(|f| (from..=to).contains(&f.time)).collect();
     let wanted = o.points.unwrap_or(POINTS);
-    let dense = median(used.iter().map(|f| f.readings().count() as f64).collect()).unwrap_or(0.0);
+    let clouds: Vec<_> = r.clouds.iter().filter(|c| (from..=to).contains(&c.time)).collect();
+    let counts = used.iter().map(|f| f.readings().count()).chain(clouds.iter().map(|c| c.points.len()));
+    let dense = median(counts.map(|n| n as f64).collect()).unwrap_or(0.0);
     let stride = (dense / wanted as f64).sqrt().ceil().max(1.0) as usize;
-    let mut times: Vec<f64> = used.iter().map(|f| f.time).collect();
+    let mut times: Vec<f64> = used.iter().map(|f| f.time).chain(clouds.iter().map(|c| c.time)).collect();
     let markers = r.markers.iter().flat_map(|m| m.samples.iter().map(|s| s.time));
     let tracks = r.points.iter().flat_map(|p| p.track.times.iter().copied());
     times.extend(markers.chain(tracks).filter(|t| (from..=to).contains(t)));

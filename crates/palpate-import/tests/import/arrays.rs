@@ -3,6 +3,7 @@
 use super::truth::*;
 use palpate_import::{Options, Unit};
 use palpate_io::npy::{Array, write_npz};
+use palpate_io::recording::DepthPixels;
 
 fn array(shape: &[usize], values: Vec<f64>) -> Array {
     Array { shape: shape.to_vec(), values }
@@ -47,10 +48,11 @@ fn floats_in_metres_or_millimetres_are_recognised() {
         let (imported, r, _) = bench.good("ball.npz", &far());
         assert_eq!((imported.format, imported.images), ("npy", FRAMES));
         let (off, n) = off_ball(&r);
-        // Depth in tenths of a millimetre: half of one, along rays that slant by less than a third.
-        assert!(off < 6e-5 && n > 1000, "{off} {n}");
+        // Single precision: some 1e-7 of 1.2 m.
+        assert!(off < 5e-7 && n > 1000, "{off} {n}");
         assert!(imported.guesses.iter().any(|g| g.what == "unit" && g.text.contains(word)), "{:?}", imported.guesses);
-        assert!(imported.losses.iter().any(|l| l.contains("0.0001 m")), "{:?}", imported.losses);
+        assert!(imported.losses.is_empty(), "{:?}", imported.losses);
+        assert!(r.frames.iter().all(|f| matches!(f.depth.as_ref().unwrap().pixels, DepthPixels::Metres(_))));
     }
 }
 

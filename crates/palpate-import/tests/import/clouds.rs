@@ -2,8 +2,8 @@
 
 use super::truth::*;
 use glam::DVec3;
-use palpate_import::Options;
-use palpate_io::recording::Recording;
+use palpate_import::{Background, Options, Unit};
+use palpate_io::recording::{Recording, SeenFrom};
 use std::fmt::Write;
 
 /// Points of the ball that the camera sees, in an order of their own.
@@ -60,18 +60,17 @@ fn pcd(points: &[DVec3], data: &str) -> Vec<u8> {
 }
 
 fn check(r: &Recording) {
-    let (off, n) = off_ball(r);
-    let fine = r.cameras[0].focal[0];
-    // Half a pixel's diagonal sideways, with a slope of up to one kept out of the rim by … the rim itself: there the error is the sideways way.
-    let sideways = 0.71 * 0.66 / fine;
-    assert!(off < sideways + 1e-4, "{off} {sideways}");
-    let all: usize = (0..FRAMES).map(|k| cloud(time(k)).len()).sum();
-    // Pixels are a quarter of the mean distance wide: few points meet, the most at the rim, where the ball is seen at a slant.
-    assert!(n > all * 9 / 10, "{n} of {all}");
+    assert!(r.cameras.is_empty() && r.frames.is_empty() && r.clouds.len() == FRAMES);
+    for (k, c) in r.clouds.iter().enumerate() {
+        assert_eq!((c.from, c.points.len()), (SeenFrom::Origin(DVec3::ZERO), cloud(time(k)).len()));
+        // Files have six digits behind the point, or those of a float.
+        let off = c.points.iter().map(|p| (p.distance(center(c.time)) - RADIUS).abs()).fold(0.0, f64::max);
+        assert!(off < 2e-6, "{off}");
+    }
 }
 
 #[test]
-fn a_sequence_of_any_kind_becomes_depth_images() {
+fn a_sequence_of_any_kind_is_kept() {
     for kind in ["ply", "mm", "ascii", "binary", "binary_compressed"] {
         let bench = Bench::new();
         for k in 0..FRAMES {
@@ -83,11 +82,35 @@ fn a_sequence_of_any_kind_becomes_depth_images() {
             }
         }
         let (imported, r, _) = bench.good("s", &Options { fps: Some(RATE), ..Options::default() });
-        assert_eq!(imported.images, FRAMES, "{kind}");
+        assert_eq!((imported.clouds, imported.images), (FRAMES, 0), "{kind}");
+        assert!(imported.losses.is_empty(), "{:?}", imported.losses);
         check(&r);
         let unit = imported.guesses.iter().find(|g| g.what == "unit").unwrap();
         assert!(unit.text.contains(if kind == "mm" { "mm" } else { "are m," }), "{unit:?}");
     }
+}
+
+#[test]
+fn ranges_and_boxes_take_points_away_and_a_background_makes_images() {
+    let bench = Bench::new();
+    // A wall behind the ball, and nothing else in the first cloud.
+    let wall = |z: f64| (0..900).map(move |i| DVec3::new(0.02 * f64::from(i % 30) - 0.3, 0.02 * f64::from(i / 30) - 0.3, z));
+    for k in 0..FRAMES {
+        let mut points = cloud(time(k));
+        points.extend(wall(2.0));
+        bench.write(&format!("s/{k}.ply"), ply(&points, 1.0));
+    }
+    let base = Options { fps: Some(RATE), unit: Some(Unit::Metre), ..Options::default() };
+    let (imported, r, _) = bench.good("s", &Options { far: Some(1.5), ..base.clone() });
+    check(&r);
+    assert!(imported.facts.iter().any(|f| f.contains("are taken for the object")), "{:?}", imported.facts);
+    let (_, r, _) = Bench::good(&bench, "s", &Options { remove_plane: true, force: true, ..base.clone() });
+    check(&r);
+    let e = bench.import("s", &Options { near: Some(3.0), force: true, ..base.clone() }).unwrap_err().to_string();
+    assert!(e.contains("no point of any cloud is left"), "{e}");
+    let (imported, r, _) =
+        bench.good("s", &Options { background: Some(Background::Frames(0, 0)), far: Some(1.5), force: true, ..base });
+    assert!(r.clouds.is_empty() && imported.images > 0, "{:?}", imported.losses);
 }
 
 #[test]

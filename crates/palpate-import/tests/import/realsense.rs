@@ -2,6 +2,7 @@
 
 use super::truth::*;
 use palpate_import::{Background, Options};
+use palpate_io::recording::RawDepth;
 use std::fs;
 
 fn intrinsics() -> String {
@@ -34,9 +35,10 @@ fn a_folder_becomes_the_recording_that_was_seen() {
         let camera = &r.cameras[f.camera];
         let all = counts(f.time, 0.001);
         let (u0, v0) = (CENTER[0] - camera.center[0], CENTER[1] - camera.center[1]);
-        let recorded: Vec<(usize, u16)> =
+        let recorded: Vec<(usize, RawDepth)> =
             f.readings().map(|(u, v, c)| (u + u0 as usize + (v + v0 as usize) * SIZE[0], c)).collect();
-        let seen: Vec<(usize, u16)> = all.iter().copied().enumerate().filter(|(_, c)| *c < 900).collect();
+        let seen = all.iter().copied().enumerate().filter(|(_, c)| *c < 900);
+        let seen: Vec<(usize, RawDepth)> = seen.map(|(i, c)| (i, c.into())).collect();
         // Counts go through untouched, wherever the images are cut.
         assert_eq!(recorded, seen, "frame {k}");
     }

@@ -2,8 +2,8 @@
 
 use super::sequence::{check_times, check_vectors};
 use super::{
-    DepthImage, MarkerSample, RecordedCamera, RecordedDisplacements, RecordedFrame, RecordedMarkers, RecordedPoints, Recording,
-    Sequence, image, noise_range,
+    DepthImage, DepthPixels, MarkerSample, RecordedCamera, RecordedDisplacements, RecordedFrame, RecordedMarkers, RecordedPoints,
+    Recording, Sequence, image, noise_range,
 };
 use crate::error::{InputError, number};
 use crate::rigid::rigid;
@@ -43,8 +43,8 @@ pub struct DepthStack {
     pub pose: [[f64; 4]; 4],
     /// Rising times on the recording's clock [s] `[F]`.
     pub times: Vec<f64>,
-    /// Counts of the camera's `depth_scale` `[F, height, width]`; 0 = no reading.
-    pub counts: Vec<u16>,
+    /// Counts of the camera's `depth_scale`, or metres `[F, height, width]`.
+    pub pixels: DepthPixels,
     /// True where the object is `[F, height, width]`; `None` = every pixel may be the object.
     pub masks: Option<Vec<bool>>,
 }
@@ -112,6 +112,7 @@ impl Recording {
             markers: None,
             points: None,
             displacements: None,
+            clouds: Vec::new(),
             warnings: Vec::new(),
         }
     }
@@ -169,7 +170,7 @@ impl Recording {
     /// # Errors
     /// As [`Recording::with_points`].
     pub fn with_depth(mut self, stack: DepthStack) -> Result<Recording, InputError> {
-        let DepthStack { camera, pose, times, counts, masks } = stack;
+        let DepthStack { camera, pose, times, pixels, masks } = stack;
         let name = format!("camera \"{}\"", camera.name);
         let camera =
             RecordedCamera { world_from_camera: rigid(pose).map_err(|e| wrong("camera.world_from_camera", e))?, ..camera };
@@ -186,21 +187,26 @@ impl Recording {
             return Err(wrong("camera", format!("{name}: a number is not finite, or depth_scale is not > 0 (m per count)")));
         }
         Noise { sigma: camera.noise_sigma, systematic: camera.noise_systematic }.check("camera")?;
-        camera.check_distortion().map_err(|e| wrong("camera.distortion", e))?;
+        if let Some(message) = camera.folded() {
+            return Err(wrong("camera.distortion", message));
+        }
         let (width, height) = (camera.width, camera.height);
         let size = width * height;
-        if size == 0 || !counts.len().is_multiple_of(size) || masks.as_ref().is_some_and(|m| m.len() != counts.len()) {
+        let count = pixels.count();
+        if size == 0 || !count.is_multiple_of(size) || masks.as_ref().is_some_and(|m| m.len() != count) {
             return Err(wrong("frame.depth", format!("{name}: depths or masks are no images of {width} × {height} pixels")));
         }
-        check_times(&times, counts.len() / size).map_err(|e| wrong("frame.time", e))?;
+        check_times(&times, count / size).map_err(|e| wrong("frame.time", e))?;
+        if camera.depth_scale.is_none() && matches!(pixels, DepthPixels::Counts(_)) {
+            return Err(wrong("camera.depth_scale", format!("{name}: is missing: metres per count (0.001 for millimetres)")));
+        }
         let number = self.cameras.len();
-        let image = |k: usize| counts[k * size..(k + 1) * size].to_vec();
         let mask = |k: usize| masks.as_ref().map(|m| m[k * size..(k + 1) * size].to_vec());
         let frames: Vec<RecordedFrame> = (times.iter().enumerate())
             .map(|(k, time)| RecordedFrame {
                 camera: number,
                 time: *time,
-                depth: Some(DepthImage { width, height, counts: image(k) }),
+                depth: Some(DepthImage { width, height, pixels: pixels.slice(k * size..(k + 1) * size) }),
                 mask: mask(k),
             })
             .collect();

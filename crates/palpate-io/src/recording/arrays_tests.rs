@@ -25,7 +25,7 @@ fn stack() -> DepthStack {
         height: 2,
         focal: [100.0, 100.0],
         center: [1.0, 0.5],
-        distortion: [0.0; 5],
+        distortion: [0.0; 8],
         world_from_camera: DAffine3::IDENTITY,
         depth_scale: Some(0.001),
         depth_offset: 0.0,
@@ -33,7 +33,13 @@ fn stack() -> DepthStack {
         noise_systematic: 0.0,
     };
     let masks = Some([true, false].repeat(6));
-    DepthStack { camera, pose: POSE, times: vec![0.0, 0.05], counts: (0..12).map(|k| 1000 + k).collect(), masks }
+    DepthStack {
+        camera,
+        pose: POSE,
+        times: vec![0.0, 0.05],
+        pixels: DepthPixels::Counts((0..12).map(|k| 1000 + k).collect()),
+        masks,
+    }
 }
 
 #[test]
@@ -87,12 +93,17 @@ fn cameras_of_arrays_are_checked() {
     let millimetres = RecordedCamera { depth_scale: Some(1.0), ..stack().camera };
     let said = refused(DepthStack { camera: millimetres, ..stack() });
     assert!(said.starts_with("<arrays>: camera.depth_scale: the median depth") && said.contains("depth_scale = 0.001"), "{said}");
+    let unscaled = RecordedCamera { depth_scale: None, ..stack().camera };
+    let said = refused(DepthStack { camera: unscaled, ..stack() });
+    assert!(said.starts_with("<arrays>: camera.depth_scale: camera \"cam\": is missing"), "{said}");
+    let floats = DepthStack { pixels: DepthPixels::Metres(vec![1000.0; 12]), ..stack() };
+    assert!(refused(floats).contains("are they millimetres? Floats are metres"));
     let mut leaning = POSE;
     leaning[0][1] = 0.5;
     assert!(refused(DepthStack { pose: leaning, ..stack() }).contains("camera.world_from_camera: not rigid"));
-    let short = DepthStack { counts: vec![1000; 7], ..stack() };
+    let short = DepthStack { pixels: DepthPixels::Counts(vec![1000; 7]), ..stack() };
     assert!(refused(short).contains("frame.depth: camera \"cam\": depths or masks are no images of 3 × 2 pixels"));
-    let dark = DepthStack { counts: vec![0; 12], ..stack() };
+    let dark = DepthStack { pixels: DepthPixels::Counts(vec![0; 12]), ..stack() };
     assert!(refused(dark).ends_with("no image holds a reading of the object"));
     let blind = RecordedCamera { focal: [0.0, 1.0], ..stack().camera };
     assert!(refused(DepthStack { camera: blind, ..stack() }).starts_with("<arrays>: camera.fx: 0 is not allowed"));

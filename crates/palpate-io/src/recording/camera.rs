@@ -1,10 +1,13 @@
-//! Pinhole cameras with OpenCV's distortion.
+//! Cameras with OpenCV's distortion.
 
+use super::image::{self, RawDepth};
 use super::noise;
 use crate::document::Table;
 use crate::error::InputError;
+use crate::lens::Lens;
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
+use std::path::Path;
 
 /// A calibrated depth camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,11 +22,11 @@ pub struct RecordedCamera {
     pub focal: [f64; 2],
     /// Principal point cx, cy [pixels]; (0, 0) is the centre of the top-left pixel.
     pub center: [f64; 2],
-    /// OpenCV's k1, k2, p1, p2, k3.
-    pub distortion: [f64; 5],
+    /// OpenCV's k1, k2, p1, p2, k3, k4, k5, k6; the last three are 0 but for a rational lens.
+    pub distortion: [f64; 8],
     /// Camera to world; camera axes x right, y down, z forward.
     pub world_from_camera: DAffine3,
-    /// Metres per count of a depth image; `None` when no depth was recorded.
+    /// Metres per count of a depth image; `None` when no counts were recorded.
     pub depth_scale: Option<f64>,
     /// Metres added to every reading.
     pub depth_offset: f64,
@@ -35,7 +38,9 @@ pub struct RecordedCamera {
 
 pub(super) fn cameras(root: &Table) -> Result<Vec<RecordedCamera>, InputError> {
     let mut cameras: Vec<RecordedCamera> = Vec::new();
-    let any_depth = root.tables("frame")?.iter().any(|f| f.has("depth"));
+    // Images of floats are in metres.
+    let counts = |f: &Table| f.optional_str("depth").ok().flatten().is_some_and(|file| !image::holds_metres(Path::new(file)));
+    let any_counts = root.tables("frame")?.iter().any(counts);
     for t in root.tables("camera")? {
         let name = t.optional_str("name")?.ok_or_else(|| t.missing("name", "a label"))?;
         if cameras.iter().any(|c| c.name == name) {
@@ -54,8 +59,8 @@ pub(super) fn cameras(root: &Table) -> Result<Vec<RecordedCamera>, InputError> {
             .optional_matrix4("world_from_camera")?
             .ok_or_else(|| t.missing("world_from_camera", "a rigid 4 × 4 matrix, row-major"))?;
         let depth_scale = t.f64_where("depth_scale", |x| x > 0.0, "is not allowed: must be > 0 (m per count)")?;
-        if any_depth && depth_scale.is_none() {
-            let used = root.tables("frame")?.iter().any(|f| f.has("depth") && f.optional_str("camera").ok() == Some(Some(name)));
+        if any_counts && depth_scale.is_none() {
+            let used = root.tables("frame")?.iter().any(|f| counts(f) && f.optional_str("camera").ok() == Some(Some(name)));
             if used {
                 return Err(t.missing("depth_scale", "metres per PNG count (0.001 for millimetres)"));
             }
@@ -66,26 +71,53 @@ pub(super) fn cameras(root: &Table) -> Result<Vec<RecordedCamera>, InputError> {
             height: size("height")?,
             focal: [focal("fx")?, focal("fy")?],
             center: [principal("cx")?, principal("cy")?],
-            distortion: t.optional_numbers("distortion", 5)?.map_or([0.0; 5], |d| [d[0], d[1], d[2], d[3], d[4]]),
+            distortion: distortion(&t)?,
             world_from_camera: rigid(pose).map_err(|e| t.error("world_from_camera", e))?,
             depth_scale,
             depth_offset: t.optional_f64("depth_offset")?.unwrap_or(0.0),
             noise_sigma: noise(&t, "noise_sigma")?,
             noise_systematic: noise(&t, "noise_systematic")?.unwrap_or(0.0),
         };
-        camera.check_distortion().map_err(|e| t.error("distortion", e))?;
+        if let Some(message) = camera.folded() {
+            return Err(t.error("distortion", message));
+        }
         cameras.push(camera);
     }
     Ok(cameras)
 }
 
+/// Five coefficients of Brown & Conrady, or eight of a rational lens.
+fn distortion(t: &Table) -> Result<[f64; 8], InputError> {
+    let mut all = [0.0; 8];
+    let Some(given) = t.optional_list("distortion")? else { return Ok(all) };
+    if given.len() != 5 && given.len() != 8 {
+        let text = format!("expected 5 numbers (k1 k2 p1 p2 k3) or 8 (k4 k5 k6 as well), found {}", given.len());
+        return Err(t.error("distortion", text));
+    }
+    all.iter_mut().zip(given).for_each(|(a, k)| *a = k);
+    Ok(all)
+}
+
 impl RecordedCamera {
-    /// Refuses a distortion that cannot be removed everywhere.
-    pub(super) fn check_distortion(&self) -> Result<(), String> {
-        // The corners are farthest from the axis: where they can be undistorted, every pixel can.
-        let (right, low) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
-        let lost = [[0.0, 0.0], [right, 0.0], [0.0, low], [right, low]].into_iter().find(|[u, v]| self.ray(*u, *v).is_none());
-        lost.map_or(Ok(()), |[u, v]| Err(format!("cannot be inverted at pixel ({u}, {v}); are the coefficients k1 k2 p1 p2 k3?")))
+    /// Its lens.
+    pub fn lens(&self) -> Lens {
+        Lens::recorded(self.distortion)
+    }
+
+    /// What is wrong with a lens that is folded over itself inside of the image.
+    ///
+    /// The corners are farthest from the axis: where they can be undistorted, every pixel can. Behind a rational lens the corners of
+    /// wide images see nothing; there the middles of the sides decide, and a reading that has no ray is refused by itself.
+    pub fn folded(&self) -> Option<String> {
+        let (u, v) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
+        let places = match self.lens() {
+            Lens::Rational(_) => [[0.0, 0.5 * v], [u, 0.5 * v], [0.5 * u, 0.0], [0.5 * u, v]],
+            _ => [[0.0, 0.0], [u, 0.0], [0.0, v], [u, v]],
+        };
+        let [u, v] = *places.iter().find(|p| self.ray(p[0], p[1]).is_none())?;
+        Some(format!(
+            "cannot be inverted at pixel ({u}, {v}); are the coefficients k1 k2 p1 p2 k3, and k4 k5 k6 of a rational lens?"
+        ))
     }
 
     /// Centre of projection in the world [m].
@@ -99,36 +131,8 @@ impl RecordedCamera {
     }
 
     /// Normalised image coordinates (x/z, y/z) of a pixel, distortion removed; `None` where it cannot be inverted.
-    ///
-    /// OpenCV's model x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²) (y likewise) is inverted by fixed-point iteration.
     pub fn ray(&self, u: f64, v: f64) -> Option<[f64; 2]> {
-        let target = [(u - self.center[0]) / self.focal[0], (v - self.center[1]) / self.focal[1]];
-        if self.distortion == [0.0; 5] {
-            return Some(target);
-        }
-        let mut p = target;
-        // Real lenses need some ten rounds; one that needs more than this is folded over itself.
-        for _ in 0..200 {
-            let (radial, tangential) = self.distort(p);
-            if radial <= 0.0 {
-                return None;
-            }
-            let next = [(target[0] - tangential[0]) / radial, (target[1] - tangential[1]) / radial];
-            let change = (next[0] - p[0]).abs().max((next[1] - p[1]).abs());
-            p = next;
-            if change < 1e-12 {
-                return Some(p);
-            }
-        }
-        None
-    }
-
-    /// Radial factor and tangential shift at normalised coordinates.
-    fn distort(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        (radial, [2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y])
+        self.lens().undistort([(u - self.center[0]) / self.focal[0], (v - self.center[1]) / self.focal[1]])
     }
 
     /// Pixel (u, v) and depth along the axis [m] of a world point; `None` behind the camera.
@@ -137,10 +141,14 @@ impl RecordedCamera {
         if p.z <= 0.0 {
             return None;
         }
-        let n = [p.x / p.z, p.y / p.z];
-        let (radial, shift) = self.distort(n);
-        let uv = [0, 1].map(|a| (n[a] * radial + shift[a]) * self.focal[a] + self.center[a]);
-        Some((uv, p.z))
+        let bent = self.lens().distort([p.x / p.z, p.y / p.z])?;
+        Some(([0, 1].map(|a| bent[a] * self.focal[a] + self.center[a]), p.z))
+    }
+
+    /// True where a world point [m] falls into the image.
+    pub fn holds(&self, world: DVec3) -> bool {
+        let size = [self.width as f64, self.height as f64];
+        self.project(world).is_some_and(|(uv, _)| (0..2).all(|a| (-0.5..size[a] - 0.5).contains(&uv[a])))
     }
 
     /// World point of a pixel whose depth along the axis is `z` [m]; `None` where the distortion cannot be inverted.
@@ -149,8 +157,16 @@ impl RecordedCamera {
         Some(self.world_from_camera.transform_point3(DVec3::new(x * z, y * z, z)))
     }
 
-    /// Depth [m] of a count of a depth image, offset included.
-    pub fn depth(&self, count: u16) -> f64 {
-        f64::from(count) * self.depth_scale.unwrap_or(0.0) + self.depth_offset
+    /// Depth [m] of a reading of a depth image, offset included.
+    pub fn depth(&self, reading: impl Into<RawDepth>) -> f64 {
+        self.plain_depth(reading.into()) + self.depth_offset
+    }
+
+    /// The same without the offset.
+    pub(super) fn plain_depth(&self, reading: RawDepth) -> f64 {
+        match reading {
+            RawDepth::Count(c) => f64::from(c) * self.depth_scale.unwrap_or(0.0),
+            RawDepth::Metres(z) => f64::from(z),
+        }
     }
 }

@@ -1,20 +1,24 @@
-//! Format `recording/1`: a folder of depth images, masks, markers and arrays ↔ [`Recording`].
+//! Format `recording/1`: a folder of depth images, masks, clouds, markers and arrays ↔ [`Recording`].
 
 mod arrays;
 mod c3d;
 mod camera;
+mod clouds;
 mod image;
 mod markers;
 mod observation;
 mod overlap;
 mod sequence;
 #[cfg(test)]
+mod surface_tests;
+#[cfg(test)]
 mod tests;
 mod write;
 
 pub use arrays::{DepthStack, Noise, Tracks};
 pub use camera::RecordedCamera;
-pub use image::DepthImage;
+pub use clouds::{RecordedCloud, SeenFrom};
+pub use image::{DepthImage, DepthPixels, RawDepth};
 pub use markers::{MarkerSample, RecordedMarkers};
 pub use observation::ObservationError;
 pub use overlap::check_overlap;
@@ -46,6 +50,8 @@ pub struct Recording {
     pub cameras: Vec<RecordedCamera>,
     /// Images, ordered by time.
     pub frames: Vec<RecordedFrame>,
+    /// Point clouds, ordered by time.
+    pub clouds: Vec<RecordedCloud>,
     /// Markers.
     pub markers: Option<RecordedMarkers>,
     /// Tracked points of the body.
@@ -88,11 +94,12 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
     let mut warnings = Vec::new();
     let cameras = camera::cameras(&root)?;
     let frames = frames(&source, &root, &cameras, &mut warnings)?;
+    let clouds = clouds::clouds(&source, &root, &cameras, &mut warnings)?;
     let markers = markers(&source, &root, &mut warnings)?;
     let points = sequence::points(&source, &root)?;
     let displacements = sequence::displacements(&source, &root)?;
-    if frames.is_empty() && markers.is_none() && points.is_none() && displacements.is_none() {
-        let text = "holds neither a [[frame]] nor [markers], [points] or [displacements]: nothing was measured";
+    if frames.is_empty() && clouds.is_empty() && markers.is_none() && points.is_none() && displacements.is_none() {
+        let text = "holds neither a [[frame]] nor [[cloud]], [markers], [points] or [displacements]: nothing was measured";
         return Err(root.own_error(text));
     }
     image::check_depth_unit(&root, &cameras, &frames)?;
@@ -102,6 +109,7 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
         path: source.path.clone(),
         cameras,
         frames,
+        clouds,
         markers,
         points,
         displacements,
@@ -230,7 +238,7 @@ impl Recording {
     /// What kinds of readings it holds, in a fixed order.
     pub fn kinds(&self) -> Vec<ReadingKind> {
         let holds = |kind: &ReadingKind| match kind {
-            ReadingKind::Depth => self.frames.iter().any(|f| f.depth.is_some()),
+            ReadingKind::Depth => !self.clouds.is_empty() || self.frames.iter().any(|f| f.depth.is_some()),
             ReadingKind::Marker => self.markers.is_some(),
             ReadingKind::Track => self.points.is_some(),
             ReadingKind::Displacement => self.displacements.is_some(),
@@ -240,13 +248,13 @@ impl Recording {
 }
 
 impl RecordedFrame {
-    /// Pixels (column u, row v) of the object with a reading, and their counts, row by row.
-    pub fn readings(&self) -> impl Iterator<Item = (usize, usize, u16)> + '_ {
+    /// Pixels (column u, row v) of the object with a reading, and what is read there, row by row.
+    pub fn readings(&self) -> impl Iterator<Item = (usize, usize, RawDepth)> + '_ {
         let width = self.depth.as_ref().map_or(1, |d| d.width);
-        let counts = self.depth.as_ref().map_or(&[][..], |d| &d.counts[..]);
-        (counts.iter().enumerate())
-            .filter(|(i, c)| **c > 0 && self.mask.as_ref().is_none_or(|m| m[*i]))
-            .map(move |(i, c)| (i % width, i / width, *c))
+        let count = self.depth.as_ref().map_or(0, |d| d.pixels.count());
+        (0..count)
+            .filter(|i| self.mask.as_ref().is_none_or(|m| m[*i]))
+            .filter_map(move |i| Some((i % width, i / width, self.depth.as_ref()?.pixels.reading(i)?)))
     }
 }
 

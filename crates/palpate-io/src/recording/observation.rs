@@ -1,6 +1,6 @@
-//! A recording as an [`Observation`]: pixels to world points, markers to frames.
+//! A recording as an [`Observation`]: pixels and clouds to points of the surface, markers to frames.
 
-use super::{RecordedFrame, RecordedMarkers, Recording, Sequence};
+use super::{RawDepth, RecordedFrame, RecordedMarkers, Recording, SeenFrom, Sequence};
 use crate::error::{InputError, number};
 use glam::DVec3;
 use palpate_model::observation::{
@@ -34,6 +34,14 @@ pub enum ObservationError {
     },
 }
 
+/// A noise [m], or the usual one of depth readings with a word about it; `who` begins the sentence.
+fn stated(noise: Option<f64>, warnings: &mut Vec<String>, who: impl Fn() -> String) -> f64 {
+    noise.unwrap_or_else(|| {
+        warnings.push(format!("{} no noise_sigma; {DEPTH_NOISE} m is assumed", who()));
+        DEPTH_NOISE
+    })
+}
+
 fn asked(key: impl Into<String>, message: String) -> ObservationError {
     ObservationError::Scene { key: key.into(), message }
 }
@@ -42,7 +50,8 @@ impl Recording {
     /// What a scene's `[observation]` uses of this recording, in world coordinates; sites are left to the caller, who
     /// knows the body: `ObservedMarker::site` counts the returned rest places, and after them those of the tracks.
     ///
-    /// Of images and of marker times in `from..=to`, every `every`-th is used; pixels on every `pixel_stride`-th row and column.
+    /// Of times of images and clouds, and of markers, in `from..=to` every `every`-th is used; pixels on every `pixel_stride`-th row and column,
+    /// and as large a part of a cloud's points.
     /// What was assumed is added to `warnings`.
     ///
     /// # Errors
@@ -53,7 +62,7 @@ impl Recording {
         warnings: &mut Vec<String>,
     ) -> Result<(Observation, Vec<MarkerRest>), ObservationError> {
         let mut o = Observation {
-            cameras: self.cameras.iter().map(|c| Camera { center: c.position(), axis: c.axis() }).collect(),
+            cameras: self.cameras.iter().map(|c| Camera::Pinhole { center: c.position(), axis: c.axis() }).collect(),
             camera_names: self.cameras.iter().map(|c| c.name.clone()).collect(),
             ..Observation::default()
         };
@@ -102,19 +111,15 @@ impl Recording {
         )
     }
 
+    /// Readings of the surface: depth images and clouds.
     fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), ObservationError> {
-        let mut used = vec![false; self.cameras.len()];
-        let images = self.frames.iter().filter(|f| f.depth.is_some() && (spec.from..=spec.to).contains(&f.time));
-        let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
-        for f in images {
-            if f.time - last > SAME_TIME {
-                instants += 1;
-                last = f.time;
-            }
-            if !(instants - 1).is_multiple_of(spec.every) {
-                continue;
-            }
-            used[f.camera] = true;
+        let chosen = self.chosen_times(spec);
+        let is_chosen = |time: f64| chosen.iter().any(|t| (t - time).abs() <= SAME_TIME);
+        // Noise and systematic error of every sensor that is used, and its number.
+        let mut used: Vec<(usize, f64, f64)> = Vec::new();
+        let mut usable = vec![false; self.cameras.len()];
+        for f in self.frames.iter().filter(|f| f.depth.is_some() && is_chosen(f.time)) {
+            usable[f.camera] = true;
             let camera = &self.cameras[f.camera];
             let strided =
                 f.readings().filter(|(u, v, _)| u.is_multiple_of(spec.pixel_stride) && v.is_multiple_of(spec.pixel_stride));
@@ -136,25 +141,63 @@ impl Recording {
                 ));
             }
         }
+        self.warn_of_images(o, warnings);
+        for (i, c) in self.cameras.iter().enumerate().filter(|(i, _)| usable[*i]) {
+            let noise = stated(c.noise_sigma, warnings, || format!("{}: camera \"{}\" states", self.path.display(), c.name));
+            used.push((i, noise, c.noise_systematic));
+        }
+        for (k, c) in self.clouds.iter().filter(|c| is_chosen(c.time)).enumerate() {
+            let sensor = self.sensor(c.from, o);
+            // As many are left as of an image's pixels.
+            let every = spec.pixel_stride * spec.pixel_stride;
+            let points = c.points.iter().step_by(every).map(|p| ObservedPoint { position: *p, camera: sensor as u32 }).collect();
+            o.frames.push(Frame { time: c.time, points, ..Frame::default() });
+            let mut aside = Vec::new();
+            let said = if k == 0 { &mut *warnings } else { &mut aside };
+            let noise = stated(c.noise_sigma, said, || format!("{}: [[cloud]] states", self.path.display()));
+            if !used.contains(&(sensor, noise, c.noise_systematic)) {
+                used.push((sensor, noise, c.noise_systematic));
+            }
+        }
+        o.frames.sort_by(|a, b| a.time.total_cmp(&b.time));
         if o.frames.iter().all(|f| f.points.is_empty()) {
-            let seen = self.frames.iter().filter(|f| f.readings().next().is_some()).map(|f| f.time);
+            let images = self.frames.iter().filter(|f| f.readings().next().is_some()).map(|f| f.time);
+            let seen = images.chain(self.clouds.iter().filter(|c| !c.points.is_empty()).map(|c| c.time));
             return Err(self.no_data(spec, "depth reading of the object", seen));
         }
-        self.warn_of_images(o, warnings);
-        // One noise serves all cameras: the root mean square of those in use.
-        let cameras = || self.cameras.iter().zip(&used).filter(|(_, u)| **u).map(|(c, _)| c);
-        let n = cameras().count() as f64;
-        for c in cameras().filter(|c| c.noise_sigma.is_none()) {
-            warnings.push(format!(
-                "{}: camera \"{}\" states no noise_sigma; {DEPTH_NOISE} m is assumed",
-                self.path.display(),
-                c.name
-            ));
-        }
-        let noise = (cameras().map(|c| c.noise_sigma.unwrap_or(DEPTH_NOISE).powi(2)).sum::<f64>() / n).sqrt();
-        let systematic = cameras().map(|c| c.noise_systematic).fold(0.0, f64::max);
+        // One noise serves all sensors: the root mean square of those in use.
+        let noise = (used.iter().map(|u| u.1.powi(2)).sum::<f64>() / used.len() as f64).sqrt();
+        let systematic = used.iter().map(|u| u.2).fold(0.0, f64::max);
         o.channels.push(Channel { kind: ReadingKind::Depth, noise, systematic });
         Ok(())
+    }
+
+    /// Times of images and clouds that a scene uses, rising.
+    fn chosen_times(&self, spec: &ObservationSpec) -> Vec<f64> {
+        let images = self.frames.iter().filter(|f| f.depth.is_some()).map(|f| f.time);
+        let mut all: Vec<f64> = images.chain(self.clouds.iter().map(|c| c.time)).collect();
+        all.retain(|t| (spec.from..=spec.to).contains(t));
+        all.sort_by(f64::total_cmp);
+        all.dedup_by(|later, first| *later - *first <= SAME_TIME);
+        all.into_iter().step_by(spec.every).collect()
+    }
+
+    /// Number of what saw a cloud, among the cameras and behind them.
+    fn sensor(&self, from: SeenFrom, o: &mut Observation) -> usize {
+        let camera = match from {
+            SeenFrom::Camera(c) => return c,
+            SeenFrom::Origin(center) => Camera::Scanner { center },
+            SeenFrom::Unknown => Camera::Unknown,
+        };
+        let behind = self.cameras.len();
+        o.cameras[behind..].iter().position(|c| *c == camera).map_or_else(
+            || {
+                o.cameras.push(camera);
+                o.camera_names.push(format!("cloud {}", o.cameras.len() - 1 - behind));
+                o.cameras.len() - 1
+            },
+            |k| behind + k,
+        )
     }
 
     /// Images that say nothing among others that do: without a reading of the object, or with readings at the end of the camera's range.
@@ -168,8 +211,9 @@ impl Recording {
         };
         let seen = |t: f64| o.frames.iter().any(|f| (f.time - t).abs() < SAME_TIME);
         // Readings at the largest count, and all.
-        let count =
-            |i: &RecordedFrame| i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == u16::MAX), all + 1));
+        let count = |i: &RecordedFrame| {
+            i.readings().fold((0, 0), |(full, all), r| (full + usize::from(r.2 == RawDepth::Count(u16::MAX)), all + 1))
+        };
         let images: Vec<(f64, (usize, usize))> =
             self.frames.iter().filter(|f| f.depth.is_some() && seen(f.time)).map(|f| (f.time, count(f))).collect();
         let times = |is: fn(usize, usize) -> bool| -> Vec<f64> {

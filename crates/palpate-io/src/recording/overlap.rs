@@ -40,18 +40,18 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     let size = (max - min).length();
     millimetres(observation, min, max)?;
     let distance = |p: DVec3| (p - p.clamp(min, max)).length();
-    let mut all = Vec::new();
-    for f in &observation.frames {
-        let d: Vec<f64> = positions(f).map(distance).collect();
-        let near = d.iter().filter(|d| **d < 0.5 * size).count();
-        if near > 0 && near * 100 >= d.len() {
-            return Ok(());
-        }
-        all.extend(d);
-    }
-    if all.is_empty() {
+    let lies_near = |scale: f64| {
+        observation.frames.iter().any(|f| {
+            let near = positions(f).filter(|p| distance(scale * *p) < 0.5 * size).count();
+            near > 0 && near * 100 >= positions(f).count()
+        })
+    };
+    let mut all: Vec<f64> = observation.frames.iter().flat_map(positions).map(distance).collect();
+    if lies_near(1.0) || all.is_empty() {
         return Ok(());
     }
+    let unit = [(0.001, "millimetres"), (0.01, "centimetres")].into_iter().find(|u| lies_near(u.0));
+    let hint = unit.map_or(String::new(), |u| format!("; in {} it would lie at the object", u.1));
     let nearest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let middle = all.len() / 2;
     let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
@@ -59,6 +59,6 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     Err(format!(
         "the recording lies nowhere near the object: the median distance of {of} points from it is {median:.4} m \
          (nearest {nearest:.4} m, {factor:.1} × the object's diagonal of {size:.4} m); \
-         check object.pose, world_from_camera and the units"
+         check object.pose, world_from_camera and the units{hint}"
     ))
 }

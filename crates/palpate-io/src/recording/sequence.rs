@@ -1,6 +1,7 @@
 //! Things that are seen again and again, in arrays of NumPy: tracked points (`[points]`) and node displacements (`[displacements]`).
 
 use super::{inside, noise};
+use crate::cloud::ending;
 use crate::document::{Source, Table};
 use crate::error::{InputError, number};
 use crate::npy::{Array, is_archive, read_array};
@@ -62,18 +63,18 @@ pub struct RecordedDisplacements {
 }
 
 /// A table whose arrays are read.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     source: &'a Source,
     table: Table<'a>,
-    file: PathBuf,
+    pub(super) file: PathBuf,
     /// Metres of a unit, and what follows.
-    unit: f64,
-    transform: DAffine3,
+    pub(super) unit: f64,
+    pub(super) transform: DAffine3,
 }
 
 pub(super) fn points(source: &Source, root: &Table) -> Result<Option<RecordedPoints>, InputError> {
     let Some(table) = root.optional_table("points")? else { return Ok(None) };
-    let r = Reader::new(source, table)?;
+    let r = Reader::new(source, table, &["npy", "npz"])?;
     let track = r.sequence("points", |p| r.transform.transform_point3(p))?;
     let rest = r.rest(&track)?;
     let tolerance = r.table.f64_where("tolerance", |x| x > 0.0, "is not allowed: must be > 0 (m)")?;
@@ -82,7 +83,7 @@ pub(super) fn points(source: &Source, root: &Table) -> Result<Option<RecordedPoi
 
 pub(super) fn displacements(source: &Source, root: &Table) -> Result<Option<RecordedDisplacements>, InputError> {
     let Some(table) = root.optional_table("displacements")? else { return Ok(None) };
-    let r = Reader::new(source, table)?;
+    let r = Reader::new(source, table, &["npy", "npz"])?;
     let track = r.sequence("displacements", |u| r.transform.transform_vector3(u))?;
     let nodes = match r.table.optional_str("nodes")? {
         None => Vec::new(),
@@ -92,10 +93,13 @@ pub(super) fn displacements(source: &Source, root: &Table) -> Result<Option<Reco
 }
 
 impl<'a> Reader<'a> {
-    fn new(source: &'a Source, table: Table<'a>) -> Result<Reader<'a>, InputError> {
-        let file = inside(source, &table, "file")?.ok_or_else(|| table.missing("file", "an .npy or .npz file"))?;
-        if !is_array(&file) {
-            return Err(table.error("file", format!("\"{}\" is neither an .npy nor an .npz file", file.display())));
+    /// Of a table whose `file` has one of these endings.
+    pub(super) fn new(source: &'a Source, table: Table<'a>, endings: &[&str]) -> Result<Reader<'a>, InputError> {
+        let allowed = endings.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(", ");
+        let file =
+            inside(source, &table, "file")?.ok_or_else(|| table.missing("file", &format!("a file; allowed: {allowed}")))?;
+        if !endings.contains(&ending(&file).as_str()) {
+            return Err(table.error("file", format!("\"{}\" is none of {allowed}", file.display())));
         }
         let units = [("m", 1.0), ("cm", 0.01), ("mm", 0.001)];
         let unit = table.optional_choice("unit", &units)?.unwrap_or(1.0);
@@ -121,16 +125,21 @@ impl<'a> Reader<'a> {
         read_array(&super::inside_text(self.source, &self.table, key, &file)?, name)
     }
 
+    /// The array that the table is about; `usual` is its name where none is given.
+    pub(super) fn main_array(&self, usual: &str) -> Result<Array, InputError> {
+        let named = self.table.optional_str("array")?;
+        if is_archive(&self.file) {
+            read_array(&self.file, Some(named.unwrap_or(usual)))
+        } else if named.is_some() {
+            Err(self.table.error("array", "names an array of an .npz file, and `file` is an .npy file"))
+        } else {
+            read_array(&self.file, None)
+        }
+    }
+
     fn sequence(&self, usual: &str, place: impl Fn(DVec3) -> DVec3) -> Result<Sequence, InputError> {
         let t = &self.table;
-        let named = t.optional_str("array")?;
-        let array = if is_archive(&self.file) {
-            read_array(&self.file, Some(named.unwrap_or(usual)))?
-        } else if named.is_some() {
-            return Err(t.error("array", "names an array of an .npz file, and `file` is an .npy file"));
-        } else {
-            read_array(&self.file, None)?
-        };
+        let array = self.main_array(usual)?;
         let [frames, count, 3] = array.shape[..] else {
             let text = format!("has shape {}, expected (frames, points, 3)", array.shape_text());
             return Err(t.error("file", text));
@@ -159,7 +168,7 @@ impl<'a> Reader<'a> {
     }
 
     /// `times` (numbers, or an array by name), or `rate` with `start`.
-    fn times(&self, frames: usize) -> Result<Vec<f64>, InputError> {
+    pub(super) fn times(&self, frames: usize) -> Result<Vec<f64>, InputError> {
         let t = &self.table;
         if t.has("rate") == t.has("times") {
             return Err(t.missing("times", "numbers (s) or an array, or `rate` (1/s) instead"));
@@ -238,10 +247,6 @@ pub(super) fn check_times(times: &[f64], frames: usize) -> Result<(), String> {
     }
     let wrong = (0..frames).find(|k| !times[*k].is_finite() || (*k > 0 && times[*k] <= times[k - 1]));
     wrong.map_or(Ok(()), |k| Err(format!("{} of frame {k} is not finite, or not after the one before", number(times[k]))))
-}
-
-fn is_array(path: &std::path::Path) -> bool {
-    is_archive(path) || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"))
 }
 
 #[cfg(test)]

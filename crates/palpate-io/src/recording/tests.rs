@@ -15,7 +15,7 @@ fn camera(name: &str) -> RecordedCamera {
         height: 6,
         focal: [10.0, 11.0],
         center: [3.4, 2.6],
-        distortion: [0.1, -0.02, 0.001, -0.002, 0.003],
+        distortion: [0.1, -0.02, 0.001, -0.002, 0.003, 0.0, 0.0, 0.0],
         world_from_camera: DAffine3::from_rotation_translation(DQuat::from_rotation_y(0.3), DVec3::new(0.1, 0.2, -0.5)),
         depth_scale: Some(0.001),
         depth_offset: -0.01,
@@ -26,7 +26,7 @@ fn camera(name: &str) -> RecordedCamera {
 
 fn sample() -> Recording {
     let counts: Vec<u16> = (0..48).map(|i| if i % 5 == 0 { 0 } else { 500 + i }).collect();
-    let depth = DepthImage { width: 8, height: 6, counts };
+    let depth = DepthImage { width: 8, height: 6, pixels: DepthPixels::Counts(counts) };
     let mask: Vec<bool> = (0..48).map(|i| i % 2 == 0).collect();
     let frame = |camera, time| RecordedFrame { camera, time, depth: Some(depth.clone()), mask: Some(mask.clone()) };
     let mut silhouette = frame(0, 0.2);
@@ -38,6 +38,7 @@ fn sample() -> Recording {
         source: "made up".into(),
         cameras: vec![camera("left"), camera("right one")],
         frames: vec![frame(0, -0.1), frame(1, -0.1), frame(0, 0.1), silhouette],
+        clouds: Vec::new(),
         markers: Some(RecordedMarkers {
             file: PathBuf::new(),
             names: vec!["a".into(), "b".into()],
@@ -113,7 +114,7 @@ fn distortion_is_opencvs() {
     c.world_from_camera = DAffine3::IDENTITY;
     (c.focal, c.center) = ([100.0, 200.0], [50.0, 30.0]);
     // k1, k2, p1, p2, k3.
-    c.distortion = [0.4, -0.8, 0.02, 0.05, 1.6];
+    c.distortion = [0.4, -0.8, 0.02, 0.05, 1.6, 0.0, 0.0, 0.0];
     // (0.6, 0.8, 2) has x = 0.3, y = 0.4, r² = 0.25, r⁴ = 0.0625, r⁶ = 0.015625.
     // Radial: 1 + 0.4·0.25 − 0.8·0.0625 + 1.6·0.015625 = 1 + 0.1 − 0.05 + 0.025 = 1.075.
     // Tangential: 2·0.02·0.12 + 0.05·(0.25 + 2·0.09) = 0.0048 + 0.0215 = 0.0263 in x,
@@ -256,7 +257,7 @@ fn faults_of_images_are_named() {
 
     let folder = tempfile::tempdir().unwrap();
     let mut s = sample();
-    s.frames[2].depth.as_mut().unwrap().counts.fill(0);
+    s.frames[2].depth.as_mut().unwrap().pixels = DepthPixels::Counts(vec![0; 48]);
     write_recording(folder.path(), &s).unwrap();
     let w = read_recording(folder.path()).unwrap().warnings;
     assert!(w.len() == 1 && w[0].contains("holds no reading of the object"), "{w:?}");
@@ -285,5 +286,9 @@ fn a_recording_elsewhere_is_refused_with_numbers() {
     let far = c + DVec3::new(0.0, 0.0, 7.0);
     let e = check_overlap(&o, far - DVec3::splat(0.1), far + DVec3::splat(0.1)).unwrap_err();
     assert!(e.contains("nowhere near") && e.contains("diagonal of 0.3464 m") && e.contains("object.pose"), "{e}");
+    let mut large = o.clone();
+    large.frames.iter_mut().flat_map(|f| &mut f.points).for_each(|p| p.position *= 1000.0);
+    let e = check_overlap(&large, c - DVec3::splat(0.1), c + DVec3::splat(0.1)).unwrap_err();
+    assert!(e.ends_with("the units; in millimetres it would lie at the object"), "{e}");
     assert_eq!(check_overlap(&Observation::default(), far, far), Ok(()), "nothing measured is another error");
 }

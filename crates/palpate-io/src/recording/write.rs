@@ -1,6 +1,7 @@
 //! Synthetic recordings, in the format that is read.
 
-use super::{FORMAT, RecordedDisplacements, RecordedMarkers, RecordedPoints, Recording, Sequence};
+use super::{DepthPixels, FORMAT, RecordedDisplacements, RecordedMarkers, RecordedPoints, Recording, SeenFrom, Sequence};
+use crate::cloud::{ending, write_cloud};
 use crate::error::OutputError;
 use crate::npy::{Array, write_npz};
 use crate::output::{make_folder, write_file};
@@ -8,8 +9,12 @@ use glam::{DAffine3, DVec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::fmt::Write as _;
 use std::path::Path;
+use tiff::TiffError;
+use tiff::encoder::TiffEncoder;
+use tiff::encoder::colortype::Gray32Float;
 
-/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `markers.csv`, `points.npz`, `displacements.npz`. [`super::read_recording`] gives it back.
+/// Writes a recording as a folder: `recording.toml`, `depth/`, `mask/`, `cloud/`, `markers.csv`, `points.npz`,
+/// `displacements.npz`. [`super::read_recording`] gives it back.
 ///
 /// # Errors
 /// The file that could not be written and why.
@@ -29,9 +34,18 @@ pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Resul
         let _ = write!(toml, "\n[[frame]]\ncamera = {}\ntime = {:?}\n", quoted(&camera.name), f.time);
         let size = (camera.width as u32, camera.height as u32);
         if let Some(d) = &f.depth {
-            let bytes: Vec<u8> = d.counts.iter().flat_map(|c| c.to_ne_bytes()).collect();
-            png(folder, &place("depth"), &bytes, size, ExtendedColorType::L16)?;
-            let _ = writeln!(toml, "depth = \"{}\"", place("depth"));
+            let mut file = place("depth");
+            match &d.pixels {
+                DepthPixels::Counts(counts) => {
+                    let bytes: Vec<u8> = counts.iter().flat_map(|c| c.to_ne_bytes()).collect();
+                    png(folder, &file, &bytes, size, ExtendedColorType::L16)?;
+                }
+                DepthPixels::Metres(metres) => {
+                    file = file.replace(".png", ".tiff");
+                    tiff(folder, &file, metres, size)?;
+                }
+            }
+            let _ = writeln!(toml, "depth = \"{file}\"");
         }
         if let Some(m) = &f.mask {
             let bytes: Vec<u8> = m.iter().map(|b| if *b { 255 } else { 0 }).collect();
@@ -39,6 +53,7 @@ pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Resul
             let _ = writeln!(toml, "mask = \"{}\"", place("mask"));
         }
     }
+    write_clouds(folder, &mut toml, recording)?;
     if let Some(m) = &recording.markers {
         write_markers(folder, &mut toml, m)?;
     }
@@ -71,7 +86,8 @@ fn head(toml: &mut String, r: &Recording) -> std::fmt::Result {
     for c in &r.cameras {
         writeln!(toml, "\n[[camera]]\nname = {}\nwidth = {}\nheight = {}", quoted(&c.name), c.width, c.height)?;
         writeln!(toml, "fx = {:?}\nfy = {:?}\ncx = {:?}\ncy = {:?}", c.focal[0], c.focal[1], c.center[0], c.center[1])?;
-        writeln!(toml, "distortion = {:?}", c.distortion)?;
+        let coefficients = if c.distortion[5..] == [0.0; 3] { 5 } else { 8 };
+        writeln!(toml, "distortion = {:?}", &c.distortion[..coefficients])?;
         writeln!(toml, "world_from_camera = {}", matrix(&c.world_from_camera))?;
         if let Some(s) = c.depth_scale {
             writeln!(toml, "depth_scale = {s:?}")?;
@@ -91,6 +107,48 @@ fn png(folder: &Path, place: &str, bytes: &[u8], (w, h): (u32, u32), color: Exte
         make_folder(parent)?;
     }
     write_file(&path, |out| PngEncoder::new(out).write_image(bytes, w, h, color).map_err(std::io::Error::other))
+}
+
+fn tiff(folder: &Path, place: &str, metres: &[f32], (w, h): (u32, u32)) -> Result<(), OutputError> {
+    let path = folder.join(place);
+    if let Some(parent) = path.parent() {
+        make_folder(parent)?;
+    }
+    let encoded = (|| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        TiffEncoder::new(&mut bytes)?.write_image::<Gray32Float>(w, h, metres)?;
+        Ok::<_, TiffError>(bytes.into_inner())
+    })();
+    write_file(&path, |out| out.write_all(&encoded.map_err(std::io::Error::other)?))
+}
+
+/// Clouds, each in a file of the kind that it came from.
+fn write_clouds(folder: &Path, toml: &mut String, recording: &Recording) -> Result<(), OutputError> {
+    for (number, c) in recording.clouds.iter().enumerate() {
+        let kind = match ending(&c.file).as_str() {
+            "pcd" => "pcd",
+            "npz" | "npy" => "npz",
+            _ => "ply",
+        };
+        let place = format!("cloud/{number:06}.{kind}");
+        let _ = writeln!(toml, "\n[[cloud]]\nfile = \"{place}\"\ntime = {:?}", c.time);
+        match c.from {
+            SeenFrom::Camera(k) => writeln!(toml, "camera = {}", quoted(&recording.cameras[k].name)),
+            SeenFrom::Origin(o) => writeln!(toml, "origin = {}", vector(o)),
+            SeenFrom::Unknown => Ok(()),
+        }
+        .unwrap_or_default();
+        if let Some(s) = c.noise_sigma {
+            let _ = writeln!(toml, "noise_sigma = {s:?}");
+        }
+        let _ = writeln!(toml, "noise_systematic = {:?}", c.noise_systematic);
+        make_folder(folder.join("cloud"))?;
+        match kind {
+            "npz" => write_npz(folder.join(place), &[("points", &array(&[c.points.len(), 3], &c.points))])?,
+            _ => write_cloud(folder.join(place), &c.points)?,
+        }
+    }
+    Ok(())
 }
 
 fn write_markers(folder: &Path, toml: &mut String, m: &RecordedMarkers) -> Result<(), OutputError> {

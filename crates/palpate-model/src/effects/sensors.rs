@@ -102,9 +102,10 @@ impl Sensors {
         self.links_of(camera).rev().fold(seen, |s, l| l.reading.undo(s, &l.values))
     }
 
-    /// What would have been read without the effects.
+    /// What would have been read without the effects, which leave points without a line of sight where they are.
     pub fn truth(&self, camera: &Camera, point: &ObservedPoint) -> Seen<f64> {
-        self.undo(camera.sees(point.position), point.camera)
+        let seen = camera.sees(point.position);
+        if *camera == Camera::Unknown { seen } else { self.undo(seen, point.camera) }
     }
 
     /// A frame's points where they truly were; `None` when that is where the recording has them.
@@ -118,8 +119,15 @@ impl Sensors {
     /// The cameras where they truly were.
     pub fn cameras(&self, cameras: &[Camera]) -> Vec<Camera> {
         let moved = |(number, c): (usize, &Camera)| {
-            let seen = self.undo(c.sees(c.center + c.axis), number as u32);
-            Camera { center: DVec3::from_array(seen.center), axis: DVec3::from_array(seen.axis) }
+            let at = |center: DVec3, axis: DVec3| self.undo(c.sees(center + axis), number as u32);
+            match c {
+                Camera::Pinhole { center, axis } => {
+                    let seen = at(*center, *axis);
+                    Camera::Pinhole { center: DVec3::from_array(seen.center), axis: DVec3::from_array(seen.axis) }
+                }
+                Camera::Scanner { center } => Camera::Scanner { center: DVec3::from_array(at(*center, DVec3::X).center) },
+                Camera::Unknown => Camera::Unknown,
+            }
         };
         cameras.iter().enumerate().map(moved).collect()
     }
@@ -133,6 +141,9 @@ impl Sensors {
         wanted: impl Fn(usize) -> bool,
         mut add: impl FnMut(usize, DVec3),
     ) {
+        if *camera == Camera::Unknown {
+            return;
+        }
         let mut before = camera.sees(point.position);
         let chain = || self.links_of(point.camera).rev();
         for (n, link) in chain().enumerate() {
@@ -196,7 +207,7 @@ impl Sensors {
 /// A camera's pose after what moves its readings.
 fn moved(pose: DAffine3, by: impl Fn(Seen<f64>) -> Seen<f64>) -> DAffine3 {
     // A law that moves the camera turns every direction fixed to it as it turns the axis.
-    let along = |axis: DVec3| by(Camera { center: pose.translation, axis }.sees(pose.translation + axis));
+    let along = |axis: DVec3| by(Camera::Pinhole { center: pose.translation, axis }.sees(pose.translation + axis));
     let m = pose.matrix3;
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(|a| DVec3::from_array(along(a).axis));
     let center = DVec3::from_array(along(m.z_axis).center);

@@ -5,7 +5,7 @@ use std::fmt;
 /// How a reading is compared with a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ReadingKind {
-    /// A point of a depth image and its distance from the surface: one residual.
+    /// A point of a depth image or a point cloud, and its distance from the surface: one residual.
     Depth,
     /// Displacement of a simulation node: three residuals.
     Displacement,
@@ -59,6 +59,8 @@ impl Channel {
 pub enum Sensor {
     /// A depth camera, by its number in [`super::Observation::cameras`].
     Camera(u32),
+    /// What a point cloud without a camera was seen from, by its number in [`super::Observation::cameras`].
+    Cloud(u32),
     /// Whatever gave displacements of simulation nodes.
     Nodes,
     /// A marker, by its number in [`super::Observation::markers`].
@@ -71,7 +73,7 @@ impl Sensor {
     /// How its readings are compared.
     pub fn kind(self) -> ReadingKind {
         match self {
-            Sensor::Camera(_) => ReadingKind::Depth,
+            Sensor::Camera(_) | Sensor::Cloud(_) => ReadingKind::Depth,
             Sensor::Nodes => ReadingKind::Displacement,
             Sensor::Marker(_) => ReadingKind::Marker,
             Sensor::Tracks => ReadingKind::Track,
@@ -83,9 +85,14 @@ impl Sensor {
         !matches!(self, Sensor::Marker(_))
     }
 
-    /// True of a depth camera.
+    /// True of a depth camera: its readings stand in the order of an image's pixels.
     pub fn is_camera(self) -> bool {
         matches!(self, Sensor::Camera(_))
+    }
+
+    /// True of what gives points of the surface.
+    pub fn is_depth(self) -> bool {
+        self.kind() == ReadingKind::Depth
     }
 }
 
@@ -93,6 +100,7 @@ impl fmt::Display for Sensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Sensor::Camera(c) => write!(f, "camera {c}"),
+            Sensor::Cloud(c) => write!(f, "cloud {c}"),
             Sensor::Nodes => write!(f, "nodes"),
             Sensor::Marker(m) => write!(f, "marker {m}"),
             Sensor::Tracks => write!(f, "points"),

@@ -1,21 +1,57 @@
 //! Cameras, and what was seen at one time.
 
+use super::channel::Sensor;
 use crate::effects::reading::Seen;
 use glam::DVec3;
 
-/// A camera's place and direction.
+/// From where points of the surface were seen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Camera {
-    /// Centre of projection in the world [m].
-    pub center: DVec3,
-    /// Unit vector along which depth counts.
-    pub axis: DVec3,
+pub enum Camera {
+    /// A depth camera.
+    Pinhole {
+        /// Centre of projection in the world [m].
+        center: DVec3,
+        /// Unit vector along which depth counts.
+        axis: DVec3,
+    },
+    /// A scanner that looks from one place into all directions: distances count along its rays.
+    Scanner {
+        /// Where the rays come from [m].
+        center: DVec3,
+    },
+    /// Nobody knows: points have no line of sight, and may lie on any side of the body.
+    Unknown,
 }
 
 impl Camera {
-    /// A reading of this camera at a world point [m].
+    /// Where lines of sight come from [m].
+    pub fn center(&self) -> Option<DVec3> {
+        match self {
+            Camera::Pinhole { center, .. } | Camera::Scanner { center } => Some(*center),
+            Camera::Unknown => None,
+        }
+    }
+
+    /// Unit vector along the line of sight to a point [m]; zero where there is none.
+    pub fn line(&self, point: DVec3) -> DVec3 {
+        self.center().map_or(DVec3::ZERO, |c| (point - c).normalize_or_zero())
+    }
+
+    /// A reading at a world point [m]; without a line of sight its ray and its axis are zero.
     pub fn sees(&self, point: DVec3) -> Seen<f64> {
-        Seen { point: point.to_array(), center: self.center.to_array(), axis: self.axis.to_array() }
+        let axis = match self {
+            Camera::Pinhole { axis, .. } => *axis,
+            Camera::Scanner { .. } | Camera::Unknown => self.line(point),
+        };
+        Seen { point: point.to_array(), center: self.center().unwrap_or(point).to_array(), axis: axis.to_array() }
+    }
+
+    /// What takes its readings, where it has this number in [`super::Observation::cameras`].
+    pub fn sensor(&self, number: u32) -> Sensor {
+        match self {
+            Camera::Pinhole { .. } => Sensor::Camera(number),
+            Camera::Scanner { .. } | Camera::Unknown => Sensor::Cloud(number),
+        }
     }
 }
 
@@ -24,7 +60,7 @@ impl Camera {
 pub struct Frame {
     /// Time on the recording's clock [s].
     pub time: f64,
-    /// Points of depth images.
+    /// Points of depth images and point clouds.
     pub points: Vec<ObservedPoint>,
     /// Markers and tracked points.
     pub markers: Vec<ObservedMarker>,
@@ -43,12 +79,12 @@ impl Frame {
     }
 }
 
-/// One pixel of a depth image as a world point.
+/// One pixel of a depth image, or one point of a cloud, as a world point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedPoint {
     /// World position [m].
     pub position: DVec3,
-    /// Number of the camera in [`super::Observation::cameras`].
+    /// Number of what saw it in [`super::Observation::cameras`].
     pub camera: u32,
 }
 

@@ -20,7 +20,7 @@ use glam::DVec3;
 pub struct Observation {
     /// Kinds of readings that frames may hold, one channel each at most.
     pub channels: Vec<Channel>,
-    /// Cameras, for visibility.
+    /// Cameras, for visibility, and after them what else saw points of the surface.
     pub cameras: Vec<Camera>,
     /// Their names in the recording; fewer where it gives none.
     pub camera_names: Vec<String>,
@@ -73,7 +73,7 @@ impl Observation {
     /// Name of a sensor: that of the camera or marker in the recording, or what it is.
     pub fn name(&self, sensor: Sensor) -> String {
         let known = match sensor {
-            Sensor::Camera(c) => self.camera_names.get(c as usize).cloned(),
+            Sensor::Camera(c) | Sensor::Cloud(c) => self.camera_names.get(c as usize).cloned(),
             Sensor::Marker(m) => self.markers.get(m as usize).map(|m| m.name.clone()),
             Sensor::Nodes | Sensor::Tracks => None,
         };
@@ -86,6 +86,22 @@ impl Observation {
             ReadingKind::Track => Sensor::Tracks,
             _ => Sensor::Marker(site),
         }
+    }
+
+    /// The sensor that saw a point of the surface.
+    pub fn sensor_of_point(&self, point: &ObservedPoint) -> Sensor {
+        self.cameras[point.camera as usize].sensor(point.camera)
+    }
+
+    /// Number of depth cameras, what else saw points not among them.
+    pub fn camera_count(&self) -> usize {
+        self.cameras.iter().filter(|c| matches!(c, Camera::Pinhole { .. })).count()
+    }
+
+    /// True where some point of the surface has a line of sight, or there is no such point.
+    pub fn has_sight(&self) -> bool {
+        let mut used = self.frames.iter().flat_map(|f| &f.points).map(|p| &self.cameras[p.camera as usize]).peekable();
+        used.peek().is_none() || used.any(|c| c.center().is_some())
     }
 
     /// Number of markers, tracked points not among them.

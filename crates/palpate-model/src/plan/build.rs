@@ -106,7 +106,13 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
     sites::check_nodes(&observation, &body)?;
     // A scene that is only simulated concerns no camera.
     if !observation.frames.is_empty() {
-        check_choices(&scene.effects, observation.cameras.len(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
+        check_choices(&scene.effects, observation.camera_count(), observation.marker_count()).map_err(|(k, m)| error(k, m))?;
+        let of_readings = |e: &Effect| matches!(e.law().site, Site::Readings(_));
+        if let Some(i) = scene.effects.iter().position(of_readings).filter(|_| !observation.has_sight()) {
+            let text =
+                "acts along lines of sight, and no point that was measured has one; give `camera` or `origin` in [[cloud]]";
+            return Err(error(format!("effect.{i}.kind"), text.into()));
+        }
     }
     check_effects(scene, &body)?;
     let planes = scene

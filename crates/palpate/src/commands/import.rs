@@ -186,6 +186,7 @@ fn report(a: &Arguments, i: &Imported) -> String {
     t += &format!("  {from:.3} to {to:.3} s");
     for (n, what) in [
         (i.images, "depth images"),
+        (i.clouds, "point clouds"),
         (i.cameras, "cameras"),
         (i.depth_readings, "depth readings of the object"),
         (i.marker_readings, "readings of markers"),
@@ -216,6 +217,7 @@ fn document(i: &Imported) -> ImportDocument {
         why: i.why.clone(),
         cameras: i.cameras,
         images: i.images,
+        clouds: i.clouds,
         depth_readings: i.depth_readings,
         marker_readings: i.marker_readings,
         tracked_readings: i.tracked_readings,

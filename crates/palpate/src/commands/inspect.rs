@@ -1,6 +1,7 @@
 //! `palpate inspect`: what would be simulated and fitted, and what looks wrong.
 
 mod identify;
+mod recorded;
 mod tets;
 
 use crate::catalogue;
@@ -12,15 +13,12 @@ use crate::fitting::{self, free_parameters};
 use crate::memory::{Demand, adapter};
 use crate::options::BackendName;
 use crate::progress::Track;
-use crate::results::inspection::{
-    CameraInspection, Cells, Constraints, Images, Inspected, InspectionDocument, Markers, Observed, RecordingInspection,
-    SceneInspection, SequenceInspection, Time,
-};
-use crate::results::{self, finite, inspection};
+use crate::results::inspection::{Cells, Constraints, Inspected, InspectionDocument, Observed, SceneInspection, Time};
+use crate::results::{self, inspection};
 use crate::suited::{Suited, suited};
 use clap::Args;
 use palpate_gpu::AdapterReport;
-use palpate_io::recording::{Recording, Sequence, read_recording};
+use palpate_io::recording::read_recording;
 use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
 use palpate_model::scene::BodySource;
@@ -77,7 +75,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     };
     let (kind, content, lines, warnings) = if is_recording(path) {
         let r = read_recording(path)?;
-        let (content, lines) = recording(&r);
+        let (content, lines) = recorded::recording(&r);
         ("recording", Inspected::Recording(Box::new(content)), lines, r.warnings)
     } else {
         let e = Experiment::open(path)?;
@@ -330,86 +328,6 @@ fn counted(n: usize, one: &str, many: &str) -> String {
 /// Smallest and largest of some numbers; zeros without any.
 fn extremes(numbers: &[usize]) -> [usize; 2] {
     [numbers.iter().min().copied().unwrap_or(0), numbers.iter().max().copied().unwrap_or(0)]
-}
-
-fn recording(r: &Recording) -> (RecordingInspection, Lines) {
-    let mut content = RecordingInspection { title: title(&r.title), ..RecordingInspection::default() };
-    let mut lines: Lines = content.title.iter().map(|t| ("title", t.clone())).collect();
-    let stated = |noise: Option<f64>| noise.map_or("not stated".to_string(), |s| format!("{:.2} mm", s * 1e3));
-    for c in &r.cameras {
-        let (noise, at) = (stated(c.noise_sigma), c.position());
-        lines.push(("camera", format!("{} {} × {} pixels, noise {noise}, at {at:.3}", c.name, c.width, c.height)));
-        content.cameras.push(CameraInspection {
-            name: c.name.clone(),
-            width: c.width,
-            height: c.height,
-            noise: c.noise_sigma,
-            systematic: c.noise_systematic,
-            position: at.to_array(),
-        });
-    }
-    let readings: Vec<usize> = r.frames.iter().map(|f| f.readings().count()).collect();
-    if let (Some(first), Some(last)) = (r.frames.first(), r.frames.last()) {
-        let (count, [low, high], from, to) = (r.frames.len(), extremes(&readings), first.time, last.time);
-        lines.push(("images", format!("{count} from {from:.4} s to {to:.4} s, {low} to {high} readings of the object each")));
-        let readings = readings.iter().sum();
-        content.frames = Some(Images { count, from, to, readings, readings_per_image: [low, high] });
-    }
-    if let Some(m) = &r.markers {
-        let (from, to) = (m.samples.first().map_or(f64::NAN, |s| s.time), m.samples.last().map_or(f64::NAN, |s| s.time));
-        lines.push((
-            "markers",
-            format!(
-                "{} markers, {} readings from {} s to {} s, noise {}, {} with a rest place",
-                m.names.len(),
-                m.samples.len(),
-                short(from),
-                short(to),
-                stated(m.noise_sigma),
-                m.rest.len()
-            ),
-        ));
-        content.markers = Some(Markers {
-            names: m.names.clone(),
-            readings: m.samples.len(),
-            from: finite(from),
-            to: finite(to),
-            noise: m.noise_sigma,
-            rest_places: m.rest.len(),
-        });
-    }
-    let mut of_array = |label: &'static str, s: &Sequence, things: &str| {
-        let found = sequence(s);
-        let text = format!(
-            "{} {things}, {} of {} readings seen in {} frames from {} s to {} s, noise {}",
-            found.count,
-            found.readings,
-            found.readings + found.unseen,
-            found.frames,
-            short(found.from),
-            short(found.to),
-            stated(s.noise_sigma)
-        );
-        lines.push((label, text));
-        found
-    };
-    content.points = r.points.as_ref().map(|p| of_array("tracked points", &p.track, "points"));
-    content.displacements = r.displacements.as_ref().map(|d| of_array("displacements", &d.track, "nodes"));
-    (content, lines)
-}
-
-/// What an array holds.
-fn sequence(s: &Sequence) -> SequenceInspection {
-    let (count, readings) = (s.count(), s.readings());
-    SequenceInspection {
-        count,
-        frames: s.times.len(),
-        readings,
-        unseen: s.vectors.len() - readings,
-        from: s.times.first().copied().unwrap_or_default(),
-        to: s.times.last().copied().unwrap_or_default(),
-        noise: s.noise_sigma,
-    }
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use crate::embed::Embedding;
 use crate::engine::{Backend, between};
 use crate::experiment::Experiment;
 use crate::render::Pinhole;
-use crate::residuals::{pinhole, spread};
+use crate::residuals::spread;
 use crate::synthetic::read_depths;
+use crate::viewers::viewers;
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_diagnose::{Model, Separation, direction};
 use palpate_engine::{Snapshot, Stop};
@@ -49,7 +50,7 @@ pub(super) fn separations(base: &[Experiment], backend: Backend, models: &[&Mode
         let one = |(m, r): (&&Model, &Prepared)| watch.motion(r, &m.values, trial, backend, stop);
         models.par_iter().zip(&ready).map(one).collect()
     };
-    let mut compare = |measurement: String, motions: &[Motion], cameras: &[Pinhole], markers: bool| {
+    let mut compare = |measurement: String, motions: &[Motion], cameras: &[(u32, Pinhole)], markers: bool| {
         let seen: Vec<Seen> = motions.par_iter().map(|m| watch.read(m, cameras, markers)).collect();
         let differences: Option<Vec<(f64, f64)>> = seen[1..].iter().map(|s| watch.apart(&seen[0], s)).collect();
         out.extend(differences.map(|differences| Separation { measurement, differences }));
@@ -111,8 +112,8 @@ struct Watch {
     times: Vec<f64>,
     surface: Embedding,
     triangles: Vec<[u32; 3]>,
-    /// As the recording states them.
-    cameras: Vec<Pinhole>,
+    /// As the recording states them, with their numbers in the observation.
+    cameras: Vec<(u32, Pinhole)>,
     /// The largest difference of a depth that counts [m]: where an outline has moved by a pixel, depth jumps by as much as the body is deep.
     largest: f64,
 }
@@ -145,7 +146,7 @@ impl Watch {
             times: spread(&all, count).into_iter().map(|f| o.frames[f].time).collect(),
             surface,
             triangles,
-            cameras: e.recording().iter().flat_map(|r| &r.cameras).map(|c| coarse(pinhole(c))).collect(),
+            cameras: viewers(e).into_iter().map(|(number, c)| (number, coarse(c))).collect(),
             largest: e.plan.body.length,
         }
     }
@@ -180,12 +181,12 @@ impl Watch {
     }
 
     /// What cameras at these stated poses, and markers where they are wanted, read of a motion.
-    fn read(&self, m: &Motion, cameras: &[Pinhole], markers: bool) -> Seen {
+    fn read(&self, m: &Motion, cameras: &[(u32, Pinhole)], markers: bool) -> Seen {
         let mut out = Seen::default();
         for u in &m.frames {
             let vertices = self.surface.deform(u);
-            for (number, stated) in cameras.iter().enumerate() {
-                let number = number as u32;
+            for (number, stated) in cameras {
+                let number = *number;
                 let camera =
                     Pinhole { world_from_camera: m.sensors.true_pose(number, stated.world_from_camera), ..stated.clone() };
                 out.depths.extend(read_depths(&m.sensors, number, &camera, &vertices, &self.triangles).depth);
@@ -215,7 +216,7 @@ impl Watch {
     }
 
     /// The cameras elsewhere: nearer and farther along the line to the middle of a motion, and a quarter turn around it.
-    fn views(&self, m: &Motion, up: DVec3) -> Vec<(String, Vec<Pinhole>)> {
+    fn views(&self, m: &Motion, up: DVec3) -> Vec<(String, Vec<(u32, Pinhole)>)> {
         let middle = |u: &Vec<DVec3>| {
             let x = self.surface.deform(u);
             x.iter().sum::<DVec3>() / x.len().max(1) as f64
@@ -236,7 +237,8 @@ impl Watch {
             DAffine3::from_translation(target) * turn * DAffine3::from_translation(-target) * c.world_from_camera
         };
         let stand = |pose: &dyn Fn(&Pinhole) -> DAffine3| {
-            self.cameras.iter().map(|c| Pinhole { world_from_camera: pose(c), ..c.clone() }).collect::<Vec<_>>()
+            let stood = |(number, c): &(u32, Pinhole)| (*number, Pinhole { world_from_camera: pose(c), ..c.clone() });
+            self.cameras.iter().map(stood).collect::<Vec<_>>()
         };
         vec![
             (format!("{which} at 3/4 of its distance"), stand(&at(0.75))),

@@ -8,7 +8,7 @@ use crate::experiment::Experiment;
 use palpate_diagnose::{Change, Field, LabError, Reading};
 use palpate_engine::Source;
 use palpate_model::effects::{Effect, find};
-use palpate_model::observation::{ReadingKind, Sensor};
+use palpate_model::observation::{Camera, ReadingKind, Sensor};
 
 /// A measuring effect with its choice (a marker, say) made.
 fn effect(kind: &str, choice: Option<usize>) -> Option<Change> {
@@ -19,7 +19,7 @@ fn effect(kind: &str, choice: Option<usize>) -> Option<Change> {
     Some(Change::Effect(effect))
 }
 
-/// One field for every marker and axis, for every camera, and for every axis of tracked points, of every recording that states `noise_systematic`.
+/// One field for every marker and axis, for every camera, and for every axis of tracked points and of clouds without lines of sight, of every recording that states `noise_systematic`.
 pub(super) fn systematic(
     base: &[Experiment],
     changes: &[Change],
@@ -64,8 +64,21 @@ pub(super) fn systematic(
             out.push(field("place of a marker", &mine, &along(column, size)));
         }
         for camera in (0..e.plan.observation.cameras.len()).filter(|_| cameras && depth[scene] > 0.0) {
-            let mine = |s: usize, source: &Source| s == scene && source.sensor == Sensor::Camera(camera as u32);
+            let sensor = e.plan.observation.cameras[camera].sensor(camera as u32);
+            let mine = |s: usize, source: &Source| s == scene && source.sensor == sensor;
             out.push(field("zero point of a camera", &mine, &along(3 * markers, depth[scene])));
+        }
+        // So do points of a cloud without lines of sight, whose zero point has no direction.
+        let blind = |s: usize, source: &Source| {
+            let camera = match source.sensor {
+                Sensor::Cloud(c) => e.plan.observation.cameras.get(c as usize),
+                _ => None,
+            };
+            s == scene && camera == Some(&Camera::Unknown)
+        };
+        for axis in (0..3).filter(|_| depth[scene] > 0.0) {
+            let change = |i: usize| rows.rows[i].row.by_place[axis] * depth[scene] / 3f64.sqrt();
+            out.push(field("origin of a cloud", &blind, &change));
         }
         // All tracked points share one error, a length along three axes.
         for axis in 0..3u8 {

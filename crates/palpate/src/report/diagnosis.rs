@@ -198,5 +198,5 @@ pub fn diagnosis_summary(done: &Diagnosed, folder: &std::path::Path) -> String {
 /// Name of a stream: a camera, or a coordinate of something else.
 pub(super) fn stream(done: &Diagnosed, scene: usize, stream: Stream) -> String {
     let name = done.experiments[scene].plan().observation.name(stream.sensor);
-    if stream.sensor.is_camera() { name } else { format!("{name}.{}", ["x", "y", "z"][usize::from(stream.axis)]) }
+    if stream.sensor.is_depth() { name } else { format!("{name}.{}", ["x", "y", "z"][usize::from(stream.axis)]) }
 }

@@ -4,7 +4,8 @@ use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::render::{Picture, Pinhole, residual_colour, shade};
-use crate::residuals::{pinhole, spread, visit_frames};
+use crate::residuals::{spread, visit_frames};
+use crate::viewers::viewer;
 use glam::DVec3;
 use palpate_engine::{FrameResiduals, Stop};
 
@@ -51,7 +52,7 @@ pub fn pictures(
     Ok(out)
 }
 
-/// The camera that saw most points of the frame, cut down to the body; a view from aside where only markers were recorded.
+/// The camera that saw most points of the frame, cut down to the body; a view from aside where nothing has lines of sight.
 fn camera(experiment: &Experiment, frame: usize, vertices: &[DVec3]) -> Pinhole {
     let f = &experiment.plan().observation.frames[frame];
     let count = |c: usize| f.points.iter().filter(|p| p.camera as usize == c).count();
@@ -59,12 +60,13 @@ fn camera(experiment: &Experiment, frame: usize, vertices: &[DVec3]) -> Pinhole 
         points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)))
     };
     let best = (0..experiment.plan().observation.cameras.len()).max_by_key(|c| (count(*c), std::cmp::Reverse(*c)));
-    if let (Some(c), Some(recording)) = (best.filter(|c| count(*c) > 0), experiment.recording()) {
-        let camera = pinhole(&recording.cameras[c]);
+    let bounds = extent(&mut vertices.iter().copied());
+    if let Some(camera) = best.filter(|c| count(*c) > 0).and_then(|c| viewer(experiment, c, bounds)) {
         let mut pixels = vertices.iter().map(|v| camera.project(*v)).filter(|p| p.z > 0.0 && p.is_finite());
         return cropped(&camera, extent(&mut pixels));
     }
-    let (lo, hi) = extent(&mut vertices.iter().copied().chain(f.markers.iter().map(|m| m.position)));
+    let measured = f.markers.iter().map(|m| m.position).chain(f.points.iter().map(|p| p.position));
+    let (lo, hi) = extent(&mut vertices.iter().copied().chain(measured));
     Pinhole::framing(lo, hi, experiment.up(), WIDTH, WIDTH * 3 / 4)
 }
 
@@ -90,7 +92,7 @@ fn cropped(camera: &Pinhole, (lo, hi): (DVec3, DVec3)) -> Pinhole {
 
 fn mark(picture: &mut Picture, camera: &Pinhole, r: &FrameResiduals, scale: f64) {
     // Not more dots than the picture can show.
-    let distances: Vec<_> = r.readings.iter().filter(|r| r.sensor.is_camera()).zip(r.distances()).collect();
+    let distances: Vec<_> = r.readings.iter().filter(|r| r.sensor.is_depth()).zip(r.distances()).collect();
     let every = (distances.len() / 8000).max(1);
     for (p, d) in distances.into_iter().step_by(every) {
         let q = camera.project(p.place);

@@ -18,6 +18,9 @@ pub struct ImportDocument {
     pub cameras: usize,
     /// Depth images.
     pub images: usize,
+    /// Point clouds.
+    #[serde(default)]
+    pub clouds: usize,
     /// Depth readings of the object.
     pub depth_readings: usize,
     /// Readings of markers.
@@ -63,6 +66,7 @@ mod tests {
             why: "depth.txt".into(),
             cameras: 1,
             images: 12,
+            clouds: 0,
             depth_readings: 4000,
             marker_readings: 0,
             tracked_readings: 0,
@@ -78,6 +82,7 @@ mod tests {
             "format",
             "guesses",
             "images",
+            "clouds",
             "losses",
             "marker_readings",
             "recording",

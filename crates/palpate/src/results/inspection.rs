@@ -273,6 +273,9 @@ pub struct RecordingInspection {
     /// Its depth images; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<Images>,
+    /// Its point clouds; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clouds: Option<Clouds>,
     /// Its markers; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub markers: Option<Markers>,
@@ -318,6 +321,25 @@ pub struct CameraInspection {
     pub systematic: f64,
     /// Where it stands in the world [m].
     pub position: [f64; 3],
+}
+
+/// Point clouds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Clouds {
+    /// How many.
+    pub count: usize,
+    /// How many of them have no line of sight: neither camera nor origin is stated.
+    pub without_sight: usize,
+    /// Time of the first [s].
+    pub from: f64,
+    /// Time of the last [s].
+    pub to: f64,
+    /// Points of all of them.
+    pub points: usize,
+    /// Fewest and most of a cloud.
+    pub points_per_cloud: [usize; 2],
+    /// Standard deviation of a distance in the first [m]; `None` where it is not stated.
+    pub noise: Option<f64>,
 }
 
 /// Depth images.
@@ -395,6 +417,15 @@ mod tests {
             title: Some("Seen".into()),
             cameras: vec![camera],
             frames: Some(Images { count: 17, from: 0.0, to: 0.16, readings: 4000, readings_per_image: [200, 260] }),
+            clouds: Some(Clouds {
+                count: 2,
+                without_sight: 1,
+                from: 0.0,
+                to: 0.1,
+                points: 30,
+                points_per_cloud: [10, 20],
+                noise: None,
+            }),
             markers: Some(Markers {
                 names: vec!["tip".into()],
                 readings: 0,
