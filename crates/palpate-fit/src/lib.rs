@@ -4,6 +4,7 @@
 //! and derivatives out), the transform and typical size of a parameter and, of a field with a prior, which values lie beside each other.
 
 mod chart;
+mod controls;
 mod dense;
 mod expected;
 mod fit;
@@ -18,6 +19,7 @@ mod uncertainty;
 mod vibrations;
 
 pub use chart::{AtBound, Chart};
+pub use controls::{Controls, Zones};
 pub use expected::{Expected, expected};
 pub use fit::{FitError, FitResult, FittedField, FittedParameter, Hooks, Lead, Progress, Run, Worth, fit};
 pub use journal::{JournalError, JournalFile};

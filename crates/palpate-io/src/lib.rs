@@ -25,8 +25,8 @@ pub use error::{InputError, Loaded, OutputError};
 pub use mesh::read_mesh;
 pub use recording::{Recording, check_overlap, read_recording, write_recording};
 pub use scene::{
-    append_effects, edit_scene, name_field_files, parse_scene, read_scene, recast_scene, scene_error, scene_of_tracks,
-    scene_with_values, without_wishes, write_scene,
+    append_effects, edit_scene, name_field_files, parse_scene, read_scene, recast_scene, scene_error, scene_in, scene_of_tracks,
+    scene_with_regions, scene_with_values, without_wishes, write_scene,
 };
 pub use sdf::{SdfGrid, read_sdf};
 pub use surface::{write_obj, write_ply};

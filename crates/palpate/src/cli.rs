@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, synthesize, track};
+use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, place, simulate, synthesize, track};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -20,6 +20,7 @@ A first session:
   palpate simulate scene.toml --format png     pictures of the motion in out/scene/
   palpate fit      scene.toml --out found      parameters, errors and a report in found/
   palpate track    scene.toml --out seen       the moving body in every frame of its recording
+  palpate place    scene.toml --out parts      over which regions of the body a number varies
   palpate simulate found/model.toml            the scene with the found values
   palpate synthesize found/model.toml          a motion that nobody has seen: pulls, wind, keyframes, edits
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
@@ -43,6 +44,7 @@ enum Command {
     Observe(observe::Arguments),
     Track(track::Arguments),
     Fit(fit::Arguments),
+    Place(place::Arguments),
     Batch(batch::Arguments),
     Coarsen(coarsen::Arguments),
     Diagnose(diagnose::Arguments),
@@ -136,6 +138,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Observe(a) => observe::run(a, &mut console),
         Command::Track(a) => track::run(a, &mut console),
         Command::Fit(a) => fit::run(a, &mut console),
+        Command::Place(a) => place::run(a, &mut console),
         Command::Batch(a) => batch::run(a, &mut console),
         Command::Coarsen(a) => coarsen::run(a, &mut console),
         Command::Diagnose(a) => diagnose::run(a, &mut console),

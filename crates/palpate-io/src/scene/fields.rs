@@ -40,8 +40,7 @@ fn field(t: &Table) -> Result<FieldSpec, InputError> {
         Kind::Cells => Basis::Cells,
         Kind::Nodes => Basis::Nodes,
         Kind::Regions => {
-            let blends = [("harmonic", Blend::Harmonic), ("axis", Blend::Axis), ("nearest", Blend::Nearest)];
-            let blend = t.optional_choice("blend", &blends)?.unwrap_or(Blend::Harmonic);
+            let blend = t.optional_choice("blend", &Blend::ALL)?.unwrap_or(Blend::Harmonic);
             Basis::Regions(regions(t, blend)?, blend)
         }
     };

@@ -10,6 +10,7 @@ mod material;
 mod motion;
 mod object;
 mod path;
+mod regions;
 mod rework;
 mod rows;
 pub(crate) mod scale;
@@ -21,6 +22,7 @@ mod track;
 mod write;
 
 pub use edit::edit_scene;
+pub use regions::{scene_in, scene_with_regions};
 pub use rework::{recast_scene, scene_of_tracks};
 pub use write::{append_effects, name_field_files, scene_with_values, without_wishes, write_scene};
 

@@ -259,7 +259,7 @@ fn moved_plane(point: DVec3, normal: DVec3, [height, theta, phi]: [Option<f64>; 
     (point + n * (height - point.dot(n)), n)
 }
 
-fn vector(v: DVec3) -> Value {
+pub(super) fn vector(v: DVec3) -> Value {
     Value::from(v.to_array().into_iter().collect::<Array>())
 }
 

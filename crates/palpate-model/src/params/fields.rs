@@ -57,6 +57,17 @@ pub enum Blend {
     Nearest,
 }
 
+impl Blend {
+    /// All, by name; the first where none is given.
+    pub const ALL: [(&'static str, Blend); 3] =
+        [("harmonic", Blend::Harmonic), ("axis", Blend::Axis), ("nearest", Blend::Nearest)];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Blend::ALL.iter().find(|b| b.1 == self).map_or("", |b| b.0)
+    }
+}
+
 /// A region of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {

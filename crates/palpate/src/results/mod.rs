@@ -17,6 +17,7 @@ pub mod import;
 pub mod inspection;
 pub mod lock;
 pub mod observation;
+pub mod placement;
 pub mod simulation;
 pub mod synthesis;
 pub mod tracking;
