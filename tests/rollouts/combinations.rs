@@ -127,7 +127,7 @@ fn every_tetrahedron_of_a_body_that_starts_in_equilibrium() {
     s.initial.velocity = DVec3::ZERO;
     s.initial.state = InitialShape::StaticEquilibrium;
     let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None, prior: None };
-    s.fields = vec![of(Varied::Modulus, Basis::Cells), of(Varied::Density, Basis::Nodes)];
+    s.fields = vec![of(Varied::Modulus, Basis::Cells), of(Varied::Density, Basis::Nodes), of(Varied::Damping, Basis::Cells)];
     // Of the nodes' densities a few tell enough.
     let some = |key| match key {
         ParamKey::Field { field: 1, index } => index % 16 == 3,

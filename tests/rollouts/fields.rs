@@ -60,7 +60,7 @@ fn check(plan: &Plan, name: &str) {
 
 #[test]
 fn gradients_by_cells_and_nodes_are_those_of_differences() {
-    for (varied, name) in [(Varied::Modulus, "modulus"), (Varied::Density, "density")] {
+    for (varied, name) in [(Varied::Modulus, "modulus"), (Varied::Density, "density"), (Varied::Damping, "damping")] {
         check(&with_field(varied, Basis::Cells, Scale::Log), &format!("{name} by cells"));
         check(&with_field(varied, Basis::Nodes, Scale::Linear), &format!("{name} by nodes"));
     }

@@ -165,8 +165,8 @@ pub fn flowing(source: BodySource, exponent: f64, effects: Vec<Effect>) -> Plan 
     Made { viscosity: Some(Viscosity { coefficient: 40.0, exponent }), ..Made::of(source, effects) }.plan()
 }
 
-/// Stiffness by cells and density by nodes.
+/// Stiffness and damping by cells, and density by nodes.
 pub fn fields() -> Vec<FieldSpec> {
     let of = |varied, basis| FieldSpec { varied, basis, scale: Scale::Log, values: None, prior: None };
-    vec![of(Varied::Modulus, Basis::Cells), of(Varied::Density, Basis::Nodes)]
+    vec![of(Varied::Modulus, Basis::Cells), of(Varied::Density, Basis::Nodes), of(Varied::Damping, Basis::Cells)]
 }

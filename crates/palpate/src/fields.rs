@@ -155,7 +155,7 @@ impl Found<'_> {
     fn errors_by_place(&self) -> Option<&[f64]> {
         let own = matches!(
             (&self.experiment.scene().fields[self.field].basis, self.varied()),
-            (Basis::Cells, Varied::Modulus) | (Basis::Nodes, Varied::Density)
+            (Basis::Cells, Varied::Modulus | Varied::Damping) | (Basis::Nodes, Varied::Density)
         );
         self.errors.as_deref().filter(|_| own)
     }
@@ -206,12 +206,12 @@ fn posterior(p: &FieldPosterior) -> Posterior {
     }
 }
 
-/// The fields on the grid, and `E_sd` or `density_sd` where a value of one field is that of a place.
+/// The fields on the grid, and `E_sd`, `density_sd` or `damping_sd` where a value of one field is that of a place.
 fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Result<(), Error> {
     let plan = e.plan();
     let shown: Vec<usize> = found.iter().map(|f| f.field).collect();
     let mut grid = OnGrid::new(plan, theta, &shown);
-    for varied in [Varied::Modulus, Varied::Density] {
+    for (_, varied) in Varied::ALL {
         let own: Vec<&Found> = found.iter().filter(|f| f.varied() == varied).collect();
         let [f] = &own[..] else { continue };
         let Some(errors) = f.errors_by_place() else { continue };
@@ -237,7 +237,7 @@ fn write_grid(path: &Path, e: &Experiment, theta: &[f64], found: &[Found]) -> Re
 /// Fields of a scene as arrays by element and by node.
 #[derive(Debug, Default)]
 pub(crate) struct OnGrid {
-    /// `E` [Pa] with all fields of it, and `factor_K` of field K.
+    /// `E` [Pa] and `damping` [s] with all fields of them, and `factor_K` of field K.
     pub(crate) elements: Vec<(String, Vec<f64>)>,
     /// `density` [kg/m³], and `factor_K`.
     pub(crate) nodes: Vec<(String, Vec<f64>)>,
@@ -247,7 +247,8 @@ impl OnGrid {
     /// The fields numbered `shown` at parameters θ `[P]`; nothing of a number that none of them varies.
     pub(crate) fn new(plan: &Plan, theta: &[f64], shown: &[usize]) -> OnGrid {
         let mut all = OnGrid::default();
-        for (varied, key) in [(Varied::Modulus, ParamKey::YoungsModulus), (Varied::Density, ParamKey::Density)] {
+        let keys = [ParamKey::YoungsModulus, ParamKey::Density, ParamKey::StiffnessDamping];
+        for ((_, varied), key) in Varied::ALL.into_iter().zip(keys) {
             let mut number = vec![theta[plan.layout.index(key)]; varied.places(&plan.body).len()];
             let (name, out) = all.of(varied);
             for (k, (places, f)) in plan.layout.fields().zip(&plan.fields).enumerate().filter(|(_, (_, f))| f.varied == varied) {
@@ -269,6 +270,7 @@ impl OnGrid {
         match varied {
             Varied::Modulus => ("E", &mut self.elements),
             Varied::Density => ("density", &mut self.nodes),
+            Varied::Damping => ("damping", &mut self.elements),
         }
     }
 }

@@ -203,6 +203,34 @@ impl<'a> Context<'a> {
         self.coefficients.changes.modulus.as_ref().map_or(1.0, |m| m[cell])
     }
 
+    /// How the states enter the elastic force of a cell, whose damping may be its own.
+    #[inline(always)]
+    pub fn weights_of(&self, cell: usize) -> Weights {
+        Weights { rate: self.weights.rate * self.damping_factor(cell), ..self.weights }
+    }
+
+    /// Factor on the stiffness damping in a cell.
+    #[inline(always)]
+    pub fn damping_factor(&self, cell: usize) -> f64 {
+        self.coefficients.changes.damping.as_ref().map_or(1.0, |d| d[cell])
+    }
+
+    /// Change of a cell's stiffness damping along `rates` [s].
+    pub fn damping_along(&self, rates: &Coefficients, cell: usize) -> f64 {
+        let own = rates.changes.damping.as_ref().map_or(0.0, |d| self.physics().stiffness_damping * d[cell]);
+        rates.physics.stiffness_damping * self.damping_factor(cell) + own
+    }
+
+    /// Adds what derivatives by the cells' stiffness damping make of the coefficients: `by` lists cell and derivative.
+    pub fn pull_damping(&self, by: impl Iterator<Item = (usize, f64)>, gradient: &mut Coefficients) {
+        for (cell, g) in by {
+            gradient.physics.stiffness_damping += g * self.damping_factor(cell);
+            if let Some(d) = &mut gradient.changes.damping {
+                d[cell] += g * self.physics().stiffness_damping;
+            }
+        }
+    }
+
     /// Change of the logarithm of Young's modulus along `rates`, but for what varies from cell to cell.
     pub fn ln_young_along(&self, rates: &Coefficients) -> f64 {
         let own = rates.physics.youngs_modulus / self.physics().youngs_modulus;

@@ -17,6 +17,8 @@ pub struct Changes {
     pub modulus: Option<Vec<f64>>,
     /// Factor on the density per node.
     pub density: Option<Vec<f64>>,
+    /// Factor on the stiffness damping per cell.
+    pub damping: Option<Vec<f64>>,
     /// Displacement W of the stress-free shape per node [m].
     pub rest: Option<Vec<DVec3>>,
 }
@@ -91,6 +93,7 @@ impl Changes {
         let mut out = Changes {
             modulus: product(plan, physics, modulus_law, || plan.body.middles().collect()),
             density: product(plan, physics, density_law, || plan.body.nodes.clone()),
+            damping: None,
             rest,
         };
         for (field, values) in plan.fields.iter().zip(&physics.fields) {
@@ -108,6 +111,7 @@ impl Changes {
         match varied {
             Varied::Modulus => &mut self.modulus,
             Varied::Density => &mut self.density,
+            Varied::Damping => &mut self.damping,
         }
     }
 
@@ -116,6 +120,7 @@ impl Changes {
         match varied {
             Varied::Modulus => self.modulus.as_deref(),
             Varied::Density => self.density.as_deref(),
+            Varied::Damping => self.damping.as_deref(),
         }
     }
 

@@ -31,7 +31,7 @@ pub struct Sought {
     pub poisson: bool,
     /// Density, or anything that it varies by.
     pub density: bool,
-    /// Rayleigh damping of either kind: mass, stiffness.
+    /// Rayleigh damping of either kind: mass, stiffness or anything that it varies by.
     pub damping: [bool; 2],
     /// Numbers of the viscosity.
     pub viscosity: bool,
@@ -83,6 +83,7 @@ impl Sought {
                 ParamKey::Field { field, .. } => match plan.fields[usize::from(field)].varied {
                     Varied::Modulus => s.modulus = true,
                     Varied::Density => s.density = true,
+                    Varied::Damping => s.damping[1] = true,
                 },
             }
         }
@@ -131,6 +132,7 @@ impl Coefficients {
         let changes = Changes {
             modulus: sought.modulus.then(|| vec![0.0; cells]),
             density: sought.density.then(|| vec![0.0; nodes]),
+            damping: sought.damping[1].then(|| vec![0.0; cells]),
             rest: sought.rest.then(|| vec![DVec3::ZERO; nodes]),
         };
         Coefficients { physics: Physics::new(&plan.layout, &vec![0.0; plan.layout.len()]), changes }

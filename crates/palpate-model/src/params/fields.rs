@@ -16,24 +16,31 @@ pub enum Varied {
     Modulus,
     /// `material.density`, node by node.
     Density,
+    /// `material.stiffness_damping`, cell by cell.
+    Damping,
 }
 
 impl Varied {
     /// All, by the path of the number that varies.
-    pub const ALL: [(&'static str, Varied); 2] =
-        [("material.youngs_modulus", Varied::Modulus), ("material.density", Varied::Density)];
+    pub const ALL: [(&'static str, Varied); 3] = [
+        ("material.youngs_modulus", Varied::Modulus),
+        ("material.density", Varied::Density),
+        ("material.stiffness_damping", Varied::Damping),
+    ];
 
     /// The path.
     pub fn path(self) -> &'static str {
         Varied::ALL.iter().find(|v| v.1 == self).map_or("", |v| v.0)
     }
 
+    /// True of what varies from cell to cell, false of what does from node to node.
+    pub fn by_cells(self) -> bool {
+        self != Varied::Density
+    }
+
     /// Rest positions of the places where it varies [m].
     pub fn places(self, body: &Body) -> Vec<DVec3> {
-        match self {
-            Varied::Modulus => body.middles().collect(),
-            Varied::Density => body.nodes.clone(),
-        }
+        if self.by_cells() { body.middles().collect() } else { body.nodes.clone() }
     }
 }
 
@@ -206,25 +213,17 @@ impl Field {
     pub fn new(spec: &FieldSpec, body: &Body) -> Result<Field, String> {
         let places = spec.varied.places(body);
         let rows: Vec<Vec<(u32, f64)>> = match &spec.basis {
-            Basis::Cells => match spec.varied {
-                Varied::Modulus => (0..places.len() as u32).map(|e| vec![(e, 1.0)]).collect(),
-                Varied::Density => cells_around_nodes(body),
-            },
-            Basis::Nodes => match spec.varied {
-                Varied::Modulus => {
-                    let share = |nodes: &[u32]| nodes.iter().map(|n| (*n, 1.0 / nodes.len() as f64)).collect();
-                    body.element_nodes().map(share).collect()
-                }
-                Varied::Density => (0..places.len() as u32).map(|n| vec![(n, 1.0)]).collect(),
-            },
+            Basis::Cells if !spec.varied.by_cells() => cells_around_nodes(body),
+            Basis::Nodes if spec.varied.by_cells() => {
+                let share = |nodes: &[u32]| nodes.iter().map(|n| (*n, 1.0 / nodes.len() as f64)).collect();
+                body.element_nodes().map(share).collect()
+            }
+            Basis::Cells | Basis::Nodes => (0..places.len() as u32).map(|own| vec![(own, 1.0)]).collect(),
             Basis::Regions(regions, Blend::Nearest) => places.iter().map(|x| vec![(nearest(regions, *x), 1.0)]).collect(),
             Basis::Regions(regions, Blend::Axis) => places.iter().map(|x| along_axis(regions, *x)).collect(),
             Basis::Regions(regions, Blend::Harmonic) => {
                 let of_nodes = harmonic(regions, body)?;
-                match spec.varied {
-                    Varied::Density => of_nodes,
-                    Varied::Modulus => body.element_nodes().map(|nodes| mean(nodes, &of_nodes)).collect(),
-                }
+                if spec.varied.by_cells() { body.element_nodes().map(|nodes| mean(nodes, &of_nodes)).collect() } else { of_nodes }
             }
         };
         let mut field = Field {
@@ -391,7 +390,7 @@ mod tests {
         let region = |x: f64, value: f64| Region { center: DVec3::new(x, 0.02, 0.02), radius: 0.03, value };
         let three = vec![region(0.02, 0.5), region(0.1, 2.0), region(0.18, 4.0)];
         let mut out = Vec::new();
-        for varied in [Varied::Modulus, Varied::Density] {
+        for (_, varied) in Varied::ALL {
             for scale in [Scale::Log, Scale::Linear] {
                 let blends = [Blend::Harmonic, Blend::Axis, Blend::Nearest].map(|b| Basis::Regions(three.clone(), b));
                 for basis in [Basis::Cells, Basis::Nodes].into_iter().chain(blends) {

@@ -16,7 +16,7 @@ use crate::effects::{Effect, Site, check_choices, impulse};
 use crate::observation::{MarkerRest, Observation};
 use crate::params::Layout;
 use crate::params::ParamKey;
-use crate::params::fields::Field;
+use crate::params::fields::{Field, Varied};
 use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
 use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, InitialShape, Resolution, Scene};
 use crate::shape::{Shape, shape_of};
@@ -122,6 +122,10 @@ pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[Ma
         .collect::<Vec<_>>();
     let (mut fields, mut starts) = (Vec::new(), Vec::new());
     for (i, spec) in scene.fields.iter().enumerate() {
+        if spec.varied == Varied::Damping && scene.material.stiffness_damping == 0.0 {
+            let text = "varies a number that is 0; give material.stiffness_damping (s)";
+            return Err(error(format!("field.{i}.path"), text.into()));
+        }
         fields.push(Field::new(spec, &body).map_err(|m| error(format!("field.{i}.regions"), m))?);
         starts.push(spec.start(&body).map_err(|m| error(format!("field.{i}.file"), m))?);
     }

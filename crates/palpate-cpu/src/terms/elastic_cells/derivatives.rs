@@ -14,6 +14,7 @@ struct Pull {
     /// By the logarithm of its modulus.
     ln_young: f64,
     poisson: f64,
+    /// By its own stiffness damping.
     stiffness_damping: f64,
 }
 
@@ -36,10 +37,10 @@ impl ElasticCells<'_> {
         if !cells.c.weights.sees_past() {
             return;
         }
-        let b = cells.c.weights.factors().1 * weight;
         cells.gather(
             #[inline(always)]
             |e| {
+                let b = cells.c.weights_of(e).factors().1 * weight;
                 let d = pick(cells.body(), e, d);
                 let rate = times(cells.stiffness(e), &cells.pose(e, u).strain_rate(&d), cells.young_of(e) * b);
                 let mut f = self.posed[e].pose.force(&rate);
@@ -56,10 +57,10 @@ impl ElasticCells<'_> {
         if !cells.c.weights.sees_past() {
             return;
         }
-        let b = cells.c.weights.factors().1 * weight;
         cells.gather(
             #[inline(always)]
             |e| {
+                let b = cells.c.weights_of(e).factors().1 * weight;
                 let z = pick(cells.body(), e, z);
                 let rate = times(cells.stiffness(e), &self.posed[e].pose.strain_rate(&z), cells.young_of(e) * b);
                 let mut f = cells.pose(e, u).force(&rate);
@@ -73,7 +74,7 @@ impl ElasticCells<'_> {
     /// q that the new pose's force is made of: a q₁ + b q̃.
     #[inline(always)]
     fn mixed(&self, e: usize) -> V24 {
-        let (a, b) = self.cells.c.weights.factors();
+        let (a, b) = self.cells.c.weights_of(e).factors();
         let (new, old) = (&self.posed[e].pose.q, self.before.q.get(e).unwrap_or(&[0.0; 24]));
         std::array::from_fn(|i| a * new[i] + b * old[i])
     }
@@ -98,16 +99,17 @@ impl ElasticCells<'_> {
     pub(super) fn along_coefficients(&self, rates: &Coefficients, out: &mut [DVec3]) {
         let (cells, d) = (&self.cells, &rates.physics);
         let ln_young = cells.c.ln_young_along(rates);
-        let damping = d.stiffness_damping * cells.c.inertia.map_or(0.0, |t| t.rate);
+        let rate = cells.c.inertia.map_or(0.0, |t| t.rate);
+        let undamped = rate == 0.0 || (d.stiffness_damping == 0.0 && rates.changes.damping.is_none());
         let rest = rates.changes.rest.as_deref().filter(|_| cells.c.altered.rest.is_some());
-        let still = ln_young == 0.0 && d.poisson_ratio == 0.0 && damping == 0.0;
+        let still = ln_young == 0.0 && d.poisson_ratio == 0.0 && undamped;
         if still && rest.is_none() && rates.changes.modulus.is_none() {
             return;
         }
-        cells.gather(|e| self.cell_along(e, ln_young, damping, rest, rates), out);
+        cells.gather(|e| self.cell_along(e, ln_young, rate, rest, rates), out);
     }
 
-    fn cell_along(&self, e: usize, ln_young: f64, damping: f64, rest: Option<&[DVec3]>, rates: &Coefficients) -> Corners {
+    fn cell_along(&self, e: usize, ln_young: f64, rate: f64, rest: Option<&[DVec3]>, rates: &Coefficients) -> Corners {
         let (cells, posed, k, young) = (&self.cells, &self.posed[e], self.cells.stiffness(e), self.cells.young_of(e));
         let (weights, by_nu) = (&cells.c.weights, rates.physics.poisson_ratio);
         let ln = ln_young + cells.c.ln_factor_along(rates, e);
@@ -119,6 +121,7 @@ impl ElasticCells<'_> {
         if by_nu != 0.0 {
             add(&mut new, times(cells.by_poisson(e), &self.mixed(e), young * by_nu));
         }
+        let damping = rate * cells.c.damping_along(rates, e);
         if damping != 0.0 {
             add(&mut new, times(k, &self.way(e), young * damping));
         }
@@ -154,11 +157,8 @@ impl ElasticCells<'_> {
                 #[inline(always)]
                 |e| self.cell_pull(e, &pick(cells.body(), e, z), sought, rate),
             );
-            let p = &mut gradient.physics;
-            for part in &parts {
-                p.poisson_ratio += part.poisson;
-                p.stiffness_damping += part.stiffness_damping;
-            }
+            parts.iter().for_each(|part| gradient.physics.poisson_ratio += part.poisson);
+            cells.c.pull_damping(parts.iter().map(|p| p.stiffness_damping).enumerate(), gradient);
             if sought.modulus {
                 cells.c.pull_modulus(parts.iter().map(|p| p.ln_young).enumerate(), gradient);
             }

@@ -188,7 +188,7 @@ impl<'a> ElasticCells<'a> {
     fn posed_at(&self, e: usize, u1: &[DVec3]) -> Posed {
         let cells = &self.cells;
         let pose = cells.pose(e, u1);
-        let (a, b) = cells.c.weights.factors();
+        let (a, b) = cells.c.weights_of(e).factors();
         let mut q = pose.q.map(|q| a * q);
         if let Some(old) = self.before.q.get(e) {
             for i in 0..24 {
@@ -209,7 +209,7 @@ impl<'a> ElasticCells<'a> {
     fn upper_tangent(&self, e: usize, curvature: Curvature, out: &mut M24) {
         let Posed { pose, stress, .. } = &self.posed[e];
         let convex = curvature == Curvature::Convex;
-        let scale = self.cells.young_of(e) * self.cells.c.weights.factors().0;
+        let scale = self.cells.young_of(e) * self.cells.c.weights_of(e).factors().0;
         match (&self.laws, self.lawful.get(e)) {
             (Some(laws), Some(state)) => {
                 let both = std::array::from_fn(|i| stress[i] + state.stress[i]);
@@ -266,10 +266,10 @@ impl Term for ElasticCells<'_> {
     }
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
-        let (a, b) = self.cells.c.weights.factors();
         let parts = self.cells.each_cell(
             #[inline(always)]
             |e| {
+                let (a, b) = self.cells.c.weights_of(e).factors();
                 let pose = self.cells.pose(e, u1);
                 let q = pose.q;
                 let kq = times(self.cells.stiffness(e), &q, self.cells.young_of(e));

@@ -18,7 +18,7 @@ pub(super) struct Tangents<'a, 'b> {
 impl ElasticPoints<'_> {
     /// ∂P/∂F of a point at the new state [Pa].
     pub(super) fn tangent_of(&self, point: &Point, u1: &[DVec3]) -> [[f64; 9]; 9] {
-        let (w, Point { e, moduli: (lambda, mu), .. }) = (&self.c.weights, point);
+        let (w, Point { e, moduli: (lambda, mu), .. }) = (self.c.weights_of(point.element), point);
         let h = point.h(u1);
         let f = h + DMat3::IDENTITY;
         let mut tangent = self.c.law().stress(&rows(h), *lambda, *mu).1.map(|r| r.map(|t| t * w.new));

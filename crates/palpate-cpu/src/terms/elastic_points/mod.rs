@@ -189,7 +189,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// Whole stress that a modulus scales at u₁, the old state's share included [Pa].
     fn total(&self, p: Point, u1: &[DVec3]) -> DMat3 {
-        let (w, h) = (&self.c.weights, p.h(u1));
+        let (w, h) = (self.c.weights_of(p.element), p.h(u1));
         let mut stress = self.stress(h, p.moduli) * w.new;
         if w.old != 0.0 {
             stress += self.old[p.e] * w.old;
@@ -228,7 +228,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// Derivative of the whole stress by Poisson's ratio, over E.
     fn by_poisson(&self, point: Point, u1: &[DVec3]) -> DMat3 {
-        let (w, [(lambda, mu), by_nu]) = (&self.c.weights, point.lame);
+        let (w, [(lambda, mu), by_nu]) = (self.c.weights_of(point.element), point.lame);
         let elastic = |u: &[DVec3]| {
             let [by_lambda, by_mu] = self.c.law().by_moduli(&rows(point.h(u)), lambda, mu);
             matrix_of(&std::array::from_fn(|k| by_nu.0 * by_lambda[k] + by_nu.1 * by_mu[k]))
@@ -247,7 +247,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// Change of the whole stress when F at past state `i` changes by `dh`.
     fn along_past(&self, p: Point, i: usize, u1: &[DVec3], dh: DMat3) -> DMat3 {
-        let (w, (weight, u), h) = (&self.c.weights, self.c.past.each[i], p.h(u1));
+        let (w, (weight, u), h) = (self.c.weights_of(p.element), self.c.past.each[i], p.h(u1));
         let before = p.h(u);
         let dg = green_rate(before + DMat3::IDENTITY, dh) * weight;
         let stress = linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg);
@@ -260,7 +260,7 @@ impl<'a> ElasticPoints<'a> {
 
     /// Its transpose.
     fn pull_past(&self, p: Point, i: usize, u1: &[DVec3], dz: DMat3) -> DMat3 {
-        let (w, (weight, u), h) = (&self.c.weights, self.c.past.each[i], p.h(u1));
+        let (w, (weight, u), h) = (self.c.weights_of(p.element), self.c.past.each[i], p.h(u1));
         let before = p.h(u);
         let dg = green_rate(h + DMat3::IDENTITY, dz);
         let stress = linear_stress(dg, p.moduli) * w.rate + self.flow_rate(p.e, h, dg);
@@ -301,9 +301,9 @@ impl Term for ElasticPoints<'_> {
     }
 
     fn potential(&self, u1: &[DVec3]) -> f64 {
-        let w = &self.c.weights;
         let of = |p: Point| {
             let (Point { e, v, moduli: (lambda, mu), .. }, h) = (p, p.h(u1));
+            let w = self.c.weights_of(p.element);
             let mut psi = w.new * self.c.law().value(&rows(h), lambda, mu);
             if w.old != 0.0 {
                 psi += w.old * contract(self.old[e], h);
@@ -339,7 +339,7 @@ impl Term for ElasticPoints<'_> {
 
     fn by_coefficients(&self, u1: &[DVec3], rates: &Coefficients, out: &mut [DVec3]) {
         let (ln_young, d) = (self.c.ln_young_along(rates), &rates.physics);
-        let damping = d.stiffness_damping * self.c.inertia.map_or(0.0, |t| t.rate);
+        let rate = self.c.inertia.map_or(0.0, |t| t.rate);
         let flow = d.viscosity.filter(|_| self.flow.is_some());
         let curves: Vec<f64> = d.curves.iter().flatten().copied().collect();
         let curves = if curves.iter().any(|r| *r != 0.0) { curves } else { Vec::new() };
@@ -351,6 +351,7 @@ impl Term for ElasticPoints<'_> {
             if d.poisson_ratio != 0.0 {
                 stress += self.by_poisson(p, u1) * (d.poisson_ratio * self.young * self.c.factor(element));
             }
+            let damping = rate * self.c.damping_along(rates, element);
             if damping != 0.0 {
                 stress += self.viscous(e, h, moduli) * damping;
             }
@@ -387,9 +388,10 @@ impl Term for ElasticPoints<'_> {
             ]
         };
         let all = self.each(of);
-        for [_, by_poisson, by_damping, by_coefficient, by_exponent] in &all {
+        let points = &self.c.plan.body.points;
+        self.c.pull_damping(all.iter().enumerate().map(|(e, g)| (points.element_of(e), g[2])), gradient);
+        for [_, by_poisson, _, by_coefficient, by_exponent] in &all {
             gradient.physics.poisson_ratio += by_poisson;
-            gradient.physics.stiffness_damping += by_damping;
             if let Some(v) = gradient.physics.viscosity.as_mut().filter(|_| flows) {
                 v.coefficient += by_coefficient;
                 v.exponent += by_exponent;
@@ -406,7 +408,6 @@ impl Term for ElasticPoints<'_> {
             self.gather(|p| self.pull_rest(p, u1, z) * p.v, out);
         }
         if sought.modulus {
-            let points = &self.c.plan.body.points;
             self.c.pull_modulus(all.iter().enumerate().map(|(e, g)| (points.element_of(e), g[0])), gradient);
         }
     }

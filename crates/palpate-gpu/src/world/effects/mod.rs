@@ -130,6 +130,7 @@ impl Effects {
             e.bits |= match field.varied {
                 Varied::Modulus => FIELD_MODULUS,
                 Varied::Density => FIELD_DENSITY,
+                Varied::Damping => return Err(GpuError::Plan { what: "fields of stiffness damping".into() }),
             };
         }
         e.matrix_rows = grips::matrix_rows(plan, &e.grip_rows);
