@@ -62,6 +62,11 @@ fn combined<'v>(stage: &Stage, vectors: impl Iterator<Item = &'v Nodes>) -> Node
 
 /// The equation of a stage, or of the static problem (`None`).
 pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>, start: &'a Start<'a>) -> Equation<'a> {
+    Equation::new(context(shared, member, stage, start))
+}
+
+/// What the terms of an equation read.
+pub(crate) fn context<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>, start: &'a Start<'a>) -> Context<'a> {
     let p = &member.coefficients.physics;
     let (inertia, weights, time) = match stage {
         None => (None, Weights::STATIC, p.start),
@@ -71,7 +76,7 @@ pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option
             p.start + time,
         ),
     };
-    Equation::new(Context {
+    Context {
         plan: &shared.plan,
         pattern: &shared.pattern,
         places: &shared.places,
@@ -86,7 +91,7 @@ pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option
         weights,
         time,
         past: start.past(),
-    })
+    }
 }
 
 /// The residual of the static problem at a displacement, and its derivative.
@@ -160,7 +165,7 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
     for ((v, x), u) in s.v.iter_mut().zip(&plan.body.nodes).zip(&s.u) {
         *v = p.velocity + p.angular_velocity.cross(*x + *u - plan.pivot);
     }
-    if plan.initial == InitialShape::StaticEquilibrium {
+    if plan.initial == InitialShape::StaticEquilibrium || member.balanced.is_some() {
         if plan.clamps.is_empty() {
             return Err((FailureKind::NoEquilibrium, "no clamp holds the body".into()));
         }
@@ -206,21 +211,19 @@ pub fn start_adjoint(
             rest[i] += adj.u[i] + v.cross(spin);
         }
     }
-    if stress_free::applies(&shared.plan) {
-        return stress_free::pull(shared, member, gradient);
+    let given = stress_free::applies(&shared.plan);
+    if !at_rest && (!given || member.balanced.is_some()) {
+        let still = Start::still(s.u.len());
+        with_matrix(member, |member, matrix| -> Result<(), Reason> {
+            let mut e = equation(shared, member, None, &still);
+            e.residual(&s.u);
+            let mut z = [adj.u.clone()];
+            newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut z)?;
+            gradient.take(&e, &s.u, &z[0]);
+            Ok(())
+        })?;
     }
-    if at_rest {
-        return Ok(());
-    }
-    let still = Start::still(s.u.len());
-    with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, None, &still);
-        e.residual(&s.u);
-        let mut z = [adj.u.clone()];
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut z)?;
-        gradient.take(&e, &s.u, &z[0]);
-        Ok(())
-    })
+    if given { stress_free::pull(shared, member, gradient) } else { Ok(()) }
 }
 
 /// Derivatives of the coefficients along directions; that of a stress-free shape which follows from others comes with the start's tangent.
@@ -254,9 +257,9 @@ pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &
         t.rates = Arc::new(rates);
         // Tangents of later states are made with them.
         member.rates = Some(Rated { directions: t.directions.clone(), rates: t.rates.clone() });
-        return Ok(());
     }
-    if at_rest {
+    // Where nothing departs from the shape given, the start does not move.
+    if at_rest || (stress_free::applies(&shared.plan) && member.balanced.is_none()) {
         return Ok(());
     }
     let still = Start::still(s.u.len());

@@ -6,17 +6,21 @@
 //!
 //! `J dW = −∂r/∂p dp` for tangents, and `Jᵀ y = dJ/dW`, `dJ/dp −= y · ∂r/∂p` for the adjoint.
 //!
+//! A shape that was measured with errors is the equilibrium only about: where effects change the stress-free shape by D, that is X + W + D, and the start
+//! is its own equilibrium. W stays what balances in the shape given.
+//!
 //! J is not symmetric, and close to minus the tangent stiffness, whose factor preconditions it.
 
 use crate::linear::gmres;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, EVER_TAMER, Reason};
-use crate::simulate::{Start, equation};
+use crate::simulate::{Start, context};
 use crate::terms::altered::Altered;
 use crate::terms::{Equation, zeros};
-use crate::world::{Gradient, Member, Shared};
+use crate::world::{Balanced, Gradient, Member, Shared};
 use glam::DVec3;
 use palpate_engine::{FailureKind, number};
+use palpate_model::params::changes;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
 use palpate_model::scene::InitialShape;
@@ -54,7 +58,11 @@ struct Balance<'a> {
 impl<'a> Balance<'a> {
     fn new(shared: &'a Shared, member: &'a Member, start: &'a Start<'a>) -> (Balance<'a>, Nodes) {
         let still = zeros(shared.plan.body.nodes.len());
-        let mut equation = equation(shared, member, None, start);
+        let mut c = context(shared, member, None, start);
+        if let Some(balanced) = &member.balanced {
+            (c.coefficients, c.altered) = (&balanced.coefficients, &balanced.altered);
+        }
+        let mut equation = Equation::new(c);
         let residual = equation.residual(&still);
         (Balance { equation, plan: &shared.plan, still }, residual)
     }
@@ -130,6 +138,7 @@ pub(crate) fn solve(shared: &Shared, member: &mut Member) -> Result<(), Reason> 
     if plan.clamps.is_empty() {
         return Err((FailureKind::NoEquilibrium, "no clamp holds the body whose shape is given as an equilibrium".into()));
     }
+    (member.balanced, member.rates) = (None, None);
     let mut w = zeros(plan.body.nodes.len());
     place(shared, member, w.clone());
     let start = Start::still(w.len());
@@ -153,7 +162,16 @@ pub(crate) fn solve(shared: &Shared, member: &mut Member) -> Result<(), Reason> 
     place(shared, member, w);
     // The body stays in the shape given only if it is stable there.
     let (balance, _) = Balance::new(shared, member, &start);
-    with_stiffness(shared, &balance, true, |_| ())
+    with_stiffness(shared, &balance, true, |_| ())?;
+    drop(balance);
+    if let Some(mut d) = changes::rest_of_effects(plan, &member.coefficients.physics) {
+        let coefficients = member.coefficients.clone();
+        add_scaled(&mut d, 1.0, coefficients.changes.rest.as_deref().unwrap_or_default());
+        let altered = std::mem::take(&mut member.altered);
+        member.balanced = Some(Box::new(Balanced { coefficients, altered }));
+        place(shared, member, d);
+    }
+    Ok(())
 }
 
 /// Why no shape was found. Loads of a share and the whole modulus balance as the whole loads and a larger modulus do.
@@ -212,10 +230,14 @@ pub(crate) fn along(shared: &Shared, member: &Member, rates: &mut [Coefficients]
     let (balance, _) = Balance::new(shared, member, &start);
     with_stiffness(shared, &balance, false, |inverse| {
         for rate in rates {
+            // That of D alone.
+            let mut dw = rate.changes.rest.take();
             let b: Nodes = balance.equation.by_coefficients(&balance.still, rate).into_iter().map(|v| -v).collect();
             if b.iter().any(|v| *v != DVec3::ZERO) {
-                rate.changes.rest = Some(solved(&balance, inverse, &b, LEFT[1])?);
+                let found = solved(&balance, inverse, &b, LEFT[1])?;
+                add_scaled(dw.get_or_insert_with(|| zeros(found.len())), 1.0, &found);
             }
+            rate.changes.rest = dw;
         }
         Ok(())
     })?
@@ -231,5 +253,9 @@ pub(crate) fn pull(shared: &Shared, member: &Member, gradient: &mut Gradient) ->
     let (balance, _) = Balance::new(shared, member, &start);
     let y = with_stiffness(shared, &balance, false, |inverse| solved_back(&balance, inverse, &by_rest, LEFT[1]))??;
     gradient.take(&balance.equation, &balance.still, &y);
+    if member.balanced.is_some() {
+        // D's share is the effects'.
+        gradient.coefficients.changes.rest = Some(by_rest);
+    }
     Ok(())
 }

@@ -64,6 +64,15 @@ pub struct Member {
     pub(crate) effort: Effort,
     /// Known where the stress-free shape follows from the parameters.
     pub(crate) rates: Option<Rated>,
+    /// What balances in the shape given, where effects change the stress-free shape beyond.
+    pub(crate) balanced: Option<Box<Balanced>>,
+}
+
+/// Coefficients with the stress-free shape of the shape given.
+#[derive(Debug)]
+pub(crate) struct Balanced {
+    pub(crate) coefficients: Coefficients,
+    pub(crate) altered: Altered,
 }
 
 /// Directions, and derivatives of the coefficients along them.
@@ -151,6 +160,7 @@ impl World {
                 matrix: scratch.pop().unwrap_or_default(),
                 effort: Effort::default(),
                 rates: None,
+                balanced: None,
             });
         }
     }

@@ -5,12 +5,14 @@ use crate::experiment::Experiment;
 use crate::fitting::Fitted;
 use crate::results::finite;
 use crate::results::fit::{FieldReference, Posterior, Tried};
+use palpate_cpu::CpuBackend;
 use palpate_fit::FieldPosterior;
 use palpate_io::npy::{Array, write_npz};
 use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::params::fields::{Basis, Varied};
 use palpate_model::params::{On, ParamKey};
 use palpate_model::plan::Plan;
+use palpate_model::scene::InitialShape;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -68,11 +70,12 @@ fn found<'a>(experiment: &'a Experiment, fitted: &'a Fitted, scene: usize) -> Ve
     .collect()
 }
 
-/// Names of files of fields that lie in a folder.
+/// Names of files of fields and stress-free shapes that lie in a folder.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let names = entries.filter_map(Result::ok).map(|e| e.file_name().to_string_lossy().into_owned());
-    let is_own = |n: &String| n.starts_with("field") && (n.ends_with(".npz") || n.ends_with(".vtu"));
+    let is_own =
+        |n: &String| (n.starts_with("field") || n.starts_with("stress-free")) && (n.ends_with(".npz") || n.ends_with(".vtu"));
     let mut own: Vec<String> = names.filter(is_own).collect();
     own.sort();
     own
@@ -84,12 +87,24 @@ fn file_names(scenes: usize, scene: usize, field: usize) -> (String, String) {
     (format!("fields{ending}.vtu"), format!("field-{field}{ending}.npz"))
 }
 
-/// Writes the fields of a fit into a folder, an NPZ file each and a VTU file a scene, and says where they are.
+/// Writes the stress-free shape of a scene whose shape is given under load: the displacement from the shape given, `stress_free` [m], on the grid.
+fn write_stress_free(path: &Path, e: &Experiment, theta: &[f64]) -> Result<(), Error> {
+    let (plan, body) = (e.plan(), &e.plan().body);
+    let w = CpuBackend.stress_free(plan, theta)?;
+    Ok(write_vtu(path, &body.nodes, &Elements::of(body), &[("stress_free", Values::Vectors(&w))], &[])?)
+}
+
+/// Writes the fields of a fit into a folder, an NPZ file each and a VTU file a scene, and says where they are; beside them the stress-free shape of
+/// scenes whose shape is given under load.
 ///
 /// # Errors
 /// A file cannot be written.
 pub(crate) fn write_fields(folder: &Path, experiments: &[Experiment], fitted: &Fitted) -> Result<Vec<FieldReference>, Error> {
     for (scene, e) in experiments.iter().enumerate() {
+        if e.plan().initial == InitialShape::Given {
+            let ending = if experiments.len() == 1 { String::new() } else { format!("-scene-{}", scene + 1) };
+            write_stress_free(&folder.join(format!("stress-free{ending}.vtu")), e, &fitted.result.theta[scene])?;
+        }
         let found = found(e, fitted, scene);
         for (k, f) in found.iter().enumerate() {
             let (grid, file) = file_names(experiments.len(), scene, f.field);

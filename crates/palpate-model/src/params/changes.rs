@@ -82,19 +82,11 @@ fn product(
 impl Changes {
     /// The fields of one member.
     pub fn new(plan: &Plan, physics: &Physics) -> Changes {
-        let mut rest: Option<Vec<DVec3>> = None;
-        let spot = Spot::of(plan);
-        for (field, p) in effects(&plan.layout, physics).filter_map(|(_, law, p)| Some((rest_law(law)?, p))) {
-            let w = rest.get_or_insert_with(|| vec![DVec3::ZERO; plan.body.nodes.len()]);
-            for (w, x) in w.iter_mut().zip(&plan.body.nodes) {
-                *w += DVec3::from_array(field.at(&Spot { rest: *x, ..spot }, p));
-            }
-        }
         let mut out = Changes {
             modulus: product(plan, physics, modulus_law, || plan.body.middles().collect()),
             density: product(plan, physics, density_law, || plan.body.nodes.clone()),
             damping: None,
-            rest,
+            rest: rest_of_effects(plan, physics),
         };
         for (field, values) in plan.fields.iter().zip(&physics.fields) {
             let factors = field.factors(values);
@@ -152,6 +144,19 @@ fn slope(
         whole * field.slope(&s, p, slot)[0] / field.at(&s, p)[0]
     };
     Some(product.iter().zip(spots).map(at).collect())
+}
+
+/// What effects make of W at every node [m]; `None` where none does.
+pub fn rest_of_effects(plan: &Plan, physics: &Physics) -> Option<Vec<DVec3>> {
+    let mut rest: Option<Vec<DVec3>> = None;
+    let spot = Spot::of(plan);
+    for (field, p) in effects(&plan.layout, physics).filter_map(|(_, law, p)| Some((rest_law(law)?, p))) {
+        let w = rest.get_or_insert_with(|| vec![DVec3::ZERO; plan.body.nodes.len()]);
+        for (w, x) in w.iter_mut().zip(&plan.body.nodes) {
+            *w += DVec3::from_array(field.at(&Spot { rest: *x, ..spot }, p));
+        }
+    }
+    rest
 }
 
 /// Derivative of W at every node by number `slot` of effect `effect` [m per unit]; `None` for other effects.

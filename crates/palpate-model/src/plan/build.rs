@@ -226,19 +226,12 @@ fn check_impulse(effect: &Effect, step: f64) -> Result<(), String> {
     Err(format!("{duration} s is shorter than {} steps ({least} s), so that steps would miss part of it", impulse::LEAST_STEPS))
 }
 
-/// A shape that is given as the equilibrium needs something that holds it, and leaves no choice of a stress-free one.
+/// A shape that is given as the equilibrium needs something that holds it.
 fn check_given(scene: &Scene) -> Result<(), PlanError> {
-    if scene.initial.state != InitialShape::Given {
+    if scene.initial.state != InitialShape::Given || !scene.clamps.is_empty() {
         return Ok(());
     }
-    if scene.clamps.is_empty() {
-        return Err(error("object.state", "\"static\" needs a [[clamp]]: nothing holds the body".into()));
-    }
-    let changed = scene.effects.iter().position(|e| matches!(e.law().site, Site::Rest(_)));
-    changed.map_or(Ok(()), |i| {
-        let message = "changes the stress-free shape, which follows from object.state = \"static\"".into();
-        Err(error(format!("effect.{i}.kind"), message))
-    })
+    Err(error("object.state", "\"static\" needs a [[clamp]]: nothing holds the body".into()))
 }
 
 fn clamp_site(i: usize, clamp: &Clamp, scene: &Scene, parts: &Parts, shape: &Arc<dyn Shape>) -> Result<ClampSite, PlanError> {
