@@ -2,6 +2,7 @@
 
 use crate::bench::counts;
 use crate::coverage;
+use crate::pages;
 use crate::paper;
 use crate::real::report::Report;
 use crate::real::{diagnoses, models};
@@ -38,6 +39,7 @@ pub fn check(root: &Path) -> Vec<String> {
     generated(root, &mut found);
     verified(root, &mut found);
     effects(root, &mut found);
+    pages::check(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
         let size = fs::metadata(&file).map_or(0, |m| m.len());
