@@ -92,7 +92,8 @@ fn without_addresses(text: &str) -> String {
 /// Whether a sentence ends with this word, which another one follows.
 fn ends(word: &str, next: &str) -> bool {
     let bare = word.trim_end_matches(['*', '_', '"', '”', '’', ')', '`', ']']);
-    let initial = bare.chars().count() == 2 && bare.starts_with(char::is_alphabetic);
+    // An initial, as in "J. R. Stat. Soc.", and no symbol at the end of a sentence.
+    let initial = bare.chars().count() == 2 && bare.starts_with(char::is_alphabetic) && next.contains('.');
     let abbreviated = ABBREVIATED.contains(&bare.trim_start_matches(['(', '*', '_']));
     bare.ends_with(['.', '?', '!'])
         && !initial
@@ -143,7 +144,7 @@ mod tests {
     #[test]
     fn sentences_end_where_a_reader_ends_them() {
         assert_eq!(lengths("# A heading\n\nOne two three.\nFour *five.* Six\n"), [3, 2, 1]);
-        assert_eq!(lengths("It is 0.5 m, see Fig. 3 of Weiss et al. (2020), e.g. there. And h. next"), [14, 3]);
+        assert_eq!(lengths("It is 0.5 m, see Fig. 3 of Weiss et al. (2020), e.g. there. And h. next. The E. Then J. R. Soc. 3"), [14, 3, 2, 5]);
         assert_eq!(
             lengths("- one two\n- three\n  four\n1. five six\n\nSeven\n```\nno words here\n```\neight nine\n"),
             [2, 2, 2, 1, 2]
