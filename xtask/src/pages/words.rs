@@ -98,7 +98,8 @@ fn ends(word: &str, next: &str) -> bool {
     bare.ends_with(['.', '?', '!'])
         && !initial
         && !abbreviated
-        && (next.starts_with('`')
+        && (next.starts_with(['`', '['])
+            || next == "palpate"
             || !next.trim_start_matches(['*', '_', '"', '“', '(', '[']).starts_with(|c: char| c.is_ascii_lowercase()))
 }
 
@@ -143,8 +144,11 @@ mod tests {
 
     #[test]
     fn sentences_end_where_a_reader_ends_them() {
-        assert_eq!(lengths("# A heading\n\nOne two three.\nFour *five.* Six\n"), [3, 2, 1]);
-        assert_eq!(lengths("It is 0.5 m, see Fig. 3 of Weiss et al. (2020), e.g. there. And h. next. The E. Then J. R. Soc. 3"), [14, 3, 2, 5]);
+        assert_eq!(lengths("# A heading\n\nOne two three.\nFour *five.* Six. palpate [a](b) c\n"), [3, 2, 1, 3]);
+        assert_eq!(
+            lengths("It is 0.5 m, see Fig. 3 of Weiss et al. (2020), e.g. there. And h. next. The E. Then J. R. Soc. 3"),
+            [14, 3, 2, 5]
+        );
         assert_eq!(
             lengths("- one two\n- three\n  four\n1. five six\n\nSeven\n```\nno words here\n```\neight nine\n"),
             [2, 2, 2, 1, 2]
