@@ -173,7 +173,7 @@ fn the_effect_is_found_as_the_page_says() {
     assert_eq!(run("docs/an-effect.md"), 3);
 }
 
-/// Commands of other pages that are marked to be run.
+/// Commands of other pages that are marked to be run. Long fits are left to tests of their own: `tests/cli/fitting.rs` has that of the README.
 #[test]
 fn commands_of_other_pages_run() {
     let mut pages: Vec<String> = fs::read_dir(root().join("docs"))
@@ -181,13 +181,14 @@ fn commands_of_other_pages_run() {
         .map(|e| format!("docs/{}", e.unwrap().file_name().to_str().unwrap()))
         .filter(|n| n.ends_with(".md") && !["docs/ten-minutes.md", "docs/an-effect.md"].contains(&n.as_str()))
         .collect();
+    pages.push("README.md".into());
     pages.sort();
     let commands: usize = pages.iter().map(|page| run(page)).sum();
     assert!(commands >= OTHERS, "{commands} commands");
 }
 
 /// So many there are at least.
-const OTHERS: usize = 0;
+const OTHERS: usize = 7;
 
 #[test]
 fn lines_are_compared_as_readers_compare_them() {
