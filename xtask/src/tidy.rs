@@ -1,6 +1,6 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
-use crate::bench::counts;
+use crate::bench::{counts, page};
 use crate::coverage;
 use crate::pages;
 use crate::paper;
@@ -130,6 +130,7 @@ fn generated(root: &Path, found: &mut Vec<String>) {
     check("docs/suite.md", "suite", suite, "suite --report");
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
+    check("docs/speed.md", "speed", page::shown(root), "bench, and its name in xtask/src/bench/page.rs");
     for set in paper::SETS {
         let verb = format!("paper --only {} --report", set.name);
         match set.stored(root) {
