@@ -75,6 +75,32 @@ pub fn summary(root: &Path, pages: &[(String, String)], found: &mut Vec<String>)
     }
 }
 
+/// Every way to write a path with `{a,b}` in it.
+fn alternatives(path: &str) -> Vec<String> {
+    let Some((before, (inside, after))) = path.split_once('{').and_then(|(b, r)| Some((b, r.split_once('}')?))) else {
+        return vec![path.into()];
+    };
+    inside.split(',').flat_map(|one| alternatives(&format!("{before}{one}{after}"))).collect()
+}
+
+/// Sources that a page names in backquotes and that are not there. Of a path its end is enough, `corotation/hessian.rs`; names in capitals stand for any.
+pub fn sources(files: &[String], name: &str, text: &str, found: &mut Vec<String>) {
+    let is_path = |c: &str| c.chars().all(|c| c.is_ascii_alphanumeric() || "_-./{},".contains(c));
+    for (number, line) in outside_code(text) {
+        let spans = line.split('`').skip(1).step_by(2);
+        for path in spans.filter(|s| is_path(s) && (s.ends_with(".rs") || s.ends_with(".wgsl"))).flat_map(alternatives) {
+            let stands_for_any = path.rsplit('/').next().is_some_and(|n| n.starts_with(|c: char| c.is_ascii_uppercase()));
+            if !stands_for_any
+                && !files
+                    .iter()
+                    .any(|f| *f == path || f.ends_with(&format!("/{path}")) || f.replace("/src/", "/").ends_with(&path))
+            {
+                found.push(format!("{name}:{number}: there is no {path}"));
+            }
+        }
+    }
+}
+
 /// Blocks behind `<!-- quoted from: FILE -->` that do not stand in that file.
 pub fn quotes(root: &Path, name: &str, text: &str, found: &mut Vec<String>) {
     const MARK: &str = "<!-- quoted from: ";
@@ -100,6 +126,10 @@ mod tests {
         write("code.rs", "fn f() {}\nfn g() {}\n");
         let quote = |line: &str| format!("<!-- quoted from: code.rs -->\n```rust\n{line}\n```\n");
         write("README.md", &(quote("fn g() {}") + &quote("fn h() {}")));
+        let code = ["a/src/b/c.rs".to_string()];
+        let mut missing = Vec::new();
+        sources(&code, "x.md", "`b/c.rs` `a/b/c.rs` `b/{c,d}.rs` `b/NAME.rs` c.rs\n```\n`e.rs`\n```\n", &mut missing);
+        assert_eq!(missing, ["x.md:1: there is no b/d.rs"]);
         let a = "[b](b.md#two--words) [up](../README.md) [web](https://x.org/y) [own](#here) `[no](link.md)`\n\n## Here\n";
         write("docs/a.md", a);
         write("docs/b.md", "# Two — words\n\n[c](c.md)\n[a](a.md#there)\n```\n[d](d.md)\n```\n");

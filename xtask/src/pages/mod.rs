@@ -23,13 +23,26 @@ pub fn pages(root: &Path) -> Vec<(String, String)> {
     names.filter_map(|n| Some((n.clone(), fs::read_to_string(root.join(&n)).ok()?))).collect()
 }
 
+/// Files below a folder, by their paths from the root.
+fn below(root: &Path, folder: &str, files: &mut Vec<String>) {
+    for entry in fs::read_dir(root.join(folder)).into_iter().flatten().flatten() {
+        let name = format!("{folder}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() { below(root, &name, files) } else { files.push(name) }
+    }
+}
+
 /// Checks every page; one line per finding.
 pub fn check(root: &Path, found: &mut Vec<String>) {
     let all = pages(root);
+    let mut files = Vec::new();
+    for folder in ["crates", "shaders", "tests", "xtask", "python"] {
+        below(root, folder, &mut files);
+    }
     for (name, text) in &all {
         words::check(name, text, found);
         links::check(root, name, text, found);
         links::quotes(root, name, text, found);
+        links::sources(&files, name, text, found);
     }
     links::summary(root, &all, found);
     results::check(root, found);
