@@ -2,6 +2,7 @@
 
 use crate::bench::{counts, page};
 use crate::coverage;
+use crate::figures;
 use crate::pages;
 use crate::paper;
 use crate::real::report::Report;
@@ -40,6 +41,7 @@ pub fn check(root: &Path) -> Vec<String> {
     verified(root, &mut found);
     effects(root, &mut found);
     pages::check(root, &mut found);
+    figures::check(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
         let size = fs::metadata(&file).map_or(0, |m| m.len());
