@@ -1,7 +1,9 @@
 //! `cargo xtask tidy`: what the house promises and the compiler does not check.
 
-use crate::bench::counts;
+use crate::bench::{counts, page};
 use crate::coverage;
+use crate::figures;
+use crate::pages;
 use crate::paper;
 use crate::real::report::Report;
 use crate::real::{diagnoses, models};
@@ -38,6 +40,8 @@ pub fn check(root: &Path) -> Vec<String> {
     generated(root, &mut found);
     verified(root, &mut found);
     effects(root, &mut found);
+    pages::check(root, &mut found);
+    figures::check(root, &mut found);
     for file in files(root) {
         let name = file.strip_prefix(root).unwrap_or(&file).display().to_string();
         let size = fs::metadata(&file).map_or(0, |m| m.len());
@@ -128,6 +132,7 @@ fn generated(root: &Path, found: &mut Vec<String>) {
     check("docs/suite.md", "suite", suite, "suite --report");
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
+    check("docs/speed.md", "speed", page::shown(root), "bench, and its name in xtask/src/bench/page.rs");
     for set in paper::SETS {
         let verb = format!("paper --only {} --report", set.name);
         match set.stored(root) {

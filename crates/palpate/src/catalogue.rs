@@ -31,10 +31,10 @@ fn title(family: Family) -> (&'static str, &'static str) {
         Family::Shape => ("Shape and supports", "Rest shape, state at the start, clamps."),
         Family::Measurement => (
             "Measurement",
-            "How it was measured: what is compared changes, the motion does not. The sign of all: *reading = truth + effect*. A depth bias of
-+0.02 m means that readings are 2 cm too large, an offset of a camera that the recording states it so far off its true pose, a
-time offset that the recording's clock is ahead by it, an offset of a marker that it sits so far from its stated place. A fit undoes
-the effect before it compares (in reverse order of the scene); `palpate observe` applies it to the recording that it makes.",
+            "How it was measured: what is compared changes, the motion does not. The sign of all: *reading = truth + effect*. With a depth bias
+of +0.02 m readings are 2 cm too large. With an offset of a camera the recording states it so far off its true pose. With a time offset the
+recording's clock is ahead by it. With an offset of a marker the marker sits so far from its stated place. A fit undoes the effect before it
+compares (in reverse order of the scene); `palpate observe` applies it to the recording that it makes.",
         ),
         Family::Slack => ("Slack", "A free force field: a bound on what any load could explain, never an explanation."),
     }

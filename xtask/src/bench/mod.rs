@@ -6,6 +6,7 @@ pub mod fields;
 pub mod fit;
 pub mod gpu;
 pub mod model;
+pub mod page;
 pub mod report;
 
 use crate::table;

@@ -37,9 +37,9 @@ pub static STUDIES: &[Study] = &[
     Study {
         name: "space",
         title: "Order in space",
-        text: "A smooth displacement with strains of up to 15 % is given on a free box; the loads that it would need are integrated in their weak \
-               form over the\nbox, which is made of whole cells or cuts cells on all sides, and Newton's method finds the discrete solution. Its \
-               error is the root mean square over\nthe mass.",
+        text: "A smooth displacement with strains of up to 15 % is given on a free box, which is made of whole cells or cuts cells on all \
+               sides. The loads that\nit would need are integrated in their weak form over the box, and Newton's method finds the discrete \
+               solution. Its error is the root mean square\nover the mass.",
         run: space::run,
     },
     Study {
