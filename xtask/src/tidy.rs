@@ -19,16 +19,17 @@ const LONGEST: usize = 450;
 const LARGEST: u64 = 300_000;
 
 /// Which rooms a room may import (`palpate-` left out); nobody but tests and xtask imports `palpate`.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("palpate-model", &[]),
     ("palpate-io", &["model"]),
     ("palpate-import", &["model", "io"]),
+    ("palpate-export", &["model"]),
     ("palpate-engine", &["model"]),
     ("palpate-cpu", &["model", "engine"]),
     ("palpate-gpu", &["model", "engine"]),
     ("palpate-fit", &["model", "engine"]),
     ("palpate-diagnose", &["model", "engine"]),
-    ("palpate", &["model", "io", "import", "engine", "cpu", "gpu", "fit", "diagnose"]),
+    ("palpate", &["model", "io", "import", "export", "engine", "cpu", "gpu", "fit", "diagnose"]),
 ];
 
 /// Checks the workspace at `root`; one line per finding.

@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, place, simulate, synthesize, track};
+use crate::commands::{batch, coarsen, diagnose, export, fit, import, inspect, observe, place, simulate, synthesize, track};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -24,6 +24,7 @@ A first session:
   palpate simulate found/model.toml            the scene with the found values
   palpate synthesize found/model.toml          a motion that nobody has seen: pulls, wind, keyframes, edits
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
+  palpate export   found --format mujoco       the body for another simulator
 
 Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted (Ctrl-C; the best so far is written).";
 
@@ -47,6 +48,7 @@ enum Command {
     Place(place::Arguments),
     Batch(batch::Arguments),
     Coarsen(coarsen::Arguments),
+    Export(export::Arguments),
     Diagnose(diagnose::Arguments),
     Inspect(inspect::Arguments),
 }
@@ -106,7 +108,7 @@ impl Console<'_> {
 
 /// True where the command that these arguments name ends in good order when it is interrupted. The others are ended by the system.
 pub fn listens<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> bool {
-    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_)))
+    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Export(_)))
 }
 
 /// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown
@@ -141,6 +143,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Place(a) => place::run(a, &mut console),
         Command::Batch(a) => batch::run(a, &mut console),
         Command::Coarsen(a) => coarsen::run(a, &mut console),
+        Command::Export(a) => export::run(a, &mut console),
         Command::Diagnose(a) => diagnose::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };

@@ -4,6 +4,7 @@ pub mod batch;
 pub mod coarsen;
 pub mod devices;
 pub mod diagnose;
+pub mod export;
 pub mod fit;
 pub mod frames;
 pub mod import;

@@ -12,6 +12,7 @@ pub mod coarsening;
 pub mod devices;
 pub mod diagnosis;
 pub mod effects;
+pub mod export;
 pub mod fit;
 pub mod import;
 pub mod inspection;
