@@ -4,6 +4,7 @@ mod batch;
 mod effects;
 mod fields;
 mod fitting;
+mod reporting;
 mod synthesis;
 mod tets;
 mod tracking;

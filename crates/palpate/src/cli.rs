@@ -1,6 +1,6 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, synthesize, track};
+use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, pictures, simulate, synthesize, track};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -22,6 +22,7 @@ A first session:
   palpate track    scene.toml --out seen       the moving body in every frame of its recording
   palpate simulate found/model.toml            the scene with the found values
   palpate synthesize found/model.toml          a motion that nobody has seen: pulls, wind, keyframes, edits
+  palpate pictures found --format gif          what the report shows as pictures, charts and a movie
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
 
 Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted (Ctrl-C; the best so far is written).";
@@ -46,6 +47,7 @@ enum Command {
     Batch(batch::Arguments),
     Coarsen(coarsen::Arguments),
     Diagnose(diagnose::Arguments),
+    Pictures(pictures::Arguments),
     Inspect(inspect::Arguments),
 }
 
@@ -104,7 +106,7 @@ impl Console<'_> {
 
 /// True where the command that these arguments name ends in good order when it is interrupted. The others are ended by the system.
 pub fn listens<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> bool {
-    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_)))
+    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Pictures(_)))
 }
 
 /// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown
@@ -139,6 +141,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Batch(a) => batch::run(a, &mut console),
         Command::Coarsen(a) => coarsen::run(a, &mut console),
         Command::Diagnose(a) => diagnose::run(a, &mut console),
+        Command::Pictures(a) => pictures::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {

@@ -9,6 +9,7 @@ pub mod frames;
 pub mod import;
 pub mod inspect;
 pub mod observe;
+pub mod pictures;
 pub mod simulate;
 pub mod synthesize;
 pub mod track;

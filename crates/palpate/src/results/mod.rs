@@ -17,6 +17,8 @@ pub mod import;
 pub mod inspection;
 pub mod lock;
 pub mod observation;
+pub mod pictures;
+pub mod report;
 pub mod simulation;
 pub mod synthesis;
 pub mod tracking;
