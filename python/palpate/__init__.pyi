@@ -296,7 +296,7 @@ class Fit:
         """The scenes with what was found."""
     def residuals(self) -> list[Residuals]:
         """How far every reading lies from the best simulation, scene by scene; it is simulated once more for that."""
-    def save(self, folder: _Path, *, pictures: int = 4) -> None:
+    def save(self, folder: _Path, *, pictures: int = 24) -> None:
         """Writes what the command line writes: result.json, model.toml, history.csv, fields, and report.html."""
 
 @final

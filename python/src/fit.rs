@@ -137,8 +137,8 @@ impl Fit {
         (0..self.experiments.len()).map(at).collect()
     }
 
-    /// Writes what the command line writes: `result.json`, `model.toml`, `history.csv`, fields, and `report.html` with so many pictures a scene.
-    #[pyo3(signature = (folder, *, pictures = 4))]
+    /// Writes what the command line writes: `result.json`, `model.toml`, `history.csv`, fields, and `report.html` with so many frames of a scene in space.
+    #[pyo3(signature = (folder, *, pictures = palpate::report::FRAMES))]
     fn save(&self, py: Python<'_>, folder: PathBuf, pictures: usize) -> PyResult<()> {
         let (experiments, fitted) = (self.experiments.clone(), self.fitted.clone());
         let write = move || {

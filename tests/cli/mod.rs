@@ -5,6 +5,7 @@ mod effects;
 mod fields;
 mod fitting;
 mod placing;
+mod reporting;
 mod synthesis;
 mod tets;
 mod tracking;

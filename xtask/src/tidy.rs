@@ -49,7 +49,9 @@ pub fn check(root: &Path) -> Vec<String> {
         if name.starts_with("assets/") && size > LARGEST {
             found.push(format!("{name}: {size} bytes; assets may have {LARGEST}"));
         }
-        if matches!(file.extension().and_then(|e| e.to_str()), Some("rs" | "wgsl")) {
+        // Libraries of others are as they come.
+        let own = !name.contains("/vendor/");
+        if own && matches!(file.extension().and_then(|e| e.to_str()), Some("rs" | "wgsl" | "js" | "css")) {
             let text = fs::read_to_string(&file).unwrap_or_default();
             source(&name, &text, &mut found);
         }

@@ -47,6 +47,13 @@ impl Elements {
         all
     }
 
+    /// So many points, each an element by itself (VTK's type 1).
+    pub fn vertices(count: usize) -> Elements {
+        let mut all = Elements::default();
+        (0..count as u32).for_each(|k| all.push(CellType::Vertex, [k]));
+        all
+    }
+
     fn push(&mut self, kind: CellType, points: impl IntoIterator<Item = u32>) {
         self.connectivity.extend(points.into_iter().map(u64::from));
         self.offsets.push(self.connectivity.len() as u64);
@@ -71,6 +78,8 @@ pub enum Values<'a> {
     Vectors(&'a [DVec3]),
     /// Numbers.
     Numbers(&'a [f64]),
+    /// Symmetric matrices: xx, yy, zz, xy, yz, xz, as ParaView names six numbers.
+    Symmetric(&'a [[f64; 6]]),
 }
 
 /// Arrays by name.
@@ -116,6 +125,7 @@ fn attributes(path: &Path, arrays: &Arrays, wanted: usize) -> Result<Vec<Attribu
         let (found, array) = match values {
             Values::Vectors(v) => (v.len(), DataArray::vectors(*name).with_data(flat(v))),
             Values::Numbers(v) => (v.len(), DataArray::scalars(*name, 1).with_data(v.to_vec())),
+            Values::Symmetric(v) => (v.len(), DataArray::new(*name, 6).with_data(v.as_flattened().to_vec())),
         };
         match found == wanted {
             true => Ok(Attribute::DataArray(array)),

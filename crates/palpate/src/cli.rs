@@ -1,6 +1,8 @@
 //! The command line as a function: arguments in, exit code out.
 
-use crate::commands::{batch, coarsen, diagnose, export, fit, import, inspect, observe, place, simulate, synthesize, track};
+use crate::commands::{
+    batch, coarsen, diagnose, export, fit, import, inspect, observe, pictures, place, simulate, synthesize, track,
+};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
@@ -23,6 +25,7 @@ A first session:
   palpate place    scene.toml --out parts      over which regions of the body a number varies
   palpate simulate found/model.toml            the scene with the found values
   palpate synthesize found/model.toml          a motion that nobody has seen: pulls, wind, keyframes, edits
+  palpate pictures found --format gif          what the report shows as pictures, charts and a movie
   palpate diagnose scene.toml --out why        what the model lacks, and the corrected scene
   palpate export   found --format mujoco       the body for another simulator
 
@@ -50,6 +53,7 @@ enum Command {
     Coarsen(coarsen::Arguments),
     Export(export::Arguments),
     Diagnose(diagnose::Arguments),
+    Pictures(pictures::Arguments),
     Inspect(inspect::Arguments),
 }
 
@@ -108,7 +112,7 @@ impl Console<'_> {
 
 /// True where the command that these arguments name ends in good order when it is interrupted. The others are ended by the system.
 pub fn listens<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> bool {
-    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Export(_)))
+    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Export(_) | Command::Pictures(_)))
 }
 
 /// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown
@@ -145,6 +149,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Coarsen(a) => coarsen::run(a, &mut console),
         Command::Export(a) => export::run(a, &mut console),
         Command::Diagnose(a) => diagnose::run(a, &mut console),
+        Command::Pictures(a) => pictures::run(a, &mut console),
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {

@@ -7,6 +7,7 @@ use crate::experiment::Experiment;
 use crate::fitting::Fitted;
 use crate::results::finite;
 use crate::results::fit::FoundCurve;
+use glam::{DMat3, DVec3};
 use palpate_model::cutcells::grid::SIGNS;
 use palpate_model::materials::Gradient;
 use palpate_model::materials::curve::Curve;
@@ -17,21 +18,33 @@ use std::ops::ControlFlow;
 /// States that are looked at.
 const STATES: usize = 40;
 
-/// Displacement gradient of every element, row by row: in the middle of a cell, at an elastic point.
-fn gradients<'a>(plan: &'a Plan, u: &'a [glam::DVec3]) -> impl Iterator<Item = Gradient<f64>> + 'a {
-    let rows = |m: glam::DMat3| std::array::from_fn(|i| std::array::from_fn(|j| m.col(j)[i]));
+/// A matrix by row and column.
+pub(crate) fn matrix(of: impl Fn(usize, usize) -> f64) -> DMat3 {
+    DMat3::from_cols_array_2d(&std::array::from_fn(|j| std::array::from_fn(|i| of(i, j))))
+}
+
+/// Displacement gradient in the middle of every cell at displacements `[N]`.
+fn of_cells<'a>(plan: &'a Plan, u: &'a [DVec3]) -> impl Iterator<Item = DMat3> + 'a {
     let h = plan.body.length;
-    let of_cell = move |nodes: &[u32; 8]| {
-        let mut m = glam::DMat3::ZERO;
-        for (n, s) in nodes.iter().zip(SIGNS) {
-            let (v, g) = (u[*n as usize], glam::DVec3::from_array(s.map(f64::from)) * (0.25 / h));
-            m += glam::DMat3::from_cols(v * g.x, v * g.y, v * g.z);
+    plan.body.cells().iter().map(move |c| {
+        let mut m = DMat3::ZERO;
+        for (n, s) in c.nodes.iter().zip(SIGNS) {
+            let (v, g) = (u[*n as usize], DVec3::from_array(s.map(f64::from)) * (0.25 / h));
+            m += DMat3::from_cols(v * g.x, v * g.y, v * g.z);
         }
         m
-    };
-    let cells = plan.body.cells().iter().map(move |c| of_cell(&c.nodes));
-    let points = plan.body.points.stencils.iter().map(move |s| s.gradient_of(u));
-    cells.chain(points).map(rows)
+    })
+}
+
+/// Displacement gradient of every element: in the middle of a cell, the mean of a tetrahedron.
+pub(crate) fn middles<'a>(plan: &'a Plan, u: &'a [DVec3]) -> impl Iterator<Item = DMat3> + 'a {
+    of_cells(plan, u).chain(plan.body.points.means().map(|s| s.gradient_of(u)))
+}
+
+/// The same row by row, in the middle of a cell and at every elastic point.
+fn gradients<'a>(plan: &'a Plan, u: &'a [DVec3]) -> impl Iterator<Item = Gradient<f64>> + 'a {
+    let rows = |m: DMat3| std::array::from_fn(|i| std::array::from_fn(|j| m.col(j)[i]));
+    of_cells(plan, u).chain(plan.body.points.stencils.iter().map(|s| s.gradient_of(u))).map(rows)
 }
 
 /// Smallest and largest principal stretch, and ratio of volumes, over a simulation's elements and states.

@@ -63,6 +63,7 @@ pub mod report;
 mod residuals;
 pub mod results;
 mod scatter;
+mod stress;
 mod suited;
 mod synthesis;
 pub mod synthetic;

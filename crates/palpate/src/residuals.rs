@@ -63,7 +63,8 @@ pub struct FrameResidual {
 }
 
 impl FrameResidual {
-    fn new(time: f64, r: &FrameResiduals) -> FrameResidual {
+    /// Of the readings of a frame at this time [s].
+    pub(crate) fn new(time: f64, r: &FrameResiduals) -> FrameResidual {
         let squares: f64 = ReadingKind::ALL.iter().map(|kind| of_kind(r, *kind).map(Misfit::length_squared).sum::<f64>()).sum();
         let points = r.readings.iter().filter(|r| r.misfit.is_some()).count();
         let distances: Vec<f64> = r.distances().flatten().collect();

@@ -7,9 +7,13 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::{Clock, Interrupt};
 use crate::options::{BackendName, out_folder};
-use crate::report::{DiagnosisInput, FramePicture, diagnosis_document, diagnosis_html, diagnosis_summary, pictures};
+use crate::report::{
+    Compared, DiagnosisInput, FRAMES, Simulated, diagnosis_document, diagnosis_html, diagnosis_summary, diagnosis_title,
+    report_data,
+};
 use crate::results;
 use crate::results::diagnosis::DiagnosisDocument;
+use crate::results::report::ReportData;
 use clap::Args;
 use palpate_engine::FailureKind;
 use palpate_io::output::{make_folder, write_file};
@@ -49,8 +53,8 @@ pub struct Arguments {
     /// Go on with the checkpoints in the output folder
     #[arg(long)]
     resume: bool,
-    /// Pictures per scene in the report
-    #[arg(long, value_name = "N", default_value_t = 4, hide_short_help = true)]
+    /// Most frames that the report shows in space; 0: no motion is simulated for it
+    #[arg(long, value_name = "N", default_value_t = FRAMES, hide_short_help = true)]
     pictures: usize,
 }
 
@@ -79,44 +83,47 @@ fn write_all(
         let name = if experiments.len() == 1 { "model.toml".to_string() } else { format!("model-{}.toml", s + 1) };
         text(&name, &model)?;
     }
-    // The page without pictures, which take simulations: there may be no time for them.
-    let page = |pictures| diagnosis_html(&DiagnosisInput { done, pictures, command: command(a) });
-    text("report.html", &page(None))?;
-    if let Some(pictures) = draw(a, experiments, done, backend, limits)? {
-        text("report.html", &page(Some(pictures)))?;
+    // The page without motions, which take simulations: there may be no time for them.
+    let page = |data| diagnosis_html(&DiagnosisInput { done, data, command: command(a) });
+    text("report.html", &page(ReportData { title: diagnosis_title(&done.diagnosis).into(), ..ReportData::default() }))?;
+    if let Some(data) = motions(a, experiments, done, backend, limits)? {
+        text("report.html", &page(data))?;
     }
     Ok(result)
 }
 
-/// Pictures of a scene before and after.
-type Pictures = (Vec<FramePicture>, Vec<FramePicture>);
-
-/// Pictures of every scene; `None` where they were stopped.
-fn draw(
+/// The motions of every scene before and after, beside what was measured; `None` where they were stopped.
+fn motions(
     a: &Arguments,
     experiments: &[Experiment],
     done: &Diagnosed,
     backend: Backend,
     limits: &Interrupt,
-) -> Result<Option<Vec<Pictures>>, Error> {
+) -> Result<Option<ReportData>, Error> {
     let d = &done.diagnosis;
-    let scale = 2.0 * d.before.rms.max(d.before.noise).max(1e-9);
+    // Whoever interrupts does not want to wait, and neither does who has set a limit.
+    if a.pictures == 0 || d.interrupted || limits.is_raised() {
+        return Ok(None);
+    }
     // A device that failed may fail again; the report needs none.
     let backend = if done.broken.is_some() { Backend::Cpu } else { backend };
-    let of = |e: &Experiment, theta: &[f64]| pictures(e, backend, theta, a.pictures, scale, &limits.at_once());
-    let mut all = Vec::new();
-    for ((e, theta), after) in experiments.iter().zip(&done.theta_before).zip(&done.experiments) {
-        // Whoever interrupts does not want to wait, and neither does who has set a limit.
-        if a.pictures == 0 || d.interrupted || limits.is_raised() {
-            return Ok(None);
-        }
-        match of(e, theta).and_then(|before| Ok((before, of(after, &after.plan().theta)?))) {
-            Ok(both) => all.push(both),
-            Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => return Ok(None),
-            Err(e) => return Err(e),
-        }
+    let both = experiments.iter().zip(&done.theta_before).zip(&done.experiments);
+    let compared: Vec<Compared> = both
+        .map(|((experiment, theta), after)| Compared {
+            before: Some(Simulated { experiment, theta }),
+            after: Some(Simulated { experiment: after, theta: &after.plan().theta }),
+            experiment,
+            noise: d.before.noise,
+            rms: [Vec::new(), Vec::new()],
+            // What the baseline lacks is what is to be seen.
+            measure: 0,
+        })
+        .collect();
+    match report_data(diagnosis_title(d), ["before", "after"], &compared, backend, a.pictures, &limits.at_once()) {
+        Ok(data) => Ok(Some(data)),
+        Err(Error::Simulation(f)) if f.kind == FailureKind::Stopped => Ok(None),
+        Err(e) => Err(e),
     }
-    Ok(Some(all))
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {

@@ -8,7 +8,7 @@ use crate::fields;
 use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters, usual};
 use crate::options::{BackendName, count, out_folder};
 use crate::progress::Track;
-use crate::report::{summary, write_fit, write_report};
+use crate::report::{FRAMES, summary, write_fit, write_report};
 use crate::results;
 use crate::results::fit::{FitDocument, FitStatus};
 use clap::{Args, ValueEnum};
@@ -93,8 +93,8 @@ pub struct Choices {
     /// evaluations, and says how long it took)
     #[arg(long)]
     no_grid_check: bool,
-    /// Pictures per scene in the report
-    #[arg(long, value_name = "N", default_value_t = 4, hide_short_help = true)]
+    /// Most frames that the report shows in space; 0: no motion is simulated for it
+    #[arg(long, value_name = "N", default_value_t = FRAMES, hide_short_help = true)]
     pictures: usize,
 }
 

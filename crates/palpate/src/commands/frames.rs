@@ -9,6 +9,7 @@ use crate::fields::{OnGrid, named};
 use crate::options::count;
 use crate::progress::Track;
 use crate::render::{Pinhole, shade};
+use crate::stress::stressed;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
@@ -130,6 +131,11 @@ impl Writer<'_> {
                     of_nodes.push(("velocity", Values::Vectors(&state.velocity)));
                     of_nodes.extend(self.stress_free.iter().map(|w| ("stress_free", Values::Vectors(w))));
                     let mut of_elements = named(&self.fields.elements);
+                    let plan = self.experiment.plan();
+                    let s = stressed(plan, &plan.theta, &state.displacement, self.stress_free.as_deref());
+                    of_elements.push(("strain", Values::Symmetric(&s.strain)));
+                    of_elements.push(("stress", Values::Symmetric(&s.stress)));
+                    of_elements.push(("von_mises", Values::Numbers(&s.von_mises)));
                     if body.cut.is_some() {
                         of_elements.push(("fraction", Values::Numbers(&fractions)));
                     }

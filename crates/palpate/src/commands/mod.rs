@@ -10,6 +10,7 @@ pub mod frames;
 pub mod import;
 pub mod inspect;
 pub mod observe;
+pub mod pictures;
 pub mod place;
 pub mod simulate;
 pub mod synthesize;

@@ -16,8 +16,8 @@ Examples:
   palpate simulate beam.toml --format vtu,png --every 5
   palpate simulate found/model.toml --out frames       what a fit has found, simulated again
 
-obj, ply: the deformed surface; vtu: the cells or tetrahedra with displacement, velocity and fields, and a .pvd for the whole
-series; png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
+obj, ply: the deformed surface; vtu: the cells or tetrahedra with displacement, velocity and fields, strain (Green) and stress
+(Cauchy, and von Mises' of it; the material's alone), and a .pvd for the whole series; png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
 formats are replaced: those that this one has no frame for are removed.";
 
 /// Simulate a scene and write its motion

@@ -67,21 +67,29 @@ impl Pinhole {
         })
     }
 
-    /// A camera that sees the whole box `min..max` [m] from the side, `up` upwards in the picture: the default view of reports.
+    /// A camera that sees the whole box `min..max` [m] from the side, `up` upwards in the picture: the default view.
     pub fn framing(min: DVec3, max: DVec3, up: DVec3, width: usize, height: usize) -> Pinhole {
-        let center = 0.5 * (min + max);
-        let radius = (0.5 * (max - min).length()).max(1e-9);
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         // A three-quarter view: two horizontal directions made from `up`, and a little from above.
         let a = up.any_orthonormal_vector();
-        let b = up.cross(a);
-        let direction = (a * 0.5 - b * 0.85 + up * 0.35).normalize();
+        Pinhole::facing(min, max, (a * 0.5 - up.cross(a) * 0.85 + up * 0.35).normalize(), up, width, height)
+    }
+
+    /// The same from a direction: that from the middle of the box to the camera, which is not parallel to `up`.
+    pub fn facing(min: DVec3, max: DVec3, direction: DVec3, up: DVec3, width: usize, height: usize) -> Pinhole {
+        let center = 0.5 * (min + max);
+        let radius = (0.5 * (max - min).length()).max(1e-9);
         let fov = 30.0_f64;
         // The sphere around the box touches the narrower half angle; 5 % stays free.
         let narrow = (0.5 * fov.to_radians()).tan() * (width as f64 / height as f64).min(1.0);
         let distance = 1.05 * radius / narrow.atan().sin();
-        Pinhole::looking_at(center + direction * distance, center, up, fov, width.max(1), height.max(1))
-            .expect("a framing camera has a valid direction by construction")
+        let (width, height) = (width.max(1), height.max(1));
+        let look = |up: DVec3| Pinhole::looking_at(center + direction * distance, center, up, fov, width, height);
+        // Who looks along `up` sees any other direction upwards as well.
+        look(up)
+            .or_else(|_| look(direction.any_orthonormal_vector()))
+            .or_else(|_| Pinhole::looking_at(center + DVec3::X * distance, center, DVec3::Z, fov, width, height))
+            .expect("a camera beside the box that looks at its middle has a direction")
     }
 
     /// Column, row and depth along the camera's z axis [m] of a world point.

@@ -15,7 +15,8 @@ pub struct Picture {
     pub rgb: Vec<[u8; 3]>,
 }
 
-const BACKGROUND: [u8; 3] = [250, 250, 250];
+/// Colour of what nothing is drawn on.
+pub const BACKGROUND: [u8; 3] = [255, 255, 255];
 
 impl Picture {
     /// A picture of one colour.
@@ -56,9 +57,22 @@ pub fn shade(
     up: DVec3,
     colour: impl Fn(usize) -> DVec3,
 ) -> Picture {
+    let mut picture = Picture::blank(camera.width, camera.height);
+    shade_on(&mut picture, camera, vertices, triangles, up, colour);
+    picture
+}
+
+/// The same over what a picture of the camera's size shows already; returns what was seen where.
+pub fn shade_on(
+    picture: &mut Picture,
+    camera: &Pinhole,
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    up: DVec3,
+    colour: impl Fn(usize) -> DVec3,
+) -> DepthImage {
     let image = rasterise(camera, vertices, triangles);
     let normals = vertex_normals(vertices, triangles);
-    let mut picture = Picture::blank(camera.width, camera.height);
     let eye = camera.world_from_camera.translation;
     let sky = up.try_normalize().unwrap_or(DVec3::Z);
     for y in 0..camera.height {
@@ -79,7 +93,7 @@ pub fn shade(
             picture.rgb[i] = (c * 255.0).round().to_array().map(|v| v as u8);
         }
     }
-    picture
+    image
 }
 
 /// Area-weighted unit normals of the vertices.
@@ -107,12 +121,13 @@ fn barycentric(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [u, v, 1.0 - u - v]
 }
 
-/// Colour of a signed residual: blue (point inside the model) through white to red (outside); saturated at ±`scale`.
+/// Colour of a signed residual: blue (point inside the model) through grey to red (outside), saturated at ±`scale`. Grey in the middle is seen
+/// on light and on dark ground, and blue and red by who cannot tell red from green (Moreland, Diverging color maps, 2009).
 pub fn residual_colour(residual: f64, scale: f64) -> [u8; 3] {
     let t = (residual / scale).clamp(-1.0, 1.0);
-    let (red, blue) = (DVec3::new(178.0, 24.0, 43.0), DVec3::new(33.0, 102.0, 172.0));
-    let white = DVec3::splat(247.0);
-    let c = if t >= 0.0 { white.lerp(red, t) } else { white.lerp(blue, -t) };
+    let (red, blue) = (DVec3::new(180.0, 4.0, 38.0), DVec3::new(39.0, 66.0, 190.0));
+    let middle = DVec3::splat(205.0);
+    let c = if t >= 0.0 { middle.lerp(red, t) } else { middle.lerp(blue, -t) };
     c.round().to_array().map(|v| v as u8)
 }
 

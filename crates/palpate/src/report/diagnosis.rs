@@ -164,7 +164,7 @@ pub fn diagnosis_document(done: &Diagnosed) -> DiagnosisDocument {
 }
 
 /// A fitted number with its standard error.
-pub(super) fn fitted(m: &Model, k: usize) -> String {
+fn fitted(m: &Model, k: usize) -> String {
     stated(m.values[k], m.errors[k])
 }
 

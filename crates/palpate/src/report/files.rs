@@ -1,12 +1,15 @@
 //! The files of a fit in its folder.
 
-use super::{FramePicture, ReportInput, fit_document, fit_html, history_csv, pictures};
+use super::data::{Compared, Simulated, curve, scenes, searches};
+use super::html::fit_title;
+use super::{ReportInput, fit_document, fit_html, history_csv};
 use crate::curves;
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fields::{files_of, write_fields};
 use crate::fitting::Fitted;
+use crate::residuals::ResidualSummary;
 use crate::results;
 use crate::results::fit::FitDocument;
 use palpate_engine::Stop;
@@ -38,20 +41,11 @@ pub fn write_fit(folder: &Path, experiments: &[Experiment], fitted: &Fitted, bac
     Ok(result)
 }
 
-/// Pictures of one scene before and after; a start that cannot be simulated has none.
-type Pair = (Vec<FramePicture>, Vec<FramePicture>);
-
-fn scene_pictures(e: &Experiment, fitted: &Fitted, s: usize, backend: Backend, count: usize, scale: f64) -> Result<Pair, Error> {
-    let theta = &fitted.theta_start[s];
-    let stop = Stop::default();
-    let before = pictures(e, backend, theta, count, scale, &stop).unwrap_or_default();
-    Ok((before, pictures(e, backend, &fitted.result.theta[s], count, scale, &stop)?))
-}
-
-/// Writes `report.html` beside them, with so many pictures a scene; `command` is said to give the same result.
+/// Writes `report.html` beside them, with at most `pictures` frames of a scene in space (0: no motion is simulated
+/// for it); `command` is said to give the same result.
 ///
 /// # Errors
-/// The file cannot be written, or a picture not simulated.
+/// The file cannot be written, or what was found cannot be simulated.
 pub fn write_report(
     folder: &Path,
     experiments: &[Experiment],
@@ -61,14 +55,19 @@ pub fn write_report(
     pictures: usize,
     command: String,
 ) -> Result<(), Error> {
-    let (rms, noise, _) = fitted.residual();
-    let scale = if rms.is_finite() { 2.0 * rms.max(noise) } else { noise.max(1e-3) };
-    let pictures = experiments.iter().enumerate().map(|(s, e)| match pictures {
-        0 => Ok((Vec::new(), Vec::new())),
-        n => scene_pictures(e, fitted, s, backend, n, scale),
-    });
-    let pictures = pictures.collect::<Result<Vec<_>, _>>()?;
+    let frames = |r: &ResidualSummary| r.frames.iter().map(|f| f.rms).collect();
+    let mut compared = Vec::new();
+    for (s, experiment) in experiments.iter().enumerate() {
+        let theta = [&fitted.theta_start[s], &fitted.result.theta[s]];
+        let [before, after] = theta.map(|theta| (pictures > 0).then_some(Simulated { experiment, theta }));
+        let noise = fitted.after[s].noise;
+        let rms = [fitted.before[s].as_ref().map_or(Vec::new(), frames), frames(&fitted.after[s])];
+        compared.push(Compared { before, after, experiment, noise, rms, measure: 1 });
+    }
+    let mut data = scenes(&fit_title(experiments), ["start values", "fitted"], &compared, backend, pictures, &Stop::default())?;
+    data.charts.extend(searches(fitted));
+    data.charts.extend(result.curves.iter().enumerate().map(|(k, c)| curve(k, c)));
     let (fields, curves) = (&result.fields[..], &result.curves[..]);
-    let page = fit_html(&ReportInput { fitted, experiments, fields, curves, pictures, scale, command });
+    let page = fit_html(&ReportInput { fitted, experiments, fields, curves, data, command });
     Ok(write_file(folder.join("report.html"), |w| w.write_all(page.as_bytes()))?)
 }

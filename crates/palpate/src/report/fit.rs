@@ -210,7 +210,7 @@ pub(super) fn posterior_lines(f: &FieldReference) -> Vec<String> {
 }
 
 /// The parts of a number's error, and what was done to its value; empty where there is nothing to say.
-pub(super) fn parts(fitted: &Fitted, i: usize) -> String {
+fn parts(fitted: &Fitted, i: usize) -> String {
     let (h, effect) = (fitted.headline(i), fitted.grid.as_ref().map(|g| g.numbers[i]));
     let Some(parts) = h.parts else { return String::new() };
     let short = |x: f64| palpate_engine::number(format!("{x:.1e}").parse().unwrap_or(x));

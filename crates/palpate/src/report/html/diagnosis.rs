@@ -1,20 +1,20 @@
 //! The report of a diagnosis.
 
-use super::{Column, figure, heads, page, plot, reproduce, unit};
+use super::map::map;
+use super::{Column, chart, heads, page, reproduce, scene::scene};
 use crate::diagnosing::Diagnosed;
-use crate::report::diagnosis::{fitted, stream};
 use crate::report::fit::number;
-use crate::report::pictures::FramePicture;
-use crate::report::plots::Curve;
+use crate::report::quantity::{name, quantity};
+use crate::results::report::{Chart, ReportData, Role, Series, Style, Topic};
 use maud::{Markup, html};
-use palpate_diagnose::{Diagnosis, Found, Instant, Level, MapEntry, Movement, Tried, Verdict, direction, millimetres, stated};
+use palpate_diagnose::{Diagnosis, Found, Instant, Level, Model, Movement, Tried, Verdict, direction, millimetres};
 
 /// What a report of a diagnosis is made of, scene by scene.
 pub struct DiagnosisInput<'a> {
     /// The diagnosis.
     pub done: &'a Diagnosed,
-    /// Pictures before and after; `None` where there was no time for them.
-    pub pictures: Option<Vec<(Vec<FramePicture>, Vec<FramePicture>)>>,
+    /// What it shows; without scenes where there was no time to simulate them.
+    pub data: ReportData,
     /// The command that reproduces it.
     pub command: String,
 }
@@ -22,10 +22,20 @@ pub struct DiagnosisInput<'a> {
 /// The whole page.
 pub fn diagnosis_html(input: &DiagnosisInput) -> String {
     let (done, d) = (input.done, &input.done.diagnosis);
-    let body = html! {
-        p { (d.sentence()) }
+    let good = d.verdict == Verdict::Adequate;
+    let first = html! {
+        p.verdict.good[good].bad[!good] role="status" {
+            span.sign aria-hidden="true" { @if good { "✓" } @else { "!" } }
+            span { b { (d.verdict.name()) } ": " (d.sentence()) }
+        }
         (ending(done))
         (distances(d))
+    };
+    let courses: Vec<Chart> = match input.data.scenes.is_empty() {
+        true => (0..done.experiments.len()).filter_map(|s| course(done, s)).collect(),
+        false => Vec::new(),
+    };
+    let body = html! {
         @for f in &d.effects {
             (effect(f))
         }
@@ -33,17 +43,19 @@ pub fn diagnosis_html(input: &DiagnosisInput) -> String {
         (values(d))
         (places(d))
         (map(done))
-        @for s in 0..done.experiments.len() {
-            (scene(input, s))
+        @for s in 0..input.data.scenes.len() {
+            (scene(&input.data, s))
         }
+        @for c in &courses { (chart(c)) }
         (slack(d))
         (tried(d))
         (reproduce(&input.command, done.backend, &format!("{:.1} s", done.seconds)))
     };
-    page(title(d), &body)
+    page(title(d), &first, &body, &input.data)
 }
 
-fn title(d: &Diagnosis) -> &'static str {
+/// Title of a diagnosis's report.
+pub(crate) fn title(d: &Diagnosis) -> &'static str {
     match d.verdict {
         Verdict::Adequate => "Diagnosis: nothing is missing",
         Verdict::MissingEffect => "Diagnosis: an effect is missing",
@@ -117,9 +129,8 @@ fn effect(f: &Found) -> Markup {
         table {
             @for (path, value, error, of) in &f.parameters {
                 tr {
-                    td { code { (path) } }
-                    td.n { (stated(*value, *error)) }
-                    td { (unit(of)) }
+                    th scope="row" { code { (path) } }
+                    td.value { (quantity(*value, *error, of)) }
                 }
             }
         }
@@ -146,7 +157,7 @@ fn movements(d: &Diagnosis) -> Markup {
 }
 
 fn values(d: &Diagnosis) -> Markup {
-    use Column::{Number, Text};
+    use Column::Text;
     if d.baseline.numbers.is_empty() {
         return Markup::default();
     }
@@ -160,16 +171,16 @@ fn values(d: &Diagnosis) -> Markup {
         }
         table {
             @if changed {
-                (heads(&[("number", Text), ("before", Number), ("after", Number), ("unit", Text)]))
+                (heads(&[("number", Text), ("before", Text), ("after", Text)]))
             } @else {
-                (heads(&[("number", Text), ("value", Number), ("unit", Text)]))
+                (heads(&[("number", Text), ("value", Text)]))
             }
             @for (k, n) in d.baseline.numbers.iter().enumerate() {
                 tr {
-                    td { code { (n.path) } }
-                    td.n { (fitted(&d.baseline, k)) }
-                    @if changed { td.n { (fitted(&d.model, k)) } }
-                    td { (unit(&n.unit)) }
+                    @let words = name(&n.path);
+                    th scope="row" { (words) @if words != n.path { br; code { (n.path) } } }
+                    td.value { (fitted(&d.baseline, k)) }
+                    @if changed { td.value { (fitted(&d.model, k)) } }
                 }
             }
         }
@@ -202,78 +213,31 @@ fn places(d: &Diagnosis) -> Markup {
     }
 }
 
-/// What each sensor saw of each region of the rest surface against time: blue where the measurement lies inside the model, red outside, full
-/// colour at six standard deviations.
-fn map(done: &Diagnosed) -> Markup {
-    let entries = &done.diagnosis.map;
-    if entries.is_empty() {
-        return Markup::default();
-    }
-    let key = |e: &MapEntry| (e.scene, e.stream, e.region);
-    let mut rows: Vec<_> = entries.iter().map(key).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    let (from, to) = entries.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(e.time.0), b.max(e.time.1)));
-    html! {
-        h2 { "Residual map" }
-        p {
-            "Rows: what a camera saw of a region of the rest surface (its middle in metres), or a coordinate of a marker; columns: stretches "
-            "of time from " (format!("{from:.3} to {to:.3} s")) ", before | after. Blue: a point measured inside the model, or a coordinate "
-            "larger than simulated; red: the other way round; full colour at six standard deviations of what noise and grid leave."
-        }
-        table {
-            @for row in rows {
-                (map_row(done, &entries.iter().filter(|e| key(e) == row).collect::<Vec<_>>()))
-            }
-        }
-    }
-}
-
-/// What one sensor saw of one region.
-fn map_row(done: &Diagnosed, entries: &[&MapEntry]) -> Markup {
-    let first = entries[0];
-    let c = first.place;
-    let block = |e: &MapEntry, z: f64| {
-        html! { td style=(colour(z)) title=(format!("{:.3} s: {z:.1}", e.time.0)) { "\u{a0}" } }
+/// Residuals over time as the search saw them, where there was no time to simulate both models once more.
+fn course(done: &Diagnosed, s: usize) -> Option<Chart> {
+    let course: Vec<&Instant> = done.diagnosis.course.iter().filter(|i| i.scene == s).collect();
+    let line = |label: &str, role, style, rms: fn(&Instant) -> f64| {
+        Series::new(label, role, style, course.iter().map(|i| (i.time, rms(i) * 1e3)))
     };
-    html! {
-        tr {
-            td {
-                @if done.experiments.len() > 1 { "scene " (first.scene + 1) ", " }
-                (stream(done, first.scene, first.stream))
-                @if first.stream.sensor.is_spread() { (format!(" ({:.3}, {:.3}, {:.3})", c.x, c.y, c.z)) }
-            }
-            @for e in entries { (block(e, e.before)) }
-            td { "|" }
-            @for e in entries { (block(e, e.after)) }
-        }
-    }
+    (!course.is_empty()).then(|| Chart {
+        key: format!("residual-{s}"),
+        topic: Topic::Residual,
+        title: format!("Distance between measurement and model over time, scene {}", s + 1),
+        words: "Root mean square distance over time, before and after.".into(),
+        x: "time [s]".into(),
+        y: "rms distance [mm]".into(),
+        main: true,
+        series: vec![
+            line("before", Role::Before, Style::Dashed, |i| i.before),
+            line("after", Role::After, Style::Line, |i| i.after),
+        ],
+        ..Chart::default()
+    })
 }
 
-/// Colour of a block at so many standard deviations.
-fn colour(z: f64) -> String {
-    let strength = (z.abs() / 6.0).min(1.0);
-    let (r, b) = if z > 0.0 { (178, 43) } else { (33, 172) };
-    format!("background:rgba({r},60,{b},{strength:.2})")
-}
-
-fn scene(input: &DiagnosisInput, s: usize) -> Markup {
-    let course: Vec<&Instant> = input.done.diagnosis.course.iter().filter(|i| i.scene == s).collect();
-    let line = |label: &str, rms: fn(&Instant) -> f64| Curve {
-        label: label.into(),
-        points: course.iter().map(|i| (i.time, rms(i) * 1e3)).collect(),
-    };
-    let lines = [line("after", |i| i.after), line("before", |i| i.before)];
-    let pictures = input.pictures.iter().flat_map(|all| all.get(s)).flat_map(|(b, a)| b.iter().zip(a));
-    html! {
-        @if let Some(drawing) = plot(&lines, "time [s]", "rms distance [mm]", false) {
-            h2 { "Residual over time, scene " (s + 1) }
-            (drawing)
-        }
-        @for (b, a) in pictures {
-            (figure([b, a], &format!("t = {:.4} s, before and after", a.time)))
-        }
-    }
+/// A fitted number with its standard error and unit.
+fn fitted(m: &Model, k: usize) -> String {
+    quantity(m.values[k], m.errors[k], &m.numbers[k].unit)
 }
 
 fn slack(d: &Diagnosis) -> Markup {
@@ -299,14 +263,10 @@ fn slack(d: &Diagnosis) -> Markup {
     }
 }
 
-/// Why a candidate was not fitted: it promised too little, or the search did not come to it.
-fn not_fitted(t: &Tried) -> &'static str {
-    if t.open { "not yet fitted" } else { "not fitted" }
-}
-
+/// What was fitted in a table, and what was not in a line each round: of those only the promise is known.
 fn tried(d: &Diagnosis) -> Markup {
     use Column::{Number, Text};
-    if d.tried.is_empty() {
+    if d.tried.is_empty() && d.not_tried.is_empty() {
         return Markup::default();
     }
     let columns = [
@@ -315,17 +275,34 @@ fn tried(d: &Diagnosis) -> Markup {
         ("promised share of the residual", Number),
         ("gap closed on data left out", Number),
     ];
+    let fitted: Vec<&Tried> = d.tried.iter().filter(|t| t.held_out_gain.is_some()).collect();
+    let others = |open: bool| -> Vec<String> {
+        let mut all: Vec<&Tried> = d.tried.iter().filter(|t| t.held_out_gain.is_none() && t.open == open).collect();
+        all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+        all.iter().map(|t| format!("{} ({:.1} %)", t.kind, 100.0 * t.promised)).collect()
+    };
     html! {
         h2 { "What was tried" }
-        table {
-            (heads(&columns))
-            @for t in &d.tried {
-                tr {
-                    td { (t.round) }
-                    td { (t.kind) }
-                    td.n { (format!("{:.1} %", 100.0 * t.promised)) }
-                    td.n { (t.held_out_gain.map_or(not_fitted(t).into(), |g| format!("{:.0} %", 100.0 * g))) }
+        details {
+            summary { (fitted.len()) " candidates were fitted, " (d.tried.len() - fitted.len()) " were not" }
+            @if !fitted.is_empty() {
+                div.wide {
+                    table {
+                        (heads(&columns))
+                        @for t in &fitted {
+                            tr {
+                                td { (t.round) }
+                                td { (t.kind) }
+                                td.n { (format!("{:.1} %", 100.0 * t.promised)) }
+                                td.n { (t.held_out_gain.map_or(String::new(), |g| format!("{:.0} %", 100.0 * g))) }
+                            }
+                        }
+                    }
                 }
+            }
+            @for (open, what) in [(true, "not yet fitted, for the search ended before"), (false, "not fitted, for they promise too little")] {
+                @let list = others(open);
+                @if !list.is_empty() { p { (what) ": " (list.join(", ")) "." } }
             }
         }
         @for n in &d.not_tried {
