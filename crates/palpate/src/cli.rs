@@ -7,6 +7,7 @@ use crate::options::Talk;
 use crate::progress::{Liveliness, Track};
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::Write;
 
@@ -49,6 +50,19 @@ enum Command {
     Inspect(inspect::Arguments),
 }
 
+/// Longest message in one line; nobody reads more of what was given.
+const LONGEST: usize = 4000;
+
+/// A message, with its middle left out where it is very long.
+fn line(text: &str) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return Cow::Borrowed(text);
+    }
+    let (head, tail) = (text.chars().take(LONGEST / 2), text.chars().skip(count - LONGEST / 4));
+    Cow::Owned(format!("{} … {}", head.collect::<String>(), tail.collect::<String>()))
+}
+
 /// Where a command talks to.
 pub struct Console<'a> {
     out: &'a mut dyn Write,
@@ -84,14 +98,14 @@ impl Console<'_> {
     /// A note that may be silenced.
     pub fn note(&mut self, text: &str) {
         if !self.talk.quiet {
-            let _ = writeln!(self.err, "{text}");
+            let _ = writeln!(self.err, "{}", line(text));
         }
     }
 
     /// Warnings, one line each.
     pub fn warn(&mut self, warnings: &[String]) {
         for w in warnings {
-            let _ = writeln!(self.err, "warning: {w}");
+            let _ = writeln!(self.err, "warning: {}", line(w));
         }
     }
 
@@ -119,7 +133,7 @@ pub fn run<A: Into<OsString> + Clone>(
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(e) if e.use_stderr() => {
-            let _ = writeln!(err, "{}", usage_error(&e));
+            let _ = writeln!(err, "{}", line(&usage_error(&e)));
             return 2;
         }
         // --help and --version are answers, not errors.
@@ -128,6 +142,8 @@ pub fn run<A: Into<OsString> + Clone>(
             return 0;
         }
     };
+    // Commands begin with reading; each says when it begins to compute or write.
+    interrupt.read(None, "nothing was written");
     let mut console = Console { out, err, talk: cli.talk, alive, interrupt };
     let done = match &cli.command {
         Command::Import(a) => import::run(a, &mut console),
@@ -142,7 +158,7 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {
-        let _ = writeln!(console.err, "error: {e}");
+        let _ = writeln!(console.err, "error: {}", line(&e.to_string()));
         e.exit_code()
     });
     let _ = console.out.flush();

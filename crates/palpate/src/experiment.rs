@@ -14,7 +14,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_er
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{MarkerRest, Observation};
 use palpate_model::plan::Plan;
-use palpate_model::plan::build::{PlanError, build_plan};
+use palpate_model::plan::build::{PlanError, build_plan_of, plan_memory};
 use palpate_model::plan::locking::locking;
 use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
@@ -143,7 +143,7 @@ impl Experiment {
         warnings: Vec<String>,
     ) -> Result<Experiment, Error> {
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
-        let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
+        let plan = build_plan_of(&scene, shape.clone(), observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
         experiment.check_times()?;
         experiment.check_planes();

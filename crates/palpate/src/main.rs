@@ -31,6 +31,10 @@ fn main() {
         if presses.fetch_add(1, Ordering::SeqCst) > 0 {
             std::process::exit(palpate::cli::INTERRUPTED);
         }
+        raise.abandon(|said| {
+            eprintln!("\ninterrupted: {said}");
+            std::process::exit(palpate::cli::INTERRUPTED);
+        });
         raise.raise();
         eprintln!("\ninterrupted: stopping at the next time step; press Ctrl-C again to stop at once");
     };

@@ -23,6 +23,7 @@ pub use write::write_recording;
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded};
+use crate::input::read_bytes;
 use crate::keys::{RECORDING, suggest};
 use crate::scene::{check_format, marker_rest};
 use palpate_model::observation::{MarkerRest, ReadingKind};
@@ -115,7 +116,7 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
 /// The file cannot be read, is damaged, or holds no marker that was seen.
 pub fn read_c3d(path: impl AsRef<Path>) -> Result<Loaded<RecordedMarkers>, InputError> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     let mut warnings = Vec::new();
     let (names, samples) = c3d::read_c3d(path, &bytes, &mut warnings)?;
     let file = path.to_path_buf();
@@ -197,7 +198,6 @@ fn frames(
         }
         headers.push(Header { table, camera, time, depth, mask });
     }
-    let load = |path: &PathBuf| std::fs::read(path).map_err(|e| InputError::io(path, &e));
     // Files are read and decoded side by side; what is wrong is still reported in the order of the file.
     type Images = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);
     let images: Vec<Images> = (headers.iter().map(|h| (h.camera, h.depth.clone(), h.mask.clone())).collect::<Vec<_>>())
@@ -205,8 +205,8 @@ fn frames(
         .map(|(c, depth, mask)| {
             let size = (cameras[c].width, cameras[c].height);
             (
-                depth.map(|p| load(&p).and_then(|b| image::depth(&p, &b, size))),
-                mask.map(|p| load(&p).and_then(|b| image::mask(&p, &b, size))),
+                depth.map(|p| read_bytes(&p).and_then(|b| image::depth(&p, &b, size))),
+                mask.map(|p| read_bytes(&p).and_then(|b| image::mask(&p, &b, size))),
             )
         })
         .collect();
@@ -254,7 +254,7 @@ fn markers(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<
     let Some(t) = root.optional_table("markers")? else { return Ok(None) };
     let file = inside(source, &t, "file")?.ok_or_else(|| t.missing("file", "a .csv or .c3d file"))?;
     let extension = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let bytes = std::fs::read(&file).map_err(|e| InputError::io(&file, &e))?;
+    let bytes = read_bytes(&file)?;
     let (names, samples) = match extension.as_str() {
         "csv" => markers::read_csv(&file, &bytes)?,
         "c3d" => c3d::read_c3d(&file, &bytes, warnings)?,

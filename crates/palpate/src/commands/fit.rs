@@ -198,7 +198,9 @@ fn tracked(folders: &[PathBuf], scenes: usize) -> Result<Vec<Recording>, Error> 
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let folder = out_folder(&a.out, &a.scenes[0], "-fit");
     // Before anything that takes time.
+    crate::folder::check(&folder)?;
     let mut track = console.progress(0, "fitting");
     track.on(0, "reading");
     let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
@@ -206,8 +208,10 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let from = tracked(&a.from, a.scenes.len())?;
     let (backend, note) = choose(&a.choices, &experiments, &mut track)?;
     track.aside(|| note.iter().for_each(|n| console.note(n)));
-    let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    let may_write = || Ok(());
+    let lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
+    let may_write = || lock.check();
     let (fitted, result) =
         run_in(&a.scenes, &from, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
     track.finish();
@@ -314,7 +318,8 @@ pub fn run_in(
             on_stage: Some(&mut say),
             on_iteration: Some(&mut hear),
         },
-    )?;
+    )
+    .map_err(|e| e.with_kept(&folder.join(JOURNAL)))?;
     let track = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     may_write()?;
     if resume {

@@ -20,6 +20,7 @@ use crate::results::{self, finite, inspection};
 use crate::suited::{Suited, suited};
 use clap::Args;
 use palpate_gpu::AdapterReport;
+use palpate_io::read_text;
 use palpate_io::recording::{Recording, Sequence, read_recording};
 use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
@@ -64,7 +65,7 @@ type Lines = Vec<(&'static str, String)>;
 
 fn is_recording(path: &Path) -> bool {
     let format = |text: String| text.lines().any(|l| l.trim_start().starts_with("format") && l.contains("recording/"));
-    path.is_dir() || std::fs::read_to_string(path).is_ok_and(format)
+    path.is_dir() || read_text(path).is_ok_and(format)
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
