@@ -7,6 +7,7 @@
 pub mod bench;
 pub mod coverage;
 pub mod dawn;
+pub mod fuzz;
 pub mod paper;
 pub mod real;
 pub mod rows;

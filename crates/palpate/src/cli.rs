@@ -2,6 +2,7 @@
 
 use crate::commands::{batch, coarsen, diagnose, fit, import, inspect, observe, simulate, synthesize, track};
 use crate::error::Error;
+use crate::events::{Kind, begin, tell};
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
 use crate::progress::{Liveliness, Track};
@@ -79,7 +80,7 @@ impl Console<'_> {
         Console {
             out,
             err,
-            talk: Talk { json: false, quiet: false, progress: None },
+            talk: Talk { json: false, quiet: false, progress: None, log: None },
             alive: Liveliness::Silent,
             interrupt: self.interrupt.clone(),
         }
@@ -97,7 +98,9 @@ impl Console<'_> {
 
     /// A note that may be silenced.
     pub fn note(&mut self, text: &str) {
-        if !self.talk.quiet {
+        if self.talk.log.is_some() {
+            tell(Kind::Note, &line(text), None, None);
+        } else if !self.talk.quiet {
             let _ = writeln!(self.err, "{}", line(text));
         }
     }
@@ -105,13 +108,21 @@ impl Console<'_> {
     /// Warnings, one line each.
     pub fn warn(&mut self, warnings: &[String]) {
         for w in warnings {
-            let _ = writeln!(self.err, "warning: {}", line(w));
+            if self.talk.log.is_some() {
+                tell(Kind::Warning, &line(w), None, None);
+            } else {
+                let _ = writeln!(self.err, "warning: {}", line(w));
+            }
         }
     }
 
     /// Progress of `what` over `length` units (0: unknown) on stderr.
     pub fn progress(&self, length: u64, what: &str) -> Track {
-        let how = if self.talk.quiet { Liveliness::Silent } else { self.talk.progress.unwrap_or(self.alive) };
+        let how = match self.talk {
+            Talk { quiet: true, .. } => Liveliness::Silent,
+            Talk { log: Some(_), .. } => Liveliness::Events,
+            Talk { progress, .. } => progress.unwrap_or(self.alive),
+        };
         Track::new(how, length, what)
     }
 }
@@ -144,6 +155,7 @@ pub fn run<A: Into<OsString> + Clone>(
     };
     // Commands begin with reading; each says when it begins to compute or write.
     interrupt.read(None, "nothing was written");
+    cli.talk.log.iter().for_each(|log| begin(*log));
     let mut console = Console { out, err, talk: cli.talk, alive, interrupt };
     let done = match &cli.command {
         Command::Import(a) => import::run(a, &mut console),
@@ -158,7 +170,11 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {
-        let _ = writeln!(console.err, "error: {}", line(&e.to_string()));
+        if console.talk.log.is_some() {
+            tell(Kind::Error, &line(&e.to_string()), None, Some(e.exit_code()));
+        } else {
+            let _ = writeln!(console.err, "error: {}", line(&e.to_string()));
+        }
         e.exit_code()
     });
     let _ = console.out.flush();

@@ -43,6 +43,7 @@ mod diagnosing;
 mod embed;
 mod engine;
 mod error;
+mod events;
 mod experiment;
 mod fields;
 mod fingerprint;

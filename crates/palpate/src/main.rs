@@ -44,7 +44,7 @@ fn main() {
     {
         eprintln!("warning: Ctrl-C will stop at once ({e})");
     }
-    let alive = if std::io::stderr().is_terminal() { Liveliness::Bars } else { Liveliness::Silent };
+    let alive = if std::io::stderr().is_terminal() { Liveliness::Bars } else { Liveliness::Lines };
     let code = palpate::cli::run(arguments, &mut std::io::stdout(), &mut std::io::stderr(), interrupt, alive);
     std::process::exit(code);
 }

@@ -3,7 +3,8 @@
 use super::{RecordedCamera, RecordedFrame};
 use crate::document::Table;
 use crate::error::{InputError, number};
-use image::{DynamicImage, ImageFormat};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 
 /// A depth image in counts of the camera's `depth_scale`; 0 = no reading.
@@ -18,14 +19,19 @@ pub struct DepthImage {
 }
 
 fn decode(path: &Path, bytes: &[u8], size: (usize, usize)) -> Result<DynamicImage, InputError> {
-    let image = image::load_from_memory_with_format(bytes, ImageFormat::Png)
-        .map_err(|e| InputError::file(path, format!("not a readable PNG file (truncated?): {e}")))?;
-    let found = (image.width() as usize, image.height() as usize);
+    let broken = |e: ImageError| {
+        let cut = matches!(&e, ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof);
+        let why = if cut { " (truncated?)" } else { "" };
+        InputError::file(path, format!("not a readable PNG file{why}: {e}"))
+    };
+    // The size stands in the header: nothing is made room for before it is right.
+    let header = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png).into_dimensions().map_err(broken)?;
+    let found = (header.0 as usize, header.1 as usize);
     if found != size {
         let text = format!("is {} × {} pixels, its camera has {} × {}", found.0, found.1, size.0, size.1);
         return Err(InputError::file(path, text));
     }
-    Ok(image)
+    image::load_from_memory_with_format(bytes, ImageFormat::Png).map_err(broken)
 }
 
 /// A 16-bit greyscale PNG of a camera's size (width, height).

@@ -124,6 +124,21 @@ pub fn read_c3d(path: impl AsRef<Path>) -> Result<Loaded<RecordedMarkers>, Input
     Ok(Loaded { value, warnings })
 }
 
+/// True for a path that leads out of the folder that it starts from. A recording is handed from person to person: what it names lies in its
+/// folder. A scene is its author's own, and its paths may lead anywhere but through a recording.
+pub(crate) fn leaves(text: &str) -> bool {
+    let mut depth = 0i32;
+    Path::new(text).components().any(|c| {
+        match c {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => depth = i32::MIN / 2,
+        }
+        depth < 0
+    })
+}
+
 /// A file that is there; its path must stay inside the recording's folder.
 fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, InputError> {
     t.optional_str(key)?.map(|text| inside_text(source, t, key, text)).transpose()
@@ -131,19 +146,8 @@ fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, Inpu
 
 /// The same for a path that is part of a key's value.
 fn inside_text(source: &Source, t: &Table, key: &str, text: &str) -> Result<PathBuf, InputError> {
-    let mut depth = 0i32;
-    for c in Path::new(text).components() {
-        match c {
-            Component::Normal(_) => depth += 1,
-            Component::CurDir => {}
-            Component::ParentDir => depth -= 1,
-            Component::RootDir | Component::Prefix(_) => depth = i32::MIN / 2,
-        }
-        if depth < 0 {
-            return Err(
-                t.error(key, format!("\"{text}\" leaves the recording's folder; paths are relative to it and stay inside"))
-            );
-        }
+    if leaves(text) {
+        return Err(t.error(key, format!("\"{text}\" leaves the recording's folder; paths are relative to it and stay inside")));
     }
     let path = source.folder().join(text);
     // A link may lead out of the folder where the text does not.
@@ -210,7 +214,7 @@ fn frames(
             )
         })
         .collect();
-    let mut frames = Vec::new();
+    let (mut frames, mut useless) = (Vec::new(), Vec::new());
     for (h, (depth, mask)) in headers.iter().zip(images) {
         let frame = RecordedFrame { camera: h.camera, time: h.time, depth: depth.transpose()?, mask: mask.transpose()? };
         if frame.mask.as_ref().is_some_and(|m| !m.contains(&true)) {
@@ -218,10 +222,16 @@ fn frames(
             return Err(e);
         }
         if frame.depth.is_some() && frame.readings().next().is_none() {
-            let e = h.table.error("depth", "holds no reading of the object; the frame is of no use");
-            warnings.push(e.to_string());
+            useless.push(h);
         }
         frames.push(frame);
+    }
+    if let Some(first) = useless.first() {
+        let others = match useless.len() - 1 {
+            0 => "the frame is of no use".to_string(),
+            n => format!("the frame is of no use, and so are {n} others"),
+        };
+        warnings.push(first.table.error("depth", format!("holds no reading of the object; {others}")).to_string());
     }
     Ok(frames)
 }

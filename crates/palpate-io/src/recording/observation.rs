@@ -103,7 +103,7 @@ impl Recording {
     }
 
     fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), ObservationError> {
-        let mut used = vec![false; self.cameras.len()];
+        let (mut used, mut unmasked) = (vec![false; self.cameras.len()], Vec::new());
         let images = self.frames.iter().filter(|f| f.depth.is_some() && (spec.from..=spec.to).contains(&f.time));
         let (mut instants, mut last) = (0usize, f64::NEG_INFINITY);
         for f in images {
@@ -128,13 +128,13 @@ impl Recording {
                 })
                 .collect::<Result<Vec<_>, InputError>>()?;
             o.frames.push(Frame { time: f.time, points, ..Frame::default() });
-            if f.mask.is_none() {
-                warnings.push(format!(
-                    "{}: frame at {} s has no mask; every pixel may be the object",
-                    self.path.display(),
-                    f.time
-                ));
-            }
+            unmasked.extend(f.mask.is_none().then_some(f.time));
+        }
+        if let Some(first) = unmasked.first() {
+            let (path, n, of) = (self.path.display(), unmasked.len(), o.frames.len());
+            let (have, first) = (if n == 1 { "image has" } else { "images have" }, number(*first));
+            let text = format!("{n} of {of} depth {have} no mask (the first at {first} s); every pixel may be the object");
+            warnings.push(format!("{path}: {text}"));
         }
         if o.frames.iter().all(|f| f.points.is_empty()) {
             let seen = self.frames.iter().filter(|f| f.readings().next().is_some()).map(|f| f.time);

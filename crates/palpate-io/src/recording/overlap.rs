@@ -26,6 +26,14 @@ fn millimetres(observation: &Observation, min: DVec3, max: DVec3) -> Result<(), 
     ))
 }
 
+/// True if in some frame one in a hundred points comes closer than `reach` [m], with all lengths multiplied by `scale`.
+fn meets(observation: &Observation, scale: f64, distance: impl Fn(DVec3) -> f64, reach: f64) -> bool {
+    observation.frames.iter().any(|f| {
+        let (near, all) = positions(f).fold((0, 0), |(near, all), p| (near + usize::from(distance(scale * p) < reach), all + 1));
+        near > 0 && near * 100 >= all
+    })
+}
+
 /// Checks that what was measured lies near the body's bounding box at rest, `min` to `max` [m].
 ///
 /// In at least one frame, at least one in a hundred points or markers must come closer to the box than half its diagonal: bodies
@@ -40,25 +48,24 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     let size = (max - min).length();
     millimetres(observation, min, max)?;
     let distance = |p: DVec3| (p - p.clamp(min, max)).length();
-    let mut all = Vec::new();
-    for f in &observation.frames {
-        let d: Vec<f64> = positions(f).map(distance).collect();
-        let near = d.iter().filter(|d| **d < 0.5 * size).count();
-        if near > 0 && near * 100 >= d.len() {
-            return Ok(());
-        }
-        all.extend(d);
+    if meets(observation, 1.0, distance, 0.5 * size) {
+        return Ok(());
     }
+    let mut all: Vec<f64> = observation.frames.iter().flat_map(positions).map(distance).collect();
     if all.is_empty() {
         return Ok(());
     }
+    // What would lie at the object a thousandth as large was measured in millimetres.
+    let unit = match meets(observation, 1e-3, distance, 0.5 * size) {
+        true => "is the recording in millimetres? Multiplied by 0.001 it lies at the object: convert it to metres",
+        false => "check object.pose, world_from_camera and the units",
+    };
     let nearest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let middle = all.len() / 2;
     let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
     let (factor, of) = (median / size, all.len());
     Err(format!(
         "the recording lies nowhere near the object: the median distance of {of} points from it is {median:.4} m \
-         (nearest {nearest:.4} m, {factor:.1} × the object's diagonal of {size:.4} m); \
-         check object.pose, world_from_camera and the units"
+         (nearest {nearest:.4} m, {factor:.1} × the object's diagonal of {size:.4} m); {unit}"
     ))
 }

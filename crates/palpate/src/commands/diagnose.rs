@@ -5,6 +5,7 @@ use crate::diagnosing::checkpoint::CHECKPOINTS;
 use crate::diagnosing::{DiagnoseOptions, Diagnosed, demand, diagnose};
 use crate::engine::Backend;
 use crate::error::Error;
+use crate::events::Stage;
 use crate::experiment::Experiment;
 use crate::interrupt::{Clock, Interrupt};
 use crate::options::{BackendName, out_folder};
@@ -126,6 +127,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     {
         return Err(Error::option("budget", b, "must be > 0 and below 1000000 (minutes)"));
     }
+    let _stage = Stage::begin("diagnose");
     // Opening the scenes counts as well.
     let clock = Clock::start();
     let budget = a.budget.map(|m| Duration::from_secs_f64(60.0 * m));
