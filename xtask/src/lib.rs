@@ -8,6 +8,7 @@ pub mod bench;
 pub mod coverage;
 pub mod dawn;
 pub mod figures;
+pub mod fuzz;
 pub mod pages;
 pub mod paper;
 pub mod real;

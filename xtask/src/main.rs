@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, coverage, dawn, paper, real, same, suite, table, test, tidy, verify};
+use studies::{bench, coverage, dawn, fuzz, paper, real, same, suite, table, test, tidy, verify};
 
 /// Counts what the benchmarks allocate.
 #[global_allocator]
@@ -181,6 +181,12 @@ enum Verb {
         #[arg(long)]
         compile: bool,
     },
+    /// Damaged files against every reader
+    Fuzz {
+        /// How long, all targets together
+        #[arg(long, default_value_t = 5.0)]
+        minutes: f64,
+    },
     /// Check rooms, imports, sizes of files
     Tidy,
 }
@@ -249,6 +255,7 @@ fn run(verb: Verb) -> Result<(), String> {
         }
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Dawn { compile } => dawn::run(dawn::Options { compile })?,
+        Verb::Fuzz { minutes } => fuzz::run(&table::root(), minutes)?,
         Verb::Tidy => {
             let found = tidy::check(&table::root());
             found.iter().for_each(|f| println!("{f}"));

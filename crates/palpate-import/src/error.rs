@@ -1,6 +1,6 @@
 //! Why an import stopped.
 
-use palpate_io::{InputError, OutputError};
+use palpate_io::{InputError, OutputError, shown};
 use std::path::Path;
 
 /// Why nothing was imported, in one line that says what is allowed.
@@ -10,7 +10,7 @@ pub enum ImportError {
     #[error(transparent)]
     File(#[from] InputError),
     /// An option contradicts the source, or is wrong by itself.
-    #[error("--{option}{}{given}: {message}", if given.is_empty() { "" } else { " " })]
+    #[error("--{option}{}{}: {message}", if given.is_empty() { "" } else { " " }, shown(given))]
     Option {
         /// Its name, without dashes.
         option: &'static str,
@@ -48,13 +48,7 @@ pub(crate) fn refuse_option<T>(option: &'static str, given: impl ToString, messa
 
 /// The bytes of a file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, ImportError> {
-    // A pipe would hang for ever, a folder has no bytes.
-    match std::fs::metadata(path) {
-        Ok(m) if !m.is_file() => return refuse(path, "is no plain file"),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return refuse(path, "no such file"),
-        _ => {}
-    }
-    std::fs::read(path).or_else(|e| refuse(path, format!("cannot be read: {e}")))
+    Ok(palpate_io::read_bytes(path)?)
 }
 
 /// The text of a file; what is no UTF-8 is replaced, since names in older files are in other encodings.

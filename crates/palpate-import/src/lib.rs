@@ -191,7 +191,7 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         thinned,
     };
     let scene = write::scene::text(&parts, o, &mut said);
-    watch.at(0, 1, "writing")?;
+    watch.at(0, 1, WRITING)?;
     write_all(out, &r, &body, &scene, &said)?;
     Ok(Imported {
         format: format.name,
@@ -211,6 +211,9 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         warnings: body.warnings,
     })
 }
+
+/// What is heard before anything is written.
+pub const WRITING: &str = "writing";
 
 /// Refuses to write among what is read: images could be written over, and the next import would read what this one wrote.
 fn apart(source: &Path, out: &Path) -> Result<(), ImportError> {

@@ -96,6 +96,10 @@ pub fn has_ending(path: &Path, endings: &[&str]) -> bool {
 /// First bytes of a file; none where it cannot be read.
 pub fn head(path: &Path, most: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
+    // A pipe would wait for ever.
+    if palpate_io::check_plain(path).is_err() {
+        return bytes;
+    }
     if let Ok(file) = std::fs::File::open(path) {
         let _ = file.take(most).read_to_end(&mut bytes);
     }

@@ -1,6 +1,7 @@
 //! A TOML file with line numbers: typed access to keys whose errors name file, line, key and what is allowed.
 
 use crate::error::{InputError, number};
+use crate::input::read_bytes;
 use crate::keys::Schema;
 use glam::DVec3;
 use std::ops::Range;
@@ -19,7 +20,8 @@ pub(crate) struct Source {
 /// # Errors
 /// It is not there, may not be read, or is not UTF-8.
 pub fn read_text(path: impl AsRef<Path>) -> Result<String, InputError> {
-    std::fs::read_to_string(&path).map_err(|e| InputError::io(path, &e))
+    let bytes = read_bytes(&path)?;
+    String::from_utf8(bytes).map_err(|_| InputError::file(&path, "is not UTF-8 text"))
 }
 
 impl Source {

@@ -44,9 +44,27 @@ pub(crate) fn number(x: f64) -> String {
     if x == 0.0 || !x.is_finite() || (1e-6..1e9).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
+/// Longest text that an error repeats in full.
+const LONGEST: usize = 400;
+
+/// A text as an error repeats it: a number without hundreds of zeros, the middle of anything very long left out.
+pub fn shown(text: &str) -> String {
+    if text.len() > 24
+        && let Ok(x) = text.parse::<f64>()
+    {
+        return format!("{x:e}");
+    }
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return text.to_string();
+    }
+    let (head, tail) = (text.chars().take(LONGEST / 2), text.chars().skip(count - LONGEST / 4));
+    format!("{}…{}", head.collect::<String>(), tail.collect::<String>())
+}
+
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.file.display())?;
+        write!(f, "{}", shown(&self.file.to_string_lossy()))?;
         if let Some(line) = self.line {
             write!(f, ":{line}")?;
         }
@@ -62,7 +80,7 @@ impl std::error::Error for InputError {}
 
 /// A file could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot be written: {cause}", file.display())]
+#[error("{}: cannot be written: {cause}", shown(&file.to_string_lossy()))]
 pub struct OutputError {
     /// The file.
     pub file: PathBuf,
@@ -85,4 +103,18 @@ pub struct Loaded<T> {
     pub value: T,
     /// One line each.
     pub warnings: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_long_is_repeated_in_full() {
+        assert_eq!(shown(&format!("1{}", "0".repeat(300))), "1e300");
+        assert_eq!(shown("0.25"), "0.25");
+        let long = format!("a{}é", "x".repeat(100_000));
+        let e = InputError::file(&long, "no such file").to_string();
+        assert!(e.len() < 500 && e.starts_with("axx") && e.ends_with("é: no such file") && e.contains('…'), "{e}");
+    }
 }

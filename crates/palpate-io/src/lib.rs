@@ -6,8 +6,10 @@
 
 mod document;
 mod error;
+mod input;
 mod keys;
 mod rigid;
+mod room;
 
 pub mod cloud;
 pub mod lens;
@@ -21,9 +23,11 @@ pub mod surface;
 pub mod vtk;
 
 pub use document::read_text;
-pub use error::{InputError, Loaded, OutputError};
+pub use error::{InputError, Loaded, OutputError, shown};
+pub use input::{check_plain, read_bytes};
 pub use mesh::read_mesh;
 pub use recording::{Recording, check_overlap, read_recording, write_recording};
+pub use room::{Room, available, gigabytes};
 pub use scene::{
     append_effects, edit_scene, name_field_files, parse_scene, read_scene, recast_scene, scene_error, scene_in, scene_of_tracks,
     scene_with_regions, scene_with_values, without_wishes, write_scene,

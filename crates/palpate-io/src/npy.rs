@@ -4,6 +4,7 @@
 //! little-endian, in C order.
 
 use crate::error::{InputError, OutputError};
+use crate::input::read_bytes;
 use crate::keys::suggest;
 use crate::output::write_file;
 use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
@@ -42,7 +43,7 @@ pub fn is_archive(path: &Path) -> bool {
 /// # Errors
 /// The file cannot be read, is no array of real numbers, or has no array of the name.
 pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> {
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     if !is_archive(path) {
         return match name {
             None => decode(path, "", &bytes),

@@ -1,6 +1,7 @@
 //! Signed distance grids in the binary layout of the Sparse Surface Constraints code.
 
 use crate::error::InputError;
+use crate::input::read_bytes;
 use glam::DVec3;
 use palpate_model::shape::{Shape, TriMesh};
 use std::collections::BTreeMap;
@@ -30,7 +31,7 @@ pub struct SdfGrid {
 /// A file that is too short or too long for its size, or a value that is not finite.
 pub fn read_sdf(path: impl AsRef<Path>, scale: f64) -> Result<SdfGrid, InputError> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     let (head, body) =
         bytes.split_at_checked(28).ok_or_else(|| InputError::file(path, "is shorter than the header of 28 bytes"))?;
     let words: Vec<i32> = head.chunks_exact(4).map(|c| i32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();

@@ -2,6 +2,9 @@
 
 mod analytic;
 pub(crate) mod components;
+mod contacts;
+mod edges;
+mod joining;
 mod mesh;
 mod pseudonormal;
 mod repair;

@@ -4,11 +4,13 @@ use crate::commands::{
     batch, coarsen, diagnose, export, fit, import, inspect, observe, pictures, place, simulate, synthesize, track,
 };
 use crate::error::Error;
+use crate::events::{Kind, begin, tell};
 use crate::interrupt::Interrupt;
 use crate::options::Talk;
 use crate::progress::{Liveliness, Track};
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::Write;
 
@@ -57,6 +59,19 @@ enum Command {
     Inspect(inspect::Arguments),
 }
 
+/// Longest message in one line; nobody reads more of what was given.
+const LONGEST: usize = 4000;
+
+/// A message, with its middle left out where it is very long.
+fn line(text: &str) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= LONGEST {
+        return Cow::Borrowed(text);
+    }
+    let (head, tail) = (text.chars().take(LONGEST / 2), text.chars().skip(count - LONGEST / 4));
+    Cow::Owned(format!("{} … {}", head.collect::<String>(), tail.collect::<String>()))
+}
+
 /// Where a command talks to.
 pub struct Console<'a> {
     out: &'a mut dyn Write,
@@ -73,7 +88,7 @@ impl Console<'_> {
         Console {
             out,
             err,
-            talk: Talk { json: false, quiet: false, progress: None },
+            talk: Talk { json: false, quiet: false, progress: None, log: None },
             alive: Liveliness::Silent,
             interrupt: self.interrupt.clone(),
         }
@@ -91,21 +106,31 @@ impl Console<'_> {
 
     /// A note that may be silenced.
     pub fn note(&mut self, text: &str) {
-        if !self.talk.quiet {
-            let _ = writeln!(self.err, "{text}");
+        if self.talk.log.is_some() {
+            tell(Kind::Note, &line(text), None, None);
+        } else if !self.talk.quiet {
+            let _ = writeln!(self.err, "{}", line(text));
         }
     }
 
     /// Warnings, one line each.
     pub fn warn(&mut self, warnings: &[String]) {
         for w in warnings {
-            let _ = writeln!(self.err, "warning: {w}");
+            if self.talk.log.is_some() {
+                tell(Kind::Warning, &line(w), None, None);
+            } else {
+                let _ = writeln!(self.err, "warning: {}", line(w));
+            }
         }
     }
 
     /// Progress of `what` over `length` units (0: unknown) on stderr.
     pub fn progress(&self, length: u64, what: &str) -> Track {
-        let how = if self.talk.quiet { Liveliness::Silent } else { self.talk.progress.unwrap_or(self.alive) };
+        let how = match self.talk {
+            Talk { quiet: true, .. } => Liveliness::Silent,
+            Talk { log: Some(_), .. } => Liveliness::Events,
+            Talk { progress, .. } => progress.unwrap_or(self.alive),
+        };
         Track::new(how, length, what)
     }
 }
@@ -127,7 +152,7 @@ pub fn run<A: Into<OsString> + Clone>(
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(e) if e.use_stderr() => {
-            let _ = writeln!(err, "{}", usage_error(&e));
+            let _ = writeln!(err, "{}", line(&usage_error(&e)));
             return 2;
         }
         // --help and --version are answers, not errors.
@@ -136,6 +161,9 @@ pub fn run<A: Into<OsString> + Clone>(
             return 0;
         }
     };
+    // Commands begin with reading; each says when it begins to compute or write.
+    interrupt.read(None, "nothing was written");
+    cli.talk.log.iter().for_each(|log| begin(*log));
     let mut console = Console { out, err, talk: cli.talk, alive, interrupt };
     let done = match &cli.command {
         Command::Import(a) => import::run(a, &mut console),
@@ -153,7 +181,11 @@ pub fn run<A: Into<OsString> + Clone>(
         Command::Inspect(a) => inspect::run(a, &mut console),
     };
     let code = done.unwrap_or_else(|e: Error| {
-        let _ = writeln!(console.err, "error: {e}");
+        if console.talk.log.is_some() {
+            tell(Kind::Error, &line(&e.to_string()), None, Some(e.exit_code()));
+        } else {
+            let _ = writeln!(console.err, "error: {}", line(&e.to_string()));
+        }
         e.exit_code()
     });
     let _ = console.out.flush();

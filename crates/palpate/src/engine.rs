@@ -3,7 +3,7 @@
 use crate::auto;
 use crate::error::Error;
 use crate::host::host;
-use crate::memory::Demand;
+use crate::memory::{Demand, require_on_cpu};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop};
@@ -118,7 +118,10 @@ impl Backend {
                 let room = gpu().map_err(Error::Device)?.gpu().largest_buffer();
                 Ok(demand.on_device(plan, room).map_err(Error::Device)?.0)
             }
-            _ => Ok(demand.on_cpu(plan, threads).0),
+            _ => {
+                require_on_cpu(plan, demand, threads)?;
+                Ok(demand.on_cpu(plan, threads).0)
+            }
         }
     }
 
@@ -192,7 +195,10 @@ impl Backend {
     ) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
             Backend::Gpu => Ok(Rollout::new(gpu_for(1)?, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
-            _ => Ok(Rollout::new(CpuBackend, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
+            _ => {
+                require_on_cpu(plan, &Demand::forward(1), 0)?;
+                Ok(Rollout::new(CpuBackend, plan, 1)?.stopped_by(stop).visit(theta, visit)?)
+            }
         }
     }
 
@@ -217,7 +223,12 @@ pub fn between(a: &Snapshot, b: &Snapshot, time: f64) -> Vec<DVec3> {
         .collect()
 }
 
-/// Runs `work` with so many threads (0 = one per core).
+/// Threads beyond which more only wait for each other: one a core, and a few on small machines, so that results can be compared there.
+pub(crate) fn most_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from).max(16)
+}
+
+/// Runs `work` with so many threads (0 = one per core), but not more than are of use.
 ///
 /// # Errors
 /// The operating system refuses the threads.
@@ -225,6 +236,7 @@ pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) ->
     if threads == 0 {
         return Ok(work());
     }
+    let threads = threads.min(most_threads());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     Ok(pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?.install(work))
 }

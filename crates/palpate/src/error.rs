@@ -5,7 +5,7 @@ use palpate_engine::{BuildError, Failure};
 use palpate_fit::{FitError, JournalError};
 use palpate_gpu::GpuError;
 use palpate_import::ImportError;
-use palpate_io::{InputError, OutputError};
+use palpate_io::{InputError, OutputError, shown};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ pub enum Error {
         message: String,
     },
     /// An option of the command line is wrong.
-    #[error("--{option}{}{given}: {message}", if given.is_empty() { "" } else { " " })]
+    #[error("--{option}{}{}: {message}", if given.is_empty() { "" } else { " " }, shown(given))]
     Option {
         /// Its name, without dashes.
         option: &'static str,
@@ -72,6 +72,12 @@ pub enum Error {
     /// The user asked to stop before there was anything worth keeping.
     #[error("interrupted: nothing was written")]
     Interrupted,
+    /// The user asked to stop before there was a result; what was computed until then is kept.
+    #[error("interrupted before there was a result; what was computed is in {}, --resume goes on from there", kept.display())]
+    InterruptedKept {
+        /// The journal or the checkpoints.
+        kept: PathBuf,
+    },
 }
 
 impl Error {
@@ -90,12 +96,25 @@ impl Error {
         Error::Output(OutputError::new(path, cause))
     }
 
+    /// Of an interrupted computation with a journal says that this is kept, where anything stands in it.
+    pub(crate) fn with_kept(self, journal: &Path) -> Error {
+        match self {
+            Error::Interrupted if journal.metadata().is_ok_and(|m| m.len() > 0) => Error::InterruptedKept { kept: journal.into() },
+            other => other,
+        }
+    }
+
+    /// True where somebody asked to stop.
+    pub fn is_interrupt(&self) -> bool {
+        matches!(self, Error::Interrupted | Error::InterruptedKept { .. })
+    }
+
     /// Exit code of the command line: 2 for bad input, 1 for a failed computation, 130 when interrupted.
     pub fn exit_code(&self) -> i32 {
         match self {
             Error::File(_) | Error::Scene { .. } | Error::Option { .. } | Error::Input(_) => 2,
             Error::Fit(FitError::Journal(JournalError::Content { .. }) | FitError::Residuals { .. }) => 2,
-            Error::Interrupted => crate::cli::INTERRUPTED,
+            Error::Interrupted | Error::InterruptedKept { .. } => crate::cli::INTERRUPTED,
             _ => 1,
         }
     }

@@ -4,8 +4,10 @@ use crate::choose::{Choice, choose};
 use crate::embed::Embedding;
 use crate::engine::Backend;
 use crate::error::Error;
+use crate::events::Stage;
 use crate::fitting::{self, FitOptions, Fitted};
 use crate::interrupt::Interrupt;
+use crate::memory::require;
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
 use palpate_engine::{FailureKind, FrameResiduals, Snapshot, Stop, number};
@@ -14,7 +16,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_er
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{MarkerRest, Observation};
 use palpate_model::plan::Plan;
-use palpate_model::plan::build::{PlanError, build_plan};
+use palpate_model::plan::build::{PlanError, build_plan_of, plan_memory};
 use palpate_model::plan::locking::locking;
 use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
@@ -22,6 +24,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 mod changed;
+mod doubts;
 
 /// A time [s]: four decimals, or few digits where it is none that anything moves in.
 pub(crate) fn short(t: f64) -> String {
@@ -79,6 +82,7 @@ impl Experiment {
     /// [`Error::File`] with the first thing that is wrong with a file.
     pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
         let text = read_text(&path)?;
+        let _stage = Stage::begin("read the scene");
         let loaded = parse_scene(&text, path)?;
         let scene = Scene { observation: None, ..loaded.value };
         Experiment::new(scene, text, loaded.warnings)
@@ -102,17 +106,25 @@ impl Experiment {
     }
 
     /// The same with the recording that the scene's `[observation]` means, where it is at hand.
-    fn build(scene: Scene, text: String, mut warnings: Vec<String>, known: Option<Arc<Recording>>) -> Result<Experiment, Error> {
-        let fault = |key: &str, message: String| Error::from(scene_error(&scene.path, &text, key, message));
+    fn build(
+        mut scene: Scene,
+        text: String,
+        mut warnings: Vec<String>,
+        known: Option<Arc<Recording>>,
+    ) -> Result<Experiment, Error> {
+        let _stage = Stage::begin("shape, recording and plan");
+        let path = scene.path.clone();
+        let fault = |key: &str, message: String| Error::from(scene_error(&path, &text, key, message));
         let shape = shape_of(&scene.object);
         let mut recording = None;
         let (mut observation, mut rest) = (Observation::default(), Vec::new());
-        if let Some(spec) = &scene.observation {
+        if let Some(spec) = &mut scene.observation {
             let read = match known {
                 Some(known) => known,
                 None => Arc::new(read_recording(place_of(spec).map_err(|e| fault("observation.recording", e))?)?),
             };
             warnings.extend(read.warnings.iter().cloned());
+            warnings.extend(doubts::thin(&read, spec, &path, &text));
             (observation, rest) = read.observation(spec, &mut warnings).map_err(|e| match e {
                 ObservationError::Recording(e) => Error::from(e),
                 ObservationError::Scene { key, message } => fault(&key, message),
@@ -143,11 +155,19 @@ impl Experiment {
         warnings: Vec<String>,
     ) -> Result<Experiment, Error> {
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
-        let plan = build_plan(&scene, observation, &rest).map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
+        if let Some(bytes) = plan_memory(&scene, shape.as_ref()) {
+            require(bytes as u64, &format!("{}: cutting the body", scene.path.display()), "take coarser cells: object.cell_size")?;
+        }
+        let cutting = Stage::begin("cut the body");
+        let plan = build_plan_of(&scene, shape.clone(), observation, &rest)
+            .map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
+        drop(cutting);
         let mut experiment = Experiment { scene, text, recording, shape, plan, chosen, warnings };
         experiment.check_times()?;
         experiment.check_planes();
         experiment.check_elements();
+        let doubts = doubts::doubts(&experiment);
+        experiment.warnings.extend(doubts);
         Ok(experiment)
     }
 

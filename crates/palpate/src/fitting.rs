@@ -1,7 +1,8 @@
 //! From experiments to a fit: free parameters, shared or not, batches, and the residual before and after.
 
-use crate::engine::{Backend, with_threads};
+use crate::engine::{Backend, most_threads, with_threads};
 use crate::error::Error;
+use crate::events::Stage;
 use crate::experiment::Experiment;
 pub(crate) use crate::fingerprint::{FNV_START, fingerprint, fnv1a};
 use crate::grid::{GridCheck, grid_check};
@@ -36,6 +37,7 @@ const SURPRISING: f64 = 3.0;
 pub use answer::{Headline, Parts};
 use counted::Counted;
 pub(crate) use free::free_parameters;
+pub(crate) use verdict::held_whole;
 use verdict::verdict;
 pub use warm::FromTracks;
 
@@ -210,6 +212,7 @@ pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
 /// [`Error::Fit`] when no start can be computed. A device that fails later leaves the best so far, with the reason in
 /// [`FitResult::broken`].
 pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
+    let _stage = Stage::begin("fit");
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     check(experiments)?;
     let spec = specs(first).expect("every scene was just found to have a [fit]");
@@ -233,6 +236,10 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let (optimizer, chosen) = optimizer(asked, &free).map_err(|e| Error::scene(&first.scene().path, "fit.optimizer", e))?;
     let settings = Settings { optimizer, ..settings };
     let threads = options.threads.unwrap_or(spec.threads);
+    if threads > most_threads() {
+        warnings.push(format!("{threads} threads are more than this machine has a use for; {} are started", most_threads()));
+    }
+    let threads = threads.min(most_threads());
     let members = |joint: &Joint| {
         let demand = demand(&free, joint.parts[0].0, settings.optimizer, settings.starts);
         let demand = Demand { asked: options.batch, starts: demand.starts * joint.parts.len(), ..demand };

@@ -1,8 +1,9 @@
 //! Asking a long computation to stop in good order.
 
 use palpate_engine::Stop;
-use std::sync::Arc;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Time since something began. Clones share the beginning.
@@ -40,8 +41,20 @@ pub struct Interrupt {
     /// Set by [`Interrupt::raise`] alone: the last round of a budget is finished.
     now: Arc<AtomicBool>,
     remaining: Arc<AtomicU64>,
+    /// Whether anything would be lost by ending at once.
+    phase: Arc<Mutex<Phase>>,
     /// From when on it counts as raised; each clone may have its own.
     deadline: Option<(Clock, Duration)>,
+}
+
+/// What a command is at.
+#[derive(Default)]
+enum Phase {
+    /// It computes or writes, and looks at its interrupt.
+    #[default]
+    Working,
+    /// It only reads and prepares, in calls that cannot be interrupted: to end the process loses nothing but files that must not outlive it.
+    Reading { remove: Option<PathBuf>, said: &'static str },
 }
 
 impl Default for Interrupt {
@@ -54,13 +67,44 @@ impl Interrupt {
     /// An interrupt that raises itself after so many rounds of evaluations: a budget.
     pub fn after(rounds: u64) -> Interrupt {
         let raised = Arc::new(AtomicBool::new(rounds == 0));
-        Interrupt { raised, now: Arc::default(), remaining: Arc::new(AtomicU64::new(rounds)), deadline: None }
+        Interrupt {
+            raised,
+            now: Arc::default(),
+            remaining: Arc::new(AtomicU64::new(rounds)),
+            phase: Arc::default(),
+            deadline: None,
+        }
     }
 
     /// The same request, which raises itself at a time of a clock as well; running evaluations end then.
     #[must_use]
     pub fn until(&self, clock: &Clock, end: Duration) -> Interrupt {
         Interrupt { deadline: Some((clock.clone(), end)), ..self.clone() }
+    }
+
+    fn enter(&self, phase: Phase) {
+        *self.phase.lock().unwrap_or_else(PoisonError::into_inner) = phase;
+    }
+
+    /// From now on the process may be ended at once: nothing is written. A file that must not outlive it is removed then; `said` is for people.
+    pub(crate) fn read(&self, remove: Option<PathBuf>, said: &'static str) {
+        self.enter(Phase::Reading { remove, said });
+    }
+
+    /// From now on this interrupt is looked at.
+    pub(crate) fn serve(&self) {
+        self.enter(Phase::Working);
+    }
+
+    /// Ends the process with what is to be said, if that loses nothing: while files are read, nobody looks at an interrupt. `end` is not expected
+    /// to come back; until it does, the command cannot begin to write.
+    pub fn abandon(&self, end: impl FnOnce(&str)) {
+        let phase = self.phase.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Phase::Reading { remove, said } = &*phase {
+            // One that stays is taken for dead once this process has ended.
+            remove.iter().for_each(|file| drop(std::fs::remove_file(file)));
+            end(said);
+        }
     }
 
     /// Asks to stop.
@@ -126,6 +170,24 @@ mod tests {
         a.raise();
         assert!(a.clone().at_once().is_over());
         assert!(!Interrupt::default().is_raised() && Interrupt::after(0).is_raised());
+    }
+
+    #[test]
+    fn who_only_reads_may_be_ended_at_once_and_who_writes_may_not() {
+        let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+        let lock = folder.path().join("lock");
+        std::fs::write(&lock, "").unwrap_or_else(|e| panic!("{e}"));
+        let (a, said) = (Interrupt::default(), |a: &Interrupt| {
+            let mut heard = None;
+            a.abandon(|text| heard = Some(text.to_string()));
+            heard
+        });
+        assert_eq!(said(&a), None);
+        a.clone().read(Some(lock.clone()), "nothing was written");
+        assert_eq!(said(&a).as_deref(), Some("nothing was written"));
+        assert!(!lock.exists() && !a.is_raised());
+        a.serve();
+        assert_eq!(said(&a.clone()), None);
     }
 
     #[test]

@@ -31,6 +31,10 @@ fn main() {
         if presses.fetch_add(1, Ordering::SeqCst) > 0 {
             std::process::exit(palpate::cli::INTERRUPTED);
         }
+        raise.abandon(|said| {
+            eprintln!("\ninterrupted: {said}");
+            std::process::exit(palpate::cli::INTERRUPTED);
+        });
         raise.raise();
         eprintln!("\ninterrupted: stopping at the next time step; press Ctrl-C again to stop at once");
     };
@@ -40,7 +44,7 @@ fn main() {
     {
         eprintln!("warning: Ctrl-C will stop at once ({e})");
     }
-    let alive = if std::io::stderr().is_terminal() { Liveliness::Bars } else { Liveliness::Silent };
+    let alive = if std::io::stderr().is_terminal() { Liveliness::Bars } else { Liveliness::Lines };
     let code = palpate::cli::run(arguments, &mut std::io::stdout(), &mut std::io::stderr(), interrupt, alive);
     std::process::exit(code);
 }

@@ -1,5 +1,6 @@
 //! How many simulations of a fit run at once, and how much memory they take.
 
+use crate::error::Error;
 use palpate_engine::{MOST_SENSITIVITIES, Request, Wanted};
 use palpate_fit::{Want, want};
 use palpate_gpu::{AdapterReport, Choice, GpuError, Load};
@@ -10,6 +11,36 @@ use palpate_model::scene::Optimizer;
 /// Memory that the simulations of one batch may take together [B], unless the user says how many run at once. What a graphics
 /// device has cannot be asked; any that computes faster than a CPU has more.
 pub(crate) const BATCH_MEMORY: u64 = 2_000_000_000;
+
+/// Bytes a node below which no simulation on the CPU stays, up to bodies of a million nodes: the fill of a factor.
+const ROUGH: u64 = 150_000;
+
+/// Refuses what memory has no room for, before it is taken: a process that runs out of memory is ended without a word.
+///
+/// # Errors
+/// More bytes are asked for than the machine, the container or the shell leave.
+pub(crate) fn require(bytes: u64, what: &str, hint: &str) -> Result<(), Error> {
+    let short = palpate_io::available().filter(|room| room.bytes < bytes);
+    short.map_or(Ok(()), |room| {
+        let needed = palpate_io::gigabytes(bytes);
+        Err(Error::Failed(format!("{what} takes about {needed} of memory, and {room} (hint: {hint})")))
+    })
+}
+
+/// Refuses a simulation on the CPU that memory has no room for.
+///
+/// # Errors
+/// As [`require`].
+pub(crate) fn require_on_cpu(plan: &Plan, demand: &Demand, threads: usize) -> Result<(), Error> {
+    // Sizes are counted only where it may matter.
+    let rough = ROUGH * plan.body.nodes.len() as u64;
+    if palpate_io::available().is_none_or(|room| room.bytes > rough) {
+        return Ok(());
+    }
+    let memory = demand.on_cpu(plan, threads).1;
+    let what = format!("a simulation of {} nodes", plan.body.nodes.len());
+    require(memory.total(), &what, "take coarser cells, or fewer simulations at once (--batch)")
+}
 
 /// What a fit asks of its backend.
 #[derive(Clone, Debug)]
@@ -84,7 +115,8 @@ impl Demand {
             let during = sizes.memory(members, self.ratios(plan, members), threads, &self.request());
             [Some(last), product].into_iter().flatten().fold(during, |most, m| if m.total() > most.total() { m } else { most })
         };
-        largest(self.most(), of, |m| self.asked.is_some() || m.total() <= BATCH_MEMORY)
+        let most = palpate_io::available().map_or(BATCH_MEMORY, |room| room.bytes.min(BATCH_MEMORY));
+        largest(self.most(), of, |m| self.asked.is_some() || m.total() <= most)
     }
 
     /// The same on a device whose largest buffer is `room` [B]. Where not even one simulation fits, one is the answer: to make it

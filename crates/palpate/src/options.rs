@@ -62,9 +62,21 @@ pub struct Talk {
     /// No progress and no notes on stderr; warnings and errors remain
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Progress on stderr [default: bar on a terminal, none otherwise]
+    /// Progress on stderr [default: bar on a terminal, lines otherwise]
     #[arg(long, global = true, value_enum, value_name = "HOW")]
     pub progress: Option<Liveliness>,
+    /// Progress, notes, warnings, errors and how long each stage took as events on stderr, one a line [default: words for people]
+    #[arg(long, global = true, value_enum, value_name = "FORM", conflicts_with = "progress")]
+    pub log: Option<Log>,
+}
+
+/// What events look like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Log {
+    /// Time, kind and words
+    Text,
+    /// A JSON object a line: time, kind (progress, note, warning, error, stage), message, and seconds or code where there are such
+    Json,
 }
 
 /// Reads a whole number in a range, and says which are allowed where it is none of them. Clap by itself takes a negative number for an

@@ -1,5 +1,10 @@
-//! Signs of life of a long command on stderr: a bar on a terminal; where a log asks for it, a plain line now and then.
+//! Signs of life of a long command on stderr: a bar on a terminal, a line now and then in a log, or events that a program reads.
 
+mod convergence;
+
+pub(crate) use convergence::{Convergence, UNITS};
+
+use crate::events::{Kind, tell};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
@@ -18,10 +23,13 @@ pub enum Liveliness {
     Bars,
     /// A line every few seconds, for logs
     Lines,
+    /// An event every few seconds, as `--log` shows them
+    #[value(skip)]
+    Events,
 }
 
-/// No line in the first seconds: short commands need none.
-const FIRST: Duration = Duration::from_secs(2);
+/// No line in the first moments: short commands need none.
+const FIRST: Duration = Duration::from_millis(1500);
 /// Least time between two lines.
 const BETWEEN: Duration = Duration::from_secs(5);
 /// Longest time without a line, while nothing new happens.
@@ -81,6 +89,20 @@ impl Pace {
     }
 }
 
+/// Writes lines as events.
+struct Events;
+
+impl Write for Events {
+    fn write(&mut self, line: &[u8]) -> std::io::Result<usize> {
+        tell(Kind::Progress, String::from_utf8_lossy(line).trim_end(), None, None);
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
 impl Lines {
     fn new(what: &str, mut to: impl Write + Send + 'static) -> Lines {
         let (news, heard) = channel::<String>();
@@ -98,7 +120,7 @@ impl Lines {
                 }
                 if let Some(line) = pace.line(&what, Instant::now()) {
                     // A log that is gone is no reason to stop computing.
-                    let _ = writeln!(to, "{line}");
+                    let _ = to.write_all(format!("{line}\n").as_bytes());
                 }
             }
         });
@@ -119,7 +141,7 @@ impl Track {
     /// Progress of `what` over `length` units; 0: unknown.
     pub fn new(how: Liveliness, length: u64, what: &str) -> Track {
         let bar = match how {
-            Liveliness::Silent | Liveliness::Lines => ProgressBar::hidden(),
+            Liveliness::Silent | Liveliness::Lines | Liveliness::Events => ProgressBar::hidden(),
             Liveliness::Bars => {
                 let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
                 let bar = bar.with_style(style(length)).with_prefix(what.to_string());
@@ -127,7 +149,11 @@ impl Track {
                 bar
             }
         };
-        let lines = (how == Liveliness::Lines).then(|| Lines::new(what, std::io::stderr()));
+        let lines = match how {
+            Liveliness::Lines => Some(Lines::new(what, std::io::stderr())),
+            Liveliness::Events => Some(Lines::new(what, Events)),
+            Liveliness::Silent | Liveliness::Bars => None,
+        };
         Track { bar, lines, length, position: 0 }
     }
 
@@ -197,7 +223,7 @@ mod tests {
             }
             lines.extend(pace.line("diagnosing", now));
         }
-        let expected = ["2 s: stage 18", "7 s: stage 69", "12 s: stage 99", "72 s: stage 99"];
+        let expected = ["2 s: stage 15", "6 s: stage 63", "12 s: stage 99", "72 s: stage 99"];
         assert_eq!(lines, expected.map(|l| format!("diagnosing, {l}")));
     }
 

@@ -219,7 +219,7 @@ fn two_processes_with_the_same_scenes_share_them() {
     for name in ["firm", "medium", "soft"] {
         assert_eq!(log.concat().matches(&format!("{name}: complete in ")).count(), 1, "{name}: {log:?}");
         assert!(!out.join(name).join("previous-1").exists(), "{name} was fitted twice");
-        assert!(out.join(name).join("row.json").exists() && !out.join(name).join("fit.lock").exists(), "{name}");
+        assert!(out.join(name).join("row.json").exists() && !out.join(name).join("palpate.lock").exists(), "{name}");
     }
     assert_eq!(merge(&out).0, 0);
 }
@@ -230,7 +230,7 @@ fn what_a_killed_process_held_is_taken_at_once_and_what_another_holds_is_left() 
     let folder = tempfile::tempdir().expect("a folder");
     let scenes = scenes(folder.path(), |t| t);
     let out = folder.path().join("out");
-    let lock = out.join("medium/fit.lock");
+    let lock = out.join("medium/palpate.lock");
     // What an earlier batch left in the folder is no result of this one.
     assert_eq!(run(&mut batch(&scenes, &out, &["--shard", "2/3"])).0, 0);
     {

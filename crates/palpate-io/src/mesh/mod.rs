@@ -8,8 +8,10 @@ mod volume;
 pub use volume::read_tets;
 
 use crate::error::{InputError, Loaded, number};
+use crate::input::read_bytes;
 use glam::DVec3;
 use palpate_model::shape::{MeshReport, Repaired, TriMesh, diagnose, repair};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Longest side of an object [m]; anything larger was written in another unit.
@@ -42,7 +44,7 @@ pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Repaired>, InputError>
 }
 
 fn read_scaled(path: &Path, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<Repaired>, InputError> {
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.as_str() {
         "obj" => parse::obj(&bytes),
@@ -64,16 +66,24 @@ pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
 
 /// Equal vertices become one, unused ones and collapsed triangles go; the order of the rest is kept.
 fn merge(mesh: TriMesh) -> TriMesh {
-    let mut number = std::collections::BTreeMap::new();
+    // Adding zero turns −0 into +0, which have different bits.
+    let bits = |v: u32| (mesh.vertices[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut order: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+    order.par_sort_unstable_by_key(|v| (bits(*v), *v));
+    let mut first: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+    for group in order.chunk_by(|a, b| bits(*a) == bits(*b)) {
+        group.iter().for_each(|v| first[*v as usize] = group[0]);
+    }
+    let mut number = vec![u32::MAX; mesh.vertices.len()];
     let mut out = TriMesh::default();
     for t in &mesh.triangles {
         let corners = t.map(|v| {
-            // Adding zero turns −0 into +0, which have different bits.
-            let p = mesh.vertices[v as usize] + DVec3::ZERO;
-            *number.entry(p.to_array().map(f64::to_bits)).or_insert_with(|| {
-                out.vertices.push(p);
-                out.vertices.len() as u32 - 1
-            })
+            let (own, n) = (first[v as usize], out.vertices.len() as u32);
+            if number[own as usize] == u32::MAX {
+                number[own as usize] = n;
+                out.vertices.push(mesh.vertices[own as usize] + DVec3::ZERO);
+            }
+            number[own as usize]
         });
         if corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0] {
             out.triangles.push(corners);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate_model::shape::TriMesh;
 use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{DefaultElement, Property};
+use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use std::io::Cursor;
 
 /// Fan of a polygon with vertices `at(0..n)`; the solid is the same for planar polygons that are convex.
@@ -39,29 +39,48 @@ pub(super) fn obj(bytes: &[u8]) -> Result<TriMesh, String> {
     finite(mesh)
 }
 
-fn number(p: Option<&Property>) -> Option<f64> {
-    match p? {
-        Property::Float(x) => Some(f64::from(*x)),
-        Property::Double(x) => Some(*x),
-        Property::Int(x) => Some(f64::from(*x)),
-        Property::Short(x) => Some(f64::from(*x)),
-        _ => None,
+/// What is read of a vertex or a face; other properties are passed over.
+#[derive(Default)]
+struct Row {
+    coordinates: [Option<f64>; 3],
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for Row {
+    fn new() -> Row {
+        Row::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let number = match property {
+            Property::Float(x) => Some(f64::from(x)),
+            Property::Double(x) => Some(x),
+            Property::Int(x) => Some(f64::from(x)),
+            Property::Short(x) => Some(f64::from(x)),
+            _ => None,
+        };
+        match name {
+            "x" => self.coordinates[0] = number,
+            "y" => self.coordinates[1] = number,
+            "z" => self.coordinates[2] = number,
+            "vertex_indices" | "vertex_index" => self.corners = property.to_u32_list().or(self.corners.take()),
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
     }
 }
 
 /// Stanford PLY, ASCII or binary.
 pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
-    let ply =
-        Parser::<DefaultElement>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| format!("not a readable PLY file: {e}"))?;
+    let ply = Parser::<Row>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| format!("not a readable PLY file: {e}"))?;
     let part = |name: &str| ply.payload.get(name).ok_or_else(|| format!("has no element \"{name}\""));
     let mut mesh = TriMesh::default();
     for (i, v) in part("vertex")?.iter().enumerate() {
-        let get = |k: &str| number(v.get(k)).ok_or_else(|| format!("vertex {} has no coordinate \"{k}\"", i + 1));
-        mesh.vertices.push(DVec3::new(get("x")?, get("y")?, get("z")?));
+        let get = |k: usize| v.coordinates[k].ok_or_else(|| format!("vertex {} has no coordinate \"{}\"", i + 1, ["x", "y", "z"][k]));
+        mesh.vertices.push(DVec3::new(get(0)?, get(1)?, get(2)?));
     }
     for (i, f) in part("face")?.iter().enumerate() {
-        let list = f.get("vertex_indices").or_else(|| f.get("vertex_index")).and_then(Property::to_u32_list);
-        let list = list.ok_or_else(|| format!("face {} has no list \"vertex_indices\"", i + 1))?;
+        let list = f.corners.as_ref().ok_or_else(|| format!("face {} has no list \"vertex_indices\"", i + 1))?;
         if let Some(v) = list.iter().find(|v| **v as usize >= mesh.vertices.len()) {
             return Err(format!("face {} names vertex {v}, there are {}", i + 1, mesh.vertices.len()));
         }

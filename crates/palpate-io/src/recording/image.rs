@@ -5,8 +5,8 @@ use crate::cloud::ending;
 use crate::document::Table;
 use crate::error::{InputError, number};
 use crate::npy::decode_array;
-use image::{DynamicImage, ImageFormat};
-use std::io::Cursor;
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 use tiff::TiffError;
 use tiff::decoder::{Decoder, DecodingResult};
@@ -161,10 +161,15 @@ fn tiff(path: &Path, bytes: &[u8], size: (usize, usize)) -> Result<Vec<f32>, Inp
 }
 
 fn decode(path: &Path, bytes: &[u8], size: (usize, usize)) -> Result<DynamicImage, InputError> {
-    let image = image::load_from_memory_with_format(bytes, ImageFormat::Png)
-        .map_err(|e| InputError::file(path, format!("not a readable PNG file (truncated?): {e}")))?;
-    check_size(path, (image.width() as usize, image.height() as usize), size)?;
-    Ok(image)
+    let broken = |e: ImageError| {
+        let cut = matches!(&e, ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof);
+        let why = if cut { " (truncated?)" } else { "" };
+        InputError::file(path, format!("not a readable PNG file{why}: {e}"))
+    };
+    // The size stands in the header: nothing is made room for before it is right.
+    let header = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png).into_dimensions().map_err(broken)?;
+    check_size(path, (header.0 as usize, header.1 as usize), size)?;
+    image::load_from_memory_with_format(bytes, ImageFormat::Png).map_err(broken)
 }
 
 fn counts(path: &Path, bytes: &[u8], size: (usize, usize)) -> Result<Vec<u16>, InputError> {

@@ -27,6 +27,7 @@ pub use write::write_recording;
 
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded};
+use crate::input::read_bytes;
 use crate::keys::{RECORDING, suggest};
 use crate::scene::{check_format, marker_rest};
 use palpate_model::observation::{MarkerRest, ReadingKind};
@@ -123,12 +124,27 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
 /// The file cannot be read, is damaged, or holds no marker that was seen.
 pub fn read_c3d(path: impl AsRef<Path>) -> Result<Loaded<RecordedMarkers>, InputError> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     let mut warnings = Vec::new();
     let (names, samples) = c3d::read_c3d(path, &bytes, &mut warnings)?;
     let file = path.to_path_buf();
     let value = RecordedMarkers { file, names, samples, noise_sigma: None, noise_systematic: 0.0, rest: Vec::new() };
     Ok(Loaded { value, warnings })
+}
+
+/// True for a path that leads out of the folder that it starts from. A recording is handed from person to person: what it names lies in its
+/// folder. A scene is its author's own, and its paths may lead anywhere but through a recording.
+pub(crate) fn leaves(text: &str) -> bool {
+    let mut depth = 0i32;
+    Path::new(text).components().any(|c| {
+        match c {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => depth = i32::MIN / 2,
+        }
+        depth < 0
+    })
 }
 
 /// A file that is there; its path must stay inside the recording's folder.
@@ -138,19 +154,8 @@ fn inside(source: &Source, t: &Table, key: &str) -> Result<Option<PathBuf>, Inpu
 
 /// The same for a path that is part of a key's value.
 fn inside_text(source: &Source, t: &Table, key: &str, text: &str) -> Result<PathBuf, InputError> {
-    let mut depth = 0i32;
-    for c in Path::new(text).components() {
-        match c {
-            Component::Normal(_) => depth += 1,
-            Component::CurDir => {}
-            Component::ParentDir => depth -= 1,
-            Component::RootDir | Component::Prefix(_) => depth = i32::MIN / 2,
-        }
-        if depth < 0 {
-            return Err(
-                t.error(key, format!("\"{text}\" leaves the recording's folder; paths are relative to it and stay inside"))
-            );
-        }
+    if leaves(text) {
+        return Err(t.error(key, format!("\"{text}\" leaves the recording's folder; paths are relative to it and stay inside")));
     }
     let path = source.folder().join(text);
     // A link may lead out of the folder where the text does not.
@@ -205,7 +210,6 @@ fn frames(
         }
         headers.push(Header { table, camera, time, depth, mask });
     }
-    let load = |path: &PathBuf| std::fs::read(path).map_err(|e| InputError::io(path, &e));
     // Files are read and decoded side by side; what is wrong is still reported in the order of the file.
     type Images = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);
     let images: Vec<Images> = (headers.iter().map(|h| (h.camera, h.depth.clone(), h.mask.clone())).collect::<Vec<_>>())
@@ -213,12 +217,12 @@ fn frames(
         .map(|(c, depth, mask)| {
             let size = (cameras[c].width, cameras[c].height);
             (
-                depth.map(|p| load(&p).and_then(|b| image::depth(&p, &b, size))),
-                mask.map(|p| load(&p).and_then(|b| image::mask(&p, &b, size))),
+                depth.map(|p| read_bytes(&p).and_then(|b| image::depth(&p, &b, size))),
+                mask.map(|p| read_bytes(&p).and_then(|b| image::mask(&p, &b, size))),
             )
         })
         .collect();
-    let mut frames = Vec::new();
+    let (mut frames, mut useless) = (Vec::new(), Vec::new());
     for (h, (depth, mask)) in headers.iter().zip(images) {
         let frame = RecordedFrame { camera: h.camera, time: h.time, depth: depth.transpose()?, mask: mask.transpose()? };
         if frame.mask.as_ref().is_some_and(|m| !m.contains(&true)) {
@@ -226,10 +230,16 @@ fn frames(
             return Err(e);
         }
         if frame.depth.is_some() && frame.readings().next().is_none() {
-            let e = h.table.error("depth", "holds no reading of the object; the frame is of no use");
-            warnings.push(e.to_string());
+            useless.push(h);
         }
         frames.push(frame);
+    }
+    if let Some(first) = useless.first() {
+        let others = match useless.len() - 1 {
+            0 => "the frame is of no use".to_string(),
+            n => format!("the frame is of no use, and so are {n} others"),
+        };
+        warnings.push(first.table.error("depth", format!("holds no reading of the object; {others}")).to_string());
     }
     Ok(frames)
 }
@@ -262,7 +272,7 @@ fn markers(source: &Source, root: &Table, warnings: &mut Vec<String>) -> Result<
     let Some(t) = root.optional_table("markers")? else { return Ok(None) };
     let file = inside(source, &t, "file")?.ok_or_else(|| t.missing("file", "a .csv or .c3d file"))?;
     let extension = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let bytes = std::fs::read(&file).map_err(|e| InputError::io(&file, &e))?;
+    let bytes = read_bytes(&file)?;
     let (names, samples) = match extension.as_str() {
         "csv" => markers::read_csv(&file, &bytes)?,
         "c3d" => c3d::read_c3d(&file, &bytes, warnings)?,

@@ -115,6 +115,7 @@ impl Recording {
     fn add_depth(&self, spec: &ObservationSpec, o: &mut Observation, warnings: &mut Vec<String>) -> Result<(), ObservationError> {
         let chosen = self.chosen_times(spec);
         let is_chosen = |time: f64| chosen.iter().any(|t| (t - time).abs() <= SAME_TIME);
+        let mut unmasked = Vec::new();
         // Noise and systematic error of every sensor that is used, and its number.
         let mut used: Vec<(usize, f64, f64)> = Vec::new();
         let mut usable = vec![false; self.cameras.len()];
@@ -133,13 +134,13 @@ impl Recording {
                 })
                 .collect::<Result<Vec<_>, InputError>>()?;
             o.frames.push(Frame { time: f.time, points, ..Frame::default() });
-            if f.mask.is_none() {
-                warnings.push(format!(
-                    "{}: frame at {} s has no mask; every pixel may be the object",
-                    self.path.display(),
-                    f.time
-                ));
-            }
+            unmasked.extend(f.mask.is_none().then_some(f.time));
+        }
+        if let Some(first) = unmasked.first() {
+            let (path, n, of) = (self.path.display(), unmasked.len(), o.frames.len());
+            let (have, first) = (if n == 1 { "image has" } else { "images have" }, number(*first));
+            let text = format!("{n} of {of} depth {have} no mask (the first at {first} s); every pixel may be the object");
+            warnings.push(format!("{path}: {text}"));
         }
         self.warn_of_images(o, warnings);
         for (i, c) in self.cameras.iter().enumerate().filter(|(i, _)| usable[*i]) {

@@ -26,6 +26,14 @@ fn millimetres(observation: &Observation, min: DVec3, max: DVec3) -> Result<(), 
     ))
 }
 
+/// True if in some frame one in a hundred points comes closer than `reach` [m], with all lengths multiplied by `scale`.
+fn meets(observation: &Observation, scale: f64, distance: impl Fn(DVec3) -> f64, reach: f64) -> bool {
+    observation.frames.iter().any(|f| {
+        let (near, all) = positions(f).fold((0, 0), |(near, all), p| (near + usize::from(distance(scale * p) < reach), all + 1));
+        near > 0 && near * 100 >= all
+    })
+}
+
 /// Checks that what was measured lies near the body's bounding box at rest, `min` to `max` [m].
 ///
 /// In at least one frame, at least one in a hundred points or markers must come closer to the box than half its diagonal: bodies
@@ -40,25 +48,26 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     let size = (max - min).length();
     millimetres(observation, min, max)?;
     let distance = |p: DVec3| (p - p.clamp(min, max)).length();
-    let lies_near = |scale: f64| {
-        observation.frames.iter().any(|f| {
-            let near = positions(f).filter(|p| distance(scale * *p) < 0.5 * size).count();
-            near > 0 && near * 100 >= positions(f).count()
-        })
-    };
-    let mut all: Vec<f64> = observation.frames.iter().flat_map(positions).map(distance).collect();
-    if lies_near(1.0) || all.is_empty() {
+    if meets(observation, 1.0, distance, 0.5 * size) {
         return Ok(());
     }
-    let unit = [(0.001, "millimetres"), (0.01, "centimetres")].into_iter().find(|u| lies_near(u.0));
-    let hint = unit.map_or(String::new(), |u| format!("; in {} it would lie at the object", u.1));
+    let mut all: Vec<f64> = observation.frames.iter().flat_map(positions).map(distance).collect();
+    if all.is_empty() {
+        return Ok(());
+    }
+    let units = [(0.001, "millimetres"), (0.01, "centimetres")];
+    let unit = match units.into_iter().find(|u| meets(observation, u.0, distance, 0.5 * size)) {
+        Some((factor, name)) => {
+            format!("is the recording in {name}? Multiplied by {factor} it lies at the object: convert it to metres")
+        }
+        None => "check object.pose, world_from_camera and the units".to_string(),
+    };
     let nearest = all.iter().copied().fold(f64::INFINITY, f64::min);
     let middle = all.len() / 2;
     let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
     let (factor, of) = (median / size, all.len());
     Err(format!(
         "the recording lies nowhere near the object: the median distance of {of} points from it is {median:.4} m \
-         (nearest {nearest:.4} m, {factor:.1} × the object's diagonal of {size:.4} m); \
-         check object.pose, world_from_camera and the units{hint}"
+         (nearest {nearest:.4} m, {factor:.1} × the object's diagonal of {size:.4} m); {unit}"
     ))
 }

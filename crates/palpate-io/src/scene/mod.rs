@@ -29,6 +29,7 @@ pub use write::{append_effects, name_field_files, scene_with_values, without_wis
 use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded, number};
 use crate::keys::SCENE;
+use crate::recording::leaves;
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
 use palpate_model::observation::ReadingKind;
@@ -71,6 +72,16 @@ pub fn scene_error(path: &Path, text: &str, key: &str, message: impl Into<String
         Ok(source) => source.fault(key, message),
         Err(_) => InputError { key: key.to_string(), ..InputError::file(path, message) },
     }
+}
+
+/// True where a scene's text states a dotted key (`observation.band`) itself.
+pub fn states(text: &str, key: &str) -> bool {
+    let Ok(document) = text.parse::<toml_edit::DocumentMut>() else { return false };
+    let mut item = Some(document.as_item());
+    for part in key.split('.') {
+        item = item.and_then(|i| i.get(part));
+    }
+    item.is_some()
 }
 
 fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
@@ -307,6 +318,9 @@ fn element(t: &Table, of_tets: bool, s: &mut Solver) -> Result<(), InputError> {
     Ok(())
 }
 
+/// Widest band in cells: points farther away than a body is thick tell of nothing, and the lattice grows with its cube.
+const WIDEST_BAND: f64 = 100.0;
+
 fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     let Some(t) = root.optional_table("observation")? else { return Ok(None) };
     let recording = t.optional_path("recording")?.ok_or_else(|| t.missing("recording", "the folder of a recording"))?;
@@ -339,9 +353,13 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
         spec.markers.push(marker);
     }
     if let Some(file) = t.optional_str("file")? {
+        if leaves(file) {
+            let text = format!("\"{file}\" leaves the recording's folder; it names a file inside; for another folder give `recording`");
+            return Err(t.error("file", text));
+        }
         spec.file = file.to_string();
     }
-    spec.band = t.f64_where("band", |x| x > 0.0, "is not allowed: must be > 0 (cells)")?.unwrap_or(spec.band);
+    spec.band = t.f64_where("band", |x| x > 0.0 && x <= WIDEST_BAND, "is not allowed: must be > 0 and at most 100 (cells)")?.unwrap_or(spec.band);
     spec.pixel_stride = t.optional_count("pixel_stride", 1..=100_000)?.map_or(spec.pixel_stride, |n| n as usize);
     Ok(Some(spec))
 }

@@ -1,11 +1,12 @@
 //! Tables of numbers beside a scene: CSV files with a fixed header.
 
 use crate::error::InputError;
+use crate::input::read_bytes;
 use std::path::Path;
 
 /// Rows of a file with exactly these columns, all numbers finite, each with its line.
 pub(super) fn rows<const N: usize>(path: &Path, columns: [&str; N]) -> Result<Vec<(usize, [f64; N])>, InputError> {
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+    let bytes = read_bytes(path)?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
     let broken = |e: csv::Error| {
         let line = e.position().map(|p| p.line() as usize);

@@ -265,6 +265,17 @@ pub(super) fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<
     Ok((Grid::covering(min, max, h, border), border as usize - 1))
 }
 
+/// Memory that cutting a shape out of a lattice will take [B], an estimate; `None` where that is refused anyway.
+pub(crate) fn memory(shape: &dyn Shape, h: f64, band_width: f64) -> Option<f64> {
+    let (grid, _) = lattice_for(shape, h, band_width).ok()?;
+    let (min, max) = shape.bounds();
+    let all = ((max - min) / h).ceil().element_product();
+    // The share is asked for only where it matters.
+    let cells = if all < 1e4 { all } else { all * filled(shape, min, max - min) };
+    // Numbers of nodes and distances of the whole lattice.
+    Some(cells * CELL_MEMORY + grid.len() as f64 * 16.0)
+}
+
 /// Share of its bounding box that a shape fills, by asking at a few places.
 fn filled(shape: &dyn Shape, min: DVec3, size: DVec3) -> f64 {
     let n = (size / size.max_element() * ASKED).ceil().max(DVec3::ONE);

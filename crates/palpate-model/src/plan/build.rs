@@ -41,13 +41,13 @@ fn error(key: impl Into<String>, message: String) -> PlanError {
 
 /// Cuts a scene's body. The shape is returned with it.
 pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanError> {
-    let (parts, shape) = build_parts(scene, false)?;
+    let shape = shape_of(&scene.object);
+    let parts = build_parts(scene, &shape, false)?;
     Ok((Arc::new(parts.body), shape))
 }
 
 /// `seen`: observed points are to be looked up; bodies of cells are always ready for them.
-fn build_parts(scene: &Scene, seen: bool) -> Result<(Parts, Arc<dyn Shape>), PlanError> {
-    let shape = shape_of(&scene.object);
+fn build_parts(scene: &Scene, shape: &Arc<dyn Shape>, seen: bool) -> Result<Parts, PlanError> {
     let mesh = match (&scene.object.source, scene.object.resolution) {
         (BodySource::Tetrahedra { mesh, .. }, _) => Some(mesh.transformed(&scene.object.pose)),
         (_, Resolution::Edge(_)) => Some(tets::made(&scene.object)?.0),
@@ -60,7 +60,7 @@ fn build_parts(scene: &Scene, seen: bool) -> Result<(Parts, Arc<dyn Shape>), Pla
             let (h, width) = (body.length, band_cells(scene) * body.length);
             body.band = shadow(&body, shape.as_ref(), h, width).map_err(|e| error("observation.band", e.to_string()))?;
         }
-        return Ok((Parts { body, merged: Vec::new() }, shape));
+        return Ok(Parts { body, merged: Vec::new() });
     }
     let (min, max) = shape.bounds();
     let (key, h) = match scene.object.resolution {
@@ -79,7 +79,7 @@ fn build_parts(scene: &Scene, seen: bool) -> Result<(Parts, Arc<dyn Shape>), Pla
     if scene.clamps.is_empty() && scene.time.scheme.is_of_second_order(scene.time.theta) {
         parts.body.mend_moments();
     }
-    Ok((parts, shape))
+    Ok(parts)
 }
 
 /// Width of the band in cells; without observation just enough to draw the surface.
@@ -89,8 +89,30 @@ fn band_cells(scene: &Scene) -> f64 {
 
 /// Everything a backend needs for a scene. `observation` comes with frames, cameras and channels; its markers are filled here: one per
 /// entry of `marker_rest` in the same order, then one per rest place of its tracks.
-pub fn build_plan(scene: &Scene, mut observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
-    let (parts, shape) = build_parts(scene, observation.frames.iter().any(|f| !f.points.is_empty()))?;
+pub fn build_plan(scene: &Scene, observation: Observation, marker_rest: &[MarkerRest]) -> Result<Plan, PlanError> {
+    build_plan_of(scene, shape_of(&scene.object), observation, marker_rest)
+}
+
+/// Memory that making the plan of a scene will take [B], an estimate before anything is made; `None` where it is not known: of tetrahedra, or
+/// where the cells will be refused.
+pub fn plan_memory(scene: &Scene, shape: &dyn Shape) -> Option<f64> {
+    let (min, max) = shape.bounds();
+    let h = match scene.object.resolution {
+        Resolution::CellSize(h) => h,
+        Resolution::Cells(n) => (max - min).max_element() / f64::from(n),
+        _ => return None,
+    };
+    cutting::memory(shape, h, band_cells(scene) * h)
+}
+
+/// The same with the scene's shape at hand, which takes time to make of a large mesh.
+pub fn build_plan_of(
+    scene: &Scene,
+    shape: Arc<dyn Shape>,
+    mut observation: Observation,
+    marker_rest: &[MarkerRest],
+) -> Result<Plan, PlanError> {
+    let parts = build_parts(scene, &shape, observation.frames.iter().any(|f| !f.points.is_empty()))?;
     let clamps =
         scene.clamps.iter().enumerate().map(|(i, c)| clamp_site(i, c, scene, &parts, &shape)).collect::<Result<Vec<_>, _>>()?;
     check_given(scene)?;

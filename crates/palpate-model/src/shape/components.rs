@@ -1,7 +1,5 @@
 //! Parts of a mesh that share no vertex.
 
-use std::collections::BTreeMap;
-
 fn root(parent: &mut [u32], mut v: u32) -> u32 {
     while parent[v as usize] != v {
         parent[v as usize] = parent[parent[v as usize] as usize];
@@ -19,11 +17,15 @@ pub(crate) fn components<const N: usize>(elements: &[[u32; N]], vertices: usize)
             parent[a.max(b) as usize] = a.min(b);
         }
     }
-    let mut numbers = BTreeMap::new();
+    let (mut numbers, mut count) = (vec![usize::MAX; vertices], 0);
     let of = elements.iter().map(|e| {
-        let next = numbers.len();
-        *numbers.entry(root(&mut parent, e[0])).or_insert(next)
+        let number = &mut numbers[root(&mut parent, e[0]) as usize];
+        if *number == usize::MAX {
+            *number = count;
+            count += 1;
+        }
+        *number
     });
     let of: Vec<usize> = of.collect();
-    (of, numbers.len())
+    (of, count)
 }

@@ -13,6 +13,9 @@ use std::f64::consts::PI;
 /// Triangles per leaf.
 const LEAF: usize = 4;
 
+/// Nodes with more triangles than this are worth a thread of their own.
+const ALONE: u32 = 4096;
+
 /// A cluster farther away than this many of its radii counts as one dipole; its error of order 1/9 of the cluster's own share stays
 /// well away from the decision at ½ because clusters that near the point matter are opened.
 const FAR: f64 = 3.0;
@@ -27,7 +30,7 @@ pub struct MeshShape {
     normals: Option<Pseudonormals>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Node {
     lo: DVec3,
     hi: DVec3,
@@ -51,12 +54,21 @@ impl MeshShape {
 
     /// A mesh whose signs always come from winding numbers.
     pub(super) fn unsigned(mesh: TriMesh) -> MeshShape {
-        let mut items: Vec<(u32, [DVec3; 3])> = (0..mesh.triangles.len()).map(|t| (t as u32, mesh.corners(t))).collect();
-        let mut tree = Vec::new();
-        if !items.is_empty() {
-            build(&mut items, 0, &mut tree);
+        let corners = |t: u32| mesh.corners(t as usize);
+        let mut items: Vec<(DVec3, u32)> = (0..mesh.triangles.len() as u32)
+            .map(|t| {
+                let [a, b, c] = corners(t);
+                (a + b + c, t)
+            })
+            .collect();
+        arrange(&mut items);
+        let numbers: Vec<u32> = items.into_iter().map(|(_, t)| t).collect();
+        let corners: Vec<[DVec3; 3]> = numbers.iter().map(|t| corners(*t)).collect();
+        let count = if numbers.is_empty() { 0 } else { node_counts(numbers.len()).0 };
+        let mut tree = vec![Node::default(); count];
+        if count > 0 {
+            fill(&corners, 0, 0, &mut tree);
         }
-        let (numbers, corners) = items.into_iter().unzip();
         MeshShape { mesh, corners, numbers, tree, normals: None }
     }
 
@@ -104,20 +116,56 @@ impl MeshShape {
         Some((best.1, best.2 as usize, best.3))
     }
 
-    /// Visits the triangles whose bounding boxes' leaf touches the box `lo..hi`.
-    pub(super) fn overlapping(&self, lo: DVec3, hi: DVec3, visit: &mut impl FnMut(usize)) {
-        let mut stack = if self.tree.is_empty() { Vec::new() } else { vec![0u32] };
-        while let Some(n) = stack.pop() {
-            let node = &self.tree[n as usize];
-            if node.lo.cmpgt(hi).any() || node.hi.cmplt(lo).any() {
-                continue;
+    /// Sum of what `look` says of every pair of triangles whose bounding boxes come within `margin` [m] of each other; each pair once.
+    pub(super) fn count_close(&self, margin: f64, look: &(impl Fn(usize, usize) -> usize + Sync)) -> usize {
+        if self.tree.is_empty() { 0 } else { self.within(0, margin, look) }
+    }
+
+    /// Pairs in one node.
+    fn within(&self, n: u32, margin: f64, look: &(impl Fn(usize, usize) -> usize + Sync)) -> usize {
+        let node = &self.tree[n as usize];
+        if node.second == 0 {
+            let own = node.range.0..node.range.1;
+            return own.clone().flat_map(|s| (s + 1..own.end).map(move |t| (s, t))).map(|(s, t)| self.pair(s, t, margin, look)).sum();
+        }
+        let (first, second) = (n + 1, node.second);
+        let parts = || {
+            let inner = both(node, || self.within(first, margin, look), || self.within(second, margin, look));
+            inner.0 + inner.1
+        };
+        parts() + self.between(first, second, margin, look)
+    }
+
+    /// Pairs of one in each node.
+    fn between(&self, m: u32, n: u32, margin: f64, look: &(impl Fn(usize, usize) -> usize + Sync)) -> usize {
+        let (a, b) = (&self.tree[m as usize], &self.tree[n as usize]);
+        if (a.lo - margin).cmpgt(b.hi).any() || (b.lo - margin).cmpgt(a.hi).any() {
+            return 0;
+        }
+        let size = |x: &Node| x.range.1 - x.range.0;
+        match (a.second, b.second) {
+            (0, 0) => {
+                let all = (a.range.0..a.range.1).flat_map(|s| (b.range.0..b.range.1).map(move |t| (s, t)));
+                all.map(|(s, t)| self.pair(s, t, margin, look)).sum()
             }
-            if node.second == 0 {
-                (node.range.0..node.range.1).for_each(|t| visit(self.numbers[t as usize] as usize));
-            } else {
-                stack.extend([node.second, n + 1]);
+            // The larger is opened.
+            (0, second) => self.between(m, n + 1, margin, look) + self.between(m, second, margin, look),
+            (second, other) if other == 0 || size(a) >= size(b) => {
+                let (x, y) = both(a, || self.between(m + 1, n, margin, look), || self.between(second, n, margin, look));
+                x + y
+            }
+            (_, second) => {
+                let (x, y) = both(b, || self.between(m, n + 1, margin, look), || self.between(m, second, margin, look));
+                x + y
             }
         }
+    }
+
+    /// Two triangles, by their places in the tree.
+    fn pair(&self, s: u32, t: u32, margin: f64, look: &impl Fn(usize, usize) -> usize) -> usize {
+        let ([a, b, c], [d, e, f]) = (self.corners[s as usize], self.corners[t as usize]);
+        let apart = (a.min(b).min(c) - margin).cmpgt(d.max(e).max(f)).any() || (d.min(e).min(f) - margin).cmpgt(a.max(b).max(c)).any();
+        if apart { 0 } else { look(self.numbers[s as usize] as usize, self.numbers[t as usize] as usize) }
     }
 
     /// Generalized winding number: 1 inside a closed mesh, 0 outside, between them near holes.
@@ -143,37 +191,79 @@ impl MeshShape {
     }
 }
 
-fn build(items: &mut [(u32, [DVec3; 3])], first: usize, tree: &mut Vec<Node>) {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (mut dipole, mut center, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-    let (mut clo, mut chi) = (lo, hi);
-    for (_, c) in items.iter() {
-        let vector = 0.5 * (c[1] - c[0]).cross(c[2] - c[0]);
-        let middle = (c[0] + c[1] + c[2]) / 3.0;
-        dipole += vector;
-        center += middle * vector.length();
-        area += vector.length();
-        (clo, chi) = (clo.min(middle), chi.max(middle));
-        for &p in c {
-            (lo, hi) = (lo.min(p), hi.max(p));
+/// Does two things at once where a node is large.
+fn both<A: Send, B: Send>(node: &Node, one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
+    if node.range.1 - node.range.0 > ALONE { rayon::join(one, other) } else { (one(), other()) }
+}
+
+/// Nodes of the tree over n triangles, and over n + 1.
+fn node_counts(n: usize) -> (usize, usize) {
+    if n < LEAF {
+        return (1, 1);
+    }
+    let (a, b) = node_counts(n / 2);
+    let (own, next) = if n.is_multiple_of(2) { (1 + 2 * a, 1 + a + b) } else { (1 + a + b, 1 + 2 * b) };
+    (if n <= LEAF { 1 } else { own }, next)
+}
+
+/// Orders triangles, given as three times their middles and their numbers, so that each node of the tree has a range of them.
+fn arrange(items: &mut [(DVec3, u32)]) {
+    if items.len() <= LEAF {
+        return;
+    }
+    let middles = items.iter().map(|(sum, _)| *sum / 3.0);
+    let (lo, hi) = middles.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let axis = (hi - lo).max_position();
+    let half = items.len() / 2;
+    // The triangle's number breaks ties, so that the tree is the same everywhere.
+    items.select_nth_unstable_by(half, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+    let large = items.len() as u32 > ALONE;
+    let (left, right) = items.split_at_mut(half);
+    if large {
+        rayon::join(|| arrange(left), || arrange(right));
+    } else {
+        arrange(left);
+        arrange(right);
+    }
+}
+
+/// Sums over the triangles of a node: area vectors, middles times area, area.
+type Sums = (DVec3, DVec3, f64);
+
+/// Fills in the nodes over a range of triangles, which begins at `first` of all; `number` is the place of the node among all.
+fn fill(corners: &[[DVec3; 3]], first: usize, number: usize, tree: &mut [Node]) -> Sums {
+    let (mut lo, mut hi, mut second) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0);
+    let (here, below) = tree.split_first_mut().expect("every range has a node");
+    here.range = (first as u32, (first + corners.len()) as u32);
+    let sums = if corners.len() <= LEAF {
+        let mut sums = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        for c in corners {
+            let vector = 0.5 * (c[1] - c[0]).cross(c[2] - c[0]);
+            let area = vector.length();
+            sums = (sums.0 + vector, sums.1 + (c[0] + c[1] + c[2]) / 3.0 * area, sums.2 + area);
+            (lo, hi) = c.iter().fold((lo, hi), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
         }
-    }
-    let center = if area > 0.0 { center / area } else { 0.5 * (lo + hi) };
-    let radius = items.iter().flat_map(|(_, c)| c).map(|p| p.distance(center)).fold(0.0, f64::max);
-    let here = tree.len();
-    let range = (first as u32, (first + items.len()) as u32);
-    tree.push(Node { lo, hi, range, second: 0, dipole, center, radius });
-    if items.len() > LEAF {
-        let axis = (chi - clo).max_position();
-        let key = |c: &[DVec3; 3]| c[0][axis] + c[1][axis] + c[2][axis];
-        // The triangle's number breaks ties, so that the tree is the same everywhere.
-        items.sort_unstable_by(|a, b| key(&a.1).total_cmp(&key(&b.1)).then(a.0.cmp(&b.0)));
-        let half = items.len() / 2;
-        let (left, right) = items.split_at_mut(half);
-        build(left, first, tree);
-        tree[here].second = tree.len() as u32;
-        build(right, first + half, tree);
-    }
+        sums
+    } else {
+        let half = corners.len() / 2;
+        let of_first = node_counts(half).0;
+        second = number + 1 + of_first;
+        let (left, right) = below.split_at_mut(of_first);
+        let ((a, b), (one, other)) = (
+            both(
+                here,
+                || fill(&corners[..half], first, number + 1, left),
+                || fill(&corners[half..], first + half, number + 1 + of_first, right),
+            ),
+            (&below[0], &below[of_first]),
+        );
+        (lo, hi) = (one.lo.min(other.lo), one.hi.max(other.hi));
+        (a.0 + b.0, a.1 + b.1, a.2 + b.2)
+    };
+    let center = if sums.2 > 0.0 { sums.1 / sums.2 } else { 0.5 * (lo + hi) };
+    let radius = corners.iter().flatten().map(|p| p.distance_squared(center)).fold(0.0, f64::max).sqrt();
+    *here = Node { lo, hi, range: here.range, second: second as u32, dipole: sums.0, center, radius };
+    sums
 }
 
 /// Signed solid angle of a triangle seen from `p` (van Oosterom and Strackee 1983); positive if its back is seen.

@@ -6,8 +6,11 @@
 
 use super::TriMesh;
 use super::mesh::MeshShape;
-use super::repair::diagnose;
+use super::contacts::touches_itself;
+use super::edges::{EdgeUses, bucketed};
+use super::repair::diagnose_in;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Feature of a triangle nearest to a point: corner i, edge from corner i, or the inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +34,7 @@ pub struct Pseudonormals {
 impl Pseudonormals {
     /// The normals, or `None` if the mesh is not clean. `tree` holds the same mesh.
     pub fn of(mesh: &TriMesh, tree: &MeshShape) -> Option<Pseudonormals> {
-        let report = diagnose(mesh);
+        let report = diagnose_in(mesh, tree);
         let clean = report.is_closed()
             && report.signed_volume > 0.0
             && (report.inconsistent_edges, report.intersecting_pairs, report.degenerate_triangles, report.components)
@@ -39,25 +42,24 @@ impl Pseudonormals {
         if !clean || touches_itself(mesh, tree, 1e-6 * report.size) || !single_fans(mesh) {
             return None;
         }
-        let face: Vec<DVec3> = (0..mesh.triangles.len())
+        // Normal of every face and angles at its corners [rad].
+        let (face, angles): (Vec<DVec3>, Vec<[f64; 3]>) = (0..mesh.triangles.len())
+            .into_par_iter()
             .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                (b - a).cross(c - a).normalize()
+                let p = mesh.corners(t);
+                let angle = |i: usize| (p[(i + 1) % 3] - p[i]).angle_between(p[(i + 2) % 3] - p[i]);
+                ((p[1] - p[0]).cross(p[2] - p[0]).normalize(), [0, 1, 2].map(angle))
             })
-            .collect();
+            .unzip();
         let mut corner = vec![DVec3::ZERO; mesh.vertices.len()];
-        let mut sides = std::collections::BTreeMap::<[u32; 2], DVec3>::new();
         for (t, v) in mesh.triangles.iter().enumerate() {
-            let p = mesh.corners(t);
-            for i in 0..3 {
-                let (a, b) = (p[(i + 1) % 3] - p[i], p[(i + 2) % 3] - p[i]);
-                corner[v[i] as usize] += face[t] * a.angle_between(b);
-                let (m, n) = (v[i], v[(i + 1) % 3]);
-                *sides.entry([m.min(n), m.max(n)]).or_default() += face[t];
-            }
+            (0..3).for_each(|i| corner[v[i] as usize] += face[t] * angles[t][i]);
         }
-        let side = |m: u32, n: u32| sides[&[m.min(n), m.max(n)]];
-        let edge = mesh.triangles.iter().map(|&[a, b, c]| [side(a, b), side(b, c), side(c, a)]).collect();
+        let mut edge = vec![[DVec3::ZERO; 3]; mesh.triangles.len()];
+        for (_, uses) in EdgeUses::of(mesh).groups() {
+            let sum: DVec3 = uses.iter().map(|u| face[u.triangle as usize]).sum();
+            uses.iter().for_each(|u| edge[u.triangle as usize][usize::from(u.side)] = sum);
+        }
         Some(Pseudonormals { corner, edge, face })
     }
 
@@ -71,38 +73,22 @@ impl Pseudonormals {
     }
 }
 
-/// True if a vertex lies within `tolerance` [m] of a triangle that it is no corner of.
-fn touches_itself(mesh: &TriMesh, tree: &MeshShape, tolerance: f64) -> bool {
-    (0..mesh.vertices.len()).any(|v| {
-        let p = mesh.vertices[v];
-        let mut touches = false;
-        tree.overlapping(p - tolerance, p + tolerance, &mut |t| {
-            touches |= !mesh.triangles[t].contains(&(v as u32))
-                && super::mesh::closest_on_triangle(p, mesh.corners(t)).0.distance(p) <= tolerance;
-        });
-        touches
-    })
-}
-
 /// True if the triangles around every vertex form one fan (two cones that touch in their tips form two).
 fn single_fans(mesh: &TriMesh) -> bool {
-    let mut next = std::collections::BTreeMap::<(u32, u32), u32>::new();
-    let mut around = vec![(0usize, 0u32); mesh.vertices.len()];
-    for v in &mesh.triangles {
-        for i in 0..3 {
-            next.insert((v[i], v[(i + 1) % 3]), v[(i + 2) % 3]);
-            let a = &mut around[v[i] as usize];
-            *a = (a.0 + 1, v[(i + 1) % 3]);
-        }
-    }
-    around.iter().enumerate().filter(|(_, a)| a.0 > 0).all(|(v, &(count, first))| {
-        let mut at = first;
+    // Around vertex v[i] the triangle leads from the next corner to the one after.
+    let steps = mesh.triangles.iter().flat_map(|v| (0..3).map(|i| (v[i], [v[(i + 1) % 3], v[(i + 2) % 3]])));
+    let (first, mut steps) = bucketed(mesh.vertices.len(), steps);
+    first.windows(2).filter(|w| w[0] < w[1]).all(|w| {
+        let own = &mut steps[w[0] as usize..w[1] as usize];
+        own.sort_unstable();
+        let (start, count) = (own[0][0], own.len());
+        let mut at = start;
         for n in 1..=count {
-            match next.get(&(v as u32, at)) {
-                Some(&to) => at = to,
-                None => return false,
+            match own.binary_search_by_key(&at, |s| s[0]) {
+                Ok(k) => at = own[k][1],
+                Err(_) => return false,
             }
-            if at == first {
+            if at == start {
                 return n == count;
             }
         }

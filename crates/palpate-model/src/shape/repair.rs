@@ -1,18 +1,18 @@
 //! What is wrong with a triangle mesh, and what of it can be put right without guessing.
 
 use super::components::components;
+use super::contacts::intersecting_pairs;
+use super::edges::{EdgeUses, Use, bucketed};
+use super::joining::join_vertices;
 use super::{MeshShape, TriMesh};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use rayon::prelude::*;
 
 /// Holes with more edges than this are not closed: their shape is anybody's guess.
 const HOLE_EDGES: usize = 64;
 
 /// Holes with a rim longer than this share of the mesh's size are not closed.
 const HOLE_RIM: f64 = 0.25;
-
-/// Distance at which a segment touches a triangle, over their size: rounding of coordinates in f64.
-const TOUCHING: f64 = 1e-9;
 
 /// Facts about a mesh; a closed, consistently and outward oriented surface has zeros but for volume, components and size.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,31 +44,25 @@ impl MeshReport {
     }
 }
 
-/// Triangles at every undirected edge, with the direction (true = from smaller to larger vertex) each runs along it.
-fn edge_uses(mesh: &TriMesh) -> BTreeMap<[u32; 2], Vec<(usize, bool)>> {
-    let mut uses: BTreeMap<_, Vec<_>> = BTreeMap::new();
-    for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            uses.entry([p.min(q), p.max(q)]).or_default().push((t, p < q));
-        }
-    }
-    uses
-}
-
 /// Examines a mesh.
 pub fn diagnose(mesh: &TriMesh) -> MeshReport {
-    let uses = edge_uses(mesh);
-    let count = |f: fn(&[(usize, bool)]) -> bool| uses.values().filter(|u| f(u)).count();
+    diagnose_in(mesh, &MeshShape::unsigned(mesh.clone()))
+}
+
+/// The same, with a tree that holds the mesh.
+pub(super) fn diagnose_in(mesh: &TriMesh, tree: &MeshShape) -> MeshReport {
+    let uses = EdgeUses::of(mesh);
+    let count = |f: fn(&[Use]) -> bool| uses.groups().filter(|(_, u)| f(u)).count();
     let mut holes: Vec<(usize, f64)> = rims(mesh, &uses).iter().map(|r| (r.len(), rim_length(mesh, r))).collect();
     holes.sort_by(|a, b| b.1.total_cmp(&a.1));
     MeshReport {
         open_edges: count(|u| u.len() == 1),
         non_manifold_edges: count(|u| u.len() > 2),
-        inconsistent_edges: count(|u| u.len() == 2 && u[0].1 == u[1].1),
+        inconsistent_edges: count(|u| u.len() == 2 && u[0].rising == u[1].rising),
         signed_volume: mesh.volume(),
-        intersecting_pairs: intersecting_pairs(mesh),
+        intersecting_pairs: intersecting_pairs(mesh, tree),
         components: components(&mesh.triangles, mesh.vertices.len()).1,
-        degenerate_triangles: (0..mesh.triangles.len()).filter(|&t| is_degenerate(mesh, t)).count(),
+        degenerate_triangles: (0..mesh.triangles.len()).into_par_iter().filter(|&t| is_degenerate(mesh, t)).count(),
         size: mesh.size(),
         holes,
     }
@@ -81,76 +75,42 @@ fn is_degenerate(mesh: &TriMesh, t: usize) -> bool {
     super::trimesh::triangle_area([a, b, c]) <= 0.5e-9 * longest * longest
 }
 
-/// Pairs of triangles of which an edge of one meets the other.
-fn intersecting_pairs(mesh: &TriMesh) -> usize {
-    let tree = MeshShape::unsigned(mesh.clone());
-    let mut pairs = Vec::new();
-    for (t, &v) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(t);
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            tree.overlapping(p.min(q), p.max(q), &mut |s| {
-                if mesh.triangles[s].iter().all(|w| !v.contains(w)) && meets(p, q, mesh.corners(s)) {
-                    pairs.push((t.min(s), t.max(s)));
-                }
-            });
-        }
-    }
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs.len()
-}
-
-/// True if the segment meets the triangle, its edges and its plane included: bodies that overlap by whole faces, or by corners that
-/// lie on the diagonal of a face, pierce nothing strictly.
-fn meets(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
-    let normal = (b - a).cross(c - a);
-    let size = normal.length();
-    if size == 0.0 {
-        return false;
-    }
-    let near = TOUCHING * (q - p).length().max((b - a).length()).max((c - a).length());
-    let (above, below) = (normal.dot(p - a) / size, normal.dot(q - a) / size);
-    let inside = |x: DVec3| {
-        [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(x - s).dot(normal) >= -near * size * (e - s).length())
-    };
-    if above.abs() > near || below.abs() > near {
-        // A segment that only ends in the plane meets it as well.
-        return above.min(below) <= near
-            && above.max(below) >= -near
-            && inside(p + (q - p) * (above / (above - below)).clamp(0.0, 1.0));
-    }
-    // In the plane of the triangle: an end inside, or an edge crossed.
-    let crosses = |&(s, e): &(DVec3, DVec3)| {
-        let side = |x: DVec3, from: DVec3, to: DVec3| (to - from).cross(x - from).dot(normal);
-        side(p, s, e) * side(q, s, e) < 0.0 && side(s, p, q) * side(e, p, q) < 0.0
-    };
-    inside(p) || inside(q) || [(a, b), (b, c), (c, a)].iter().any(crosses)
-}
-
 /// Closed loops of open edges, walked so that the triangle of each edge lies on its right (a filling has it on its left).
-fn rims(mesh: &TriMesh, uses: &BTreeMap<[u32; 2], Vec<(usize, bool)>>) -> Vec<Vec<u32>> {
-    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (&[a, b], u) in uses.iter().filter(|(_, u)| u.len() == 1) {
-        let (from, to) = if u[0].1 { (b, a) } else { (a, b) };
-        next.entry(from).or_default().push(to);
-    }
+fn rims(mesh: &TriMesh, uses: &EdgeUses) -> Vec<Vec<u32>> {
+    let open = uses.groups().filter(|(_, u)| u.len() == 1).map(|([a, b], u)| if u[0].rising { (b, a) } else { (a, b) });
+    let open: Vec<(u32, u32)> = open.collect();
+    let (first, to) = bucketed(mesh.vertices.len(), open.iter().copied());
+    // What is left to walk from each vertex, and where it stands on the rim that is walked.
+    let mut left: Vec<u32> = first[1..].to_vec();
+    let mut place = vec![usize::MAX; mesh.vertices.len()];
     let mut loops = Vec::new();
-    while let Some((&start, _)) = next.iter().find(|(_, to)| !to.is_empty()) {
-        let mut rim = vec![start];
-        while let Some(to) = next.get_mut(&rim[rim.len() - 1]).and_then(Vec::pop) {
-            // A vertex met again closes a loop (two holes may touch in it).
-            if let Some(i) = rim.iter().position(|&v| v == to) {
-                loops.push(rim.split_off(i));
-                if i > 0 {
-                    rim.push(to);
+    for start in 0..mesh.vertices.len() {
+        while left[start] > first[start] {
+            let mut rim = vec![start as u32];
+            place[start] = 0;
+            while let Some(&at) = rim.last().filter(|v| left[**v as usize] > first[**v as usize]) {
+                left[at as usize] -= 1;
+                let next = to[left[at as usize] as usize];
+                // A vertex met again closes a loop (two holes may touch in it).
+                let i = place[next as usize];
+                if i == usize::MAX {
+                    place[next as usize] = rim.len();
+                    rim.push(next);
                     continue;
                 }
-                break;
+                let closed = rim.split_off(i);
+                closed.iter().for_each(|v| place[*v as usize] = usize::MAX);
+                loops.push(closed);
+                if i == 0 {
+                    break;
+                }
+                place[next as usize] = rim.len();
+                rim.push(next);
             }
-            rim.push(to);
+            rim.iter().for_each(|v| place[*v as usize] = usize::MAX);
         }
     }
-    loops.retain(|l| l.len() > 2 && l.iter().all(|&v| (v as usize) < mesh.vertices.len()));
+    loops.retain(|l| l.len() > 2);
     loops
 }
 
@@ -185,54 +145,55 @@ pub fn repair(mesh: &TriMesh) -> Repaired {
     mesh.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
     say(before - mesh.triangles.len(), "dropped triangles collapsed to a line or point");
     let before = mesh.triangles.len();
-    let mut seen = std::collections::BTreeSet::new();
-    mesh.triangles.retain(|t| {
-        let mut key = *t;
-        key.sort_unstable();
-        seen.insert(key)
-    });
+    drop_doubled(&mut mesh);
     say(before - mesh.triangles.len(), "dropped triangles that occur twice");
-    say(orient(&mut mesh), "turned triangles to agree with their neighbours");
+    let uses = EdgeUses::of(&mesh);
+    // Turning a triangle changes no edge's number of triangles.
+    let open_edges = uses.open();
+    say(orient(&mut mesh, &uses), "turned triangles to agree with their neighbours");
     say(turn_outward(&mut mesh), "turned inside-out parts outward, triangles");
-    let open_edges = edge_uses(&mesh).values().filter(|u| u.len() == 1).count();
-    let holes = close_holes(&mut mesh);
+    let holes = if open_edges == 0 { 0 } else { close_holes(&mut mesh) };
     say(holes, "closed small holes");
     Repaired { mesh: drop_unused(mesh), done, open_edges }
 }
 
-/// Joins vertices closer than f32 can tell apart.
-fn join_vertices(mesh: &TriMesh) -> (TriMesh, usize) {
-    let largest = mesh.vertices.iter().map(|v| v.abs().max_element()).fold(mesh.size(), f64::max);
-    let tolerance = 1e-7 * largest;
-    let key = |p: DVec3| (p / (2.0 * tolerance).max(f64::MIN_POSITIVE)).floor().to_array().map(|x| x as i64);
-    let mut grid: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
-    let mut vertices: Vec<DVec3> = Vec::new();
-    let mut number = Vec::with_capacity(mesh.vertices.len());
-    for &p in &mesh.vertices {
-        let [x, y, z] = key(p);
-        let near = (0..27).find_map(|o| {
-            let cell = [x + o % 3 - 1, y + o / 3 % 3 - 1, z + o / 9 - 1];
-            grid.get(&cell)?.iter().copied().find(|&v| vertices[v as usize].distance(p) <= tolerance)
-        });
-        number.push(near.unwrap_or_else(|| {
-            grid.entry([x, y, z]).or_default().push(vertices.len() as u32);
-            vertices.push(p);
-            vertices.len() as u32 - 1
-        }));
+/// Of triangles with the same vertices the first stays.
+fn drop_doubled(mesh: &mut TriMesh) {
+    let sorted = |t: &[u32; 3]| {
+        let mut key = *t;
+        key.sort_unstable();
+        key
+    };
+    // By smallest vertex: few share one.
+    let keys = mesh.triangles.iter().zip(0u32..).map(|(t, n)| {
+        let [a, b, c] = sorted(t);
+        (a, ([b, c], n))
+    });
+    let (first, mut keys) = bucketed(mesh.vertices.len(), keys);
+    let mut doubled = vec![false; mesh.triangles.len()];
+    for w in first.windows(2) {
+        let own = &mut keys[w[0] as usize..w[1] as usize];
+        own.sort_unstable();
+        own.windows(2).filter(|k| k[0].0 == k[1].0).for_each(|k| doubled[k[1].1 as usize] = true);
     }
-    let joined = mesh.vertices.len() - vertices.len();
-    let triangles = mesh.triangles.iter().map(|t| t.map(|v| number[v as usize])).collect();
-    (TriMesh { vertices, triangles }, joined)
+    let mut number = 0;
+    mesh.triangles.retain(|_| {
+        number += 1;
+        !doubled[number - 1]
+    });
 }
 
 /// Walks over edges of two triangles and turns those that disagree; of each connected patch the minority is turned.
-fn orient(mesh: &mut TriMesh) -> usize {
-    let uses = edge_uses(mesh);
-    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); mesh.triangles.len()];
-    for u in uses.values().filter(|u| u.len() == 2 && u[0].0 != u[1].0) {
-        let agree = u[0].1 != u[1].1;
-        neighbours[u[0].0].push((u[1].0, agree));
-        neighbours[u[1].0].push((u[0].0, agree));
+fn orient(mesh: &mut TriMesh, uses: &EdgeUses) -> usize {
+    // A triangle has a neighbour at each of three sides at most.
+    let mut neighbours: Vec<([(u32, bool); 3], u8)> = vec![Default::default(); mesh.triangles.len()];
+    for (_, u) in uses.groups().filter(|(_, u)| u.len() == 2 && u[0].triangle != u[1].triangle) {
+        let agree = u[0].rising != u[1].rising;
+        for [from, to] in [[u[0], u[1]], [u[1], u[0]]] {
+            let (all, count) = &mut neighbours[from.triangle as usize];
+            all[usize::from(*count)] = (to.triangle, agree);
+            *count += 1;
+        }
     }
     let mut flip: Vec<Option<bool>> = vec![None; mesh.triangles.len()];
     let mut turned = 0;
@@ -245,7 +206,9 @@ fn orient(mesh: &mut TriMesh) -> usize {
         let mut i = 0;
         while i < part.len() {
             let (t, f) = part[i];
-            for &(s, agree) in &neighbours[t] {
+            let (all, count) = &neighbours[t];
+            for &(s, agree) in &all[..usize::from(*count)] {
+                let s = s as usize;
                 if flip[s].is_none() {
                     // A neighbour that agrees needs the same treatment, one that disagrees the other.
                     let g = f == agree;
@@ -272,19 +235,18 @@ fn turn_outward(mesh: &mut TriMesh) -> usize {
         vertices: mesh.vertices.clone(),
         triangles: (0..of.len()).filter(|&t| keep(of[t])).map(|t| mesh.triangles[t]).collect(),
     };
+    let (first, members) = bucketed(count, of.iter().zip(0usize..).map(|(c, t)| (*c as u32, t)));
     let mut turned = 0;
     // Parts that are not cavities first face outward by themselves; a part counts as enclosed by the absolute winding of the others.
     for c in 0..count {
-        let own = part(mesh, &|n| n == c);
+        let own = &members[first[c] as usize..first[c + 1] as usize];
         // About the part's own middle, so that an open part is judged by its bulge and not by its place.
-        let middle = {
-            let (lo, hi) = own.bounds();
-            0.5 * (lo + hi)
-        };
-        let centred = TriMesh { vertices: own.vertices.iter().map(|&p| p - middle).collect(), triangles: own.triangles };
-        let six: f64 = (0..centred.triangles.len())
+        let corners = || own.iter().flat_map(|t| mesh.corners(*t));
+        let (lo, hi) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+        let middle = 0.5 * (lo + hi);
+        let six: f64 = (own.iter())
             .map(|t| {
-                let [a, b, d] = centred.corners(t);
+                let [a, b, d] = mesh.corners(*t).map(|p| p - middle);
                 a.dot(b.cross(d))
             })
             .sum();
@@ -293,12 +255,11 @@ fn turn_outward(mesh: &mut TriMesh) -> usize {
         }
         let enclosed = count > 1 && {
             let others = MeshShape::unsigned(part(mesh, &|n| n != c));
-            let first = of.iter().position(|&n| n == c).map(|t| mesh.corners(t)[0]);
-            first.is_some_and(|p| others.winding_number(p).abs() > 0.5)
+            own.first().map(|t| mesh.corners(*t)[0]).is_some_and(|p| others.winding_number(p).abs() > 0.5)
         };
         if !enclosed {
-            for t in (0..of.len()).filter(|&t| of[t] == c) {
-                mesh.triangles[t].swap(1, 2);
+            for t in own {
+                mesh.triangles[*t].swap(1, 2);
                 turned += 1;
             }
         }
@@ -310,7 +271,7 @@ fn turn_outward(mesh: &mut TriMesh) -> usize {
 fn close_holes(mesh: &mut TriMesh) -> usize {
     let size = mesh.size();
     let mut closed = 0;
-    for rim in rims(mesh, &edge_uses(mesh)) {
+    for rim in rims(mesh, &EdgeUses::of(mesh)) {
         if rim.len() > HOLE_EDGES || rim_length(mesh, &rim) > HOLE_RIM * size {
             continue;
         }

@@ -1,6 +1,5 @@
 //! `palpate batch`: many recordings, one after the other, none of which can stop the rest; on many machines, each of which takes a part.
 
-mod lock;
 mod merge;
 mod scenes;
 mod shard;
@@ -11,11 +10,11 @@ use crate::commands::fit::{Choices, choose, run_in};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{FNV_START, fingerprint, fnv1a};
+use crate::lock::{Held, Lock, PATIENCE, Taken};
 use crate::results;
 use crate::results::batch::{BatchDocument, BatchRow, RowStatus, Shard, ShardSummary};
 use crate::results::fit::{FitDocument, VerdictWord};
 use clap::Args;
-use lock::{Held, Lock, PATIENCE, Taken};
 use palpate_io::output::{make_folder, write_file};
 use shard::Asked;
 use std::collections::BTreeMap;
@@ -124,6 +123,9 @@ fn row_in(folder: &Path, console: &mut Console) -> Option<BatchRow> {
     })
 }
 
+/// What is said when a scene is read while somebody asks to stop.
+const READING: &str = "the scene that was being read is not begun; what is complete stands in the summary";
+
 /// Fits one scene under its lock; whatever goes wrong ends up in the row. Where another process has the lock, that is given back.
 fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Console) -> Result<BatchRow, Held> {
     let clock = Instant::now();
@@ -146,6 +148,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         // Before anything that takes time.
         let mut track = console.progress(0, label);
         track.on(0, "reading");
+        console.interrupt.read(Some(lock.path().into()), READING);
         let experiment = Experiment::open(scene)?;
         let asked = format!("{:?} {:?}", a.choices.lasting(), experiment.scene().fit);
         row.fingerprint =
@@ -158,6 +161,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         let mut nothing = std::io::sink();
         let mut quiet = console.aside(&mut nothing, &mut log);
         quiet.interrupt = lock.guard(&console.interrupt);
+        console.interrupt.serve();
         // The journal of another problem is of no use; it is moved aside with the results.
         let mark = folder.join(MARK);
         note.iter().for_each(|n| quiet.note(n));
@@ -181,6 +185,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
         row.take(result);
         Ok(None)
     }));
+    console.interrupt.serve();
     match done {
         Ok(Ok(None)) => {}
         Ok(Ok(Some((message, result)))) => {
@@ -190,7 +195,7 @@ fn one(a: &Arguments, scene: &Path, name: &str, label: &str, console: &mut Conso
             return Ok(row);
         }
         Ok(Err(e)) => {
-            row.status = if matches!(e, Error::Interrupted) {
+            row.status = if e.is_interrupt() {
                 RowStatus::Interrupted
             } else if e.exit_code() == 2 {
                 RowStatus::BadInput

@@ -58,6 +58,10 @@ pub struct Arguments {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let folder = out_folder(&a.out, &a.scene, "-coarse");
+    crate::folder::check(&folder)?;
+    let mut track = console.progress(0, "coarsening");
+    track.on(0, "reading");
     let fine = Experiment::open_without_recording(&a.scene)?;
     let length = |name: &str, h: f64| match h > 0.0 && h.is_finite() {
         true => Ok(h),
@@ -68,10 +72,10 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         (None, Some(h), _) => Resolution::CellSize(length("cell-size", h)?),
         (None, None, h) => Resolution::Edge(length("edge-length", h.unwrap_or(f64::NAN))?),
     };
-    let mut track = console.progress(0, "coarsening");
     let (backend, note) = a.backend.choose(fine.plan(), 1, &mut track)?;
     track.aside(|| note.iter().for_each(|n| console.note(n)));
-    let folder = out_folder(&a.out, &a.scene, "-coarse");
+    let _lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
     let free = if a.free.is_empty() { usual_numbers(&fine) } else { a.free.clone() };
     let mut hear = |what: &str| track.on(1, what);
     let options = CoarsenOptions {

@@ -1,9 +1,11 @@
 //! `palpate diagnose`: what a model lacks.
 
 use crate::cli::{Console, INTERRUPTED};
+use crate::diagnosing::checkpoint::CHECKPOINTS;
 use crate::diagnosing::{DiagnoseOptions, Diagnosed, demand, diagnose};
 use crate::engine::Backend;
 use crate::error::Error;
+use crate::events::Stage;
 use crate::experiment::Experiment;
 use crate::interrupt::{Clock, Interrupt};
 use crate::options::{BackendName, out_folder};
@@ -16,7 +18,7 @@ use crate::results::diagnosis::DiagnosisDocument;
 use crate::results::report::ReportData;
 use clap::Args;
 use palpate_engine::FailureKind;
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -132,9 +134,12 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     {
         return Err(Error::option("budget", b, "must be > 0 and below 1000000 (minutes)"));
     }
+    let _stage = Stage::begin("diagnose");
     // Opening the scenes counts as well.
     let clock = Clock::start();
     let budget = a.budget.map(|m| Duration::from_secs_f64(60.0 * m));
+    let folder = out_folder(&a.out, &a.scenes[0], "-diagnosis");
+    crate::folder::check(&folder)?;
     let mut track = console.progress(0, "diagnosing");
     track.on(0, "reading");
     let experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
@@ -145,8 +150,9 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         experiments.iter().chain(&held_out).for_each(|e| console.warn(e.warnings()));
         note.iter().for_each(|n| console.note(n));
     });
-    let folder = out_folder(&a.out, &a.scenes[0], "-diagnosis");
-    make_folder(&folder)?;
+    let lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
     track.on(0, "the first evaluations");
     let mut hear = |what: &str| track.at(0, what);
     let done = diagnose(
@@ -161,8 +167,10 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
             checkpoints: Some((folder.clone(), a.resume)),
             on_progress: Some(&mut hear),
         },
-    )?;
+    )
+    .map_err(|e| e.with_kept(&folder.join(CHECKPOINTS)))?;
     track.finish();
+    lock.check()?;
     let limits = budget.map_or_else(|| console.interrupt.clone(), |end| console.interrupt.until(&clock, end));
     let result = write_all(a, &folder, &experiments, &done, backend, &limits)?;
     if console.json() {

@@ -3,11 +3,12 @@
 use crate::cli::{Console, INTERRUPTED};
 use crate::engine::Backend;
 use crate::error::Error;
+use crate::events::Stage;
 use crate::experiment::Experiment;
 use crate::fields;
 use crate::fitting::{FitOptions, Fitted, check, demand, fit, free_parameters, usual};
 use crate::options::{BackendName, count, out_folder};
-use crate::progress::Track;
+use crate::progress::{Convergence, Track, UNITS};
 use crate::report::{FRAMES, summary, write_fit, write_report};
 use crate::results;
 use crate::results::fit::{FitDocument, FitStatus};
@@ -121,6 +122,9 @@ impl From<OptimizerName> for Optimizer {
     }
 }
 
+/// Nodes times steps from which on a fit takes long enough for a word on what it takes.
+const LONG: usize = 200_000;
+
 const JOURNAL: &str = "journal.jsonl";
 
 /// Moves the files of an earlier fit aside; a journal that is to be resumed stays. Returns where they went.
@@ -198,16 +202,23 @@ fn tracked(folders: &[PathBuf], scenes: usize) -> Result<Vec<Recording>, Error> 
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    let folder = out_folder(&a.out, &a.scenes[0], "-fit");
     // Before anything that takes time.
+    crate::folder::check(&folder)?;
     let mut track = console.progress(0, "fitting");
     track.on(0, "reading");
     let mut experiments = a.scenes.iter().map(Experiment::open).collect::<Result<Vec<_>, _>>()?;
     warn_of_twins(&a.scenes, &mut experiments);
     let from = tracked(&a.from, a.scenes.len())?;
     let (backend, note) = choose(&a.choices, &experiments, &mut track)?;
-    track.aside(|| note.iter().for_each(|n| console.note(n)));
-    let folder = out_folder(&a.out, &a.scenes[0], "-fit");
-    let may_write = || Ok(());
+    track.aside(|| {
+        note.iter().for_each(|n| console.note(n));
+        expected(&a.choices, &experiments, backend).iter().for_each(|n| console.note(n));
+    });
+    let lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
+    let may_write = || lock.check();
     let (fitted, result) =
         run_in(&a.scenes, &from, &a.choices, backend, &experiments, &folder, a.resume, &may_write, &mut track, console)?;
     track.finish();
@@ -233,18 +244,26 @@ pub fn choose(a: &Choices, experiments: &[Experiment], track: &mut Track) -> Res
     a.backend.choose_for(first.plan(), &demand(&free, 0, optimizer, starts), track)
 }
 
+/// What a fit on the CPU will take, where that is much.
+fn expected(a: &Choices, experiments: &[Experiment], backend: Backend) -> Option<String> {
+    let (first, spec) = (&experiments[0], experiments[0].scene().fit.as_ref()?);
+    if backend == Backend::Gpu || first.plan().body.nodes.len() * first.plan().clock.steps.max(1) < LONG {
+        return None;
+    }
+    let starts = a.starts.map_or(spec.starts, |n| n as usize);
+    let (_, free, _) = free_parameters(experiments).ok()?;
+    let optimizer = a.optimizer.map(Optimizer::from).or(spec.optimizer).unwrap_or_else(|| usual(&free));
+    let (members, memory) = demand(&free, 0, optimizer, starts).on_cpu(first.plan(), a.threads.unwrap_or(0) as usize);
+    let left = palpate_io::available().map_or(String::new(), |room| format!("; {room}"));
+    let size = palpate_io::gigabytes(memory.total());
+    Some(format!("memory: about {size} for {members} of {starts} starts at once{left}"))
+}
+
 impl Choices {
     /// What decides the result: a scene may be gone on with in smaller batches, and by fewer threads.
     pub fn lasting(&self) -> Choices {
         Choices { batch: None, threads: None, ..self.clone() }
     }
-}
-
-/// Iterations that a fit may take in all.
-fn rounds(a: &Choices, experiment: &Experiment) -> u64 {
-    let spec = experiment.scene().fit.as_ref();
-    let iterations = a.iterations.unwrap_or(spec.map_or(0, |f| f.iterations as u64));
-    iterations * a.starts.unwrap_or(spec.map_or(1, |f| f.starts as u64))
 }
 
 /// Fits, beginning with what was tracked where anything was, and writes everything into a folder, unless `may_write` then says that it is
@@ -263,7 +282,7 @@ pub fn run_in(
 ) -> Result<(Fitted, FitDocument), Error> {
     check(experiments)?;
     make_folder(folder)?;
-    track.measure(rounds(a, &experiments[0]));
+    track.measure(UNITS);
     track.on(0, "the first evaluations");
     let journal = folder.join(JOURNAL);
     if resume && !journal.exists() {
@@ -289,11 +308,12 @@ pub fn run_in(
             track.on(0, text);
         }
     };
-    let mut best = f64::INFINITY;
+    let spec = experiments[0].scene().fit.as_ref();
+    let mut come = Convergence::new(a.starts.map_or(spec.map_or(1, |f| f.starts), |n| n as usize));
     let mut hear = |p: &Progress| {
-        best = best.min(p.cost);
+        come.hear(p);
         if let Ok(mut track) = shared.lock() {
-            track.on(u64::from(p.iteration > 0), &format!("best cost {best:.4}"));
+            track.at(come.units(), &come.text());
         }
     };
     let mut fitted = fit(
@@ -314,17 +334,20 @@ pub fn run_in(
             on_stage: Some(&mut say),
             on_iteration: Some(&mut hear),
         },
-    )?;
+    )
+    .map_err(|e| e.with_kept(&folder.join(JOURNAL)))?;
     let track = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     may_write()?;
     if resume {
         make_room(track, console)?;
     }
     if !a.no_grid_check {
-        track.on(0, "looking at cells and step half as large");
+        track.at(UNITS, "looking at cells and step half as large");
+        let _stage = Stage::begin("cells and step half as large");
         fitted.check_grid(experiments, backend, &console.interrupt);
     }
     may_write()?;
+    let _stage = Stage::begin("results and report");
     let result = write_fit(folder, experiments, &fitted, backend)?;
     // Whoever interrupts does not want to wait for pictures, and a device that failed would make none.
     let pictures = if fitted.status() == FitStatus::Complete { a.pictures } else { 0 };

@@ -7,7 +7,7 @@ use crate::results;
 use crate::results::import::{GuessDocument, ImportDocument};
 use clap::Args;
 use glam::{DAffine3, DVec3};
-use palpate_import::{Background, Floor, Imported, Options, Unit, Watch, corners, direction, import, rigid};
+use palpate_import::{Background, Floor, Imported, Options, Unit, Watch, corners, direction, import, rigid, WRITING};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -165,13 +165,25 @@ impl Arguments {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
+    crate::folder::check(&a.out)?;
     let mut track = console.progress(1000, "importing");
     let interrupt = console.interrupt.clone();
+    // Its folder is taken once there is something to write.
+    let mut lock = None;
     let mut look = |share: f64, what: &str| {
+        if what == WRITING && lock.is_none() {
+            lock = Some(crate::folder::take(&a.out, console));
+            interrupt.serve();
+            if lock.as_ref().is_some_and(Result::is_err) {
+                return ControlFlow::Break(());
+            }
+        }
         track.at((share * 1000.0) as u64, what);
         if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let imported = import(&a.source, &a.out, &a.options(), &mut Watch::new(&mut look))?;
+    let imported = import(&a.source, &a.out, &a.options(), &mut Watch::new(&mut look));
+    let _lock = lock.transpose()?;
+    let imported = imported?;
     track.finish();
     console.warn(&imported.warnings);
     console.warn(&imported.losses);

@@ -18,6 +18,7 @@ use crate::results::{self, inspection};
 use crate::suited::{Suited, suited};
 use clap::Args;
 use palpate_gpu::AdapterReport;
+use palpate_io::read_text;
 use palpate_io::recording::read_recording;
 use palpate_model::observation::{Channel, ReadingKind};
 use palpate_model::plan::Physics;
@@ -62,17 +63,19 @@ type Lines = Vec<(&'static str, String)>;
 
 fn is_recording(path: &Path) -> bool {
     let format = |text: String| text.lines().any(|l| l.trim_start().starts_with("format") && l.contains("recording/"));
-    path.is_dir() || std::fs::read_to_string(path).is_ok_and(format)
+    path.is_dir() || read_text(path).is_ok_and(format)
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if a.devices {
         return Ok(devices::run(console));
     }
+    let mut reading = Some(console.progress(0, "inspecting"));
     let Some(path) = &a.path else {
         console.print(&if console.json() { results::line(&catalogue::document()) } else { catalogue::markdown() });
         return Ok(0);
     };
+    reading.iter_mut().for_each(|t| t.on(0, "reading"));
     let (kind, content, lines, warnings) = if is_recording(path) {
         let r = read_recording(path)?;
         let (content, lines) = recorded::recording(&r);
@@ -81,6 +84,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         let e = Experiment::open(path)?;
         let (mut content, mut lines) = scene(&e);
         if a.identify {
+            reading.take().into_iter().for_each(Track::finish);
             let mut first = console.progress(0, "identifying");
             let (backend, _) = a.backend.choose(e.plan(), 1, &mut first)?;
             let mut track = Some(first);
@@ -96,6 +100,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         }
         ("scene", Inspected::Scene(Box::new(content)), lines, e.warnings().to_vec())
     };
+    reading.into_iter().for_each(Track::finish);
     if console.json() {
         console.print(&results::line(&InspectionDocument { path: path.display().to_string(), warnings, content }));
         return Ok(0);

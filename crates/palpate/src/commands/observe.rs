@@ -10,9 +10,9 @@ use crate::results::observation::ObservationDocument;
 use crate::synthetic::{Observers, observe};
 use clap::Args;
 use glam::DVec3;
-use palpate_io::InputError;
+use palpate_io::{InputError, read_bytes};
 use palpate_io::npy::read_array;
-use palpate_io::output::make_folder;
+use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -144,7 +144,7 @@ fn times(a: &Arguments, experiment: &Experiment) -> Result<Vec<f64>, Error> {
 /// Tracked points of a CSV file, each checked to lie on the surface.
 fn markers(path: &Path, experiment: &Experiment) -> Result<Vec<(String, DVec3)>, Error> {
     let open = |e: csv::Error| InputError::file(path, format!("cannot be read: {e}"));
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(open)?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(Cursor::new(read_bytes(path)?));
     if reader.headers().map_err(open)? != vec!["name", "x", "y", "z"] {
         return Err(InputError::line(path, 1, "the header must be name,x,y,z").into());
     }
@@ -202,8 +202,10 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     if a.out.join("recording.toml").exists() && !a.force {
         return Err(Error::option("out", a.out.display(), "a recording is already there; add --force to replace it"));
     }
-    let coarse = Experiment::open_without_recording(&a.scene)?;
+    crate::folder::check(&a.out)?;
     let mut track = console.progress(0, "observing");
+    track.on(0, "reading");
+    let coarse = Experiment::open_without_recording(&a.scene)?;
     let (backend, note) = a.backend.choose(coarse.plan(), 1, &mut track)?;
     track.aside(|| {
         console.warn(coarse.warnings());
@@ -220,7 +222,8 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     };
     let experiment = if a.refine == 1.0 { coarse } else { coarse.refined(a.refine)? };
     // Whether the folder can be made is known before the simulation, not after it.
-    make_folder(&a.out)?;
+    let _lock = crate::folder::take(&a.out, console)?;
+    console.interrupt.serve();
     track.measure(1000);
     let interrupt = console.interrupt.clone();
     let recording = observe(&experiment, backend, &observers, |share| {

@@ -37,14 +37,18 @@ pub struct Arguments {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let experiment = Experiment::open_without_recording(&a.scene)?;
+    let folder = out_folder(&a.out, &a.scene, "");
+    crate::folder::check(&folder)?;
     let mut track = console.progress(0, "simulating");
+    track.on(0, "reading");
+    let experiment = Experiment::open_without_recording(&a.scene)?;
     let (backend, note) = a.backend.choose(experiment.plan(), 1, &mut track)?;
     track.aside(|| {
         console.warn(experiment.warnings());
         note.iter().for_each(|n| console.note(n));
     });
-    let folder = out_folder(&a.out, &a.scene, "");
+    let _lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
     let written = write_motion(&experiment, backend, &folder, &a.output, track, console)?;
     let document = document(&experiment, &folder, backend.name(), &written);
     console.print(&if console.json() { results::line(&document) } else { sentence(&document) });

@@ -12,7 +12,7 @@ use crate::results::synthesis::{KeyframeDocument, LoopDocument, SearchDocument, 
 use crate::results::{self, finite};
 use crate::synthesis::{Led, Search};
 use clap::Args;
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use palpate_io::{InputError, append_effects, edit_scene, parse_scene, read_text, without_wishes, write_scene};
 use palpate_model::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -137,11 +137,16 @@ fn lines(d: &SearchDocument) -> Vec<String> {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let base = open(a)?;
-    console.warn(base.warnings());
     let folder = out_folder(&a.out, &a.scene, "-motion");
+    crate::folder::check(&folder)?;
+    let mut track = console.progress(0, "reading");
+    track.on(0, "the scene");
+    let base = open(a)?;
+    track.finish();
+    console.warn(base.warnings());
+    let _lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
     let found = lead(a, &base, console)?;
-    make_folder(&folder)?;
     let model = folder.join("scene.toml");
     let text = settled(&base, found.as_ref(), &folder)?;
     write_file(&model, |w| w.write_all(text.as_bytes()))?;

@@ -14,7 +14,7 @@ use glam::DVec3;
 use palpate_diagnose::stated;
 use palpate_engine::number;
 use palpate_io::npy::{Array, write_npz};
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::shape::TriMesh;
 use std::ops::ControlFlow;
@@ -121,12 +121,17 @@ fn write_frames(folder: &Path, experiment: &Experiment, t: &TrackedBody, formats
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let experiment = Experiment::open(&a.scene)?;
-    console.warn(experiment.warnings());
     let folder = out_folder(&a.out, &a.scene, "-tracked");
-    make_folder(&folder)?;
+    crate::folder::check(&folder)?;
+    let mut progress = console.progress(0, "tracking");
+    progress.on(0, "reading");
+    let experiment = Experiment::open(&a.scene)?;
+    progress.aside(|| console.warn(experiment.warnings()));
+    let lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
     let clock = Instant::now();
-    let mut progress = console.progress(experiment.plan().observation.frames.len() as u64, "tracking");
+    progress.measure(experiment.plan().observation.frames.len() as u64);
     let interrupt = console.interrupt.clone();
     let refined = match a.refine {
         Some(most) => refine(&experiment, most as usize, Backend::Cpu, &interrupt, &folder, |text| progress.on(0, text))?,
@@ -141,6 +146,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let Refined { tracked, experiment, text, .. } = &refined;
     progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
+    lock.check()?;
     write_arrays(&folder, experiment, tracked)?;
     write_frames(&folder, experiment, tracked, &a.format)?;
     let document = tracking_document(&refined, seconds);

@@ -10,6 +10,9 @@ use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+/// Its file in the output folder.
+pub(crate) const CHECKPOINTS: &str = "checkpoint.jsonl";
+
 /// Fits by what was fitted.
 #[derive(Debug, Default)]
 pub(super) struct Checkpoint {
@@ -21,7 +24,7 @@ impl Checkpoint {
     /// A file in a folder; without `resume` what it holds is dropped. A last line that was cut off by a crash is skipped.
     pub fn open(place: Option<(&Path, bool)>) -> Result<Checkpoint, Error> {
         let Some((folder, resume)) = place else { return Ok(Checkpoint::default()) };
-        let path = folder.join("checkpoint.jsonl");
+        let path = folder.join(CHECKPOINTS);
         let mut done = HashMap::new();
         let text = if resume { std::fs::read_to_string(&path).unwrap_or_default() } else { String::new() };
         let whole = text.rfind('\n').map_or("", |end| &text[..=end]);

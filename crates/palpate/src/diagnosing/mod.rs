@@ -1,6 +1,6 @@
 //! From experiments to a diagnosis: the baseline fit, and a laboratory that simulates and fits hypotheses for `palpate_diagnose`.
 
-mod checkpoint;
+pub(crate) mod checkpoint;
 mod crowd;
 mod hypothesis;
 mod lab;

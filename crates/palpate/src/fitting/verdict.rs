@@ -124,7 +124,7 @@ fn at_bounds(fitted: &Fitted) -> Vec<String> {
 }
 
 /// True where clamps hold all of a body's surface, up to a thousandth.
-fn held_whole(e: &Experiment) -> bool {
+pub fn held_whole(e: &Experiment) -> bool {
     let (clamps, to_object) = (&e.scene().clamps, e.scene().object.pose.inverse());
     if clamps.is_empty() {
         return false;

@@ -1,9 +1,9 @@
-//! `fit.lock` in the folder of a scene that a batch fits.
+//! `palpate.lock` in a folder that a command writes into.
 
 use super::Document;
 use serde::{Deserialize, Serialize};
 
-/// Who fits a scene (`lock/1`); the file is there as long as it does.
+/// Who writes into a folder (`lock/1`); the file is there as long as it does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LockDocument {
     /// How often it has shown that it lives, in ten digits: a sixth of `patience` goes by from one to the next.

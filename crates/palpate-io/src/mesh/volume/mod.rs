@@ -17,6 +17,7 @@ mod vtu_data;
 use self::bytes::Fault;
 use self::kinds::Kind;
 use crate::error::{InputError, Loaded};
+use crate::input::read_bytes;
 use crate::mesh::{LARGEST_SIDE, SMALLEST_SIDE, bounds};
 use glam::DVec3;
 use palpate_model::shape::unit_hint;
@@ -125,7 +126,7 @@ pub fn read_tets(path: impl AsRef<Path>) -> Result<Loaded<TetMesh>, InputError> 
     };
     let raw = match extension.as_str() {
         "msh" | "vtu" | "vtk" => {
-            let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
+            let bytes = read_bytes(path)?;
             match extension.as_str() {
                 "msh" => msh::read(&bytes).map_err(wrong)?,
                 "vtu" => vtu::read(&bytes).map_err(wrong)?,

@@ -4,6 +4,7 @@ use super::Raw;
 use super::bytes::Fault;
 use super::kinds::Kind;
 use crate::error::InputError;
+use crate::input::read_bytes;
 use std::path::Path;
 
 /// Reads both files of a mesh, whichever is named.
@@ -11,13 +12,12 @@ pub(super) fn read(path: &Path) -> Result<Raw, InputError> {
     let mut texts = Vec::new();
     for extension in ["node", "ele"] {
         let file = path.with_extension(extension);
-        let bytes = std::fs::read(&file).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound if file != path => {
-                let name = file.file_name().unwrap_or_default().to_string_lossy();
-                InputError::file(path, format!("{name} is missing beside it; TetGen writes .node and .ele, and both are needed"))
-            }
-            _ => InputError::io(&file, &e),
-        })?;
+        if file != path && !file.exists() {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let text = format!("{name} is missing beside it; TetGen writes .node and .ele, and both are needed");
+            return Err(InputError::file(path, text));
+        }
+        let bytes = read_bytes(&file)?;
         let text = String::from_utf8(bytes).map_err(|_| InputError::file(&file, "is not UTF-8 text"))?;
         texts.push((file, text));
     }

@@ -1,6 +1,6 @@
 //! `palpate batch --merge`: one summary out of what the shards left, and the names of what is missing.
 
-use super::lock::{Held, NAME};
+use crate::lock::{Held, NAME};
 use super::summary;
 use crate::cli::Console;
 use crate::error::Error;

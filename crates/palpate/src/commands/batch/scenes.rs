@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::options::stem;
-use palpate_io::InputError;
+use palpate_io::{InputError, read_text};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
             let toml = files.into_iter().filter(|f| f.extension().is_some_and(|e| e == "toml"));
             // Other TOML files (recordings, settings) may lie beside the scenes; one that cannot be read is reported later.
             let before = out.len();
-            out.extend(toml.filter(|f| std::fs::read_to_string(f).map_or(true, |t| t.contains("\"scene/1\""))));
+            out.extend(toml.filter(|f| read_text(f).map_or(true, |t| t.contains("\"scene/1\""))));
             if out.len() == before {
                 return Err(InputError::file(path, "holds no scene (*.toml with format = \"scene/1\")").into());
             }
@@ -28,7 +28,7 @@ pub fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
             out.push(path.clone());
         } else {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let lines = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
+            let lines = read_text(path)?;
             let named = lines.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#'));
             let before = out.len();
             out.extend(named.map(|l| folder.join(l)));

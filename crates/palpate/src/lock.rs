@@ -1,4 +1,4 @@
-//! One process a scene: a file in the scene's folder that says who fits it, and in which a heart beats.
+//! One process a folder: a file in it that says who writes there, and in which a heart beats.
 //!
 //! A lock is dead once nothing in it has changed for the time T that it states, by the clock of whoever watches it: clocks of two hosts are never
 //! compared. Its holder beats every T/6, and gives up by itself where it could not for T. A watcher on the same host need not wait: it asks
@@ -17,8 +17,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
-/// The file in a scene's folder.
-pub const NAME: &str = "fit.lock";
+/// The file in a folder that is written into.
+pub const NAME: &str = "palpate.lock";
 /// T: how long the heart of a living process may be still. A look opens the file, at which NFS asks its server, so that caches of attributes,
 /// which may be a minute old, do not hide a beat.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -154,6 +154,11 @@ impl Lock {
         Ok(Lock { path: path.into(), token: document.token, lost, heart: Some((end, heart)) })
     }
 
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// An interrupt that is raised as well when the lock is lost.
     pub fn guard(&self, interrupt: &Interrupt) -> Interrupt {
         let lost = self.lost.clone();
@@ -253,12 +258,22 @@ impl Held {
         self.holder.as_ref().and_then(|h| Duration::try_from_secs_f64(h.patience).ok()).unwrap_or(PATIENCE)
     }
 
-    /// True where this machine knows that its process is no more.
-    pub fn has_ended(&self) -> bool {
-        let Some(h) = &self.holder else { return false };
+    /// Whether its process is there, where this machine can know.
+    fn living(&self) -> Option<bool> {
+        let h = self.holder.as_ref()?;
         let here = !h.namespace.is_empty() && h.namespace == namespace() && h.host == host();
         let other = || h.beginning.is_some_and(|then| beginning(h.process).is_some_and(|now| now != then));
-        here && (!exists(h.process) || other())
+        here.then(|| exists(h.process) && !other())
+    }
+
+    /// True where this machine knows that its process is no more.
+    pub fn has_ended(&self) -> bool {
+        self.living() == Some(false)
+    }
+
+    /// True where this machine knows that its process is there.
+    pub fn is_alive(&self) -> bool {
+        self.living() == Some(true)
     }
 
     /// Waits for a sign of life, at most for the time that it states. True where it is worth trying again: it was released, or it is dead and

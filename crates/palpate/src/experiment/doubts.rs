@@ -1,0 +1,84 @@
+//! Numbers that no body, camera or scene has: each is named in a warning, before it becomes an error about something else.
+
+use super::Experiment;
+use crate::fitting::held_whole;
+use palpate_engine::number;
+use palpate_io::recording::Recording;
+use palpate_io::scene::states;
+use palpate_model::scene::ObservationSpec;
+use std::path::Path;
+
+/// Depth readings up to which all are used: a hundred million bytes of points, and a cost of about a second a time step.
+const MOST_READINGS: usize = 3_000_000;
+/// Speeds beyond this [m/s] are faster than anything that depth cameras see.
+const FAST: f64 = 300.0;
+/// Steps beyond this take hours.
+const MANY_STEPS: usize = 1_000_000;
+/// Views narrower or wider than this [°] are of no depth camera.
+const VIEW: [f64; 2] = [0.05, 179.0];
+
+/// Takes every n-th pixel of depth images that hold more readings than are of use, unless the scene says which; returns a warning then.
+pub(super) fn thin(read: &Recording, spec: &mut ObservationSpec, path: &Path, text: &str) -> Option<String> {
+    if spec.pixel_stride > 1 || read.frames.is_empty() {
+        return None;
+    }
+    let used = read.frames.iter().filter(|f| (spec.from..=spec.to).contains(&f.time));
+    let readings = used.map(|f| f.readings().count()).sum::<usize>() / spec.every.max(1);
+    if readings <= MOST_READINGS || states(text, "observation.pixel_stride") {
+        return None;
+    }
+    spec.pixel_stride = (readings as f64 / MOST_READINGS as f64).sqrt().ceil() as usize;
+    let (n, stride) = (number(readings as f64), spec.pixel_stride);
+    Some(format!(
+        "{}: observation.pixel_stride = {stride} is taken, since the images hold {n} readings; state it to take another, or 1 for all",
+        path.display()
+    ))
+}
+
+/// What deserves a word about the numbers of a scene and its recording.
+pub(super) fn doubts(e: &Experiment) -> Vec<String> {
+    let name = e.scene().path.display();
+    let mut out = Vec::new();
+    let speed = e.scene().initial.velocity.length();
+    if speed > FAST {
+        out.push(format!("{name}: initial.velocity: {} m/s is unusual; is it in m/s?", number(speed)));
+    }
+    let steps = e.plan().clock.steps;
+    if steps > MANY_STEPS {
+        out.push(format!("{name}: time: {steps} steps of {} s take long; is the step in seconds?", number(e.scene().time.step)));
+    }
+    if held_whole(e) {
+        out.push(format!("{name}: clamp: clamps hold the whole surface; nothing of the body can move by itself"));
+    }
+    if let Some(r) = e.recording() {
+        out.extend(cameras(e, r));
+    }
+    out
+}
+
+fn cameras(e: &Experiment, r: &Recording) -> Vec<String> {
+    let path = r.path.display();
+    let mut out = Vec::new();
+    for (i, c) in r.cameras.iter().enumerate() {
+        for (key, size, focal) in [("fx", c.width, c.focal[0]), ("fy", c.height, c.focal[1])] {
+            let view = 2.0 * (0.5 * size as f64 / focal).atan().to_degrees();
+            if !(VIEW[0]..=VIEW[1]).contains(&view) {
+                out.push(format!(
+                    "{path}: camera.{i}.{key}: {} pixels give camera \"{}\" a view of {} degrees",
+                    number(focal),
+                    c.name,
+                    number(view)
+                ));
+            }
+        }
+        let depth = -e.shape().signed_distance(c.position());
+        if depth > 0.0 {
+            out.push(format!(
+                "{path}: camera.{i}.world_from_camera: camera \"{}\" stands {} m inside the body at rest",
+                c.name,
+                number(depth)
+            ));
+        }
+    }
+    out
+}
