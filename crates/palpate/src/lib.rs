@@ -73,7 +73,7 @@ pub use embed::Embedding;
 pub use engine::Backend;
 pub use error::Error;
 pub use experiment::{Experiment, Simulation};
-pub use fitting::{FitOptions, Fitted, FreeNumber, FromTracks, Headline, Parts, fit};
+pub use fitting::{Distances, FitOptions, Fitted, FreeNumber, FromTracks, Headline, HeldOut, Parts, fit};
 pub use grid::{GridCheck, GridEffect, grid_check};
 pub use host::host;
 pub use interrupt::{Clock, Interrupt};
