@@ -254,3 +254,17 @@ fn a_state_that_would_not_stay_fails_by_its_number() {
     assert_eq!(failure.kind, FailureKind::Unstable, "{failure}");
     assert!(failure.to_string().contains("state 2 of the sequence") && (failure.time - 2.0).abs() < 1e-12, "{failure}");
 }
+
+#[test]
+fn points_that_the_body_does_not_have_are_refused() {
+    let mut s = beam();
+    let far = places(&[TIP[0], DVec3::new(0.1, 0.0, 0.2)]);
+    for (points, said) in [
+        (far, "load.0.places: 1 of 2 points lie more than"),
+        (Points::Nodes(vec![3, 1_000_000]), "load.0.index: 1000000 (number 1) is no node"),
+    ] {
+        s.effects = vec![driven("file-load", &[1.0], points, &[0.0], vec![DVec3::X; 2])];
+        let refused = build_plan(&s, Observation::default(), &[]).unwrap_err().to_string();
+        assert!(refused.starts_with(said), "{refused}");
+    }
+}

@@ -6,6 +6,8 @@ mod edit;
 mod effects;
 mod fields;
 mod fit;
+#[cfg(test)]
+mod load_tests;
 mod loads;
 mod material;
 mod motion;
