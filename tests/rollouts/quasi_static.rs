@@ -152,15 +152,15 @@ fn a_state_is_where_a_damped_motion_comes_to_rest() {
 }
 
 /// Forces on all nodes that are those of the effect "uniform-force".
-fn uniform(body: &palpate_model::space::body::Body, force: DVec3) -> Effect {
+fn uniform(body: &palpate_model::space::body::Body, per_volume: DVec3) -> Effect {
     let nodes = (0..body.nodes.len() as u32).collect();
-    let vectors = body.node_volume.iter().map(|v| force * *v / body.volume).collect();
+    let vectors = body.node_volume.iter().map(|v| *v * per_volume).collect();
     driven("file-load", &[1.0], Points::Nodes(nodes), &[0.0], vectors)
 }
 
 #[test]
 fn a_load_in_a_file_is_the_same_load_as_an_effect() {
-    let force = DVec3::new(0.05, 0.1, -0.2);
+    let force = DVec3::new(500.0, 1000.0, -2000.0);
     let mut s = beam();
     let body = planned(&s, Observation::default()).body;
     let mut effect = Effect::absent(find("uniform-force").unwrap());
@@ -186,7 +186,7 @@ fn forces_between_rows_are_linear_in_time() {
     s.gravity = DVec3::ZERO;
     let free = planned(&Scene { time: Time::weighted(0.5), ..s.clone() }, Observation::default());
     let [a, b] = [DVec3::new(0.0, 0.0, 0.02), DVec3::new(0.03, 0.0, -0.01)];
-    let of = |f: DVec3| uniform(&free.body, f).drive.unwrap().series.vectors.clone();
+    let of = |f: DVec3| uniform(&free.body, f / free.body.volume).drive.unwrap().series.vectors.clone();
     let nodes = Points::Nodes((0..free.body.nodes.len() as u32).collect());
     // Held before the first row, then linear, then held again: 0.02 s, 0.06 s and 0.02 s in whole steps.
     s.effects = vec![driven("file-load", &[1.0], nodes, &[0.02, 0.08], [of(a), of(b)].concat())];
@@ -249,7 +249,7 @@ fn a_state_that_would_not_stay_fails_by_its_number() {
     // Along the axis of symmetry: π² E I/(4 L²) = 4.2 N buckle it, and it stays straight for want of a reason to go either way.
     let ends: Vec<DVec3> = [[0.0, 0.0], [0.03, 0.0], [0.0, 0.03], [0.03, 0.03]].map(|[y, z]| DVec3::new(0.1, y, z)).to_vec();
     let force = |f: f64| vec![DVec3::new(-0.25 * f, 0.0, 0.0); 4];
-    s.effects = vec![driven("file-load", &[1.0], places(&ends), &[0.0, 1.0, 2.0], [force(1.0), force(2.0), force(9.0)].concat())];
+    s.effects = vec![driven("file-load", &[1.0], places(&ends), &[0.0, 1.0, 2.0], [force(1.0), force(3.0), force(5.0)].concat())];
     let failure = states(&planned(&s, Observation::default())).unwrap_err();
     assert_eq!(failure.kind, FailureKind::Unstable, "{failure}");
     assert!(failure.to_string().contains("state 2 of the sequence") && (failure.time - 2.0).abs() < 1e-12, "{failure}");

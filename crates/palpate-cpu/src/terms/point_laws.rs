@@ -181,7 +181,11 @@ impl<'a> PointLaws<'a> {
             Site::Driven(point) => {
                 let Some((effect, sites)) = &acting.driven else { return };
                 for (number, (stencil, rest)) in sites.stencils.iter().zip(&sites.rest).enumerate() {
-                    let followed = Followed::of_series(&sites.series, number, self.c.time, rate);
+                    let mut followed = Followed::of_series(&sites.series, number, self.c.time, rate);
+                    if place.theta() == 1.0 {
+                        // The old state's force has no weight, and need not be known.
+                        followed.old = followed.new;
+                    }
                     // A point that is not seen at one of these times is left alone.
                     if followed.new[0].is_nan() || followed.old[0].is_nan() {
                         continue;
