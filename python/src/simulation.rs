@@ -21,7 +21,7 @@ impl Simulation {
     /// Times of the states on the recording's clock [s] `[F]`.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let start = self.experiment.scene().time.start;
+        let start = self.experiment.start_time();
         PyArray1::from_vec(py, self.motion.snapshots.iter().map(|s| start + s.time).collect())
     }
 

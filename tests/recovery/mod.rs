@@ -2,6 +2,7 @@
 
 mod graphics;
 mod measurement;
+mod sequences;
 
 use glam::DVec3;
 use palpate_model::params::ParamKey;

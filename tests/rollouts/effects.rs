@@ -5,9 +5,11 @@ use super::gradients::{ball, observed};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::effects::driven::{Drive, Points};
 use palpate_model::effects::law::Asks;
 use palpate_model::effects::{self, ALL, Family};
 use palpate_model::mechanics::path::Path;
+use palpate_model::mechanics::series::Series;
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::plan::Plan;
 use palpate_model::scene::{Clamp, InitialShape};
@@ -27,6 +29,15 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         let at = |t: f64| DVec3::new(0.072 - 0.1 * t, 0.004 * (30.0 * t).sin(), 0.055);
         let times = vec![0.0, 0.03, 0.07];
         effect.path = Some(Arc::new(Path { points: times.iter().map(|t| at(*t)).collect(), times }));
+    }
+    if ALL[law].asks() == Asks::Series {
+        // Places that two points are drawn to, or forces of as many newtons; no state is at one of these times, where the rate jumps.
+        let points = vec![DVec3::new(0.04, 0.0, 0.06), DVec3::new(0.0, 0.03, 0.08)];
+        let at = |t: f64, p: &DVec3| *p + DVec3::new(0.3 * t, -0.2 * t, 2.0 * t * t);
+        let times = vec![0.0, 0.0301, 0.0703];
+        let vectors = times.iter().flat_map(|t| points.iter().map(|p| at(*t, p)).collect::<Vec<_>>()).collect();
+        let series = Arc::new(Series { count: 2, times, vectors });
+        effect.drive = Some(Arc::new(Drive { points: Points::Places(points, None), series, tracked: Vec::new() }));
     }
     scene.effects = vec![effect];
     if ALL[law].family == Family::Contact {

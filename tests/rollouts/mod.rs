@@ -7,5 +7,6 @@ mod effects;
 mod fields;
 mod gradients;
 mod measurement;
+mod quasi_static;
 mod rows;
 mod visibility;

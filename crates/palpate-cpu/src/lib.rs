@@ -16,6 +16,7 @@ pub mod modes;
 mod newton;
 #[cfg(test)]
 mod product_tests;
+mod quasi_static;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;

@@ -67,8 +67,16 @@ fn matrices(shared: &Shared, member: &Member, u: &[DVec3]) -> (Matrix, Matrix) {
     let mut e = equation(shared, member, None, &still);
     e.residual(u);
     e.tangent(u, Curvature::Exact, &mut stiffness);
-    let stage =
-        Stage { number: 0, step: 0, from: vec![(0, 1.0)], length: INSTANT, theta: 1.0, time: INSTANT, completes: Some(0) };
+    let stage = Stage {
+        number: 0,
+        step: 0,
+        from: vec![(0, 1.0)],
+        length: INSTANT,
+        theta: 1.0,
+        time: INSTANT,
+        completes: Some(0),
+        still: false,
+    };
     let at = MemberState { u: u.to_vec(), v: zeros(n) };
     let start = Start::new(&stage, &[&at]);
     let mut e = equation(shared, member, Some(&stage), &start);

@@ -4,14 +4,15 @@ use crate::linear::Purpose;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, Effort, Reason};
+use crate::quasi_static;
 use crate::stress_free;
 use crate::terms::{Context, Curvature, Equation, Past, PastChange, Rates, Weights, zeros};
 use crate::world::{Gradient, Member, MemberState, MemberTangent, Rated, Shared};
 use glam::DVec3;
 use palpate_engine::{Direction, FailureKind, number};
 use palpate_model::params::coefficients::Coefficients;
+use palpate_model::plan::WORLD_SIZE;
 use palpate_model::plan::scheme::Stage;
-use palpate_model::plan::{STATIC_ITERATIONS, WORLD_SIZE};
 use palpate_model::scene::InitialShape;
 use std::sync::Arc;
 
@@ -60,7 +61,7 @@ fn combined<'v>(stage: &Stage, vectors: impl Iterator<Item = &'v Nodes>) -> Node
     sum.unwrap_or_default()
 }
 
-/// The equation of a stage, or of the static problem (`None`).
+/// The equation of a stage, or of the static problem at the start (`None`).
 pub(crate) fn equation<'a>(shared: &'a Shared, member: &'a Member, stage: Option<&Stage>, start: &'a Start<'a>) -> Equation<'a> {
     Equation::new(context(shared, member, stage, start))
 }
@@ -70,6 +71,7 @@ pub(crate) fn context<'a>(shared: &'a Shared, member: &'a Member, stage: Option<
     let p = &member.coefficients.physics;
     let (inertia, weights, time) = match stage {
         None => (None, Weights::STATIC, p.start),
+        Some(&Stage { still: true, time, .. }) => (None, Weights::STATIC, p.start + time),
         Some(&Stage { length, theta, time, .. }) => (
             Some(Rates { displacement: 1.0 / (theta * length * length), velocity: 1.0 / (theta * length), rate: 1.0 / length }),
             Weights { new: theta, old: 1.0 - theta, rate: p.stiffness_damping / length },
@@ -104,14 +106,14 @@ pub fn statics(shared: &Shared, member: &mut Member, u: &[DVec3]) -> (Nodes, Mat
 }
 
 /// Takes the scratch matrix out of a member, so that an equation can borrow the rest.
-fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut Matrix) -> T) -> T {
+pub(crate) fn with_matrix<T>(member: &mut Member, f: impl FnOnce(&Member, &mut Matrix) -> T) -> T {
     let mut matrix = std::mem::take(&mut member.matrix);
     let result = f(member, &mut matrix);
     member.matrix = matrix;
     result
 }
 
-fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
+pub(crate) fn check(shared: &Shared, s: &MemberState) -> Result<(), Reason> {
     let far = s.u.iter().map(|u| u.length()).fold(0.0, f64::max);
     if !far.is_finite() || !is_finite(&s.u) || !is_finite(&s.v) {
         return Err((FailureKind::NotFinite, "displacement or velocity of a node".into()));
@@ -166,19 +168,15 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
         *v = p.velocity + p.angular_velocity.cross(*x + *u - plan.pivot);
     }
     if plan.initial == InitialShape::StaticEquilibrium || member.balanced.is_some() {
-        if plan.clamps.is_empty() {
+        // What holds the body of a sequence was looked at when its plan was made.
+        if plan.clamps.is_empty() && plan.times.is_empty() {
             return Err((FailureKind::NoEquilibrium, "no clamp holds the body".into()));
         }
         let still = Start::still(s.u.len());
         with_matrix(member, |member, matrix| {
             let mut e = equation(shared, member, None, &still);
-            let iterations = plan.solver.newton_iterations.max(STATIC_ITERATIONS);
-            let (tolerance, effort) = (plan.solver.tolerance, &mut Effort::default());
-            newton::solve(&mut e, &shared.solvers, matrix, Purpose::Static, &mut s.u, tolerance, iterations, effort)
-        })
-        .map_err(|(kind, detail)| match kind {
-            FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
-            _ => (kind, detail),
+            quasi_static::settle(shared, &mut e, matrix, &mut s.u, &mut Effort::default())?;
+            if plan.times.is_empty() { Ok(()) } else { quasi_static::check_stable(shared, &mut e, &s.u, 0) }
         })?;
     }
     check(shared, s)
@@ -284,6 +282,9 @@ pub fn step(
     past: &[&MemberState],
     next: &mut MemberState,
 ) -> Result<(), Reason> {
+    if stage.still {
+        return quasi_static::step(shared, member, stage, past[0], next);
+    }
     let (length, theta) = (stage.length, stage.theta);
     let from = Start::new(stage, past);
     // Free flight is the guess: exact while nothing touches or deforms.
@@ -324,6 +325,9 @@ pub fn step_adjoint(
     adj_past: &mut [&mut MemberState],
     gradient: &mut Gradient,
 ) -> Result<(), Reason> {
+    if stage.still {
+        return quasi_static::step_adjoint(shared, member, stage, next, adj, gradient);
+    }
     let (a, c) = velocity_factors(stage.length, stage.theta);
     let from = Start::new(stage, past);
     let mut z = [adj.u.iter().zip(&adj.v).map(|(u, v)| *u + a * *v).collect::<Nodes>()];
@@ -355,6 +359,9 @@ pub fn step_tangent(
     t: &[&MemberTangent],
     t_next: &mut MemberTangent,
 ) -> Result<(), Reason> {
+    if stage.still {
+        return quasi_static::step_tangent(shared, member, stage, next, t_next);
+    }
     let (a, c) = velocity_factors(stage.length, stage.theta);
     let from = Start::new(stage, past);
     let directions = t_next.rates.len();

@@ -95,7 +95,11 @@ impl Member {
 
     /// Frames of step k that count.
     pub(crate) fn instants(&self, shared: &Shared, k: usize) -> Vec<Instant> {
-        self.viewed.instants(shared.plan.clock.step, self.first_stamp(), k)
+        match &shared.plan.times[..] {
+            // A static problem shows all frames one state.
+            [] | [_] => self.viewed.instants(shared.plan.clock.step, self.first_stamp(), k),
+            times => self.viewed.instants_at(times, k),
+        }
     }
 
     /// Compares a frame with displacement `u` `[N]`.

@@ -30,6 +30,8 @@ pub enum FailureKind {
     FellOut,
     /// There is no equilibrium to be found (nothing holds the body).
     NoEquilibrium,
+    /// A state of a quasi-static sequence is in equilibrium and would not stay there.
+    Unstable,
     /// A parameter lies outside the range the model is defined for.
     BadParameter,
     /// The backend cannot compute what was asked for.
@@ -99,6 +101,7 @@ impl FailureKind {
             FailureKind::NewtonStalled => "the nonlinear solve of a step did not converge",
             FailureKind::LinearSolve => "the linear solve of a step failed",
             FailureKind::FellOut => "the body left the world",
+            FailureKind::Unstable => "an equilibrium is unstable",
             FailureKind::NoEquilibrium => "no static equilibrium was found",
             FailureKind::BadParameter => "a parameter is out of range",
             FailureKind::Unsupported => "the backend cannot do this",
@@ -119,6 +122,9 @@ impl FailureKind {
             FailureKind::FellOut => "check gravity, planes and initial velocity, or shorten [time] duration",
             FailureKind::NoEquilibrium => {
                 "hold the body with a [[clamp]] (a larger one, or one more), make it stiffer, or start from initial.state = \"rest\""
+            }
+            FailureKind::Unstable => {
+                "the body buckles or snaps through here: hold more of it, take smaller loads or states closer together, or simulate the motion"
             }
             FailureKind::BadParameter => "set bounds for the parameter in [[fit.parameter]]",
             FailureKind::Unsupported => "use --backend cpu",

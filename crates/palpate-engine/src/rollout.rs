@@ -165,7 +165,7 @@ impl<B: Backend> Rollout<B> {
     /// Prepares a plan for up to `members` simulations at once (more are evaluated in turns).
     pub fn new(backend: B, plan: &Plan, members: usize) -> Result<Self, BuildError> {
         let world = backend.build(plan, members)?;
-        let stages = plan.clock.stages();
+        let stages = plan.stages();
         Ok(Rollout {
             backend,
             world,
@@ -240,7 +240,7 @@ impl<B: Backend> Rollout<B> {
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
         self.let_go();
-        let (b, dt) = (&self.backend, self.plan.clock.step);
+        let (b, dt, times) = (&self.backend, self.plan.clock.step, &self.plan.times);
         let (stages, stop) = (&self.stages, &self.stop);
         let forward = Forward { backend: b, stages, stop, directions: None, keep: false };
         b.rollout(&mut self.world, true, |w| {
@@ -252,7 +252,8 @@ impl<B: Backend> Rollout<B> {
                 let observed = m.step.is_some() || stages.is_empty();
                 let residuals =
                     if observed { b.residuals(m.world, m.step.unwrap_or(0), m.ends[0], m.ends[1], 0) } else { Vec::new() };
-                visit(state, Snapshot { time: state as f64 * dt, displacement, velocity }, residuals)
+                let time = times.get(state).map_or(state as f64 * dt, |t| t - times[0]);
+                visit(state, Snapshot { time, displacement, velocity }, residuals)
             };
             forward.run(w, &mut tally, each).continue_value().ok_or_else(stopped)?;
             let evaluation = b.read(w, &tally).remove(0);

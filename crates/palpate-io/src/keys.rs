@@ -82,7 +82,9 @@ pub(crate) const SCENE: Schema = Schema {
             },
         ),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
-        ("time", table(&["step", "duration", "steps", "start", "scheme", "theta"])),
+        ("time", table(&["mode", "step", "duration", "steps", "start", "scheme", "theta"])),
+        ("load", table(&["kind", "forces", "total", "index", "places", "times", "rate", "start", "factor"])),
+        ("attach", table(&["points", "places", "track", "times", "rate", "start", "stiffness", "offset"])),
         ("solver", table(&["element", "linear", "tolerance", "newton_iterations", "ghost"])),
         (
             "observation",
@@ -100,7 +102,10 @@ pub(crate) const SCENE: Schema = Schema {
             "fit",
             Schema {
                 keys: &["optimizer", "iterations", "starts", "seed", "threads", "warm_start"],
-                tables: &[("parameter", table(&["path", "start", "bounds", "known", "per_scene"]))],
+                tables: &[
+                    ("parameter", table(&["path", "start", "bounds", "known", "per_scene"])),
+                    ("frames", Schema { keys: &["test"], tables: &[("train", table(&["every", "count"]))] }),
+                ],
             },
         ),
     ],

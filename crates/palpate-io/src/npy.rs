@@ -43,10 +43,15 @@ pub fn is_archive(path: &Path) -> bool {
 /// # Errors
 /// The file cannot be read, is no array of real numbers, or has no array of the name.
 pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> {
+    read_numbers(path, name, false)
+}
+
+/// `whole`: integers are allowed as well.
+fn read_numbers(path: &Path, name: Option<&str>, whole: bool) -> Result<Array, InputError> {
     let bytes = read_bytes(path)?;
     if !is_archive(path) {
         return match name {
-            None => decode(path, "", &bytes),
+            None => decode(path, "", &bytes, whole),
             Some(name) => {
                 Err(InputError::file(path, format!("holds one array without a name; \"{name}\" is one of an .npz file")))
             }
@@ -71,7 +76,23 @@ pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> 
     let file = archive.by_name(&member.unwrap_or_default()).map_err(|e| broken(&e))?;
     let mut content = Vec::new();
     file.take(LARGEST).read_to_end(&mut content).map_err(|e| broken(&e))?;
-    decode(path, name, &content)
+    decode(path, name, &content, whole)
+}
+
+/// Reads whole numbers from 0 on, stored as integers or as floats: indices.
+///
+/// # Errors
+/// As [`read_array`], and numbers that are no such.
+pub(crate) fn read_indices(path: &Path, name: Option<&str>) -> Result<Vec<u32>, InputError> {
+    let array = read_numbers(path, name, true)?;
+    if array.shape.len() != 1 {
+        return Err(InputError::file(path, format!("has shape {}, expected one axis", array.shape_text())));
+    }
+    let index = |(k, x): (usize, &f64)| {
+        let is_one = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(x);
+        is_one.then_some(*x as u32).ok_or_else(|| InputError::file(path, format!("{x} (number {k}) is no index from 0 on")))
+    };
+    array.values.iter().enumerate().map(index).collect()
 }
 
 /// The array in the bytes of an `.npy` file.
@@ -79,11 +100,11 @@ pub fn read_array(path: &Path, name: Option<&str>) -> Result<Array, InputError> 
 /// # Errors
 /// As [`read_array`].
 pub(crate) fn decode_array(path: &Path, bytes: &[u8]) -> Result<Array, InputError> {
-    decode(path, "", bytes)
+    decode(path, "", bytes, false)
 }
 
 /// The same, of one with a name.
-fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Array, InputError> {
+fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, InputError> {
     let which = if name.is_empty() { String::new() } else { format!("array \"{name}\": ") };
     let wrong = |text: String| InputError::file(path, format!("{which}{text}"));
     if !is_plausible(bytes) {
@@ -92,8 +113,15 @@ fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Array, InputError> {
     let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
     let (dtype, order) = (file.dtype(), file.order());
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
+    let mut stored = TypeChar::Float;
     let size = match &dtype {
         DType::Plain(t) if t.type_char() == TypeChar::Float && [4, 8].contains(&t.size_field()) => t.size_field(),
+        DType::Plain(t)
+            if whole && matches!(t.type_char(), TypeChar::Int | TypeChar::Uint) && [4, 8].contains(&t.size_field()) =>
+        {
+            stored = t.type_char();
+            t.size_field()
+        }
         other => {
             let text = other.descr();
             return Err(wrong(format!("holds {text}, expected float32 or float64; convert it with .astype(numpy.float32)")));
@@ -107,10 +135,13 @@ fn decode(path: &Path, name: &str, bytes: &[u8]) -> Result<Array, InputError> {
     }
     let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
     let short = |e: npyz::DTypeError| wrong(e.to_string());
-    let values: Result<Vec<f64>, std::io::Error> = if size == 4 {
-        file.data::<f32>().map_err(short)?.map(|x| x.map(f64::from)).collect()
-    } else {
-        file.data::<f64>().map_err(short)?.collect()
+    let values: Result<Vec<f64>, std::io::Error> = match (stored, size) {
+        (TypeChar::Int, 4) => file.data::<i32>().map_err(short)?.map(|x| x.map(f64::from)).collect(),
+        (TypeChar::Int, _) => file.data::<i64>().map_err(short)?.map(|x| x.map(|x| x as f64)).collect(),
+        (TypeChar::Uint, 4) => file.data::<u32>().map_err(short)?.map(|x| x.map(f64::from)).collect(),
+        (TypeChar::Uint, _) => file.data::<u64>().map_err(short)?.map(|x| x.map(|x| x as f64)).collect(),
+        (_, 4) => file.data::<f32>().map_err(short)?.map(|x| x.map(f64::from)).collect(),
+        _ => file.data::<f64>().map_err(short)?.collect(),
     };
     let values = values.map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
     Ok(Array { values: if order == Order::Fortran { to_c_order(&shape, &values) } else { values }, shape })

@@ -5,7 +5,7 @@ mod fit;
 mod in_code;
 mod synthesis;
 
-pub use fit::{FitParameter, FitSpec, Optimizer, WarmStart};
+pub use fit::{FitParameter, FitSpec, Optimizer, TrainFrames, WarmStart};
 pub use synthesis::{Handle, Keyframe, Synthesis};
 
 use crate::effects::Effect;

@@ -28,6 +28,7 @@ fn trial(plan: &Plan, steps: usize, compared: bool) -> Plan {
     let (start, dt, all) = (plan.theta[plan.layout.index(ParamKey::TimeStart)], plan.clock.step, plan.clock.steps);
     let mut short = plan.clone();
     short.clock.steps = all.min(steps);
+    short.times.truncate(short.clock.steps + 1);
     let mut seen = plan.observation.without_frames();
     if compared {
         let frames = &plan.observation.frames;

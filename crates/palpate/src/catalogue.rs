@@ -93,6 +93,9 @@ pub fn markdown() -> String {
                 let vector = if p.axis.is_some() { "vector: " } else { "" };
                 text += &format!("\n| `{}` | {unit} | {} | {} | {vector}{} |", p.key, allowed(p), default(p), p.doc);
             }
+            if law.table() != "effect" {
+                text += &format!("\n\nWritten as a table `[[{}]]` ([scene format](scene-format.md)).", law.table());
+            }
             if law.asks() == Asks::Path {
                 text += "\n| `path` | s, m | times increasing | – | what it follows: a CSV file `time,x,y,z`, or rows `[[time, x, y, z], …]`; not fitted |";
             }

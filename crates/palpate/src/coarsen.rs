@@ -72,7 +72,7 @@ pub fn usual_numbers(fine: &Experiment) -> Vec<String> {
 /// # Errors
 /// The coarse body is none, or a simulation or fit fails.
 pub fn coarsen(fine: &Experiment, folder: &Path, options: CoarsenOptions) -> Result<Coarsened, Error> {
-    if fine.plan.clock.steps == 0 {
+    if !fine.plan.clock.moves() {
         return Err(fine.fault("time", "a static scene has no motion to follow; give it a duration"));
     }
     let CoarsenOptions { resolution, free, points, frames, backend, interrupt, hear } = options;

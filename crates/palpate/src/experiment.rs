@@ -20,6 +20,7 @@ use palpate_model::plan::build::{PlanError, build_plan_of, plan_memory};
 use palpate_model::plan::locking::locking;
 use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -129,6 +130,11 @@ impl Experiment {
                 ObservationError::Recording(e) => Error::from(e),
                 ObservationError::Scene { key, message } => fault(&key, message),
             })?;
+            leave_out_what_is_held(&scene, rest.len(), &mut observation);
+            if let Some(chosen) = scene.fit.as_ref().and_then(|f| f.frames) {
+                let mut number = 0..;
+                observation.frames.retain(|_| number.next().is_some_and(|k| chosen.holds(k)));
+            }
             let (min, max) = shape.bounds();
             check_overlap(&observation, min, max).map_err(|e| fault("observation.recording", e))?;
             recording = Some(read);
@@ -180,7 +186,7 @@ impl Experiment {
             return Ok(());
         }
         let ahead = Sensors::new(&self.plan.layout, &self.plan.theta).ahead();
-        let (from, to) = (self.scene.time.start + ahead, self.end_time() + ahead);
+        let (from, to) = (self.start_time() + ahead, self.end_time() + ahead);
         // Times in files are rounded to microseconds.
         let slack = 1e-6 * (1.0 + to.abs());
         let outside = frames.iter().filter(|f| f.time < from - slack || f.time > to + slack).count();
@@ -288,8 +294,16 @@ impl Experiment {
         &self.warnings
     }
 
+    /// Time of the first state on the recording's clock [s].
+    pub fn start_time(&self) -> f64 {
+        self.plan.times.first().copied().unwrap_or(self.scene.time.start)
+    }
+
     /// Time of the last state on the recording's clock [s].
     pub fn end_time(&self) -> f64 {
+        if let Some(last) = self.plan.times.last() {
+            return *last;
+        }
         self.scene.time.start + self.scene.time.step * self.scene.time.steps as f64
     }
 
@@ -356,6 +370,19 @@ impl Experiment {
     /// Up in the world: against gravity, z without it.
     pub fn up(&self) -> DVec3 {
         (-self.scene.gravity).try_normalize().unwrap_or(DVec3::Z)
+    }
+}
+
+/// Tracked points that an attachment draws to their places say nothing of the body when they are compared with it.
+fn leave_out_what_is_held(scene: &Scene, markers: usize, observation: &mut Observation) {
+    let held: BTreeSet<u32> =
+        scene.effects.iter().filter_map(|e| e.drive.as_ref()).flat_map(|d| d.tracked.iter().copied()).collect();
+    if held.is_empty() || observation.tracks.places.is_empty() {
+        return;
+    }
+    let first = markers as u32;
+    for f in &mut observation.frames {
+        f.markers.retain(|m| m.site < first || !held.contains(&(m.site - first)));
     }
 }
 

@@ -37,6 +37,11 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
     for path in plan.followed.iter().flatten() {
         path.times.iter().chain(path.points.iter().flat_map(|p| p.as_ref())).for_each(|x| eat(x.to_bits()));
     }
+    for sites in plan.driven.iter().flatten() {
+        let places = sites.rest.iter().chain(&sites.series.vectors).flat_map(|p| p.as_ref());
+        sites.series.times.iter().chain(places).for_each(|x| eat(x.to_bits()));
+    }
+    plan.times.iter().for_each(|t| eat(t.to_bits()));
     for f in &o.frames {
         eat(f.time.to_bits());
         f.noise.iter().chain(&f.drift).for_each(|x| eat(x.to_bits()));

@@ -22,8 +22,10 @@ use palpate_model::scene::{FitSpec, Optimizer};
 use std::path::PathBuf;
 
 mod answer;
+mod common_scale;
 mod counted;
 mod free;
+mod held_out;
 mod lead;
 mod verdict;
 mod warm;
@@ -37,6 +39,7 @@ const SURPRISING: f64 = 3.0;
 pub use answer::{Headline, Parts};
 use counted::Counted;
 pub(crate) use free::free_parameters;
+pub use held_out::{Distances, HeldOut};
 pub(crate) use verdict::held_whole;
 use verdict::verdict;
 pub use warm::FromTracks;
@@ -116,6 +119,8 @@ pub struct Fitted {
     pub before: Vec<Option<ResidualSummary>>,
     /// Residuals at the best point, scene by scene; the CPU's where the device fails.
     pub after: Vec<ResidualSummary>,
+    /// What it makes of frames that it did not see, where the scenes keep some from it.
+    pub held_out: Option<HeldOut>,
     /// True when the fit was stopped before its end.
     pub interrupted: bool,
     /// What cells and time step do to each number, where that was looked at ([`Fitted::check_grid`]).
@@ -316,6 +321,14 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
     warnings.extend(result.warnings.iter().cloned().chain(notes));
+    let held_out = match cut {
+        true => None,
+        false => held_out::held_out(experiments, &result.theta, &after, backend).unwrap_or_else(|e| {
+            warnings.push(format!("the frames that the fit did not see were not compared: {e}"));
+            None
+        }),
+    };
+    warnings.extend(common_scale::warnings(experiments, &theta_start, backend));
     let interrupted = cut || result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
@@ -329,6 +342,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         history,
         before,
         after,
+        held_out,
         interrupted,
         grid: None,
         verdict: Verdict::default(),

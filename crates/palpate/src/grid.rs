@@ -146,7 +146,7 @@ pub fn grid_check(
         return Err(Error::Failed("a field by cells or nodes has no counterpart on finer ones".into()));
     }
     let cells = experiments.iter().any(|e| e.scene().object.resolution != Resolution::Own);
-    let step = experiments.iter().any(|e| e.plan().clock.steps > 0);
+    let step = experiments.iter().any(|e| e.plan().clock.moves());
     let made = experiments.iter().all(|e| matches!(e.scene().object.resolution, Resolution::Edge(_)));
     let what = match (cells, step) {
         (true, true) if made => "tetrahedra and step",

@@ -80,7 +80,7 @@ pub use engine::Backend;
 pub use error::Error;
 pub use experiment::{Experiment, Simulation};
 pub use exporting::{ExportOptions, specimen};
-pub use fitting::{FitOptions, Fitted, FreeNumber, FromTracks, Headline, Parts, fit};
+pub use fitting::{Distances, FitOptions, Fitted, FreeNumber, FromTracks, Headline, HeldOut, Parts, fit};
 pub use grid::{GridCheck, GridEffect, grid_check};
 pub use host::host;
 pub use interrupt::{Clock, Interrupt};

@@ -59,7 +59,7 @@ pub(crate) fn motions(e: &Experiment) -> Vec<Motion> {
     let side = up.any_orthonormal_vector();
     let speed = (2.0 * gravity.length().max(1.0) * size).sqrt();
     let mut out = Vec::new();
-    let moves = plan.clock.steps > 0;
+    let moves = plan.clock.moves();
     if moves && !plan.clamps.is_empty() {
         let lowest = lowest_frequency(e.scene(), e.shape());
         for (axis, name) in [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")] {

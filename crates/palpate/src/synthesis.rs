@@ -17,7 +17,6 @@ use palpate_fit::Progress;
 use palpate_model::effects::{Effect, find, impulse};
 use palpate_model::observation::target::Target;
 use palpate_model::observation::{Channel, Frame, Observation, ObservedDisplacement, ReadingKind};
-use palpate_model::params::ParamKey;
 use palpate_model::scene::{FitParameter, FitSpec, Scene, WarmStart};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -134,6 +133,7 @@ impl Search {
             seed: 1,
             threads: 0,
             warm_start: WarmStart::Stated,
+            frames: None,
             parameters: all.flat_map(|e| ["x", "y", "z"].map(|axis| one(e, axis))).collect(),
         }
     }
@@ -183,9 +183,8 @@ impl Search {
         let plan = self.experiment.plan();
         let theta = &fitted.result.theta[0];
         let force = |h: usize, knot: usize| {
-            let effect = (self.first + h * self.knots + knot) as u16;
-            let law = find(impulse::KIND).unwrap_or_default() as u16;
-            let at = |slot| theta[plan.layout.index(ParamKey::Effect { effect, law, slot })];
+            let effect = self.first + h * self.knots + knot;
+            let at = |slot| theta[plan.layout.index(plan.layout.effect_key(effect, slot))];
             DVec3::new(at(0), at(1), at(2)) / self.spacing
         };
         let forces = (0..self.handles.len()).map(|h| (0..self.knots).map(|k| force(h, k)).collect()).collect();

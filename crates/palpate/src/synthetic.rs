@@ -62,7 +62,7 @@ pub fn observe(
     mut progress: impl FnMut(f64) -> std::ops::ControlFlow<()>,
 ) -> Result<Recording, Error> {
     let plan = experiment.plan();
-    let (start, end) = (experiment.scene().time.start, experiment.end_time());
+    let (start, end) = (experiment.start_time(), experiment.end_time());
     let is_static = plan.clock.steps == 0;
     // A time on the last step must not fail by rounding.
     let slack = 1e-9 * (1.0 + end.abs());

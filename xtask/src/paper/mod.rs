@@ -11,6 +11,7 @@ pub mod scenes;
 pub mod several;
 pub mod study;
 pub mod tables;
+pub mod veo;
 
 /// Studies of other papers' methods.
-pub const SETS: [&cases::Set; 2] = [&real2sim::SET, &capture::SET];
+pub const SETS: [&cases::Set; 3] = [&real2sim::SET, &capture::SET, &veo::SET];

@@ -8,9 +8,11 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
+use palpate_model::effects::driven::{Drive, Points};
 use palpate_model::effects::law::Asks;
 use palpate_model::effects::{ALL, Effect, Law, Site, Unstated};
 use palpate_model::mechanics::path::Path;
+use palpate_model::mechanics::series::Series;
 use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker};
 use palpate_model::observation::{ObservedPoint, ReadingKind};
 use palpate_model::params::ParamKey;
@@ -197,6 +199,13 @@ fn at_work(number: usize, law: &Law) -> Effect {
         // Into the side of the ball, and on.
         let points = vec![DVec3::new(0.067, 0.0, 0.055), DVec3::new(0.06, 0.004, 0.053)];
         effect.path = Some(Arc::new(Path { times: vec![0.0, 0.07], points }));
+    }
+    if law.asks() == Asks::Series {
+        let points = vec![DVec3::new(0.04, 0.0, 0.06), DVec3::new(0.0, 0.03, 0.08)];
+        let late = DVec3::new(0.02, -0.01, 0.01);
+        let vectors = [DVec3::ZERO, late].iter().flat_map(|d| points.iter().map(|p| *p + *d).collect::<Vec<_>>()).collect();
+        let series = Arc::new(Series { count: 2, times: vec![0.0, 0.0703], vectors });
+        effect.drive = Some(Arc::new(Drive { points: Points::Places(points, None), series, tracked: Vec::new() }));
     }
     effect
 }

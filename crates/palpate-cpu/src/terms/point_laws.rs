@@ -6,6 +6,7 @@
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
+use palpate_model::effects::driven::DrivenSites;
 use palpate_model::effects::law::{Asks, COMMON, Followed, GRAVITY, MOST, OLD, PLANE, Place, Point, STIFFNESS, TIME, VELOCITY};
 use palpate_model::effects::{Law, Site};
 use palpate_model::mechanics::contact;
@@ -29,6 +30,8 @@ pub struct Acting {
     absent: bool,
     /// What it follows.
     path: Option<Arc<Path>>,
+    /// What drives it, and the number of the effect, by which the places of its points are found.
+    driven: Option<(usize, Arc<DrivenSites>)>,
 }
 
 impl std::fmt::Debug for Acting {
@@ -45,7 +48,8 @@ pub fn acting(plan: &Plan, physics: &Physics) -> Vec<Acting> {
             _ => None,
         };
         let path = plan.followed.get(number).cloned().flatten();
-        Acting { law, values: values.clone(), shares, absent: law.is_absent(values), path }
+        let driven = plan.driven.get(number).cloned().flatten().map(|sites| (number, sites));
+        Acting { law, values: values.clone(), shares, absent: law.is_absent(values), path, driven }
     };
     plan.layout.effects().zip(&physics.effects).enumerate().map(make).collect()
 }
@@ -60,6 +64,8 @@ struct At<'a> {
     node: usize,
     /// Number of the patch for effects of the surface.
     patch: Option<usize>,
+    /// Numbers of effect and point for effects of driven points.
+    driven: Option<(usize, usize)>,
     /// Number of the plane for effects of contact.
     plane: Option<usize>,
     /// How the body deforms there, and the normal in the old state, of laws that ask for it.
@@ -145,7 +151,7 @@ impl<'a> PointLaws<'a> {
                 let place = Place { rest: patch.point, normal: patch.normal, measure: patch.area, ..place };
                 if !point.skips(&place, z) {
                     let (plane, patch) = (plane.map(|p| p.0), Some(number));
-                    visit(&At { point, place, z, stencil, node: 0, patch, plane, turned });
+                    visit(&At { point, place, z, stencil, node: 0, patch, driven: None, plane, turned });
                 }
             }
         };
@@ -168,8 +174,28 @@ impl<'a> PointLaws<'a> {
                     let place = Place { rest: *x, measure, ..place };
                     if !point.skips(&place, z) {
                         let stencil = Stencil { nodes: &[i as u32], value: &[1.0], gradient: &[] };
-                        visit(&At { point, place, z, stencil, node: i, patch: None, plane: None, turned: None });
+                        visit(&At { point, place, z, stencil, node: i, patch: None, driven: None, plane: None, turned: None });
                     }
+                }
+            }
+            Site::Driven(point) => {
+                let Some((effect, sites)) = &acting.driven else { return };
+                for (number, (stencil, rest)) in sites.stencils.iter().zip(&sites.rest).enumerate() {
+                    let mut followed = Followed::of_series(&sites.series, number, self.c.time, rate);
+                    if place.theta() == 1.0 {
+                        // The old state's force has no weight, and need not be known.
+                        followed.old = followed.new;
+                    }
+                    // A point that is not seen at one of these times is left alone.
+                    if followed.new[0].is_nan() || followed.old[0].is_nan() {
+                        continue;
+                    }
+                    put(z, 0, *rest + stencil.at(u1));
+                    put(z, OLD, *rest + stencil.at(past.u));
+                    put(z, VELOCITY, stencil.at(past.v));
+                    let place = Place { rest: *rest, measure: 1.0, followed, ..place };
+                    let driven = Some((*effect, number));
+                    visit(&At { point, place, z, stencil, node: 0, patch: None, driven, plane: None, turned: None });
                 }
             }
             // Everything else does not act on points.
@@ -244,14 +270,17 @@ impl Term for PointLaws<'_> {
                 if curvature != Curvature::Exact && !positive(h) {
                     return;
                 }
-                match at.patch {
-                    None => matrix.values[self.c.pattern.blocks.diagonal[at.node]] += h,
-                    Some(patch) => {
-                        let w = at.stencil.value;
-                        for (b, place) in self.c.places.patches.of(patch).iter().enumerate() {
-                            matrix.values[*place as usize] += h * (w[b / w.len()] * w[b % w.len()]);
-                        }
+                let places = match (at.patch, at.driven) {
+                    (Some(patch), _) => self.c.places.patches.of(patch),
+                    (None, Some((effect, number))) => self.c.places.driven[effect].of(number),
+                    (None, None) => {
+                        matrix.values[self.c.pattern.blocks.diagonal[at.node]] += h;
+                        return;
                     }
+                };
+                let w = at.stencil.value;
+                for (b, place) in places.iter().enumerate() {
+                    matrix.values[*place as usize] += h * (w[b / w.len()] * w[b % w.len()]);
                 }
             });
         }

@@ -78,7 +78,7 @@ fn prior<'a>(shared: &'a Shared, member: &'a Member, problem: &Problem, start: &
 /// The stage that a step of backward Euler is.
 fn stage(problem: &Problem, time: f64) -> Option<Stage> {
     let (Prior::Step(_, length) | Prior::Held(_, length)) = problem.prior else { return None };
-    Some(Stage { number: 0, step: 0, from: vec![(0, 1.0)], length, theta: 1.0, time, completes: Some(0) })
+    Some(Stage { number: 0, step: 0, from: vec![(0, 1.0)], length, theta: 1.0, time, completes: Some(0), still: false })
 }
 
 /// The past of a prior.

@@ -8,7 +8,7 @@ mod image;
 mod markers;
 mod observation;
 mod overlap;
-mod sequence;
+pub(crate) mod sequence;
 #[cfg(test)]
 mod surface_tests;
 #[cfg(test)]
@@ -116,6 +116,41 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
         displacements,
         warnings,
     })
+}
+
+/// The tracked points of a recording alone, in world coordinates; its images are not read.
+///
+/// # Errors
+/// As [`read_recording`].
+pub(crate) fn read_points(file: &Path) -> Result<Option<RecordedPoints>, InputError> {
+    let source = Source::read(file)?;
+    sequence::points(&source, &source.root())
+}
+
+/// Times at which a recording has readings of markers, tracked points or displacements [s], rising; of the first of these kinds that it is asked
+/// for and has.
+///
+/// # Errors
+/// As [`read_recording`].
+pub(crate) fn read_times(file: &Path, kinds: &[ReadingKind]) -> Result<Option<Vec<f64>>, InputError> {
+    let source = Source::read(file)?;
+    let root = source.root();
+    for kind in kinds {
+        let times = match kind {
+            ReadingKind::Depth => None,
+            ReadingKind::Track => sequence::points(&source, &root)?.map(|p| p.track.times),
+            ReadingKind::Displacement => sequence::displacements(&source, &root)?.map(|d| d.track.times),
+            ReadingKind::Marker => markers(&source, &root, &mut Vec::new())?.map(|m| {
+                let mut times: Vec<f64> = m.samples.iter().map(|s| s.time).collect();
+                times.dedup();
+                times
+            }),
+        };
+        if times.is_some() {
+            return Ok(times);
+        }
+    }
+    Ok(None)
 }
 
 /// The markers of a C3D file, in metres and on the file's own clock, without noise and rest places.

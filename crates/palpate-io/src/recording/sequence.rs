@@ -228,7 +228,7 @@ impl<'a> Reader<'a> {
 }
 
 /// Refuses infinite numbers, and vectors that were seen in part.
-pub(super) fn check_vectors(all: impl Iterator<Item = DVec3> + Clone) -> Result<(), String> {
+pub(crate) fn check_vectors(all: impl Iterator<Item = DVec3> + Clone) -> Result<(), String> {
     let infinite = all.clone().flat_map(|v| v.to_array()).filter(|x| x.is_infinite()).count();
     if infinite > 0 {
         return Err(format!("{infinite} of {} numbers are infinite; NaN marks what was not seen", 3 * all.count()));
@@ -241,7 +241,7 @@ pub(super) fn check_vectors(all: impl Iterator<Item = DVec3> + Clone) -> Result<
 }
 
 /// Refuses times that do not rise, or are not one a frame.
-pub(super) fn check_times(times: &[f64], frames: usize) -> Result<(), String> {
+pub(crate) fn check_times(times: &[f64], frames: usize) -> Result<(), String> {
     if times.len() != frames {
         return Err(format!("holds {} times for {frames} frames", times.len()));
     }

@@ -18,6 +18,9 @@ fn effect(t: &Table) -> Result<Effect, InputError> {
     let kinds: Vec<&str> = effects::ALL.iter().map(|l| l.kind).collect();
     let law =
         effects::find(kind).ok_or_else(|| t.error("kind", format!("\"{kind}\" is not an effect; {}", suggest(kind, &kinds))))?;
+    if effects::ALL[law].table() != "effect" {
+        return Err(t.error("kind", format!("\"{kind}\" is written as a table [[{}]]", effects::ALL[law].table())));
+    }
     let mut known = vec!["kind"];
     known.extend(effects::ALL[law].params.iter().filter(|p| p.axis.unwrap_or(0) == 0).map(|p| p.key));
     let follows = effects::ALL[law].asks() == Asks::Path;

@@ -7,7 +7,7 @@ use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
 use palpate_model::params::{On, ParamKey, Transform, is_component};
 use palpate_model::plan::PlaneSite;
-use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, WarmStart};
+use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, TrainFrames, WarmStart};
 
 /// One number of a scene that can be fitted.
 struct Target {
@@ -126,12 +126,33 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
         threads: t.optional_count("threads", 0..=4096)?.unwrap_or(0) as usize,
         warm_start: t.optional_choice("warm_start", &WarmStart::ALL)?.unwrap_or_default(),
         parameters,
+        frames: frames(&t)?,
     }))
+}
+
+/// `frames`: which of them the fit sees.
+fn frames(t: &Table) -> Result<Option<TrainFrames>, InputError> {
+    let Some(f) = t.optional_table("frames")? else { return Ok(None) };
+    let train = f.optional_table("train")?.ok_or_else(|| f.missing("train", "{ every = n, count = m }"))?;
+    let count = |key: &str| train.optional_count(key, 1..=u64::MAX).map(|n| n.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
+    let (every, most) = (count("every")?, count("count")?);
+    if (every, most) == (None, None) {
+        return Err(f.error("train", "says neither every nor count: which frames is the fit to see?"));
+    }
+    f.optional_choice("test", &[("rest", ())])?;
+    Ok(Some(TrainFrames { every: every.unwrap_or(1), count: most.unwrap_or(usize::MAX), others: false }))
 }
 
 /// One `[[fit.parameter]]`: a number, the three components of a vector, or a field, whose values share one start and one pair of bounds.
 fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParameter>, InputError> {
     let path = t.optional_str("path")?.ok_or_else(|| t.missing("path", "the dotted path of a number in this file"))?;
+    if scene.time.scheme.still
+        && ["time.start", "initial.", "material.mass_damping", "material.stiffness_damping", "material.viscosity"]
+            .iter()
+            .any(|p| path.starts_with(p))
+    {
+        return Err(t.error("path", format!("{path} has no part in a quasi-static sequence, in which nothing moves")));
+    }
     let component = |k: &Target| k.path.strip_prefix(path).is_some_and(is_component);
     let of_field = field_targets(path, scene);
     let chosen: Vec<&Target> =
@@ -222,7 +243,13 @@ fn unknown_path(path: &str, scene: &Scene, known: &[Target]) -> String {
             Some((basis, None)) => format!("\"{path}\": say \"field.{i}\", or \"field.{i}.3\" for one of its {}", basis.noun()),
         };
     }
-    for (table, noun) in [("plane.", "[[plane]]"), ("mass.", "[[mass]]"), ("effect.", "[[effect]]")] {
+    for (table, noun) in [
+        ("plane.", "[[plane]]"),
+        ("mass.", "[[mass]]"),
+        ("effect.", "[[effect]]"),
+        ("load.", "[[load]]"),
+        ("attach.", "[[attach]]"),
+    ] {
         let index = path.strip_prefix(table).and_then(|r| r.split('.').next()).and_then(|i| i.parse::<usize>().ok());
         if let Some(i) = index
             && !known.iter().any(|k| k.path.starts_with(&format!("{table}{i}.")))

@@ -6,6 +6,9 @@ mod edit;
 mod effects;
 mod fields;
 mod fit;
+#[cfg(test)]
+mod load_tests;
+mod loads;
 mod material;
 mod motion;
 mod object;
@@ -18,6 +21,7 @@ mod synthesis;
 mod target;
 #[cfg(test)]
 mod tests;
+mod time;
 mod track;
 mod write;
 
@@ -33,15 +37,11 @@ use crate::recording::leaves;
 use glam::DVec3;
 use palpate_model::observation::MarkerRest;
 use palpate_model::observation::ReadingKind;
-use palpate_model::plan::scheme::{self, Scheme};
 use palpate_model::scene::*;
 use std::path::Path;
 
 /// The scene format this version reads and writes.
 pub const FORMAT: &str = "scene/1";
-
-/// More steps than this are a slip of units, not a simulation.
-const MOST_STEPS: f64 = 1e7;
 
 /// Reads a scene and every file it names except the recording.
 ///
@@ -98,8 +98,11 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         None => None,
     };
     let initial = initial(&root, object::is_given(&root)?)?;
-    let (time, mut effects) = (time(&root, initial.state)?, effects::effects(&root)?);
+    let (time, mut effects) = (time::time(&root, &initial)?, effects::effects(&root)?);
     let synthesis = synthesis::synthesis(&root, &time, &mut effects)?;
+    let observation = observation(&root)?;
+    loads::loads(source, &root, observation.as_ref(), &mut effects)?;
+    loads::attachments(source, &root, observation.as_ref(), &mut effects)?;
     let mut scene = Scene {
         path: source.path.clone(),
         title: root.optional_str("title")?.unwrap_or_default().to_string(),
@@ -115,7 +118,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         time,
         initial,
         solver: solver(&root, of_tets)?,
-        observation: observation(&root)?,
+        observation,
         targets: target::targets(&root)?,
         synthesis,
         tracking: track::tracking(&root)?,
@@ -222,65 +225,6 @@ fn initial(root: &Table, given: bool) -> Result<Initial, InputError> {
     }
     Ok(initial)
 }
-
-fn time(root: &Table, state: InitialShape) -> Result<Time, InputError> {
-    let t = root.optional_table("time")?.ok_or_else(|| root.missing("time", "a table [time] with step and duration"))?;
-    let step = t.f64_where("step", |x| x >= SHORTEST_STEP, "is not allowed: must be > 0, and at least 1e-9 (s)")?;
-    let duration = t.f64_where("duration", |x| x >= 0.0, "is not allowed: must be ≥ 0 (s)")?;
-    let steps = t.optional_count("steps", 0..=MOST_STEPS as u64)?;
-    let mut open = None;
-    let (key, count) = match (duration, steps) {
-        (Some(_), Some(_)) => return Err(t.error("steps", "duration and steps exclude each other; give one")),
-        (None, None) => return Err(t.missing("duration", "duration (s) or steps")),
-        (None, Some(n)) => ("steps", n as f64),
-        (Some(0.0), None) => ("duration", 0.0),
-        (Some(d), None) => {
-            open = step.is_none().then_some(d);
-            let step = step.unwrap_or(d);
-            let n = (d / step).round();
-            if n < 1.0 {
-                return Err(t.error("duration", format!("{} s is shorter than half a step ({} s)", number(d), number(step))));
-            }
-            ("duration", n)
-        }
-    };
-    if count > MOST_STEPS {
-        return Err(
-            t.error(key, format!("asks for {} steps, at most {MOST_STEPS:.0} are allowed; is step in seconds?", number(count)))
-        );
-    }
-    if count == 0.0 && state == InitialShape::Given {
-        return Err(
-            t.error(key, "0 leaves nothing to compute: a shape that is given as the equilibrium (object.state) needs steps")
-        );
-    }
-    if count == 0.0 && state != InitialShape::StaticEquilibrium {
-        return Err(t.error(key, "0 needs initial.state = \"static-equilibrium\" (a static problem)"));
-    }
-    // A static problem has no step; any positive length serves.
-    let given = step.or((count == 0.0).then_some(1.0)).or(open);
-    let step = given.ok_or_else(|| t.missing("step", "a number > 0 (s), or duration instead of steps"))?;
-    let theta = t.f64_where("theta", |x| (0.5..1.0).contains(&x), "is not allowed: must lie in [0.5, 1)")?;
-    let schemes: Vec<(&str, &'static Scheme)> = scheme::ALL.iter().map(|s| (s.name, s)).collect();
-    // Who states θ means its scheme.
-    let unstated = if theta.is_some() { scheme::theta() } else { Time::default().scheme };
-    let scheme = t.optional_choice("scheme", &schemes)?.unwrap_or(unstated);
-    if theta.is_some() && !scheme.leaves_theta_open() {
-        return Err(t.error("theta", format!("belongs to scheme = \"theta\"; \"{}\" has none", scheme.name)));
-    }
-    let default = Time::default();
-    Ok(Time {
-        step,
-        steps: count as usize,
-        start: t.optional_f64("start")?.unwrap_or(0.0),
-        theta: theta.unwrap_or(default.theta),
-        scheme,
-        open,
-    })
-}
-
-/// Shortest time step [s]: the fastest waves need a thousand times as long to cross the smallest cells, and forces overflow long before zero.
-const SHORTEST_STEP: f64 = 1e-9;
 
 fn solver(root: &Table, of_tets: bool) -> Result<Solver, InputError> {
     let mut s = Solver::default();

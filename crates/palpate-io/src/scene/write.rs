@@ -70,18 +70,18 @@ fn put(doc: &mut DocumentMut, scene: &Scene, values: &[(String, f64)]) -> Result
             }
             // Values of cells and nodes go into a file, which `name_field_files` names.
             ["field", i] | ["field", i, _] if i.parse().is_ok_and(|i: usize| i < scene.fields.len()) => {}
-            ["effect", i, key] => {
+            [rows @ ("effect" | "load" | "attach"), i, key] => {
                 let i: usize = i.parse().map_err(|_| unknown())?;
-                set(row(doc, "effect", i).ok_or_else(unknown)?, key, Value::from(*value));
+                set(row(doc, rows, i).ok_or_else(unknown)?, key, Value::from(*value));
             }
-            ["effect", i, key, a] => {
+            [rows @ ("effect" | "load" | "attach"), i, key, a] => {
                 let (i, a) = (i.parse::<usize>().map_err(|_| unknown())?, axis(a).ok_or_else(unknown)?);
-                let effect = scene.effects.get(i).ok_or_else(unknown)?;
+                let effect = scene.effects.iter().filter(|e| e.law().table() == rows).nth(i).ok_or_else(unknown)?;
                 let slot = effect.law().params.iter().position(|p| p.key == key && p.axis == Some(0)).ok_or_else(unknown)?;
-                let table = row(doc, "effect", i).ok_or_else(unknown)?;
+                let table = row(doc, rows, i).ok_or_else(unknown)?;
                 if !table.contains_key(key) {
                     // Components that are not written keep what the scene means by leaving them out.
-                    let known = |k: usize| values.iter().find(|(p, _)| *p == format!("effect.{i}.{key}.{}", ["x", "y", "z"][k]));
+                    let known = |k: usize| values.iter().find(|(p, _)| *p == format!("{rows}.{i}.{key}.{}", ["x", "y", "z"][k]));
                     let before = |k: usize| effect.values[slot + k].or_else(|| known(k).map(|v| v.1));
                     let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(before) else {
                         return Err(wrong("needs all three components".to_string()));
@@ -335,6 +335,8 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     let fix = |table: &mut dyn TableLike, key: &str| {
         if let Some(Value::String(s)) = table.get_mut(key).and_then(Item::as_value_mut)
             && Path::new(s.value()).is_relative()
+            // The points of the recording, not a file.
+            && (key, s.value().as_str()) != ("track", "recording")
         {
             let path = relative(&absolute(&from.join(s.value())), &absolute(to));
             replace(table.get_mut(key).and_then(Item::as_value_mut).expect("the key was just read"), Value::from(path));
@@ -347,7 +349,7 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
         fix(t, "recording");
     }
-    for (rows, key) in [("clamp", "motion"), ("field", "file"), ("target", "file"), ("effect", "path"), ("handle", "path")] {
+    for (rows, key) in FILES {
         let mut i = 0;
         while let Some(t) = row(doc, rows, i) {
             fix(t, key);
@@ -355,6 +357,24 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
         }
     }
 }
+
+/// Keys of tables that name files; one in an archive is named `file.npz:array`.
+const FILES: [(&str, &str); 14] = [
+    ("clamp", "motion"),
+    ("field", "file"),
+    ("target", "file"),
+    ("effect", "path"),
+    ("handle", "path"),
+    ("load", "forces"),
+    ("load", "total"),
+    ("load", "index"),
+    ("load", "places"),
+    ("load", "times"),
+    ("attach", "points"),
+    ("attach", "places"),
+    ("attach", "track"),
+    ("attach", "times"),
+];
 
 /// The absolute path without links, `.` and `..`, as far as the file system knows it.
 fn absolute(path: &Path) -> PathBuf {

@@ -8,6 +8,7 @@
 
 use crate::mechanics::contact;
 use crate::mechanics::path::Path;
+use crate::mechanics::series::Series;
 use glam::DVec3;
 use num_dual::{DualNum, HyperDual64};
 
@@ -64,6 +65,8 @@ pub enum Asks {
     Nothing,
     /// A path that the scene states beside its numbers.
     Path,
+    /// A vector at points of the body for every time, which a scene's file holds.
+    Series,
     /// The patch's normal in the old state.
     Normal,
 }
@@ -84,6 +87,12 @@ impl Followed {
     pub fn of(path: &Path, time: f64, rate: f64) -> Followed {
         let before = if rate > 0.0 { time - 1.0 / rate } else { time };
         Followed { time, new: path.at(time), old: path.at(before) }
+    }
+
+    /// Of a point of a series, likewise; NaN where it has none.
+    pub fn of_series(series: &Series, point: usize, time: f64, rate: f64) -> Followed {
+        let before = if rate > 0.0 { time - 1.0 / rate } else { time };
+        Followed { time, new: series.at(point, time), old: series.at(point, before) }
     }
 
     /// Place in the new state [m]; `time` is that of the new state, and carries the derivative by where the clock starts.

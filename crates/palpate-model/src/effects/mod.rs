@@ -4,8 +4,11 @@
 //! loop over sites and know no effect by name. From the table follow the scene's keys, the fit parameters, the tests of
 //! derivatives and the hypotheses of `diagnose`.
 
+pub mod attachment;
 pub mod cell;
+pub mod driven;
 pub mod field;
+pub mod file_load;
 pub mod handle;
 pub mod impulse;
 pub mod law;
@@ -52,6 +55,7 @@ use crate::mechanics::path::Path;
 use crate::params::Transform;
 use crate::params::changes::HOLD;
 use cell::Cell;
+use driven::Drive;
 use field::Field;
 use law::{Asks, Point};
 use reading::Reading;
@@ -169,6 +173,8 @@ pub enum Site {
     Surface(&'static dyn Point),
     /// Every surface patch and every plane of the scene.
     Contact(&'static dyn Point),
+    /// Points of the body that a file says something about; `measure` is 1.
+    Driven(&'static dyn Point),
     /// Every reading of a depth camera.
     Readings(&'static dyn Reading),
     /// The times of frames: they are ahead by parameter 0.
@@ -206,6 +212,8 @@ pub static ALL: &[Law] = &[
     wind::LAW,
     impulse::LAW,
     handle::LAW,
+    file_load::LAW,
+    attachment::LAW,
     stiffness_gradient::LAW,
     two_part_stiffness::LAW,
     inclusion::LAW,
@@ -292,7 +300,7 @@ impl Law {
     /// What a law of points needs beside its numbers.
     pub fn asks(&self) -> Asks {
         match self.site {
-            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) => point.asks(),
+            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) | Site::Driven(point) => point.asks(),
             _ => Asks::Nothing,
         }
     }
@@ -300,8 +308,17 @@ impl Law {
     /// True of a law of points whose force depends on neither state.
     pub fn is_load(&self) -> bool {
         match self.site {
-            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) => point.is_load(),
+            Site::Nodes(point) | Site::Surface(point) | Site::Contact(point) | Site::Driven(point) => point.is_load(),
             _ => false,
+        }
+    }
+
+    /// Name of the tables of a scene file that state it.
+    pub fn table(&self) -> &'static str {
+        match self.kind {
+            file_load::KIND => "load",
+            attachment::KIND => "attach",
+            _ => "effect",
         }
     }
 
@@ -320,14 +337,17 @@ pub struct Effect {
     pub values: Vec<Option<f64>>,
     /// What it follows, of laws that ask for a path.
     pub path: Option<Arc<Path>>,
+    /// What drives its points, of laws that ask for a series.
+    pub drive: Option<Arc<Drive>>,
 }
 
 impl Effect {
-    /// An effect with every parameter at its default; what it follows stays at the origin.
+    /// An effect with every parameter at its default; what it follows stays at the origin, and what drives it is zero.
     pub fn absent(law: usize) -> Effect {
         let follows = ALL[law].asks() == Asks::Path;
         let path = follows.then(|| Arc::new(Path { times: vec![0.0], points: vec![glam::DVec3::ZERO] }));
-        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect(), path }
+        let drive = (ALL[law].asks() == Asks::Series).then(|| Arc::new(Drive::still()));
+        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect(), path, drive }
     }
 
     /// Its law.

@@ -8,7 +8,7 @@ use glam::DVec3;
 /// The point laws of the table.
 fn point_laws() -> impl Iterator<Item = (&'static Law, &'static dyn Point)> {
     ALL.iter().filter_map(|l| match l.site {
-        Site::Nodes(p) | Site::Surface(p) | Site::Contact(p) => Some((l, p)),
+        Site::Nodes(p) | Site::Surface(p) | Site::Contact(p) | Site::Driven(p) => Some((l, p)),
         _ => None,
     })
 }
@@ -47,6 +47,10 @@ fn state(law: &Law, noise: &mut Noise) -> (Place, Vec<f64>) {
             }
             _ => (p.typical * noise.uniform(0.3, 1.5)).clamp(p.lower.max(-1e9), p.upper.min(1e9)),
         };
+    }
+    if law.asks() == Asks::Series {
+        let of = |noise: &mut Noise| [noise.vector(0.1), noise.vector(0.5)];
+        place.followed = Followed { time: z[TIME], new: of(noise), old: of(noise) };
     }
     if law.asks() == Asks::Path {
         // A ball that the point is about to touch, moving.

@@ -7,3 +7,4 @@ pub mod normal;
 pub mod path;
 pub mod plane;
 pub mod rotation;
+pub mod series;

@@ -51,6 +51,25 @@ pub fn instants(recording: &Recording, dt: f64, start: f64, k: usize) -> Vec<Ins
         .collect()
 }
 
+/// Frames that belong to step k of a sequence of states at `times` [s], of which there are two at least: every frame is the state nearest in
+/// time, and nothing lies between states. The first step has the frames of both its ends.
+pub fn instants_at(recording: &Recording, times: &[f64], k: usize) -> Vec<Instant> {
+    let last = recording.steps.min(times.len() - 1);
+    let state = |time: f64| {
+        let next = times[..=last].partition_point(|t| *t < time).min(last);
+        if next > 0 && time - times[next - 1] < times[next] - time { next - 1 } else { next }
+    };
+    let held = |frame: usize| {
+        let value = match state(recording.observation.frames[frame].time) {
+            0 if k == 0 => [1.0, 0.0, 0.0, 0.0],
+            s if s == k + 1 => [0.0, 0.0, 1.0, 0.0],
+            _ => return None,
+        };
+        Some(Instant { frame, value, rate: [0.0; 4] })
+    };
+    (0..recording.observation.frames.len()).filter_map(held).collect()
+}
+
 /// A frame that compares velocities, `drift` seconds of them, at s of a step; what is held does not move.
 fn drifting(frame: usize, s: f64, dt: f64, drift: f64) -> Instant {
     if !(0.0..=1.0).contains(&s) {
@@ -86,5 +105,16 @@ mod tests {
             assert!((seen(i.rate) - 0.4 * 6.0 * t).abs() < 1e-13, "{t}");
         }
         assert_eq!(instants(&recording, dt, 0.0, 3)[0].value, [0.0; 4]);
+    }
+
+    #[test]
+    fn frames_of_a_sequence_are_its_states() {
+        let times = [0.0, 0.4, 1.7, 2.0];
+        let frames = [1e-12, 0.4, 1.69, 2.5].map(|time| Frame { time, ..Frame::default() }).to_vec();
+        let recording = Recording { observation: Arc::new(Observation { frames, ..Observation::default() }), steps: 3 };
+        let of = |k: usize| instants_at(&recording, &times, k).iter().map(|i| (i.frame, i.value)).collect::<Vec<_>>();
+        let end = [0.0, 0.0, 1.0, 0.0];
+        assert_eq!(of(0), [(0, [1.0, 0.0, 0.0, 0.0]), (1, end)]);
+        assert_eq!((of(1), of(2)), (vec![(2, end)], vec![(3, end)]));
     }
 }

@@ -1,6 +1,6 @@
 //! What members of a batch are compared with: one of a plan's recordings, all of its frames or some of them.
 
-use super::instant::{Instant, instants};
+use super::instant::{Instant, instants, instants_at};
 use super::{Frame, Observation};
 use std::sync::Arc;
 
@@ -72,6 +72,13 @@ impl Viewed {
     /// Frames that count and belong to step k of a simulation in steps of `dt` [s] that starts at `start` on the recording's clock.
     pub fn instants(&self, dt: f64, start: f64, k: usize) -> Vec<Instant> {
         let mut all = instants(&self.recording, dt, start, k);
+        all.retain(|at| self.counts(at.frame));
+        all
+    }
+
+    /// The same of a sequence of states at given `times` on the recording's clock [s].
+    pub fn instants_at(&self, times: &[f64], k: usize) -> Vec<Instant> {
+        let mut all = instants_at(&self.recording, times, k);
         all.retain(|at| self.counts(at.frame));
         all
     }

@@ -63,6 +63,8 @@ pub enum ParamKey {
         law: u16,
         /// Place in the law's parameters.
         slot: u16,
+        /// Number of its table in the scene file among those of one name ([`effects::Law::table`]).
+        row: u16,
     },
     /// Coefficient η of the material's viscosity.
     Viscosity,
@@ -197,10 +199,11 @@ impl ParamKey {
             PlaneTheta(i) => (format!("plane.{i}.theta"), "rad", Linear, -inf, inf, 0.1, "polar angle of the plane's normal"),
             PlanePhi(i) => (format!("plane.{i}.phi"), "rad", Linear, -inf, inf, 0.1, "azimuth of the plane's normal"),
             PointMass(i) => (format!("mass.{i}.mass"), "kg", Log, 1e-9, 1e6, 1e-2, "point mass fixed to the body"),
-            Effect { effect, law, slot } => {
-                let p = &effects::ALL[usize::from(law)].params[usize::from(slot)];
+            Effect { law, slot, row, .. } => {
+                let law = &effects::ALL[usize::from(law)];
+                let p = &law.params[usize::from(slot)];
                 let axis = p.axis.map_or_else(String::new, |a| format!(".{}", AXES[usize::from(a)]));
-                (format!("effect.{effect}.{}{axis}", p.key), p.unit, p.transform, p.lower, p.upper, p.typical, p.doc)
+                (format!("{}.{row}.{}{axis}", law.table(), p.key), p.unit, p.transform, p.lower, p.upper, p.typical, p.doc)
             }
             // Beyond a factor of a million the matrix loses its digits.
             Field { field, index } => {
@@ -225,9 +228,10 @@ impl ParamKey {
     /// Path of the vector that this is a component of, if only the direction of that counts.
     pub fn direction(self) -> Option<String> {
         match self {
-            ParamKey::Effect { effect, law, slot } => {
-                let p = &effects::ALL[usize::from(law)].params[usize::from(slot)];
-                p.is_direction().then(|| format!("effect.{effect}.{}", p.key))
+            ParamKey::Effect { law, slot, row, .. } => {
+                let law = &effects::ALL[usize::from(law)];
+                let p = &law.params[usize::from(slot)];
+                p.is_direction().then(|| format!("{}.{row}.{}", law.table(), p.key))
             }
             _ => None,
         }
@@ -271,7 +275,9 @@ impl Layout {
         keys.extend((0..masses as u16).map(PointMass));
         let mut effects = vec![keys.len()];
         for (i, &law) in laws.iter().enumerate() {
-            let key = |slot: usize| Effect { effect: i as u16, law: law as u16, slot: slot as u16 };
+            let table = |law: usize| effects::ALL[law].table();
+            let row = laws[..i].iter().filter(|l| table(**l) == table(law)).count();
+            let key = |slot: usize| Effect { effect: i as u16, law: law as u16, slot: slot as u16, row: row as u16 };
             keys.extend((0..effects::ALL[law].params.len()).map(key));
             effects.push(keys.len());
         }
@@ -315,6 +321,11 @@ impl Layout {
             Some(ParamKey::Effect { law, .. }) => Some((&effects::ALL[usize::from(*law)], w[0]..w[1])),
             _ => None,
         })
+    }
+
+    /// The key of number `slot` of effect `effect`.
+    pub fn effect_key(&self, effect: usize, slot: usize) -> ParamKey {
+        self.keys[self.effects[effect] + slot]
     }
 
     /// Places in θ of the values of every field.
@@ -395,6 +406,12 @@ mod tests {
 
     #[test]
     fn every_key_has_its_place_and_every_path_finds_it() {
+        let law = |kind| effects::find(kind).expect("it is in the table");
+        let mixed = Layout::new(0, 0, &[law("wind"), law("file-load"), law("attachment"), law("tether"), law("file-load")], &[]);
+        let first = |effect: usize| mixed.effect_key(effect, 0).spec().path;
+        assert_eq!(first(1), "load.0.factor");
+        assert_eq!([first(2), first(4)], ["attach.0.stiffness", "load.1.factor"]);
+        assert!(first(3).starts_with("effect.1.") && mixed.resolve("attach.0.offset").len() == 3);
         let layout = Layout::new(2, 1, &[0, 5, 1], &[4, 1]);
         assert_eq!((layout.planes(), layout.masses()), (2, 1));
         for (p, key) in layout.keys.iter().enumerate() {

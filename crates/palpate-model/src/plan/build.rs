@@ -1,5 +1,6 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
+mod driven;
 mod sites;
 mod tets;
 
@@ -18,7 +19,7 @@ use crate::params::Layout;
 use crate::params::ParamKey;
 use crate::params::fields::{Field, Varied};
 use crate::plan::{ClampSite, Clock, Plan, PlaneSite};
-use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, InitialShape, Resolution, Scene};
+use crate::scene::{BodySource, Clamp, ClampRegion, Inertia, InitialShape, Resolution, Scene, Time};
 use crate::shape::{Shape, shape_of};
 use crate::space::body::Body;
 use crate::space::stencil::Stencils;
@@ -137,6 +138,10 @@ pub fn build_plan_of(
         }
     }
     check_effects(scene, &body)?;
+    if scene.time.scheme.still {
+        driven::check_held(scene)?;
+    }
+    let times = driven::times(scene, &observation);
     let planes = scene
         .planes
         .iter()
@@ -151,9 +156,12 @@ pub fn build_plan_of(
         fields.push(Field::new(spec, &body).map_err(|m| error(format!("field.{i}.regions"), m))?);
         starts.push(spec.start(&body).map_err(|m| error(format!("field.{i}.file"), m))?);
     }
+    let driven = driven::sites(scene, &body)?;
     let layout = scene.layout_with(&fields.iter().map(|f| f.count).collect::<Vec<_>>());
+    let time = clock_of(scene, &times);
+    let clock = Clock { step: time.step, steps: time.steps, theta: time.theta, scheme: time.scheme };
     Ok(Plan {
-        theta: theta(scene, &layout, &planes, &starts, &body),
+        theta: theta(scene, &layout, &planes, &starts, &body, time.start),
         layout,
         model: scene.material.model,
         curves: scene.curves.clone(),
@@ -162,9 +170,14 @@ pub fn build_plan_of(
         clamps,
         masses,
         followed: scene.effects.iter().map(|e| e.path.clone()).collect(),
+        driven,
         frames: Arc::new(sites::frames(scene.effects.iter().any(|e| e.law().asks() == Asks::Normal), &body)),
-        clock: Clock { step: scene.time.step, steps: scene.time.steps, theta: scene.time.theta, scheme: scene.time.scheme },
-        initial: scene.initial.state,
+        clock,
+        times,
+        initial: match scene.initial.state {
+            InitialShape::Rest if scene.time.scheme.still => InitialShape::StaticEquilibrium,
+            state => state,
+        },
         pivot: scene.initial.pivot.unwrap_or(body.center),
         observation: Arc::new(observation),
         others: Vec::new(),
@@ -174,8 +187,16 @@ pub fn build_plan_of(
     })
 }
 
+/// The scene's clock; that of a quasi-static sequence follows from when its states are.
+fn clock_of(scene: &Scene, times: &[f64]) -> Time {
+    let (Some(first), Some(last)) = (times.first(), times.last()) else { return scene.time };
+    let steps = times.len() - 1;
+    let step = if steps > 0 { (last - first) / steps as f64 } else { 1.0 };
+    Time { step, steps, start: *first, ..scene.time }
+}
+
 /// The scene's parameter values in the order of its layout.
-fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64>], body: &Body) -> Vec<f64> {
+fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64>], body: &Body, start: f64) -> Vec<f64> {
     let m = &scene.material;
     let plane = |i: u16| (&scene.planes[i as usize], &planes[i as usize]);
     let value = |key: &ParamKey| match *key {
@@ -194,7 +215,7 @@ fn theta(scene: &Scene, layout: &Layout, planes: &[PlaneSite], fields: &[Vec<f64
         ParamKey::Gravity(a) => scene.gravity[a as usize],
         ParamKey::Velocity(a) => scene.initial.velocity[a as usize],
         ParamKey::AngularVelocity(a) => scene.initial.angular_velocity[a as usize],
-        ParamKey::TimeStart => scene.time.start,
+        ParamKey::TimeStart => start,
         ParamKey::PlaneHeight(i) => plane(i).0.normal.dot(plane(i).0.point),
         ParamKey::PlaneTheta(i) => plane(i).1.angles(plane(i).0.normal).0,
         ParamKey::PlanePhi(i) => plane(i).1.angles(plane(i).0.normal).1,

@@ -7,6 +7,7 @@ pub mod scheme;
 
 pub use crate::cutcells::clamp_cell::ClampCell;
 use crate::cutcells::clamp_edge::Edge;
+use crate::effects::driven::DrivenSites;
 use crate::materials::Model;
 use crate::materials::curve::Curve;
 use crate::materials::principal_stretch::PrincipalStretch;
@@ -51,10 +52,14 @@ pub struct Plan {
     pub fields: Vec<Field>,
     /// The path of every effect that follows one.
     pub followed: Vec<Option<Arc<Path>>>,
+    /// Where the points of every effect that a series drives sit.
+    pub driven: Vec<Option<Arc<DrivenSites>>>,
     /// How the body deforms at every patch of the surface, where some effect asks for normals that turn with it; else empty.
     pub frames: Arc<Stencils>,
     /// Time steps.
     pub clock: Clock,
+    /// Times of all states of a quasi-static sequence on the recording's clock [s], rising; empty for a motion.
+    pub times: Vec<f64>,
     /// Shape at the start.
     pub initial: InitialShape,
     /// Centre of the initial spin [m].
@@ -70,6 +75,15 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// All solves from the start to the end.
+    pub fn stages(&self) -> Vec<Stage> {
+        let mut all = self.clock.stages();
+        for (stage, time) in all.iter_mut().zip(self.times.iter().skip(1)) {
+            stage.time = time - self.times[0];
+        }
+        all
+    }
+
     /// Number of recordings that members may be compared with.
     pub fn recordings(&self) -> usize {
         1 + self.others.len()
@@ -144,6 +158,11 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// True where states follow from each other in time: neither a static problem nor a sequence of them.
+    pub fn moves(&self) -> bool {
+        self.steps > 0 && !self.scheme.still
+    }
+
     /// All solves from the start to the end.
     pub fn stages(&self) -> Vec<Stage> {
         self.scheme.stages(self.step, self.steps, self.theta)

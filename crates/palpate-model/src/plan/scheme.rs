@@ -47,6 +47,8 @@ pub struct Scheme {
     pub solves: &'static [Solve],
     /// The solves of the first step, where there is no state before.
     pub first: &'static [Solve],
+    /// Every state is an equilibrium: there is no inertia, and nothing depends on a rate or on the past.
+    pub still: bool,
 }
 
 const SQRT_2: f64 = std::f64::consts::SQRT_2;
@@ -54,6 +56,8 @@ const SQRT_2: f64 = std::f64::consts::SQRT_2;
 const GAMMA: f64 = 2.0 - SQRT_2;
 
 const THETA_STEP: &[Solve] = &[Solve { from: &[(Past::Now, 1.0)], length: 1.0, theta: None, end: 1.0 }];
+
+const STILL_STEP: &[Solve] = &[Solve { from: &[(Past::Now, 1.0)], length: 1.0, theta: Some(1.0), end: 1.0 }];
 
 const BDF2_STEP: &[Solve] =
     &[Solve { from: &[(Past::Now, 4.0 / 3.0), (Past::Before, -1.0 / 3.0)], length: 2.0 / 3.0, theta: Some(1.0), end: 1.0 }];
@@ -81,20 +85,32 @@ pub static ALL: &[Scheme] = &[
         doc: "a trapezoidal and a backward part, two solves a step: the most accurate of those that damp what the step does not resolve",
         solves: TR_BDF2_STEP,
         first: TR_BDF2_STEP,
+        still: false,
     },
     Scheme {
         name: "bdf2",
         doc: "second-order backward differences: damps what the step does not resolve",
         solves: BDF2_STEP,
         first: TR_BDF2_STEP,
+        still: false,
     },
     Scheme {
         name: "theta",
         doc: "one step from the present state; `theta` weighs the new state's forces: ½ conserves energy, more damps numerically",
         solves: THETA_STEP,
         first: THETA_STEP,
+        still: false,
     },
 ];
+
+/// A sequence of equilibria: `[time] mode = "quasi-static"`. A state is where Newton's method starts for the next one, and nothing more.
+pub static QUASI_STATIC: Scheme = Scheme {
+    name: "quasi-static",
+    doc: "every state is an equilibrium under the loads of its time",
+    solves: STILL_STEP,
+    first: STILL_STEP,
+    still: true,
+};
 
 /// The θ-scheme.
 pub fn theta() -> &'static Scheme {
@@ -123,6 +139,8 @@ pub struct Stage {
     pub time: f64,
     /// Number of the state at the beginning of the step, where the step ends with this stage.
     pub completes: Option<usize>,
+    /// The new state is an equilibrium ([`Scheme::still`]).
+    pub still: bool,
 }
 
 impl Scheme {
@@ -147,6 +165,7 @@ impl Scheme {
                     theta: solve.theta.unwrap_or(theta),
                     time: if solve.end == 1.0 { (k + 1) as f64 * step } else { (k as f64 + solve.end) * step },
                     completes: (i + 1 == table.len()).then_some(now),
+                    still: self.still,
                 });
             }
             (before, now) = (now, stages.len());

@@ -17,6 +17,27 @@ pub struct FitSpec {
     pub warm_start: WarmStart,
     /// Free parameters.
     pub parameters: Vec<FitParameter>,
+    /// Which frames it sees; `None` = all.
+    pub frames: Option<TrainFrames>,
+}
+
+/// Frames that a fit sees, out of those that the scene's `[observation]` uses. It is tried on the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrainFrames {
+    /// From the first on every n-th.
+    pub every: usize,
+    /// So many at most.
+    pub count: usize,
+    /// The other way round: the frames that the fit does not see.
+    pub others: bool,
+}
+
+impl TrainFrames {
+    /// True where frame `number` is one of these.
+    pub fn holds(&self, number: usize) -> bool {
+        let trains = number.is_multiple_of(self.every) && number / self.every < self.count;
+        trains != self.others
+    }
 }
 
 /// Where a fit's start values come from, beside what the scene says.

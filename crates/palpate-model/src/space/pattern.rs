@@ -141,6 +141,8 @@ pub struct Places {
     pub patches: Squares,
     /// Blocks of the nodes of every point mass.
     pub masses: Squares,
+    /// Blocks of the nodes of every driven point, effect by effect.
+    pub driven: Vec<Squares>,
 }
 
 impl Places {
@@ -152,6 +154,11 @@ impl Places {
             points: Squares::new(pattern, &plan.body.points.stencils),
             patches: Squares::new(pattern, &plan.body.surface),
             masses: Squares::new(pattern, &plan.masses),
+            driven: plan
+                .driven
+                .iter()
+                .map(|d| d.as_ref().map(|d| Squares::new(pattern, &d.stencils)).unwrap_or_default())
+                .collect(),
         }
     }
 }

@@ -111,7 +111,7 @@ struct Writer<'a> {
 impl Writer<'_> {
     fn write(&mut self, number: usize, state: &Snapshot) -> Result<(), Error> {
         let vertices = self.surface.deform(&state.displacement);
-        let time = self.experiment.scene().time.start + state.time;
+        let time = self.experiment.start_time() + state.time;
         for format in self.formats.clone() {
             let file = self.folder.join(frame_name(number, format));
             match format {

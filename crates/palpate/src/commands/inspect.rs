@@ -241,9 +241,10 @@ fn world(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
             .join(", "),
     ));
     let (steps, time, end) = (plan.clock.steps, &e.scene().time, e.end_time());
-    content.time = Time { step: time.step, steps, start: time.start, end };
+    content.time = Time { step: plan.clock.step, steps, start: e.start_time(), end };
     let text = match steps {
         0 => "static".to_string(),
+        _ if time.scheme.still => format!("{} equilibria, from {} s to {end:.4} s", steps + 1, e.start_time()),
         _ => format!(
             "{steps} steps of {} s{}, from {} s to {end:.4} s{}",
             time.step,

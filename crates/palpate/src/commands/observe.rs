@@ -126,13 +126,16 @@ fn cameras(texts: &[String]) -> Result<Vec<Pinhole>, Error> {
 
 fn times(a: &Arguments, experiment: &Experiment) -> Result<Vec<f64>, Error> {
     let time = &experiment.scene().time;
-    let count = |step: f64| ((experiment.end_time() - time.start) / step + 1e-9).floor() as usize;
-    let evenly = |step: f64| (0..=count(step)).map(|k| time.start + k as f64 * step).collect();
+    let count = |step: f64| ((experiment.end_time() - experiment.start_time()) / step + 1e-9).floor() as usize;
+    let evenly = |step: f64| (0..=count(step)).map(|k| experiment.start_time() + k as f64 * step).collect();
     if let Some(times) = &a.times {
         if times.is_empty() || !times.windows(2).all(|w| w[0] < w[1]) || times.iter().any(|t| !t.is_finite()) {
             return Err(Error::option("times", "", "give increasing times in seconds, separated by commas"));
         }
         return Ok(times.clone());
+    }
+    if let (None, true) = (a.fps, time.scheme.still) {
+        return Ok(experiment.plan().times.clone());
     }
     let times: Vec<f64> = a.fps.map_or_else(|| evenly(time.step), |fps| evenly(1.0 / fps));
     if times.len() > 1_000_000 {

@@ -141,8 +141,8 @@ fn united<'a>(all: &[&'a [Change]]) -> (Vec<&'a Effect>, Vec<Vec<usize>>) {
 /// Where the keys of a layout are in another one that has more effects: its first `given` are the same, the others have these numbers.
 fn placed(own: &Layout, union: &Layout, given: usize, numbers: &[usize]) -> Vec<usize> {
     let key = |key: &ParamKey| match *key {
-        ParamKey::Effect { effect, law, slot } if usize::from(effect) >= given => {
-            ParamKey::Effect { effect: (given + numbers[usize::from(effect) - given]) as u16, law, slot }
+        ParamKey::Effect { effect, slot, .. } if usize::from(effect) >= given => {
+            union.effect_key(given + numbers[usize::from(effect) - given], usize::from(slot))
         }
         other => other,
     };

@@ -78,8 +78,7 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
                     let center = e.plan.body.center;
                     e.plan.theta.splice(end..end, (0..effect.values.len()).map(|slot| effect.value(slot, center)));
                     for slot in change.free_slots() {
-                        let key = ParamKey::Effect { effect: number as u16, law: effect.law as u16, slot: slot as u16 };
-                        let path = key.spec().path;
+                        let path = e.plan.layout.effect_key(number, slot).spec().path;
                         if s == 0 {
                             order.push(path.clone());
                         }
@@ -153,6 +152,7 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
         seed: 1,
         threads: 0,
         warm_start: WarmStart::Stated,
+        frames: None,
         parameters: Vec::new(),
     };
     e.scene.fit.get_or_insert_with(empty).parameters.push(parameter);

@@ -383,7 +383,7 @@ impl Laboratory for Lab<'_> {
             Ok(difference(name, &linearise(ready, values, none, &limits)?, &coarse, factor))
         };
         let (grid, step) = rayon::join(|| change("grid", &fine, GRID), || change("step", &short, STEP));
-        let is_static = self.base.iter().all(|e| e.plan.clock.steps == 0);
+        let is_static = self.base.iter().all(|e| !e.plan.clock.moves());
         self.set_aside("recordings", began);
         Ok(if is_static { vec![grid?] } else { vec![grid?, step?] })
     }

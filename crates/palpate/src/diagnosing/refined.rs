@@ -20,8 +20,11 @@ pub(super) fn finer(e: &Experiment) -> Result<Experiment, Error> {
     Ok(f)
 }
 
-/// An experiment with half the step.
+/// An experiment with half the step; one of equilibria has none.
 pub(super) fn halved(mut e: Experiment) -> Experiment {
+    if !e.plan.clock.moves() {
+        return e;
+    }
     e.plan.clock.step *= 0.5;
     e.plan.clock.steps *= 2;
     e

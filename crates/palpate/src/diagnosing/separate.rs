@@ -81,7 +81,7 @@ fn trials(e: &Experiment) -> Vec<Trial> {
     let speed = (2.0 * gravity.length().max(1.0) * size).sqrt();
     let plain = |what: String| Trial { what, push: DVec3::ZERO, spin: DVec3::ZERO, turn: DQuat::IDENTITY };
     let mut out = Vec::new();
-    if e.plan.clock.steps > 0 {
+    if e.plan.clock.moves() {
         let rate = speed / size;
         let pushed = plain(format!("a push of {:.2} m/s sideways at the start", 0.5 * speed));
         out.push(Trial { push: 0.5 * speed * side, ..pushed });

@@ -6,7 +6,7 @@ use palpate_io::parse_scene;
 use palpate_io::recording::Recording;
 use palpate_model::observation::ReadingKind;
 use palpate_model::plan::Plan;
-use palpate_model::scene::{FitSpec, ObservationSpec, Resolution, Scene};
+use palpate_model::scene::{FitSpec, ObservationSpec, Resolution, Scene, TrainFrames};
 use std::sync::Arc;
 
 impl Experiment {
@@ -74,6 +74,22 @@ impl Experiment {
         Experiment::build(scene, self.text.clone(), Vec::new(), Some(Arc::new(recording)))
     }
 
+    /// The same experiment compared with the frames that a fit of it does not see; `None` where it sees all, or none are left.
+    ///
+    /// # Errors
+    /// As [`Experiment::open`].
+    pub fn of_other_frames(&self) -> Result<Option<Experiment>, Error> {
+        let Some(chosen) = self.scene.fit.as_ref().and_then(|f| f.frames).filter(|_| self.recording.is_some()) else {
+            return Ok(None);
+        };
+        let mut scene = self.scene.clone();
+        if let Some(fit) = &mut scene.fit {
+            fit.frames = Some(TrainFrames { others: !chosen.others, ..chosen });
+        }
+        let other = Experiment::build(scene, self.text.clone(), Vec::new(), self.recording.clone())?;
+        Ok(Some(other).filter(|o| !o.plan.observation.frames.is_empty()))
+    }
+
     /// The same experiment with another search.
     pub(crate) fn searched(&self, change: impl FnOnce(&mut FitSpec)) -> Experiment {
         let mut other = self.clone();
@@ -112,7 +128,7 @@ impl Experiment {
             _ => Resolution::CellSize(self.plan.body.length / factor),
         };
         let steps = (scene.time.steps as f64 * step).round() as usize;
-        if steps > 0 {
+        if steps > 0 && !scene.time.scheme.still {
             scene.time.step *= scene.time.steps as f64 / steps as f64;
             scene.time.steps = steps;
         }

@@ -4,11 +4,12 @@ use crate::curves;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
 use crate::fields;
-use crate::fitting::{Fitted, FreeNumber, FromTracks, total};
+use crate::fitting::{Distances, Fitted, FreeNumber, FromTracks, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
 use crate::results::fit::{
-    Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run, Tracked,
+    Cost, FieldReference, FitDocument, FoundCurve, FrameDistances, Frames, Parameter, Parts, Residual, ResidualBefore, Run,
+    Tracked,
 };
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
@@ -23,6 +24,11 @@ pub(super) fn worth(fitted: &Fitted) -> Option<String> {
     let n = fitted.result.independent;
     n.is_finite()
         .then(|| format!("± counts the data as {n:.0} independent readings: neighbouring residuals that go together count once"))
+}
+
+fn distances(d: &Distances) -> FrameDistances {
+    let length = |x: Option<f64>| x.and_then(finite);
+    FrameDistances { frames: d.frames, rms: finite(d.rms), rest: length(d.rest), unmoved: length(d.unmoved) }
 }
 
 fn unmatched(fitted: &Fitted) -> usize {
@@ -108,6 +114,7 @@ pub fn fit_document(
             unmatched: unmatched(fitted),
             scenes: fitted.after.iter().map(residual).collect(),
         },
+        frames: fitted.held_out.as_ref().map(|h| Frames { train: distances(&h.train), test: distances(&h.test) }),
         residual_before: before.map(|b| ResidualBefore { rms: finite(total(&b, |r| r.rms)) }),
         best: r.best,
         runs: r.runs.iter().map(|r| run(fitted, r)).collect(),
@@ -293,6 +300,7 @@ pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
         rms * 1e3,
         noise * 1e3
     );
+    text += &fitted.held_out.as_ref().map_or(String::new(), |h| format!("\n  frames: {}", h.sentence()));
     text += &worth(fitted).map_or(String::new(), |w| format!("\n  {w}"));
     if fitted.result.parameters.iter().any(|p| p.standard_error.is_some()) {
         text += &format!("\n  {}", grid_line(fitted));

@@ -66,12 +66,16 @@ impl Effects {
             let what = "a shape that is given as the equilibrium (object.state = \"static\"), which the CPU backend has".into();
             return Err(GpuError::Plan { what });
         }
+        if plan.clock.scheme.still {
+            return Err(GpuError::Plan { what: "a quasi-static sequence (time.mode), which the CPU backend has".into() });
+        }
         let mut e = Effects { steps: plan.clock.stages().len(), viscous: plan.layout.is_viscous(), ..Effects::default() };
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let asks = match law.asks() {
                 Asks::Nothing => None,
                 Asks::Path => Some("follows a path"),
+                Asks::Series => Some("is driven by a file"),
                 Asks::Normal => Some("turns with the surface"),
             };
             if let Some(asks) = asks {
@@ -108,7 +112,7 @@ impl Effects {
                 }
                 Site::Cells(_) => Some(AT_CELLS),
                 // The observer's business.
-                Site::Clock | Site::Marker | Site::Readings(_) => None,
+                Site::Clock | Site::Marker | Site::Readings(_) | Site::Driven(_) => None,
             };
             e.first_rows.push(row);
             if let Some(site) = site.filter(|s| *s == AT_CELLS) {

@@ -85,6 +85,9 @@ fn distances(fitted: &Fitted) -> Markup {
             " with the values found; measurement noise, and the shape's rounding by cells, would leave " (millimetres(noise)) " (" (points)
             " points)."
         }
+        @if let Some(h) = &fitted.held_out {
+            p { "Frames: " (h.sentence()) "." }
+        }
         @if let Some(worth) = worth(fitted) {
             p { (worth) "." }
         }

@@ -1,0 +1,136 @@
+//! One member's sequence of equilibria: stages without inertia, in which nothing depends on a rate or on the past.
+//!
+//! A state is Newton's starting point for the next one. Where that does not lead there, the way is halved in time: loads, clamps and
+//! attachments between both are part of the problem. What is found is an equilibrium by itself, so its derivatives need no other state:
+//! one linear solve each with the exact tangent. A state whose tangent has a negative eigenvalue is no place where a body stays.
+
+use crate::linear::Purpose;
+use crate::linear::matrix::Matrix;
+use crate::linear::vector::Nodes;
+use crate::newton::{self, Effort, Reason};
+use crate::simulate::{Start, check, equation, with_matrix};
+use crate::terms::{Curvature, Equation};
+use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
+use glam::DVec3;
+use palpate_engine::FailureKind;
+use palpate_model::plan::STATIC_ITERATIONS;
+use palpate_model::plan::scheme::Stage;
+
+/// Times that the way to a state is halved at most.
+const HALVINGS: u32 = 6;
+
+/// Finds the equilibrium of a static problem from the guess in `u`.
+pub(crate) fn settle(
+    shared: &Shared,
+    e: &mut Equation,
+    matrix: &mut Matrix,
+    u: &mut Nodes,
+    effort: &mut Effort,
+) -> Result<(), Reason> {
+    let solver = shared.plan.solver;
+    let iterations = solver.newton_iterations.max(STATIC_ITERATIONS);
+    newton::solve(e, &shared.solvers, matrix, Purpose::Static, u, solver.tolerance, iterations, effort).map_err(
+        |(kind, detail)| match kind {
+            FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
+            _ => (kind, detail),
+        },
+    )
+}
+
+/// Refuses an equilibrium that the smallest push would end.
+pub(crate) fn check_stable(shared: &Shared, e: &mut Equation, u: &[DVec3], state: usize) -> Result<(), Reason> {
+    e.residual(u);
+    // Conjugate gradients meet a negative curvature where the right-hand side has a part in it: no symmetry rules that out of this one.
+    let mixed = |i: usize, a: usize| ((i * 3 + a) as f64 * 0.618_034).fract() - 0.5;
+    let probe: Nodes = (0..u.len()).map(|i| DVec3::new(mixed(i, 0), mixed(i, 1), mixed(i, 2))).collect();
+    let solved = newton::with_tangent(e, &shared.solvers, u, &[Curvature::Exact], |_, prepared| {
+        prepared.solve_many(&mut [probe], 1e-3).is_ok()
+    });
+    if solved == Some(true) {
+        return Ok(());
+    }
+    Err((FailureKind::Unstable, format!("state {state} of the sequence: its stiffness matrix is not positive definite")))
+}
+
+/// The next state of a sequence.
+pub(crate) fn step(
+    shared: &Shared,
+    member: &mut Member,
+    stage: &Stage,
+    now: &MemberState,
+    next: &mut MemberState,
+) -> Result<(), Reason> {
+    next.u.copy_from_slice(&now.u);
+    next.v.fill(DVec3::ZERO);
+    let times = &shared.plan.times;
+    let [from, to] = [stage.step, stage.step + 1].map(|k| times.get(k).copied().unwrap_or(stage.time) - times[0]);
+    let mut effort = member.effort;
+    with_matrix(member, |member, matrix| {
+        let still = Start::still(next.u.len());
+        let at = |time: f64| Stage { time, ..stage.clone() };
+        // Times that are still to be reached, the next one last.
+        let (mut waiting, mut reached) = (vec![(to, 0)], from);
+        while let Some((time, halved)) = waiting.pop() {
+            let mut u = next.u.clone();
+            let stage = at(time);
+            let mut e = equation(shared, member, Some(&stage), &still);
+            match settle(shared, &mut e, matrix, &mut u, &mut effort) {
+                Ok(()) => (next.u, reached) = (u, time),
+                Err((FailureKind::NoEquilibrium | FailureKind::NotFinite, _)) if halved < HALVINGS => {
+                    waiting.extend([(time, halved + 1), (0.5 * (reached + time), halved + 1)]);
+                }
+                Err(reason) => return Err(reason),
+            }
+        }
+        let mut e = equation(shared, member, Some(stage), &still);
+        check_stable(shared, &mut e, &next.u, stage.step + 1)
+    })?;
+    member.effort = effort;
+    check(shared, next)
+}
+
+/// Its adjoint: the past states have no part in it.
+pub(crate) fn step_adjoint(
+    shared: &Shared,
+    member: &mut Member,
+    stage: &Stage,
+    next: &MemberState,
+    adj: &MemberState,
+    gradient: &mut Gradient,
+) -> Result<(), Reason> {
+    if adj.u.iter().all(|u| *u == DVec3::ZERO) {
+        return Ok(());
+    }
+    let still = Start::still(next.u.len());
+    let mut z = [adj.u.clone()];
+    member.effort.adjoint += with_matrix(member, |member, matrix| {
+        let mut e = equation(shared, member, Some(stage), &still);
+        e.residual(&next.u);
+        let iterations = newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &next.u, &mut z)?;
+        gradient.take(&e, &next.u, &z[0]);
+        Ok::<usize, Reason>(iterations)
+    })?;
+    Ok(())
+}
+
+/// Its tangent.
+pub(crate) fn step_tangent(
+    shared: &Shared,
+    member: &mut Member,
+    stage: &Stage,
+    next: &MemberState,
+    t: &mut MemberTangent,
+) -> Result<(), Reason> {
+    let still = Start::still(next.u.len());
+    t.dv.iter_mut().for_each(|v| v.fill(DVec3::ZERO));
+    with_matrix(member, |member, matrix| {
+        let mut e = equation(shared, member, Some(stage), &still);
+        e.residual(&next.u);
+        let minus = |mut v: Nodes| {
+            v.iter_mut().for_each(|v| *v = -*v);
+            v
+        };
+        t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&next.u, r))).collect();
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &next.u, &mut t.du).map(|_| ())
+    })
+}
