@@ -88,4 +88,4 @@ pub use objective::{Coordinates, Objective};
 pub use placing::{PlaceOptions, PlaceRound, Placed, Placement, place};
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};
-pub use tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, refine, track};
+pub use tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, refine, track, track_on};
