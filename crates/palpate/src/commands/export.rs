@@ -10,7 +10,7 @@ use crate::results::export::{ExportDocument, ExportedFormat};
 use clap::{Args, ValueEnum};
 use palpate_engine::number;
 use palpate_export::{ExportError, Format, Specimen, export, find, formats};
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use std::path::{Path, PathBuf};
 
 const AFTER_HELP: &str = "\
@@ -129,7 +129,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         });
         files.extend(done.files);
     }
-    make_folder(&folder)?;
+    let _lock = crate::folder::take(&folder, console)?;
     for file in &files {
         write_file(folder.join(&file.name), |w| w.write_all(file.text.as_bytes()))?;
     }

@@ -14,7 +14,7 @@ use glam::DVec3;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, Frame, RgbaImage};
 use palpate_io::InputError;
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use palpate_io::vtk::{Elements, Values, write_pvd, write_vtu};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let report = if a.report.is_dir() { a.report.join("report.html") } else { a.report.clone() };
     let data = read_report(&report)?;
     let folder = a.out.clone().unwrap_or_else(|| report.parent().unwrap_or(Path::new(".")).join("pictures"));
-    make_folder(&folder)?;
+    let _lock = crate::folder::take(&folder, console)?;
     let mut w = Writer { folder: folder.clone(), files: Vec::new() };
     let wants = |f: Format| a.format.contains(&f);
     for c in data.charts.iter().filter(|c| c.main || a.all) {

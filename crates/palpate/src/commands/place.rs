@@ -12,7 +12,7 @@ use crate::results::placement::{ControlRow, PlaceRoundRow, PlacementDocument};
 use clap::{Args, ValueEnum};
 use palpate_diagnose::stated;
 use palpate_engine::number;
-use palpate_io::output::{make_folder, write_file};
+use palpate_io::output::write_file;
 use palpate_model::params::ParamKey;
 use palpate_model::params::fields::{Blend, Varied};
 use std::path::PathBuf;
@@ -118,14 +118,18 @@ fn document(a: &Arguments, p: &Placement, seconds: f64) -> PlacementDocument {
 }
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
-    let experiment = Experiment::open(&a.scene)?;
-    console.warn(experiment.warnings());
     let folder = out_folder(&a.out, &a.scene, "-placed");
-    make_folder(&folder)?;
-    let clock = Instant::now();
+    crate::folder::check(&folder)?;
     let mut progress = console.progress(0, "placing");
+    progress.on(0, "reading");
+    let experiment = Experiment::open(&a.scene)?;
+    progress.aside(|| console.warn(experiment.warnings()));
+    let lock = crate::folder::take(&folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
+    let clock = Instant::now();
     let (backend, note) = a.backend.choose_for(experiment.plan(), &Demand::forward(1), &mut progress)?;
-    note.iter().for_each(|n| console.note(n));
+    progress.aside(|| note.iter().for_each(|n| console.note(n)));
     let options = PlaceOptions {
         varied: a.number.varied().0,
         most: a.most as usize,
@@ -135,6 +139,7 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     };
     let placement = place(&experiment, &options, |what| progress.on(0, what))?;
     progress.finish();
+    lock.check()?;
     let document = document(a, &placement, clock.elapsed().as_secs_f64());
     let scene = palpate_io::scene_in(placement.experiment.text(), placement.experiment.scene(), &folder)?;
     write_file(folder.join("scene.toml"), |w| w.write_all(scene.as_bytes()))?;
