@@ -138,7 +138,7 @@ pub fn track(experiment: &Experiment, mut progress: impl FnMut(usize) -> Control
         interrupted = flow.is_break() && done.len() < frames.len();
         flow
     };
-    tracking::track(&mut body, &settings, &frames, experiment.scene().time.start, &draws, visit)?;
+    tracking::track(&mut body, &settings, &frames, experiment.start_time(), &draws, visit)?;
     doubt_the_sparse(&mut done);
     Ok(TrackedBody { surface, triangles, frames: done, interrupted, recorded: frames.len(), dynamic, noise: settings.noise })
 }

@@ -13,6 +13,7 @@ pub mod devices;
 pub mod diagnosis;
 pub mod effects;
 pub mod fit;
+pub mod frames;
 pub mod import;
 pub mod inspection;
 pub mod lock;
