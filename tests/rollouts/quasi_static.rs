@@ -246,6 +246,8 @@ fn a_point_that_is_not_seen_is_not_held() {
 fn a_state_that_would_not_stay_fails_by_its_number() {
     let mut s = beam();
     s.gravity = DVec3::ZERO;
+    // Down a direction that is not that of the indefinite tangent the last digits take hundreds of iterations.
+    s.solver.tolerance = Solver::default().tolerance;
     // Along the axis of symmetry: π² E I/(4 L²) = 4.2 N buckle it, and it stays straight for want of a reason to go either way.
     let ends: Vec<DVec3> = [[0.0, 0.0], [0.03, 0.0], [0.0, 0.03], [0.03, 0.03]].map(|[y, z]| DVec3::new(0.1, y, z)).to_vec();
     let force = |f: f64| vec![DVec3::new(-0.25 * f, 0.0, 0.0); 4];

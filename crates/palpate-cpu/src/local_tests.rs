@@ -77,7 +77,8 @@ impl At<'_> {
             w.set_params(&ParamBatch::from_rows(&[theta.to_vec()]));
         }
         let n = self.u1.len();
-        let still = Stage { number: 0, step: 0, from: Vec::new(), length: 1.0, theta: 1.0, time: 0.0, completes: None };
+        let still =
+            Stage { number: 0, step: 0, from: Vec::new(), length: 1.0, theta: 1.0, time: 0.0, completes: None, still: false };
         let blank = [MemberState { u: zeros(n), v: zeros(n) }];
         let start = match self.stage {
             Some(stage) => Start::new(stage, &past.iter().collect::<Vec<_>>()),

@@ -151,7 +151,7 @@ pub fn track_on(
         interrupted = flow.is_break() && done.len() < frames.len();
         flow
     };
-    tracking::track(&mut body, &settings, &frames, experiment.scene().time.start, &draws, visit)?;
+    tracking::track(&mut body, &settings, &frames, experiment.start_time(), &draws, visit)?;
     doubt_the_sparse(&mut done);
     Ok(TrackedBody { surface, triangles, frames: done, interrupted, recorded: frames.len(), dynamic, noise: settings.noise })
 }

@@ -198,6 +198,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     Plan {
         fields: Vec::new(),
         followed: Vec::new(),
+        driven: Vec::new(),
         frames: Default::default(),
         model: &ALL[0],
         curves: Default::default(),
@@ -206,6 +207,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
         planes: vec![PlaneSite { polar_axis: 0, stiffness: None }],
         clamps: Vec::new(),
         masses: Default::default(),
+        times: Vec::new(),
         clock: Clock { step: 0.01, steps, theta: 0.6, scheme: palpate_model::plan::scheme::theta() },
         initial: InitialShape::Rest,
         pivot: DVec3::ZERO,

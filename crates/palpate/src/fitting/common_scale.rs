@@ -24,9 +24,9 @@ pub(crate) fn warnings(experiments: &[Experiment], theta: &[Vec<f64>], backend: 
         }
         if is_silent(plan, theta, backend) == Some(true) {
             out.push(format!(
-                "{}: no known force acts, so that only ratios of stiffnesses are determined, and Young's modulus is that of nobody: twice as \
-                 stiff a body with supports twice as stiff gives the same states. Give a [[load]] or the weight (gravity and density), or \
-                 leave the modulus as it is stated and free ratios (a field) alone",
+                "{}: no known force acts, so that only ratios of stiffnesses are determined and Young's modulus is not: twice as stiff a body with \
+                 supports twice as stiff gives the same states. Give a [[load]] or the weight (gravity and density), or leave the modulus as it \
+                 is stated and free ratios alone (a field)",
                 e.scene().path.display()
             ));
         }

@@ -8,6 +8,7 @@ use crate::residuals::ResidualSummary;
 use glam::DVec3;
 use palpate_engine::Stop;
 use palpate_model::observation::Observation;
+use palpate_model::params::ParamKey;
 
 /// Distances from the frames that a fit sees, or from those that it does not [m].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +89,13 @@ pub(crate) fn held_out(
     let mut frames = [0; 2];
     for ((e, other), theta) in experiments.iter().zip(&others).zip(theta) {
         let Some(other) = other else { continue };
-        tested.push(ResidualSummary::new(other, backend, theta, &Stop::default())?);
+        let mut theta = theta.clone();
+        let plan = other.plan();
+        if let Some(first) = plan.times.first() {
+            // A sequence of other states begins at another time.
+            theta[plan.layout.index(ParamKey::TimeStart)] = *first;
+        }
+        tested.push(ResidualSummary::new(other, backend, &theta, &Stop::default())?);
         let middles = middles(&e.plan().observation);
         for (part, of) in [e, other].into_iter().enumerate() {
             let (o, nodes) = (&of.plan().observation, &of.plan().body.nodes);

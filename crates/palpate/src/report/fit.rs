@@ -8,9 +8,9 @@ use crate::fitting::{Distances, Fitted, FreeNumber, FromTracks, total};
 use crate::residuals::ResidualSummary;
 use crate::results::finite;
 use crate::results::fit::{
-    Cost, FieldReference, FitDocument, FoundCurve, FrameDistances, Frames, Parameter, Parts, Residual, ResidualBefore, Run,
-    Tracked,
+    Cost, FieldReference, FitDocument, FoundCurve, Parameter, Parts, Residual, ResidualBefore, Run, Tracked,
 };
+use crate::results::frames::{FrameDistances, Frames};
 use palpate_diagnose::stated;
 use palpate_fit::{FittedParameter, Progress};
 use palpate_model::params::unit_behind;

@@ -47,7 +47,7 @@ pub struct FitDocument {
     pub residual_before: Option<ResidualBefore>,
     /// Distances from the frames that the fit saw and from those that it did not, where the scene keeps some from it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frames: Option<Frames>,
+    pub frames: Option<super::frames::Frames>,
     /// Place in `runs` of the best.
     pub best: usize,
     /// One search per start.
@@ -68,28 +68,6 @@ pub struct FitDocument {
 
 impl Document for FitDocument {
     const FORMAT: &'static str = "fit/2";
-}
-
-/// How far a fit is from frames that it saw and did not see.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Frames {
-    /// Those that it saw.
-    pub train: FrameDistances,
-    /// Those that it did not see.
-    pub test: FrameDistances,
-}
-
-/// Root mean square distances from some frames [m].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FrameDistances {
-    /// Number of frames.
-    pub frames: usize,
-    /// From the simulation with the values found.
-    pub rms: Option<f64>,
-    /// From the body at rest; `None` for readings without a place of their own.
-    pub rest: Option<f64>,
-    /// From a body that does not move: points stay in the middle of where the fit saw them.
-    pub unmoved: Option<f64>,
 }
 
 /// A number as tracked points alone give it.
@@ -410,6 +388,7 @@ mod tests {
             independent_readings: None,
             residual: Residual { scenes: vec![residual(), residual()], ..residual() },
             residual_before: Some(ResidualBefore { rms: Some(0.02) }),
+            frames: Some(super::super::frames::Frames::default()),
             best: 0,
             runs: vec![Run {
                 start: values.clone(),
@@ -447,6 +426,7 @@ mod tests {
             "evaluations",
             "fields",
             "format",
+            "frames",
             "from_tracks",
             "independent_readings",
             "notes",
