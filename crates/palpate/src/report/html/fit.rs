@@ -262,7 +262,7 @@ fn runs(fitted: &Fitted) -> Markup {
     let columns = [("start", Text), ("from", Text), ("to", Text), ("cost", Number), ("iterations", Number), ("ended", Text)];
     html! {
         details {
-            summary { (fitted.result.runs.len()) " searches, " (fitted.result.evaluations) " evaluations, by " (fitted.optimizer.name()) }
+            summary { (fitted.result.runs.len()) @if fitted.result.runs.len() == 1 { " search, " } @else { " searches, " } (fitted.result.evaluations) " evaluations, by " (fitted.optimizer.name()) }
             @if found.len() > 1 { p { "In this order: " (order) "." } }
             div.wide {
                 table {
