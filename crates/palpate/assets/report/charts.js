@@ -25,7 +25,7 @@ palpate.charts = (() => {
     const base = { label: s.label || " ", stroke: colour, width: s.role === "search" ? 1.2 : 2, points: { show: false }, value: (_, v) => palpate.number(v) };
     if (s.style === "dashed") return { ...base, dash: [7, 5] };
     if (s.style === "dots") {
-      return { ...base, width: 0, paths: () => null, points: { show: true, size: wide ? 4 : 6, stroke: colour, fill: colour } };
+      return { ...base, width: 0, paths: () => null, points: { show: true, size: palpate.floats(s.x).length < 30 ? 9 : wide ? 5 : 6, stroke: colour, fill: colour } };
     }
     if (s.style === "columns") return { ...base, width: 1, fill: colour + "66", paths: uPlot.paths.bars({ size: [1, 100] }) };
     // A single point makes no line.

@@ -50,6 +50,17 @@ pub fn quantity(value: f64, error: Option<f64>, unit: &str) -> String {
     if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
+/// A size in two digits with its unit, as parts of an error are told.
+pub fn size(x: f64, unit: &str) -> String {
+    if !x.is_finite() {
+        return "not known".into();
+    }
+    let (factor, unit) = unit_for(x, unit);
+    let number =
+        if (1e-3..1e6).contains(&(x * factor).abs()) { digits(x * factor, 2) } else { powers(&format!("{:.1e}", x * factor)) };
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
+}
+
 /// `1.2e-5` as 1.2·10⁻⁵.
 fn powers(text: &str) -> String {
     let raise = |c: char| c.to_digit(10).and_then(|d| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(d as usize)).unwrap_or('⁻');
@@ -128,6 +139,10 @@ mod tests {
         ] {
             assert_eq!(quantity(value, error, unit), text);
         }
+        assert_eq!(
+            (size(128.8, "Pa"), size(2365.0, "Pa"), size(2e-7, "1")),
+            ("129 Pa".into(), "2.4 kPa".into(), "2.0·10⁻⁷".into())
+        );
         assert_eq!(powers("(2.50 ± 0.31)e-5"), "(2.50 ± 0.31)·10⁻⁵");
     }
 

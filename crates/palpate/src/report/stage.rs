@@ -79,23 +79,24 @@ fn floor(picture: &mut Picture, scene: &SceneData, camera: &Pinhole) {
 fn axes(picture: &mut Picture, scene: &SceneData, camera: &Pinhole) {
     let corner = DVec3::from_array(scene.corner);
     let bounds = scene.bounds.map(DVec3::from_array);
+    // Numbers that would stand in each other's way are left out.
+    let mut taken: Vec<(f64, f64)> = Vec::new();
     for axis in 0..3 {
         let mut end = corner;
         end[axis] = if corner[axis] == bounds[0][axis] { bounds[1][axis] } else { bounds[0][axis] };
         segment(picture, camera, corner, end, 1.5, INK, 0.8);
         let (from, to) = (corner[axis].min(end[axis]), corner[axis].max(end[axis]));
-        let mut last: Option<(f64, f64)> = None;
         let outwards = outwards(camera, bounds, corner, end);
         for k in (from / scene.tick).ceil() as i64..=(to / scene.tick).floor() as i64 {
             let mut p = corner;
             p[axis] = k as f64 * scene.tick;
             let q = camera.project(p);
             picture.line((q.x, q.y), (q.x + 5.0 * outwards.0, q.y + 5.0 * outwards.1), 1.0, INK, 0.8);
-            // Numbers that would stand in each other's way are left out.
-            if last.is_none_or(|l| (l.0 - q.x).abs() > 30.0 || (l.1 - q.y).abs() > 14.0) {
-                let text = format!("{}", (p[axis] * 1e6).round() / 1e3);
-                picture.text(q.x + 16.0 * outwards.0, q.y + 13.0 * outwards.1, 11.0, Anchor::Middle, INK, &text);
-                last = Some((q.x, q.y));
+            let (x, y) = (q.x + 16.0 * outwards.0, q.y + 13.0 * outwards.1);
+            if taken.iter().all(|t| (t.0 - x).abs() > 30.0 || (t.1 - y).abs() > 14.0) {
+                let text = format!("{}", (p[axis] * 1e6).round() / 1e3).replace('-', "−");
+                picture.text(x, y, 11.0, Anchor::Middle, INK, &text);
+                taken.push((x, y));
             }
         }
         // Behind the axis' far end, where no number stands.

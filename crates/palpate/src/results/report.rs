@@ -154,7 +154,7 @@ pub struct SceneData {
     pub triangles: Indices,
     /// Frames that are shown in space.
     pub shown: Vec<ShownFrame>,
-    /// Place in `shown` of the frame with the largest residual of the second motion.
+    /// Place in `shown` of the frame that is looked at first: one with a large residual.
     pub worst: usize,
     /// What cameras saw.
     pub overlays: Vec<Overlay>,

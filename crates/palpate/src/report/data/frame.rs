@@ -33,7 +33,7 @@ pub fn bounds(e: &Experiment, scene: &SceneData) -> ([[f64; 3]; 2], f64) {
     let size = (hi - lo).max_element().max(1e-9);
     let pad = DVec3::splat(0.03 * size);
     (lo, hi) = (lo - pad, hi + pad);
-    ([lo.to_array(), hi.to_array()], round_up(size / 6.0))
+    ([lo.to_array(), hi.to_array()], round_up(size / 8.0))
 }
 
 /// From where one looks at first: as the camera that saw most does, a little from above, so that what it measured is in front.

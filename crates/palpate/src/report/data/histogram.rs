@@ -6,8 +6,8 @@ use crate::report::quantity::millimetres;
 use crate::results::report::{Chart, Role, Series, Style, Topic};
 use palpate_model::observation::ReadingKind;
 
-/// Bins of a histogram.
-const BINS: usize = 61;
+/// Fewest and most bins of a histogram, which has one in its middle.
+const BINS: (usize, usize) = (9, 61);
 
 /// Histograms of the kinds that were read; `noise` is the distance that is expected of all readings [m].
 pub fn histograms(e: &Experiment, motions: [Option<&Motion>; 2], names: [&str; 2], noise: f64) -> Vec<Chart> {
@@ -26,7 +26,9 @@ pub fn histograms(e: &Experiment, motions: [Option<&Motion>; 2], names: [&str; 2
         sizes.sort_by(f64::total_cmp);
         let high = sizes.get((sizes.len() as f64 * 0.99) as usize).or(sizes.last()).copied().unwrap_or(0.0);
         let half = (if sigma.is_finite() { 4.0 * sigma } else { 0.0 }).max(1.1 * high).max(1e-12);
-        let width = 2.0 * half / BINS as f64;
+        // Some ten residuals a bin, as far as they go.
+        let bins = (samples.len() / 20).clamp(BINS.0 / 2, BINS.1 / 2) * 2 + 1;
+        let width = 2.0 * half / bins as f64;
         let of = |m: usize| motions[m].and_then(|m| m.samples.get(kind)).map_or(&[][..], |s| &s[..]);
         let what = match kind {
             ReadingKind::Depth => "distances of depth points",
@@ -37,9 +39,12 @@ pub fn histograms(e: &Experiment, motions: [Option<&Motion>; 2], names: [&str; 2
         let middle = |k: usize| ((k as f64 + 0.5) * width - half) * 1e3;
         let mut series = Vec::new();
         for (m, (role, style)) in [(Role::Before, Style::Line), (Role::After, Style::Columns)].into_iter().enumerate().rev() {
-            let shares = shares(of(m), half, width);
+            let (shares, beyond) = shares(of(m), half, bins);
             let points = shares.into_iter().enumerate().map(|(k, s)| (middle(k), 100.0 * s));
-            series.push(Series::new(names[m], role, style, points));
+            // Far residuals of start values would tower at the ends over everything else.
+            let label =
+                if beyond > 0.005 { format!("{} ({:.0} % beyond)", names[m], 100.0 * beyond) } else { names[m].to_string() };
+            series.push(Series::new(label, role, style, points));
         }
         series.retain(|s| !s.x.0.is_empty());
         if sigma.is_finite() && sigma > 0.0 {
@@ -58,7 +63,7 @@ pub fn histograms(e: &Experiment, motions: [Option<&Motion>; 2], names: [&str; 2
             key: format!("histogram-{}", kind.name()),
             topic: Topic::Histogram,
             subject: what.into(),
-            title: format!("Residuals of {what}; those beyond the ends are counted in the first and last bin"),
+            title: format!("Residuals of {what}, as shares of all"),
             words: format!("Histogram of residuals of {what}. {}{noise}.", told.join("; ")),
             x: "residual [mm]".into(),
             y: "share [%]".into(),
@@ -70,15 +75,19 @@ pub fn histograms(e: &Experiment, motions: [Option<&Motion>; 2], names: [&str; 2
     found.samples.iter().map(one).collect()
 }
 
-fn shares(samples: &[f64], half: f64, width: f64) -> Vec<f64> {
+/// Shares of so many bins between ±`half`, and the share beyond.
+fn shares(samples: &[f64], half: f64, bins: usize) -> (Vec<f64>, f64) {
     if samples.is_empty() {
-        return Vec::new();
+        return (Vec::new(), 0.0);
     }
-    let mut counts = vec![0usize; BINS];
-    for x in samples {
-        counts[(((x + half) / width).floor().max(0.0) as usize).min(BINS - 1)] += 1;
+    let mut counts = vec![0usize; bins];
+    let width = 2.0 * half / bins as f64;
+    for x in samples.iter().filter(|x| x.abs() <= half) {
+        counts[(((x + half) / width) as usize).min(bins - 1)] += 1;
     }
-    counts.into_iter().map(|n| n as f64 / samples.len() as f64).collect()
+    let all = samples.len() as f64;
+    let within = counts.iter().sum::<usize>() as f64;
+    (counts.into_iter().map(|n| n as f64 / all).collect(), 1.0 - within / all)
 }
 
 fn moments(samples: &[f64]) -> Option<[f64; 2]> {
@@ -93,11 +102,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_residual_is_counted_once_and_far_ones_at_the_ends() {
+    fn every_residual_is_counted_once_within_or_beyond() {
         let all = [-9.0, -0.99, -0.001, 0.0, 0.5, 0.99, 7.0, 8.0];
-        let shares = shares(&all, 1.0, 2.0 / BINS as f64);
-        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        assert_eq!((shares[0], shares[BINS - 1], shares[BINS / 2]), (0.25, 0.375, 0.25));
+        let (shares, beyond) = shares(&all, 1.0, 61);
+        assert!((shares.iter().sum::<f64>() + beyond - 1.0).abs() < 1e-12);
+        assert_eq!((shares[0], shares[60], shares[30], beyond), (0.125, 0.125, 0.25, 0.375));
         assert_eq!((moments(&[1.0, 3.0]), moments(&[])), (Some([2.0, 1.0]), None));
     }
 }

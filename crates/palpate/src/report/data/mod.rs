@@ -109,8 +109,7 @@ fn scene(
         .filter(|_| after.is_some())
         .map(|(k, f)| ShownFrame { frame: *f, time: frames[*f].time, motions: motions.map(|m| m.map(|m| m.shown[k].clone())) })
         .collect();
-    let of = |k: usize| out.rms[1].get(out.shown[k].frame).copied().flatten().unwrap_or(0.0);
-    out.worst = (0..out.shown.len()).max_by(|a, b| of(*a).total_cmp(&of(*b)).then(b.cmp(a))).unwrap_or(0);
+    out.worst = worst(&out);
     let mut all = tracks::tracks(e, &plot, motions, names);
     all.extend(charts::residuals(e, &out, motions, names));
     all.extend(histogram::histograms(e, motions, names, c.noise));
@@ -124,6 +123,16 @@ fn scene(
     out.floor = frame::floor(e, &out);
     out.overlays = overlay::overlays(e, &out);
     Ok((out, all))
+}
+
+/// The frame that is looked at first: where the second motion lies farthest from the measurement; where noise explains that, the first one.
+fn worst(scene: &SceneData) -> usize {
+    let of = |m: usize, k: usize| scene.rms[m].get(scene.shown[k].frame).copied().flatten().unwrap_or(0.0);
+    let largest = |m: usize| (0..scene.shown.len()).max_by(|a, b| of(m, *a).total_cmp(&of(m, *b)).then(b.cmp(a))).unwrap_or(0);
+    let found = largest(1);
+    // Half as much again is beyond what chance does to a frame.
+    let explained = !scene.shown.is_empty() && of(1, found) < 1.5 * scene.noise;
+    if explained && !scene.rms[0].is_empty() { largest(0) } else { found }
 }
 
 /// Residual at which colours are full: one that few exceed, and not less than what noise leaves.

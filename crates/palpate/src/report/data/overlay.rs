@@ -106,7 +106,7 @@ fn overlay(
     let ink = [40, 40, 40];
     let row = 0.5 * MARGIN.0 as f64;
     picture.text(2.0, row, 14.0, Anchor::Start, ink, &format!("{}, t = {:.4} s", camera.name, frame.time));
-    picture.text((w + 14) as f64, row, 14.0, Anchor::Start, ink, "measured depth − fitted depth");
+    picture.text((w + 14) as f64, row, 14.0, Anchor::Start, ink, "measured − simulated depth");
     let bottom = (h + MARGIN.0 + 6) as f64;
     let grey = |t: f64| [shade_of(t); 3];
     let ends = |r: f64| format!("{} m", digits(r, 3));

@@ -300,9 +300,9 @@ fn tried(d: &Diagnosis) -> Markup {
                     }
                 }
             }
-            @for (open, what) in [(true, "not yet fitted, for the search ended before"), (false, "not fitted, for they promise too little")] {
+            @for (open, what) in [(true, "not yet fitted, for the search ended before"), (false, "not fitted")] {
                 @let list = others(open);
-                @if !list.is_empty() { p { (what) ": " (list.join(", ")) "." } }
+                @if !list.is_empty() { p { (what) ", with the share of the squared residual that each promised: " (list.join(", ")) "." } }
             }
         }
         @for n in &d.not_tried {

@@ -4,7 +4,7 @@ use super::{Column, chart, heads, page, reproduce, scene::scene};
 use crate::experiment::Experiment;
 use crate::fitting::{Fitted, total};
 use crate::report::fit::{beforehand, field_line, grid_line, number, other_way, posterior_lines, worth};
-use crate::report::quantity::{millimetres, name, quantity};
+use crate::report::quantity::{millimetres, name, quantity, size as short};
 use crate::residuals::ResidualSummary;
 use crate::results::fit::{FieldReference, FoundCurve, VerdictWord};
 use crate::results::report::{ReportData, Topic};
@@ -139,7 +139,7 @@ fn parts(fitted: &Fitted, i: usize) -> Markup {
         @for (what, size) in all {
             div.part {
                 span.bar aria-hidden="true" { span style={ "width:" (format!("{:.0}", 100.0 * size.powi(2) / whole)) "%" } {} }
-                (what) " " (quantity(size, None, unit).replace("not known", "–"))
+                (what) " " (short(size, unit))
             }
         }
         @if let (Some(before), Some(order)) = (h.uncorrected, order) {
@@ -265,7 +265,7 @@ fn runs(fitted: &Fitted) -> Markup {
     let columns = [("start", Text), ("from", Text), ("to", Text), ("cost", Number), ("iterations", Number), ("ended", Text)];
     html! {
         details {
-            summary { (fitted.result.runs.len()) " searches, " (fitted.result.evaluations) " evaluations, by " (fitted.optimizer.name()) }
+            summary { (fitted.result.runs.len()) @if fitted.result.runs.len() == 1 { " search, " } @else { " searches, " } (fitted.result.evaluations) " evaluations, by " (fitted.optimizer.name()) }
             @if found.len() > 1 { p { "In this order: " (order) "." } }
             div.wide {
                 table {

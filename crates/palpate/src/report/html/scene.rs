@@ -29,7 +29,7 @@ pub fn scene(data: &ReportData, number: usize) -> Markup {
                 }
             }
             (space(data, number))
-            (overlays(&scene.overlays))
+            (overlays(data, &scene.overlays))
             @if of(Topic::Residual).next().is_some() {
                 h2 { @if scene.times.len() == 1 { "Residual along the body" } @else { "Residual over time" } }
                 @for c in of(Topic::Residual) { (chart(c)) }
@@ -94,7 +94,7 @@ fn words(data: &ReportData, scene: &SceneData, k: usize) -> String {
     format!("The simulated body with what was measured at {:.4} s. {}.", f.time, told.join("; "))
 }
 
-fn overlays(all: &[Overlay]) -> Markup {
+fn overlays(data: &ReportData, all: &[Overlay]) -> Markup {
     html! {
         @if !all.is_empty() {
             h2 { "Camera overlay" }
@@ -103,9 +103,10 @@ fn overlays(all: &[Overlay]) -> Markup {
                     img alt=(o.words) src={ "data:image/png;base64," (o.png) };
                 }
                 figcaption {
-                    "Left: measured depth, near dark and far light, what the mask leaves out paler; outlines of the body with the " b.before { "start values" }
-                    " (orange) and " b.after { "fitted" } " (blue), of the mask in black. Right: measured minus fitted depth; hatched where the body should be seen and "
-                    "nothing was measured, dark where the mask has the object and the model has not."
+                    "Left: measured depth, near dark and far light, what the mask leaves out paler; outlines of the body: " b.before { (data.motions[0]) }
+                    " in orange, " b.after { (data.motions[1]) } " in blue, of the mask in black. Right: measured minus simulated depth of the latter; hatched where "
+                    "the body should be seen and nothing was measured, dark where the mask has the object and the model has not. Depths and camera are as they "
+                    "were recorded: what a measurement effect of the scene corrects is still in them."
                 }
             }
         }
