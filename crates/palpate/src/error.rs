@@ -99,7 +99,9 @@ impl Error {
     /// Of an interrupted computation with a journal says that this is kept, where anything stands in it.
     pub(crate) fn with_kept(self, journal: &Path) -> Error {
         match self {
-            Error::Interrupted if journal.metadata().is_ok_and(|m| m.len() > 0) => Error::InterruptedKept { kept: journal.into() },
+            Error::Interrupted if journal.metadata().is_ok_and(|m| m.len() > 0) => {
+                Error::InterruptedKept { kept: journal.into() }
+            }
             other => other,
         }
     }

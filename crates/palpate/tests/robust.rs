@@ -100,7 +100,10 @@ fn inspect(path: &Path) -> (Option<i32>, String, String) {
 fn what_is_no_plain_file_is_refused_and_never_waited_for() {
     let place = Place::new();
     place.observed();
-    let mesh = place.write("mesh.toml", &BLOCK.replace("shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }", "mesh = \"pipe.ply\""));
+    let mesh = place.write(
+        "mesh.toml",
+        &BLOCK.replace("shape = { box = { min = [0, 0, 0], max = [0.04, 0.04, 0.08] } }", "mesh = \"pipe.ply\""),
+    );
     place.pipe("pipe.ply");
     place.pipe("folder/recording.toml");
     place.pipe("scene.toml");
@@ -241,11 +244,19 @@ fn the_right_cause_is_named() {
     let wide = said("band.toml", &|s| s.replace("\"sparse-surface\"", "\"sparse-surface\"\nband = 1e300"));
     assert!(wide.0 == Some(2) && wide.1.contains("observation.band") && wide.1.contains("at most 100 (cells)"), "{}", wide.1);
     let out = said("out.toml", &|s| s.replace("\"sparse-surface\"", "\"sparse-surface\"\nfile = \"../other/recording.toml\""));
-    assert!(out.0 == Some(2) && out.1.contains("observation.file: ") && out.1.contains("leaves the recording's folder"), "{}", out.1);
+    assert!(
+        out.0 == Some(2) && out.1.contains("observation.file: ") && out.1.contains("leaves the recording's folder"),
+        "{}",
+        out.1
+    );
     let held = said("held.toml", &|s| s.replace("max = [0.05, 0.05, 0.001]", "max = [0.05, 0.05, 0.1]"));
     assert!(held.0 == Some(0) && held.1.contains("clamps hold the whole surface"), "{}", held.1);
     let fast = said("fast.toml", &|s| s.replace("velocity = [0.6", "velocity = [1e6"));
-    assert!(fast.1.contains("initial.velocity: 1e6 m/s is unusual") || fast.1.contains("initial.velocity: 1000000 m/s"), "{}", fast.1);
+    assert!(
+        fast.1.contains("initial.velocity: 1e6 m/s is unusual") || fast.1.contains("initial.velocity: 1000000 m/s"),
+        "{}",
+        fast.1
+    );
     // Markers in millimetres.
     place.write("mm/markers.csv", "time,name,x,y,z\n0,a,20,20,80\n0.05,a,25,20,80\n");
     place.write(

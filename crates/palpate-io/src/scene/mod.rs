@@ -39,7 +39,7 @@ use std::path::Path;
 pub const FORMAT: &str = "scene/1";
 
 /// More steps than this are a slip of units, not a simulation.
-const MOST_STEPS: f64 = 1e7;
+const MOST_STEPS: f64 = 1e6;
 
 /// Reads a scene and every file it names except the recording.
 ///
@@ -352,12 +352,15 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     }
     if let Some(file) = t.optional_str("file")? {
         if leaves(file) {
-            let text = format!("\"{file}\" leaves the recording's folder; it names a file inside; for another folder give `recording`");
+            let text =
+                format!("\"{file}\" leaves the recording's folder; it names a file inside; for another folder give `recording`");
             return Err(t.error("file", text));
         }
         spec.file = file.to_string();
     }
-    spec.band = t.f64_where("band", |x| x > 0.0 && x <= WIDEST_BAND, "is not allowed: must be > 0 and at most 100 (cells)")?.unwrap_or(spec.band);
+    spec.band = t
+        .f64_where("band", |x| x > 0.0 && x <= WIDEST_BAND, "is not allowed: must be > 0 and at most 100 (cells)")?
+        .unwrap_or(spec.band);
     spec.pixel_stride = t.optional_count("pixel_stride", 1..=100_000)?.map_or(spec.pixel_stride, |n| n as usize);
     Ok(Some(spec))
 }
