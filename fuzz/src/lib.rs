@@ -85,6 +85,11 @@ fn import(dir: &Path, data: &[u8]) {
     let endings = ["csv", "npz", "ply", "pcd", "txt", "trc", "bag", "mcap", "c3d", "xyz", "npy", "json"];
     let source = put(dir, &format!("source.{}", endings[usize::from(*first) % endings.len()]), data);
     let mut look = |_: f64, _: &str| ControlFlow::Continue(());
-    any(palpate_import::import(&source, &dir.join("out"), &Options { force: true, ..Options::default() }, &mut Watch::new(&mut look)));
+    any(palpate_import::import(
+        &source,
+        &dir.join("out"),
+        &Options { force: true, ..Options::default() },
+        &mut Watch::new(&mut look),
+    ));
     drop(fs::remove_file(source));
 }

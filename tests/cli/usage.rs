@@ -84,8 +84,8 @@ fn a_folder_that_cannot_be_made_is_known_before_the_simulation() {
     let (scene, out) = (file("free.toml"), file("taken").join("seen"));
     for verb in [&["simulate", arg(&scene)][..], &["observe", arg(&scene), "--camera", CAMERA]] {
         let a = palpate(&[verb, &["--out", arg(&out)]].concat());
-        assert_eq!(a.code, 1, "{}", a.err);
-        assert!(a.err.contains("taken/seen: cannot be written: ") && !a.err.contains("hint"), "{}", a.err);
+        assert_eq!(a.code, 2, "{}", a.err);
+        assert!(a.err.contains("taken is a file; give a folder") && !a.err.contains("hint"), "{}", a.err);
     }
 }
 

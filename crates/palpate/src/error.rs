@@ -99,7 +99,10 @@ impl Error {
     /// Of an interrupted computation with a journal says that this is kept, where anything stands in it.
     pub(crate) fn with_kept(self, journal: &Path) -> Error {
         match self {
-            Error::Interrupted if journal.metadata().is_ok_and(|m| m.len() > 0) => Error::InterruptedKept { kept: journal.into() },
+            // The first line is the head.
+            Error::Interrupted if std::fs::read_to_string(journal).is_ok_and(|text| text.lines().count() > 1) => {
+                Error::InterruptedKept { kept: journal.into() }
+            }
             other => other,
         }
     }

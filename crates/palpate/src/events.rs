@@ -92,7 +92,10 @@ mod tests {
     fn an_event_is_a_line_that_programs_and_people_read() {
         let json = text(Log::Json, Kind::Stage, "cut \"it\"\n", Some(0.25), None);
         let value: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
-        assert_eq!((&value["kind"], &value["message"], &value["seconds"]), (&"stage".into(), &"cut \"it\"\n".into(), &0.25.into()));
+        assert_eq!(
+            (&value["kind"], &value["message"], &value["seconds"]),
+            (&"stage".into(), &"cut \"it\"\n".into(), &0.25.into())
+        );
         assert!(json.ends_with("}\n") && json.lines().count() == 1 && value.get("code").is_none(), "{json}");
         let plain = text(Log::Text, Kind::Stage, "cut", Some(0.25), None);
         assert!(plain.ends_with("Z Stage cut took 0.250 s\n"), "{plain}");

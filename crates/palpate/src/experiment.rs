@@ -162,7 +162,11 @@ impl Experiment {
     ) -> Result<Experiment, Error> {
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
         if let Some(bytes) = plan_memory(&scene, shape.as_ref()) {
-            require(bytes as u64, &format!("{}: cutting the body", scene.path.display()), "take coarser cells: object.cell_size")?;
+            require(
+                bytes as u64,
+                &format!("{}: cutting the body", scene.path.display()),
+                "take coarser cells: object.cell_size",
+            )?;
         }
         let cutting = Stage::begin("cut the body");
         let plan = build_plan_of(&scene, shape.clone(), observation, &rest)

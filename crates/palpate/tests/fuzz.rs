@@ -18,7 +18,21 @@ const LONGEST: Duration = Duration::from_secs(20);
 
 /// Texts that readers trip over.
 const WORDS: [&str; 16] = [
-    "-1", "0", "1e300", "-1e-300", "nan", "inf", "4294967295", "18446744073709551615", "99999999999999999999", "../", "\"", "[[", "]", "\0", "\u{feff}",
+    "-1",
+    "0",
+    "1e300",
+    "-1e-300",
+    "nan",
+    "inf",
+    "4294967295",
+    "18446744073709551615",
+    "99999999999999999999",
+    "../",
+    "\"",
+    "[[",
+    "]",
+    "\0",
+    "\u{feff}",
     "é",
 ];
 
@@ -73,7 +87,7 @@ fn no_reader_panics_or_hangs_on_a_damaged_file() {
         let dir = tempfile::tempdir().expect("a folder");
         let files = corpus(name);
         let mut random = ChaCha8Rng::seed_from_u64(number as u64);
-        let mut run = |data: &[u8]| {
+        let run = |data: &[u8]| {
             let begun = Instant::now();
             let kept = dir.path().join("last");
             std::fs::write(&kept, data).expect("writable");
@@ -105,8 +119,13 @@ fn scene(random: &mut ChaCha8Rng) -> String {
     let shape = match random.random_range(0..4) {
         0 => format!("{{ ball = {{ radius = {}, center = [0, 0, {}] }} }}", 0.5 * size, random.random_range(-1.0..1.0)),
         1 => format!("{{ torus = {{ major = {}, minor = {} }} }}", 0.4 * size, size * random.random_range(0.1..0.3)),
-        2 => format!("{{ cylinder = {{ radius = {}, height = {size}, axis = [1, 1, 0.2] }} }}", size * random.random_range(0.1..0.5)),
-        _ => format!("{{ box = {{ min = [0, 0, 0], max = [{size}, {}, {}] }} }}", 0.5 * size, size * random.random_range(0.1..1.0)),
+        2 => format!(
+            "{{ cylinder = {{ radius = {}, height = {size}, axis = [1, 1, 0.2] }} }}",
+            size * random.random_range(0.1..0.5)
+        ),
+        _ => {
+            format!("{{ box = {{ min = [0, 0, 0], max = [{size}, {}, {}] }} }}", 0.5 * size, size * random.random_range(0.1..1.0))
+        }
     };
     let mut text = format!(
         "format = \"scene/1\"\n[object]\nshape = {shape}\ncells = {}\n[material]\ndensity = {}\nyoungs_modulus = {}\npoisson_ratio = {}\n\
@@ -125,7 +144,11 @@ fn scene(random: &mut ChaCha8Rng) -> String {
         text += &format!("[[clamp]]\nbox = {{ min = [-2, -2, -2], max = [{}, 2, 2] }}\n", random.random_range(-0.5..0.5) * size);
     }
     if random.random_bool(0.5) {
-        text += &format!("[[plane]]\npoint = [0, 0, {}]\nnormal = [{}, 0, 1]\n", random.random_range(-1.0..0.2), random.random_range(-1.0..1.0));
+        text += &format!(
+            "[[plane]]\npoint = [0, 0, {}]\nnormal = [{}, 0, 1]\n",
+            random.random_range(-1.0..0.2),
+            random.random_range(-1.0..1.0)
+        );
     }
     text
 }

@@ -49,7 +49,7 @@ fn an_adapter_that_does_not_exist_is_one_line_with_a_way_out() {
     let (folder, scene) = scene();
     for verb in ["simulate", "observe"] {
         let mut command = program();
-        command.arg(verb).arg(&scene).args(["--backend", "gpu", "--out"]).arg(folder.path().join("out"));
+        command.args(["--progress", "none", verb]).arg(&scene).args(["--backend", "gpu", "--out"]).arg(folder.path().join("out"));
         if verb == "observe" {
             command.args(["--camera", "eye=0.25,-0.3,0.15 target=0.02,0.02,0.04 fov=25 size=8x6"]);
         }
@@ -71,7 +71,8 @@ fn without_any_adapter_there_is_one_error_with_a_way_out_and_auto_takes_the_cpu(
     let (folder, scene) = scene();
     let simulate = |backend: &str| {
         let mut command = program();
-        command.arg("simulate").arg(&scene).args(["--backend", backend, "--every", "8", "--out"]).arg(folder.path().join("out"));
+        command.args(["--progress", "none", "simulate"]).arg(&scene);
+        command.args(["--backend", backend, "--every", "8", "--out"]).arg(folder.path().join("out"));
         command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent");
         command
     };
@@ -348,12 +349,11 @@ fn an_interrupt_keeps_the_best_so_far_and_logs_show_progress_when_asked_to() {
         assert!(result["parameters"][0]["value"].as_f64().is_some_and(|e| e > 0.0), "{result}");
         result
     };
-    // Lines come after two seconds, where they come: in a file as in a pipe none do.
-    let first = stopped_when(&[], &|t| t > Duration::from_secs(4) && journal().lines().count() > 3);
+    // Lines come after two seconds, unless somebody wants none.
+    let first = stopped_when(&["--progress", "none"], &|t| t > Duration::from_secs(4) && journal().lines().count() > 3);
     assert!(!log().contains("fitting, "), "{}", log());
     let kept = journal();
-    let second =
-        stopped_when(&["--resume", "--progress", "lines"], &|_| log().contains("fitting, ") && journal().len() > kept.len());
+    let second = stopped_when(&["--resume"], &|_| log().contains("fitting, ") && journal().len() > kept.len());
     assert!(journal().starts_with(&kept), "it has begun anew");
     assert!(second["cost"]["final"].as_f64() <= first["cost"]["final"].as_f64(), "{first} {second}");
     assert!(path("out/previous-1/result.json").exists(), "the first result is kept");

@@ -76,7 +76,8 @@ pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
     let part = |name: &str| ply.payload.get(name).ok_or_else(|| format!("has no element \"{name}\""));
     let mut mesh = TriMesh::default();
     for (i, v) in part("vertex")?.iter().enumerate() {
-        let get = |k: usize| v.coordinates[k].ok_or_else(|| format!("vertex {} has no coordinate \"{}\"", i + 1, ["x", "y", "z"][k]));
+        let get =
+            |k: usize| v.coordinates[k].ok_or_else(|| format!("vertex {} has no coordinate \"{}\"", i + 1, ["x", "y", "z"][k]));
         mesh.vertices.push(DVec3::new(get(0)?, get(1)?, get(2)?));
     }
     for (i, f) in part("face")?.iter().enumerate() {

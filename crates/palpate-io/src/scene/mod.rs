@@ -298,12 +298,15 @@ fn observation(root: &Table) -> Result<Option<ObservationSpec>, InputError> {
     }
     if let Some(file) = t.optional_str("file")? {
         if leaves(file) {
-            let text = format!("\"{file}\" leaves the recording's folder; it names a file inside; for another folder give `recording`");
+            let text =
+                format!("\"{file}\" leaves the recording's folder; it names a file inside; for another folder give `recording`");
             return Err(t.error("file", text));
         }
         spec.file = file.to_string();
     }
-    spec.band = t.f64_where("band", |x| x > 0.0 && x <= WIDEST_BAND, "is not allowed: must be > 0 and at most 100 (cells)")?.unwrap_or(spec.band);
+    spec.band = t
+        .f64_where("band", |x| x > 0.0 && x <= WIDEST_BAND, "is not allowed: must be > 0 and at most 100 (cells)")?
+        .unwrap_or(spec.band);
     spec.pixel_stride = t.optional_count("pixel_stride", 1..=100_000)?.map_or(spec.pixel_stride, |n| n as usize);
     Ok(Some(spec))
 }

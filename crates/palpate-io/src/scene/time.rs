@@ -7,7 +7,7 @@ use palpate_model::plan::scheme::{self, QUASI_STATIC, Scheme};
 use palpate_model::scene::{Initial, InitialShape, Time};
 
 /// More steps than this are a slip of units, not a simulation.
-const MOST_STEPS: f64 = 1e7;
+const MOST_STEPS: f64 = 1e6;
 
 /// The clock of a scene that starts as `initial` says.
 pub(super) fn time(root: &Table, initial: &Initial) -> Result<Time, InputError> {

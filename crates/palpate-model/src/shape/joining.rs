@@ -68,7 +68,8 @@ mod tests {
     #[test]
     fn only_vertices_at_the_same_place_are_joined() {
         // Points of a grid, every seventh again, and every eleventh again a little beside it: a tenth of the tolerance of 1e-7.
-        let grid: Vec<DVec3> = (0..1000).map(|k| DVec3::new((k % 10) as f64, (k / 10 % 10) as f64, (k / 100) as f64) / 9.0).collect();
+        let grid: Vec<DVec3> =
+            (0..1000).map(|k| DVec3::new((k % 10) as f64, (k / 10 % 10) as f64, (k / 100) as f64) / 9.0).collect();
         let mut mesh = TriMesh { vertices: grid.clone(), triangles: vec![[0, 9, 99], [0, 99, 999]] };
         mesh.vertices.extend(grid.iter().step_by(7));
         mesh.vertices.extend(grid.iter().step_by(11).map(|p| *p + 1e-8));

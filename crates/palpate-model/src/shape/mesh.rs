@@ -126,7 +126,11 @@ impl MeshShape {
         let node = &self.tree[n as usize];
         if node.second == 0 {
             let own = node.range.0..node.range.1;
-            return own.clone().flat_map(|s| (s + 1..own.end).map(move |t| (s, t))).map(|(s, t)| self.pair(s, t, margin, look)).sum();
+            return own
+                .clone()
+                .flat_map(|s| (s + 1..own.end).map(move |t| (s, t)))
+                .map(|(s, t)| self.pair(s, t, margin, look))
+                .sum();
         }
         let (first, second) = (n + 1, node.second);
         let parts = || {
@@ -164,7 +168,8 @@ impl MeshShape {
     /// Two triangles, by their places in the tree.
     fn pair(&self, s: u32, t: u32, margin: f64, look: &impl Fn(usize, usize) -> usize) -> usize {
         let ([a, b, c], [d, e, f]) = (self.corners[s as usize], self.corners[t as usize]);
-        let apart = (a.min(b).min(c) - margin).cmpgt(d.max(e).max(f)).any() || (d.min(e).min(f) - margin).cmpgt(a.max(b).max(c)).any();
+        let apart =
+            (a.min(b).min(c) - margin).cmpgt(d.max(e).max(f)).any() || (d.min(e).min(f) - margin).cmpgt(a.max(b).max(c)).any();
         if apart { 0 } else { look(self.numbers[s as usize] as usize, self.numbers[t as usize] as usize) }
     }
 

@@ -5,9 +5,9 @@
 //! neither touches nor pierces itself.
 
 use super::TriMesh;
-use super::mesh::MeshShape;
 use super::contacts::touches_itself;
 use super::edges::{EdgeUses, bucketed};
+use super::mesh::MeshShape;
 use super::repair::diagnose_in;
 use glam::DVec3;
 use rayon::prelude::*;

@@ -7,7 +7,7 @@ use crate::results;
 use crate::results::import::{GuessDocument, ImportDocument};
 use clap::Args;
 use glam::{DAffine3, DVec3};
-use palpate_import::{Background, Floor, Imported, Options, Unit, Watch, corners, direction, import, rigid, WRITING};
+use palpate_import::{Background, Floor, Imported, Options, Unit, WRITING, Watch, corners, direction, import, rigid};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 

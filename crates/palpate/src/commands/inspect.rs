@@ -71,11 +71,11 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
         return Ok(devices::run(console));
     }
     let mut reading = Some(console.progress(0, "inspecting"));
+    reading.iter_mut().for_each(|t| t.on(0, "reading"));
     let Some(path) = &a.path else {
         console.print(&if console.json() { results::line(&catalogue::document()) } else { catalogue::markdown() });
         return Ok(0);
     };
-    reading.iter_mut().for_each(|t| t.on(0, "reading"));
     let (kind, content, lines, warnings) = if is_recording(path) {
         let r = read_recording(path)?;
         let (content, lines) = recorded::recording(&r);
@@ -185,7 +185,6 @@ fn scene(e: &Experiment) -> (SceneInspection, Lines) {
     (content, lines)
 }
 
-/// The body and its cells.
 fn body(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let (scene, plan) = (e.scene(), e.plan());
     let body = &plan.body;
@@ -316,7 +315,6 @@ fn observed(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     });
 }
 
-/// The numbers to be found.
 fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let Some(fit) = &e.scene().fit else { return };
     let paths: Vec<String> = fit.parameters.iter().map(|p| p.path.clone()).collect();
@@ -326,7 +324,6 @@ fn free(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     content.free = Some(paths);
 }
 
-/// So many of a thing.
 fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }

@@ -111,6 +111,9 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
 /// Largest displacement gradient of a rest shape that could be mistaken for the one given: a strain of 30 %, or a turn of 17°.
 const MOST_RESHAPED: f64 = 0.3;
 
+/// Largest ratio of density or stiffness between two ends of a body: beyond it one end is air beside the other.
+const MOST_GRADED: f64 = 100.0;
+
 /// Largest displacement gradient within the body's box that one number of a rest shape makes, for each unit of it.
 fn steepness(e: &Experiment, field: &dyn Field<3>, (slot, of): (usize, usize)) -> f64 {
     let middle = Spot::of(&e.plan);
@@ -137,6 +140,11 @@ fn set_free(e: &mut Experiment, path: String, per_scene: bool) {
         if let (Unstated::OnBody, Some(axis)) = (p.default, p.axis) {
             let (low, high) = e.shape().bounds();
             bounds = (low[usize::from(axis)], high[usize::from(axis)]);
+        }
+        if let (Site::Density(_) | Site::Modulus(_), Some(axis), "1/m") = (&ALL[usize::from(*law)].site, p.axis, p.unit) {
+            let (low, high) = e.shape().bounds();
+            let most = MOST_GRADED.ln() / (high - low)[usize::from(axis)];
+            bounds = (bounds.0.max(-most), bounds.1.min(most));
         }
         if let Site::Rest(field) = &ALL[usize::from(*law)].site {
             let most = MOST_RESHAPED / steepness(e, *field, (usize::from(*slot), ALL[usize::from(*law)].params.len()));

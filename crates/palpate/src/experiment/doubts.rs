@@ -13,7 +13,7 @@ const MOST_READINGS: usize = 3_000_000;
 /// Speeds beyond this [m/s] are faster than anything that depth cameras see.
 const FAST: f64 = 300.0;
 /// Steps beyond this take hours.
-const MANY_STEPS: usize = 1_000_000;
+const MANY_STEPS: usize = 200_000;
 /// Views narrower or wider than this [°] are of no depth camera.
 const VIEW: [f64; 2] = [0.05, 179.0];
 

@@ -2,6 +2,7 @@
 
 use palpate_fit::{Progress, Tolerance};
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 /// What the progress of a whole fit is counted in.
 pub(crate) const UNITS: u64 = 1000;
@@ -17,6 +18,7 @@ pub(crate) struct Convergence {
     known: BTreeMap<usize, (f64, f64)>,
     best: f64,
     iterations: usize,
+    begun: Instant,
 }
 
 impl Convergence {
@@ -28,6 +30,7 @@ impl Convergence {
             known: BTreeMap::new(),
             best: f64::INFINITY,
             iterations: 0,
+            begun: Instant::now(),
         }
     }
 
@@ -55,7 +58,14 @@ impl Convergence {
     /// The same in words.
     pub fn text(&self) -> String {
         let starts = if self.starts == 1 { String::new() } else { format!(", {} of {} starts", self.known.len(), self.starts) };
-        format!("to convergence: iteration {}{starts}, best cost {:.4}", self.iterations, self.best)
+        // Until convergence takes as long again as what is left of the way: a guess, since costs fall faster near the end.
+        let (share, passed) = (self.units() as f64 / UNITS as f64, self.begun.elapsed().as_secs_f64());
+        let left = if share > 0.05 && passed > 2.0 {
+            format!(", about {:.0} s left", passed * (1.0 / share - 1.0))
+        } else {
+            String::new()
+        };
+        format!("to convergence: iteration {}{starts}, best cost {:.4}{left}", self.iterations, self.best)
     }
 }
 

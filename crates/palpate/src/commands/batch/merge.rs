@@ -1,9 +1,9 @@
 //! `palpate batch --merge`: one summary out of what the shards left, and the names of what is missing.
 
-use crate::lock::{Held, NAME};
 use super::summary;
 use crate::cli::Console;
 use crate::error::Error;
+use crate::lock::{Held, NAME};
 use crate::results;
 use crate::results::batch::{BatchDocument, BatchRow, RowStatus, Shard, ShardSummary};
 use palpate_io::InputError;
