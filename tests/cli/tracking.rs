@@ -144,6 +144,20 @@ fn a_bar_that_is_far_from_where_it_is_thought_is_found() {
     assert_eq!(rows["frames"][0]["cold"], true, "{rows}");
     let (miss, moved, _) = misses(folder.path(), "late", 8);
     assert!(moved > 0.1 && miss < 0.003, "{miss} {moved}");
+    // A device that says which readings belong where leads to the same place.
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let late = file("late-gpu");
+    succeed(&["track", arg(&file("late.toml")), "--out", arg(&late), "--backend", "gpu"]);
+    let on_device = json(late.join("tracked.json"));
+    assert_eq!(on_device["frames"][0]["cold"], true, "{on_device}");
+    let surface = |out: &str| read_array(&file(out).join("tracked.npz"), Some("surface")).unwrap().values;
+    let (a, b) = (surface("late"), surface("late-gpu"));
+    let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("{apart} m apart");
+    // Both settle until a step promises next to nothing; the mixture only leads there.
+    assert!(a.len() == b.len() && apart < 1e-4, "{apart}");
 }
 
 /// The bar with two free numbers, begun at this modulus and without a word on damping.

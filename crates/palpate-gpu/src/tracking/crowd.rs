@@ -54,9 +54,10 @@ impl Prepared {
                 return Err(GpuError::Limit { limit, available, needed: count as u64, what: format!("tracking with {what}") });
             }
         }
-        let (low, high) = s.places.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-            (low.min(p.position), high.max(p.position))
-        });
+        let (low, high) = s
+            .places
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p.position), high.max(p.position)));
         let center = 0.5 * (low + high);
         let area = s.places.iter().map(|p| p.area).sum::<f64>() / s.places.len() as f64;
         let scale = if area > 0.0 { 1.0 / area } else { 1.0 };

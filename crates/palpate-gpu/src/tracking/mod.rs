@@ -153,8 +153,7 @@ impl Correspondence {
             (pass::SHARE_POINTS, some_points, LANES),
             (pass::SHARE_PLACES, some_places, LANES),
         ];
-        let found: Vec<[f32; 4]> =
-            self.compute(s, Task::Mix { reach, spread, floor, thin }, &passes, ("shares", some_places))?;
+        let found: Vec<[f32; 4]> = self.compute(s, Task::Mix { reach, spread, floor, thin }, &passes, ("shares", some_places))?;
         let chosen = shares.iter_mut().zip(s.places).step_by(thin);
         for ((share, place), [x, y, z, p]) in chosen.zip(found) {
             // The pull is told from the place, so that single precision is precise where it matters.
