@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use glam::DVec3;
 use palpate_cpu::Tracker;
+use palpate_engine::number;
 use palpate_engine::tracking::{self, Doubt, Met, Settings, Tracked};
 use palpate_io::recording::{RecordedPoints, Recording, Sequence};
 use rand::SeedableRng;
@@ -248,7 +249,14 @@ impl TrackedBody {
             }
         }
         if count == 0 {
-            return Err(Error::Input("no frame was tracked well enough to be fitted; the frames say why".into()));
+            let first = self.frames.iter().find_map(|f| f.doubts.first().map(|d| (f.time, crate::report::words(d))));
+            let why = match first {
+                Some((time, words)) if sound.is_empty() => {
+                    format!("all {} frames are doubted, that at {} s because {words}", self.frames.len(), number(time))
+                }
+                _ => format!("in {} frames that nobody doubts no reading tells of a place", sound.len()),
+            };
+            return Err(Error::Input(format!("no frame was tracked well enough to be fitted: {why}")));
         }
         let track = Sequence {
             file: PathBuf::from("points.npz"),

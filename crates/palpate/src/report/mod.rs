@@ -22,6 +22,7 @@ use crate::render::Picture;
 use crate::results::report::Chart;
 
 pub use tracking::tracking_document;
+pub(crate) use tracking::words;
 
 pub(crate) use data::scenes as report_data;
 pub(crate) use html::diagnosis_title;

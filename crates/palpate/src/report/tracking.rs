@@ -26,7 +26,7 @@ pub fn tracking_document(refined: &Refined, seconds: f64) -> TrackingDocument {
 }
 
 /// What is wrong, in words.
-fn words(doubt: &Doubt) -> String {
+pub(crate) fn words(doubt: &Doubt) -> String {
     match doubt {
         Doubt::Unmatched(share) => format!("only {:.0} % of the readings meet the body", 100.0 * share),
         Doubt::Far(rms) => format!("the body lies {} m from its readings", number(*rms)),
