@@ -18,7 +18,7 @@ pub(crate) fn npy(descr: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u
 }
 
 fn read(bytes: &[u8]) -> Result<Array, String> {
-    decode(Path::new("a.npy"), "", bytes).map_err(|e| e.to_string())
+    decode(Path::new("a.npy"), "", bytes, false).map_err(|e| e.to_string())
 }
 
 #[test]
