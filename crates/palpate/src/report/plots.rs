@@ -255,7 +255,7 @@ fn label(v: f64) -> String {
         return "0".into();
     }
     let (factor, sign) = match v.abs() {
-        a if a >= 1e6 || a < 1e-3 => {
+        a if !(1e-3..1e6).contains(&a) => {
             let power = a.log10().floor() as i32;
             let raised: String = power
                 .to_string()

@@ -46,6 +46,9 @@ pub fn quantity(value: f64, error: Option<f64>, unit: &str) -> String {
         return "not known".into();
     }
     let (factor, unit) = unit_for(value.abs().max(error.unwrap_or(0.0)), unit);
+    if value == 0.0 && error.is_none() {
+        return format!("0 {unit}").trim_end().to_string();
+    }
     let number = powers(&stated(value * factor, error.map(|e| e * factor)));
     if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
