@@ -22,8 +22,10 @@ fn share_places(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                 let n = entries[i].y;
                 let point = crowd_points[n];
                 let away = point.xyz - at;
-                let share = likelihood(place, u32(point.w), away) * inverses[n];
-                sum += share * vec4(away, 1.0);
+                let own = likelihood(place, u32(point.w), away);
+                if own > 0.0 {
+                    sum += own * inverses[n] * vec4(away, 1.0);
+                }
             }
         }
     }

@@ -133,9 +133,9 @@ fn what_stays_lost_moves_nothing() {
             self.0.certainty(p, band, u, d)
         }
         fn pierced(&mut self, frame: usize, _: &[DVec3]) -> Result<f64, Failure> {
-            if frame == 1 { 0.4 } else { 0.0 }
+            Ok(if frame == 1 { 0.4 } else { 0.0 })
         }
-        fn seen(&mut self, frame: usize, u: &[DVec3]) -> Vec<bool> {
+        fn seen(&mut self, frame: usize, u: &[DVec3]) -> Result<Vec<bool>, Failure> {
             self.0.seen(frame, u)
         }
     }
