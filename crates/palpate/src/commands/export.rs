@@ -66,9 +66,7 @@ enum Element {
 fn format(name: &str) -> Result<&'static Format, String> {
     find(name).ok_or_else(|| {
         let names: Vec<&str> = formats().map(|f| f.name).collect();
-        let near = names.iter().copied().find(|n| n.starts_with(name) || name.starts_with(n));
-        let meant = near.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
-        format!("is none of {}{meant}", names.join(", "))
+        format!("is none of {}", names.join(", "))
     })
 }
 
