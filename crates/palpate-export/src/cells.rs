@@ -29,16 +29,18 @@ fn faces(region: &ClipBox, axis: usize) -> Vec<f64> {
     if straight { vec![region.min[axis] - away, region.max[axis] - away] } else { Vec::new() }
 }
 
-/// How far a face may lie from the nearest plane of nodes, over the distance between planes, before finer cells are looked for.
+/// How far a face may lie from the nearest face of cells, over their side, before other cells are looked for.
 const MET: f64 = 0.02;
 
-/// The fewest cells, from `least` to twice as many, whose planes of nodes meet places at these shares of the way; where none do, those that come
-/// closest.
-fn meeting(shares: &[f64], least: f64) -> f64 {
-    let miss = |count: f64| shares.iter().map(|t| (2.0 * count * t - (2.0 * count * t).round()).abs()).fold(0.0, f64::max);
-    let all = (0..=least as usize).map(|k| least + k as f64);
-    let first = all.clone().find(|count| miss(*count) < MET);
-    first.or_else(|| all.min_by(|a, b| miss(*a).total_cmp(&miss(*b)))).unwrap_or(least)
+/// The number of cells, from three quarters of `wanted` to twice as many and as near to it as may be, whose faces meet places at these shares of the
+/// way; where none does, the one that comes closest. A place amid a cell would be held, but bend the part of the cell before it.
+fn meeting(shares: &[f64], wanted: f64) -> f64 {
+    let miss = |count: f64| shares.iter().map(|t| (count * t - (count * t).round()).abs()).fold(0.0, f64::max);
+    let least = (0.75 * wanted).ceil();
+    let mut all: Vec<f64> = (0..=(2.0 * wanted - least) as usize).map(|k| least + k as f64).collect();
+    all.sort_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
+    let first = all.iter().copied().find(|count| miss(*count) < MET);
+    first.or_else(|| all.into_iter().min_by(|a, b| miss(*a).total_cmp(&miss(*b)))).unwrap_or(wanted)
 }
 
 /// Lagrange's quadratic functions on [0, 1] at 0, ½ and 1.
@@ -47,8 +49,8 @@ fn quadratic(t: f64) -> [f64; 3] {
 }
 
 impl Cells {
-    /// Cells around a specimen's mesh, whose tetrahedra have edges about so long [m]; as many along each axis as bring planes of nodes to the faces
-    /// of clamps.
+    /// Cells around a specimen's mesh, whose tetrahedra have edges about so long [m]; as many along each axis as bring faces of cells to
+    /// those of clamps.
     pub fn new(s: &Specimen, edge: f64) -> Cells {
         let (low, high) = s.mesh.bounds();
         let least = ((high - low) / (COARSER * edge)).round().max(DVec3::ONE);
