@@ -2,6 +2,7 @@
 
 mod batch;
 mod effects;
+mod export;
 mod fields;
 mod fitting;
 mod placing;

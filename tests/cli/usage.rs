@@ -6,7 +6,7 @@ use support::command::{arg, palpate, succeed};
 
 #[test]
 fn help_teaches_and_versions_are_told() {
-    for command in ["import", "simulate", "observe", "fit", "inspect", "diagnose"] {
+    for command in ["import", "simulate", "observe", "fit", "inspect", "diagnose", "export"] {
         let a = succeed(&[command, "--help"]);
         assert!(a.out.contains("Examples:") && a.out.contains(&format!("palpate {command}")), "{}", a.out);
     }

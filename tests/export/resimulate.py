@@ -18,15 +18,18 @@ import meshio
 import mujoco
 import numpy as np
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
-from pyfebio.model import Model as FEBio
+from pyfebio import material as febio_material
+from pyfebio import mesh as febio_mesh
 
 HERE = Path(__file__).parent
 PALPATE, CCX, OUT = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
 FORMATS = ["mujoco", "calculix", "febio", "sofa", "usd", "gmsh", "urdf"]
 
 # Largest difference of a sag from palpate's. Quadratic elements: what is asked for. MuJoCo's linear tetrahedra lock in shear and, at a Poisson's
-# ratio of 0.4, in volume: four layers of them keep a third of the sag back, which docs/export.md states; more would be an error of ours.
-MOST = {"calculix": 0.02, "mujoco": 0.02, "mujoco linear": 0.45}
+# ratio of 0.4, in volume: four layers of them keep some 5 % of the sag back, which docs/export.md states; much more would be an error of ours.
+# Of the rod's 3.4 % in CalculiX palpate's own cells of a quarter of its diameter have 1.4 (on cells of half the size it sags by as much more), the
+# rest is that of a circle made of edges as long.
+MOST = {"bar calculix": 0.02, "bar mujoco": 0.02, "bar mujoco linear": 0.08, "rod calculix": 0.04, "rod mujoco": 0.02}
 
 failures = []
 
@@ -108,6 +111,14 @@ def volume(points, tets):
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
 
 
+def is_held(points, held):
+    """True where these are the nodes of the first 20 mm; the surface may be moved by a small part of an edge."""
+    x = np.array(points, dtype=float)[:, 0]
+    inside = np.zeros(len(x), dtype=bool)
+    inside[list(held)] = True
+    return inside.any() and x[inside].max() < 0.0202 and x[~inside].min() > 0.0198
+
+
 def open_usd(path, told):
     stage = Usd.Stage.Open(str(path))
     mesh = UsdGeom.TetMesh(next(p for p in stage.Traverse() if p.IsA(UsdGeom.TetMesh)))
@@ -124,7 +135,7 @@ def open_usd(path, told):
     gravity = UsdPhysics.Scene(next(p for p in stage.Traverse() if p.IsA(UsdPhysics.Scene))).GetGravityMagnitudeAttr().Get()
     check(abs(gravity - 9.81) < 1e-6 and UsdGeom.GetStageMetersPerUnit(stage) == 1, f"usd: gravity {gravity:.2f} m/s², metres")
     held = [UsdGeom.Subset(p).GetIndicesAttr().Get() for p in stage.Traverse() if p.IsA(UsdGeom.Subset)]
-    check(len(held) == 1 and len(held[0]) > 0 and np.ptp(points[list(held[0])][:, 0]) < 1e-5, f"usd: {len(held[0])} held points in a plane")
+    check(len(held) == 1 and is_held(points, held[0]), f"usd: {len(held[0])} points are held, those in the clamp")
 
 
 def open_gmsh(path, told):
@@ -144,13 +155,23 @@ def open_gmsh(path, told):
 
 
 def open_febio(path, told):
-    model = FEBio.from_xml(path.read_bytes())
-    elements = model.mesh_.elements[0]
-    kinds = {type(e).__name__ for e in elements.all_elements}
-    check(len(elements.all_elements) == told["tetrahedra"] and kinds == {"Tet10Element"}, f"febio: pyfebio reads {told['tetrahedra']} tet10")
-    names = {s.name for s in model.mesh_.node_sets}
-    check("clamp0" in names and model.boundary_.all_bcs[0].node_set == "clamp0", f"febio: node sets {sorted(names)}")
-    check(model.control_.analysis == "STATIC", "febio: a static analysis")
+    """Section by section: pyfebio reads no conditions of the boundary, not even its own, and takes minutes for thousands of elements."""
+    scene = HERE / f"{path.stem}.toml"
+    coarse = palpate("export", scene, "--format", "febio", "--edge-length", 0.04, "--out", path.parent / "coarse")
+    root = ET.parse(path.parent / "coarse" / path.name).getroot()
+    part = lambda tag: ET.tostring(root.find(tag))
+    mesh = febio_mesh.Mesh.from_xml(part("Mesh"))
+    elements = mesh.elements[0].all_elements
+    kinds = {type(e).__name__ for e in elements}
+    check(len(elements) == coarse["tetrahedra"] and kinds == {"Tet10Element"}, f"febio: pyfebio reads {len(elements)} tet10")
+    check({s.name for s in mesh.node_sets} == {"all", "clamp0"}, "febio: node sets")
+    solid = febio_material.Material.from_xml(part("Material")).all_materials[0]
+    check((solid.type, float(solid.E.text), float(solid.v.text)) == ("isotropic elastic", 6e5, 0.4), f"febio: {solid.type}, {solid.E.text} Pa")
+    held = root.find("Boundary/bc")
+    check(held.get("type") == "zero displacement" and held.get("node_set") == "clamp0", "febio: the clamp is held")
+    check([root.find(f"Control/{k}").text for k in ("analysis", "time_steps")] == ["STATIC", "10"], "febio: a static analysis")
+    force = root.find("Loads/body_load[@type='const']/z")
+    check(float(force.text) == 9.81 and force.get("lc") == root.find("LoadData/load_controller").get("id"), "febio: weight follows a ramp")
 
 
 def open_sofa(path, told):
@@ -165,12 +186,15 @@ def open_sofa(path, told):
     check(abs(masses.sum() / told["mass"] - 1) < 1e-9 and len(masses) == len(points), f"sofa: masses of nodes sum to {masses.sum():.4f} kg")
     check(float(field.get("youngModulus")) == 6e5 and field.get("method") == "large", "sofa: corotated elements of 600 kPa")
     held = np.array(body.find("FixedProjectiveConstraint").get("indices").split(), dtype=int)
-    check(len(held) > 0 and np.ptp(points[held][:, 0]) < 1e-5, f"sofa: {len(held)} held nodes in a plane")
+    check(is_held(points, held), f"sofa: {len(held)} nodes are held, those in the clamp")
     check({"EulerImplicitSolver", "SparseLDLSolver", "MechanicalObject"} <= {c.tag for c in body}, "sofa: solvers and state")
 
 
 def open_urdf(path, told):
-    model = mujoco.MjModel.from_xml_path(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    # A held body would be made a part of the world, which has no mass.
+    spec.compiler.fusestatic = False
+    model = spec.compile()
     check(abs(model.body_mass.sum() / told["mass"] - 1) < 1e-9, f"urdf: MuJoCo reads a body of {model.body_mass.sum():.4f} kg")
 
 
@@ -195,12 +219,13 @@ def main():
             print(f"       mujoco linear took {seconds:.1f} s for {freedoms} degrees of freedom")
         for which, sag in found.items():
             off = sag / own - 1
-            check(abs(off) <= MOST[which], f"{which}: {1e3 * sag:.3f} mm, {100 * off:+.2f} %, allowed {100 * MOST[which]:.0f} %")
+            most = MOST[f"{name} {which}"]
+            check(abs(off) <= most, f"{which}: {1e3 * sag:.3f} mm, {100 * off:+.2f} %, allowed {100 * most:.0f} %")
             sags[f"{name} {which}"] = off
         for which, opened in [("usd", open_usd), ("gmsh", open_gmsh), ("febio", open_febio), ("sofa", open_sofa), ("urdf", open_urdf)]:
             opened(made[which], told)
     # A test that cannot tell linear elements from quadratic ones would tell nothing.
-    check(sags["bar mujoco linear"] < -0.05, "linear elements are told from quadratic ones")
+    check(sags["bar mujoco linear"] < sags["bar mujoco"] - 0.02, "linear elements are told from quadratic ones")
     if failures:
         sys.exit("FAILED: " + "; ".join(failures))
 

@@ -4,7 +4,8 @@
 //! quadratic elements are.
 
 use crate::specimen::Specimen;
-use glam::{DVec3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
+use palpate_model::cutcells::cut::ClipBox;
 
 /// Side of a cell over the edge of the cube that six mean tetrahedra fill, which of a stuffed lattice is 0.79 of its edge: so cells are twice as long
 /// as palpate's own, and bend as well with their quadratic functions.
@@ -21,17 +22,46 @@ pub struct Cells {
     pub masses: Vec<f64>,
 }
 
+/// Faces of a clamp across an axis [m], where they lie across it.
+fn faces(region: &ClipBox, axis: usize) -> Vec<f64> {
+    let straight = region.to_frame.matrix3.abs_diff_eq(DMat3::IDENTITY, 1e-12);
+    let away = region.to_frame.translation[axis];
+    if straight { vec![region.min[axis] - away, region.max[axis] - away] } else { Vec::new() }
+}
+
+/// How far a face may lie from the nearest face of cells, over their side, before other cells are looked for.
+const MET: f64 = 0.02;
+
+/// The number of cells, from three quarters of `wanted` to twice as many and as near to it as may be, whose faces meet places at these shares of the
+/// way; where none does, the one that comes closest. A place amid a cell would be held, but bend the part of the cell before it.
+fn meeting(shares: &[f64], wanted: f64) -> f64 {
+    let miss = |count: f64| shares.iter().map(|t| (count * t - (count * t).round()).abs()).fold(0.0, f64::max);
+    let least = (0.75 * wanted).ceil();
+    let mut all: Vec<f64> = (0..=(2.0 * wanted - least) as usize).map(|k| least + k as f64).collect();
+    all.sort_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
+    let first = all.iter().copied().find(|count| miss(*count) < MET);
+    first.or_else(|| all.into_iter().min_by(|a, b| miss(*a).total_cmp(&miss(*b)))).unwrap_or(wanted)
+}
+
 /// Lagrange's quadratic functions on [0, 1] at 0, ½ and 1.
 fn quadratic(t: f64) -> [f64; 3] {
     [(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)]
 }
 
 impl Cells {
-    /// Cells around a specimen's mesh, whose tetrahedra have edges about so long [m].
+    /// Cells around a specimen's mesh, whose tetrahedra have edges about so long [m]; as many along each axis as bring faces of cells to
+    /// those of clamps.
     pub fn new(s: &Specimen, edge: f64) -> Cells {
         let (low, high) = s.mesh.bounds();
-        let count = ((high - low) / (COARSER * edge)).round().max(DVec3::ONE).as_ivec3();
-        let mut cells = Cells { count, low, side: (high - low) / count.as_dvec3(), masses: Vec::new() };
+        let least = ((high - low) / (COARSER * edge)).round().max(DVec3::ONE);
+        let count = DVec3::from_array(std::array::from_fn(|axis| {
+            let faces: Vec<f64> = s.held.iter().flat_map(|h| faces(&h.region, axis)).collect();
+            let span = high[axis] - low[axis];
+            let inside = faces.iter().map(|x| (x - low[axis]) / span).filter(|t| *t > 0.0 && *t < 1.0);
+            let shares: Vec<f64> = inside.collect();
+            meeting(&shares, least[axis])
+        }));
+        let mut cells = Cells { count: count.as_ivec3(), low, side: (high - low) / count, masses: Vec::new() };
         cells.masses = cells.lumped(s);
         cells
     }

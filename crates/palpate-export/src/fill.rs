@@ -1,11 +1,10 @@
 //! From a shape to the tetrahedra that other programs get.
 //!
 //! palpate's own cells are cut by the surface, and no other program has such elements. So the shape is filled by isosurface stuffing, which
-//! bounds angles and keeps the volume ([`palpate_model::space::stuffing`]). Two things are done before it:
-//!
-//! - What a clamp holds is cut out, as palpate does it: it does not deform, and the mesh ends where the clamp begins.
-//! - Each axis is stretched piece by piece, so that the sides of the box around the rest, and faces of clamps, are planes of the lattice. A
-//!   block so keeps its edges and its exact section.
+//! bounds angles and keeps the volume ([`palpate_model::space::stuffing`]). Before it each axis is stretched piece by piece, so that the sides of
+//! the box around the body, and faces of clamps, are planes of the lattice: a block keeps its edges and its exact section, and a clamp holds
+//! whole planes of nodes. What clamps hold stays in the mesh, held node by node. Were it cut off, the edge between the cut and the surface would be
+//! rounded, and just the outermost fibres, which bear bending, would not be held: a round bar of four cells then sags an eighth too far.
 
 use glam::{DAffine3, DVec3};
 use palpate_model::cutcells::build::{BodyError, SUBDIVISIONS};
@@ -16,8 +15,8 @@ use palpate_model::space::kept_volume::KeptVolume;
 use palpate_model::space::points::TetMesh;
 use palpate_model::space::stuffing::{StuffingError, stuff};
 
-/// Planes of a lattice that would lie closer than this part of an edge become one.
-const CLOSEST: f64 = 0.25;
+/// Planes of a lattice that would lie closer than this part of an edge become one: thinner layers would be flat elements.
+const CLOSEST: f64 = 0.02;
 /// How far from a clamp's region a node may lie that it holds, in edges: places on the surface are found to better than that.
 const ON: f64 = 1e-3;
 /// Cells in the box around a shape whose volume is measured.
@@ -32,7 +31,7 @@ pub struct Filled {
     pub held: Vec<Vec<u32>>,
     /// How its volume was kept.
     pub kept: KeptVolume,
-    /// Volume of the part of the shape that no clamp holds [m³].
+    /// Volume of the shape [m³].
     pub volume: f64,
 }
 
@@ -50,14 +49,6 @@ pub enum FillError {
     Nothing,
 }
 
-/// The part of a shape that no clamp holds.
-#[derive(Debug)]
-struct Free<'a> {
-    shape: &'a dyn Shape,
-    clamps: &'a [ClipBox],
-    bounds: (DVec3, DVec3),
-}
-
 /// Distance from a box [m], negative inside.
 fn distance(region: &ClipBox, p: DVec3) -> f64 {
     let d = region.distances(p);
@@ -70,41 +61,6 @@ fn along_axes(region: &ClipBox) -> Option<(DVec3, DVec3)> {
     let turn = region.to_frame.matrix3;
     let straight = turn.abs_diff_eq(glam::DMat3::IDENTITY, 1e-12);
     straight.then(|| (region.min - region.to_frame.translation, region.max - region.to_frame.translation))
-}
-
-impl<'a> Free<'a> {
-    fn new(shape: &'a dyn Shape, clamps: &'a [ClipBox]) -> Free<'a> {
-        let (mut low, mut high) = shape.bounds();
-        for (a, b) in clamps.iter().filter_map(along_axes) {
-            for axis in 0..3 {
-                let others = [(axis + 1) % 3, (axis + 2) % 3];
-                if others.iter().all(|o| a[*o] <= low[*o] && b[*o] >= high[*o]) {
-                    // It takes a whole end away.
-                    if a[axis] <= low[axis] {
-                        low[axis] = low[axis].max(b[axis]);
-                    }
-                    if b[axis] >= high[axis] {
-                        high[axis] = high[axis].min(a[axis]);
-                    }
-                }
-            }
-        }
-        Free { shape, clamps, bounds: (low, high) }
-    }
-}
-
-impl Shape for Free<'_> {
-    fn signed_distance(&self, p: DVec3) -> f64 {
-        self.clamps.iter().fold(self.shape.signed_distance(p), |d, c| d.max(-distance(c, p)))
-    }
-
-    fn bounds(&self) -> (DVec3, DVec3) {
-        self.bounds
-    }
-
-    fn surface(&self, edge: f64) -> TriMesh {
-        self.shape.surface(edge)
-    }
 }
 
 /// An axis that is stretched piece by piece: places [m] and how many edges there are up to each.
@@ -141,7 +97,7 @@ impl Axis {
 /// A shape in coordinates in which edges of the lattice are one.
 #[derive(Debug)]
 struct Stretched<'a> {
-    shape: &'a Free<'a>,
+    shape: &'a dyn Shape,
     axes: [Axis; 3],
 }
 
@@ -166,29 +122,28 @@ impl Shape for Stretched<'_> {
     }
 }
 
-/// Fills what clamps leave free of a shape with tetrahedra whose longest edges are at most about `edge` [m]. Clamps are given in the shape's
-/// frame. Same input, same bits.
+/// Fills a shape with tetrahedra whose longest edges are at most about `edge` [m], and says which nodes clamps hold. Clamps are given in the
+/// shape's frame. Same input, same bits.
 ///
 /// # Errors
 /// The edge is too fine or too coarse for the shape, or clamps hold all of it.
 pub fn fill(shape: &dyn Shape, clamps: &[ClipBox], edge: f64) -> Result<Filled, FillError> {
-    let free = Free::new(shape, clamps);
-    let (low, high) = free.bounds;
-    if !(high - low).cmpgt(DVec3::ZERO).all() {
-        return Err(FillError::Nothing);
-    }
+    let (low, high) = shape.bounds();
     let faces: Vec<(DVec3, DVec3)> = clamps.iter().filter_map(along_axes).collect();
     let axis = |a: usize| Axis::new(low[a], high[a], faces.iter().flat_map(|f| [f.0[a], f.1[a]]), edge);
-    let stretched = Stretched { shape: &free, axes: [axis(0), axis(1), axis(2)] };
-    let cells = stretched.bounds().1;
+    let stretched = Stretched { shape, axes: [axis(0), axis(1), axis(2)] };
     let mut mesh = stuff(&stretched, 1.0).map_err(|e| in_metres(e, edge))?;
-    debug_assert!(cells.min_element() >= 1.0);
     mesh.nodes.iter_mut().for_each(|x| *x = stretched.place(*x));
     let on = |c: &ClipBox| (0..mesh.nodes.len() as u32).filter(|n| distance(c, mesh.nodes[*n as usize]) <= ON * edge).collect();
-    let held = clamps.iter().map(on).collect();
+    let held: Vec<Vec<u32>> = clamps.iter().map(on).collect();
+    let mut free = vec![true; mesh.nodes.len()];
+    held.iter().flatten().for_each(|n| free[*n as usize] = false);
+    if !free.contains(&true) {
+        return Err(FillError::Nothing);
+    }
     // As for bodies of tetrahedra within palpate: cut cells know the volume of what is inside.
     let h = (0.5 * edge).max(((high - low).element_product() / REFERENCE_CELLS).cbrt()).min((high - low).min_element());
-    let volume = Body::build(&free, h, 0.0, SUBDIVISIONS)?.volume;
+    let volume = Body::build(shape, h, 0.0, SUBDIVISIONS)?.volume;
     let kept = mesh.keep_volume(volume);
     Ok(Filled { mesh, held, kept, volume })
 }

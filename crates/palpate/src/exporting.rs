@@ -16,6 +16,7 @@ use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::{BodySource, ClampRegion, InitialShape, Object, Resolution, Scene, Tetrahedron};
 use palpate_model::shape::shape_of;
 use palpate_model::space::points::TetMesh;
+use palpate_model::space::tets::EDGES;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -40,7 +41,7 @@ struct Tets {
     own: bool,
 }
 
-/// An experiment as a specimen with quadratic elements where these are wanted, and the volume of the shape that deforms [m³].
+/// An experiment as a specimen with quadratic elements where these are wanted, and the volume of the shape [m³].
 ///
 /// # Errors
 /// The edge does not suit the shape, a clamp holds nothing of the mesh, or the state at the start cannot be computed.
@@ -54,7 +55,10 @@ pub fn specimen<'a>(e: &'a Experiment, options: &ExportOptions) -> Result<(Speci
     let start = start(e, &mut tets)?;
     let quadratic = options.quadratic.unwrap_or(!tets.own || scene.solver.tetrahedron == Tetrahedron::Quadratic);
     let mesh = Mesh::new(&tets.mesh, quadratic);
-    let held = tets.held.iter().zip(regions).map(|(nodes, region)| Held { nodes: with_middles(nodes, &mesh), region });
+    // Planes of nodes that are stretched differently on either side have the middles between them a little off the face.
+    let slack = if tets.own { 1e-9 } else { 0.1 } * mesh.length();
+    let held =
+        tets.held.iter().zip(regions).map(|(nodes, region)| Held { nodes: with_middles(nodes, &mesh, &region, slack), region });
     let clock = match plan.clock.steps {
         0 => Clock::Static,
         steps => Clock::Motion { step: plan.clock.step, steps },
@@ -154,13 +158,17 @@ fn tetrahedra(e: &Experiment, regions: &[ClipBox], options: &ExportOptions) -> R
     Ok(Tets { mesh: mesh.transformed(&scene.object.pose), held, volume, own: false })
 }
 
-/// Held corners, and the middles of edges between two of them.
-fn with_middles(corners: &[u32], mesh: &Mesh) -> Vec<u32> {
+/// Held corners, and the middles of edges between two of them or within the region, which a face may pass by so far [m].
+fn with_middles(corners: &[u32], mesh: &Mesh, region: &ClipBox, slack: f64) -> Vec<u32> {
     let is_held = |n: u32| corners.binary_search(&n).is_ok();
+    let inside = |n: u32| region.distances(mesh.nodes[n as usize]).iter().all(|d| *d <= slack);
     let mut all = corners.to_vec();
     for (t, middles) in mesh.tets.iter().zip(&mesh.middles) {
-        let ends = palpate_model::space::tets::EDGES.iter();
-        all.extend(ends.zip(middles).filter(|([a, b], _)| is_held(t[*a]) && is_held(t[*b])).map(|(_, m)| *m));
+        for ([a, b], m) in EDGES.iter().zip(middles) {
+            if is_held(t[*a]) && is_held(t[*b]) || inside(*m) {
+                all.push(*m);
+            }
+        }
     }
     all.sort_unstable();
     all.dedup();

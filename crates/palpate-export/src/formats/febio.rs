@@ -1,4 +1,4 @@
-//! FEBio's `febio_spec` 4.0: elements by material, node sets, one step.
+//! FEBio's `febio_spec` 4.0: elements by material, node sets, one step. Sections stand in the order in which `pyfebio` writes and reads them.
 
 use super::{Format, file};
 use crate::feature::{Carried, Feature};
@@ -52,9 +52,9 @@ fn write(s: &Specimen, lost: &[String]) -> Result<Vec<File>, ExportError> {
     let parts = s.parts();
     let law = law(s.material.model).0;
     let mut out = format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}<febio_spec version=\"4.0\">\n", xml_head(s, lost));
-    out += "  <Module type=\"solid\"/>\n";
+    out += "  <Module type=\"solid\"/>\n  <Globals><Constants><T>0</T><P>0</P><R>0</R><Fc>0</Fc></Constants></Globals>\n";
     out += &control(s);
-    out += "  <Globals><Constants><T>0</T><P>0</P><R>0</R><Fc>0</Fc></Constants></Globals>\n  <Material>\n";
+    out += "  <Material>\n";
     for (k, (modulus, density, _)) in parts.iter().enumerate() {
         out += &format!(
             "    <material id=\"{0}\" name=\"m{0}\" type=\"{law}\"><density>{1}</density><E>{2}</E><v>{3}</v></material>\n",
@@ -78,14 +78,19 @@ fn write(s: &Specimen, lost: &[String]) -> Result<Vec<File>, ExportError> {
         }
         out += "    </Elements>\n";
     }
-    out += &format!("    <NodeSet name=\"all\">{}</NodeSet>\n", rows(1..=s.mesh.nodes.len(), 20, ",", ",\n      "));
+    out += &format!("    <NodeSet name=\"all\">{}</NodeSet>\n", rows(1..=s.mesh.nodes.len(), usize::MAX, ",", ""));
     for (i, h) in s.held.iter().enumerate() {
         out +=
-            &format!("    <NodeSet name=\"clamp{i}\">{}</NodeSet>\n", rows(h.nodes.iter().map(|n| n + 1), 20, ",", ",\n      "));
+            &format!("    <NodeSet name=\"clamp{i}\">{}</NodeSet>\n", rows(h.nodes.iter().map(|n| n + 1), usize::MAX, ",", ""));
     }
     out += "  </Mesh>\n  <MeshDomains>\n";
     (1..=parts.len()).for_each(|k| out += &format!("    <SolidDomain name=\"part{k}\" mat=\"m{k}\"/>\n"));
     out += "  </MeshDomains>\n";
+    out += &loads(s);
+    if let Some(v) = s.spin.filter(|v| v.velocity.length() > 0.0) {
+        let value = vector(v.velocity, ",");
+        out += &format!("  <Initial><ic type=\"velocity\" node_set=\"all\"><value>{value}</value></ic></Initial>\n");
+    }
     if !s.held.is_empty() {
         out += "  <Boundary>\n";
         for i in 0..s.held.len() {
@@ -95,11 +100,6 @@ fn write(s: &Specimen, lost: &[String]) -> Result<Vec<File>, ExportError> {
             );
         }
         out += "  </Boundary>\n";
-    }
-    out += &loads(s);
-    if let Some(v) = s.spin.filter(|v| v.velocity.length() > 0.0) {
-        let value = vector(v.velocity, ",");
-        out += &format!("  <Initial><ic type=\"velocity\" node_set=\"all\"><value>{value}</value></ic></Initial>\n");
     }
     out +=
         "  <Output>\n    <plotfile type=\"febio\"><var type=\"displacement\"/><var type=\"stress\"/></plotfile>\n  </Output>\n";
@@ -139,5 +139,5 @@ fn loads(s: &Specimen) -> String {
     let ramped = ramp && s.gravity.length() > 0.0;
     let data = "  <LoadData>\n    <load_controller id=\"1\" type=\"loadcurve\"><interpolate>LINEAR</interpolate>\
                 <points><pt>0,0</pt><pt>1,1</pt></points></load_controller>\n  </LoadData>\n";
-    format!("  <Loads>\n{out}  </Loads>\n{}", if ramped { data } else { "" })
+    format!("{}  <Loads>\n{out}  </Loads>\n", if ramped { data } else { "" })
 }

@@ -26,8 +26,8 @@ pub const FORMAT: Format = Format {
 const SKIN: f64 = 1e-3;
 /// Least mass of a node over the mean: cells that the surface all but misses have nodes of almost none.
 const LIGHTEST: f64 = 1e-6;
-/// How far from a clamp's region a node may lie that it holds, over the side of a cell.
-const ON: f64 = 1e-3;
+/// How far from a clamp's region a node may lie that it holds, over the side of a cell: a fifth of the way to the next plane of nodes.
+const ON: f64 = 0.1;
 
 fn carries(feature: Feature, quadratic: bool) -> Carried {
     match feature {

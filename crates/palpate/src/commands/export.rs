@@ -28,8 +28,7 @@ Formats:
   gmsh       MSH 2.2 (.msh): mesh, groups and fields
   urdf       one rigid link: mass, inertia, surface; URDF has no soft bodies
 
-Cells are replaced by tetrahedra with the same volume; a body of tetrahedra is written as it is. What clamps hold is cut off, and the
-nodes on the cut are held. What a format has no place for is a warning, and stands in the file's head. A stiffness that varies is
+Cells are replaced by tetrahedra with the same volume; a body of tetrahedra is written as it is. Nodes in clamps are held. What a format has no place for is a warning, and stands in the file's head. A stiffness that varies is
 refused by formats that have one number for it. What each program's elements cost is measured in docs/export.md.";
 
 /// Write a body and its material for another simulator
@@ -66,9 +65,7 @@ enum Element {
 fn format(name: &str) -> Result<&'static Format, String> {
     find(name).ok_or_else(|| {
         let names: Vec<&str> = formats().map(|f| f.name).collect();
-        let near = names.iter().copied().find(|n| n.starts_with(name) || name.starts_with(n));
-        let meant = near.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
-        format!("is none of {}{meant}", names.join(", "))
+        format!("is none of {}", names.join(", "))
     })
 }
 

@@ -18,7 +18,7 @@ pub struct ExportDocument {
     pub quadratic: bool,
     /// Volume of the mesh [m³].
     pub volume: f64,
-    /// Volume of the shape, without what clamps hold [m³].
+    /// Volume of the shape [m³].
     pub shape_volume: f64,
     /// Mass of the mesh, without point masses [kg].
     pub mass: f64,
