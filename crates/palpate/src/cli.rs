@@ -137,7 +137,8 @@ impl Console<'_> {
 
 /// True where the command that these arguments name ends in good order when it is interrupted. The others are ended by the system.
 pub fn listens<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> bool {
-    Cli::try_parse_from(arguments).is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Export(_) | Command::Pictures(_)))
+    Cli::try_parse_from(arguments)
+        .is_ok_and(|cli| !matches!(cli.command, Command::Inspect(_) | Command::Export(_) | Command::Pictures(_)))
 }
 
 /// Runs the command line `arguments` (the first is the program's name) and returns the exit code. Progress is shown

@@ -289,6 +289,9 @@ fn a_recording_elsewhere_is_refused_with_numbers() {
     let mut large = o.clone();
     large.frames.iter_mut().flat_map(|f| &mut f.points).for_each(|p| p.position *= 1000.0);
     let e = check_overlap(&large, c - DVec3::splat(0.1), c + DVec3::splat(0.1)).unwrap_err();
-    assert!(e.ends_with("is the recording in millimetres? Multiplied by 0.001 it lies at the object: convert it to metres"), "{e}");
+    assert!(
+        e.ends_with("is the recording in millimetres? Multiplied by 0.001 it lies at the object: convert it to metres"),
+        "{e}"
+    );
     assert_eq!(check_overlap(&Observation::default(), far, far), Ok(()), "nothing measured is another error");
 }

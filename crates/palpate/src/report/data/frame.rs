@@ -48,7 +48,9 @@ pub fn view(e: &Experiment, scene: &SceneData) -> DVec3 {
     let Some(camera) = best else { return usual };
     let from = match &cameras[camera] {
         Camera::Pinhole { axis, .. } => -*axis,
-        Camera::Scanner { center } => (*center - 0.5 * scene.bounds.map(DVec3::from_array).iter().sum::<DVec3>()).normalize_or(usual),
+        Camera::Scanner { center } => {
+            (*center - 0.5 * scene.bounds.map(DVec3::from_array).iter().sum::<DVec3>()).normalize_or(usual)
+        }
         Camera::Unknown => return usual,
     };
     let level = from - up * from.dot(up);
