@@ -84,8 +84,8 @@ mod tests {
     fn edges_come_once_in_order_with_their_triangles() {
         let mesh = TriMesh { vertices: vec![DVec3::ZERO; 4], triangles: vec![[3, 1, 0], [0, 1, 2], [1, 0, 2]] };
         let uses = EdgeUses::of(&mesh);
-        let told: Vec<([u32; 2], Vec<(u32, u8, bool)>)> =
-            uses.groups().map(|(e, u)| (e, u.iter().map(|u| (u.triangle, u.side, u.rising)).collect())).collect();
+        let told: Vec<_> =
+            uses.groups().map(|(e, u)| (e, u.iter().map(|u| (u.triangle, u.side, u.rising)).collect::<Vec<_>>())).collect();
         let expected = vec![
             ([0, 1], vec![(0, 1, false), (1, 0, true), (2, 0, false)]),
             ([0, 2], vec![(1, 2, false), (2, 1, true)]),
