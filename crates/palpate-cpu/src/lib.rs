@@ -31,5 +31,5 @@ mod world;
 pub use backend::CpuBackend;
 pub use memory::{Memory, Sizes};
 pub use newton::Effort;
-pub use tracking::Tracker;
+pub use tracking::{Correspondence, Tracker};
 pub use world::{Adjoint, State, Tally, Tangent, World};

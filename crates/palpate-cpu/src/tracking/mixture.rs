@@ -6,22 +6,16 @@
 //! place, so that no sum depends on the number of threads.
 
 use super::cubes::Cubes;
-use super::surface::Places;
-use crate::costs::Look;
+use super::surface;
 use glam::DVec3;
+use palpate_engine::tracking::{Mixing, Share, Sighting};
 use palpate_model::observation::ObservedPoint;
-use palpate_model::space::body::Body;
 use rayon::prelude::*;
-
-/// Reach of a Gaussian over σ: beyond lie 0.11 % of it.
-const REACH: f64 = 4.0;
-/// Most pairs that are looked at: with more, every so-manieth place and point stand for all.
-const PAIRS: usize = 4_000_000;
 
 /// P and Q of every place.
 #[derive(Debug)]
 pub struct Mixture {
-    pub shares: Vec<(f64, DVec3)>,
+    pub shares: Vec<Share>,
     /// Logarithm of the likelihood of all points, up to a constant.
     #[cfg(test)]
     pub likelihood: f64,
@@ -33,12 +27,10 @@ fn every(n: usize, step: usize) -> Vec<usize> {
 }
 
 impl Mixture {
-    /// The shares at displacement u `[N]`.
-    pub fn new(places: &Places, body: &Body, look: Look, u: &[DVec3], spread: f64, outliers: f64) -> Mixture {
-        let (points, cameras) = (&look.seen().points, &look.observation.cameras);
-        let all = places.at(body, u);
-        let seen = places.seen(&all, cameras);
-        let weights: Vec<Vec<f64>> = seen
+    /// The shares of a frame's points.
+    pub fn new(s: &Sighting, spread: f64, outliers: f64) -> Mixture {
+        let all = s.places;
+        let weights: Vec<Vec<f64>> = surface::visible(s)
             .iter()
             .map(|seen| {
                 let area = |k: usize| if seen[k] { all[k].area } else { 0.0 };
@@ -47,7 +39,7 @@ impl Mixture {
             })
             .collect();
         let positions: Vec<DVec3> = all.iter().map(|p| p.position).collect();
-        shares(points, &positions, &weights, spread, outliers)
+        shares(s.points, &positions, &weights, spread, outliers)
     }
 }
 
@@ -61,16 +53,7 @@ fn shares(points: &[ObservedPoint], positions: &[DVec3], weights: &[Vec<f64>], s
             likelihood: 0.0,
         };
     }
-    // Where points can be, outliers are.
-    let of_points = points.iter().map(|p| p.position);
-    let (low, high) = of_points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-    let side = (high - low).max(DVec3::splat(spread));
-    let volume = side.x * side.y * side.z;
-    // Wide Gaussians hold everything: then a sample is as good.
-    let reach = REACH * spread;
-    let near = (reach * reach * reach * 27.0 / volume).min(1.0);
-    let pairs = near * positions.len() as f64 * points.len() as f64;
-    let thin = (pairs / PAIRS as f64).sqrt().ceil().max(1.0) as usize;
+    let Mixing { volume, reach, thin } = Mixing::new(points, positions.len(), spread);
     let (some_points, some_places) = (every(points.len(), thin), every(positions.len(), thin));
     let at = |which: &[usize], of: &dyn Fn(usize) -> DVec3| which.iter().map(|i| of(*i)).collect::<Vec<_>>();
     let (xs, cs) = (at(&some_places, &|k| positions[k]), at(&some_points, &|n| points[n].position));

@@ -4,6 +4,7 @@
 //! Everything is counted in joules: with temperature η the function is `Ψ(u) = V(u) + η D(u)` and its curvature `K + η JᵀWJ`. K, the tangent
 //! stiffness of the prior, is factorised; conjugate gradients with K⁻¹ then take one iteration for every direction that the readings determine.
 
+mod correspond;
 mod cubes;
 mod draws;
 mod mixture;
@@ -12,6 +13,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use crate::costs::Look;
 use crate::linear::Prepared;
 use crate::linear::conjugate_gradient::{self, CgEnd, Precondition};
 use crate::linear::matrix::{Operator, Packed};
@@ -20,10 +22,11 @@ use crate::newton::{self, EVER_TAMER, Reason};
 use crate::simulate::{self, Start, equation};
 use crate::terms::{Equation, zeros};
 use crate::world::{Member, MemberState, Shared, World};
+pub use correspond::Correspondence;
 use glam::DVec3;
-use mixture::Mixture;
-use palpate_engine::tracking::{Certainty, Follow, Met, Pose, Prior, Problem, Pull};
+use palpate_engine::tracking::{Certainty, Correspond, Follow, Met, Place, Pose, Prior, Problem, Pull, Sighting};
 use palpate_engine::{Failure, FailureKind, ParamBatch};
+use palpate_model::observation::ReadingKind;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::InitialShape;
@@ -46,15 +49,21 @@ const TURN: f64 = 0.5;
 pub struct Tracker {
     world: World,
     places: Places,
+    who: Box<dyn Correspond>,
 }
 
 impl Tracker {
     /// A body with the plan's own parameter values.
     pub fn new(plan: &Plan) -> Tracker {
+        Tracker::with(plan, Box::new(Correspondence))
+    }
+
+    /// The same, with somebody else to say which readings belong to which part of the surface.
+    pub fn with(plan: &Plan, who: Box<dyn Correspond>) -> Tracker {
         faer::set_global_parallelism(faer::Par::Seq);
         let mut world = World::new(plan);
         world.set_params(&ParamBatch::of(&plan.theta));
-        Tracker { world, places: Places::new(&plan.body) }
+        Tracker { world, places: Places::new(&plan.body), who }
     }
 
     /// Mean distance of neighbouring places of the surface [m].
@@ -67,6 +76,12 @@ impl Tracker {
         let time = plan.observation.frames.get(frame).map_or(0.0, |f| f.time - self.world.members[0].first_stamp());
         move |reason| newton::at(time)(reason)
     }
+}
+
+/// A frame's points against places of the surface.
+fn sighting<'a>(look: Look<'a>, places: &'a [Place], spacing: f64) -> Sighting<'a> {
+    let (points, cameras, noise) = (&look.seen().points, &look.observation.cameras, look.observation.noise(ReadingKind::Depth));
+    Sighting { points, cameras, places, spacing, noise }
 }
 
 /// The prior's equation at a frame, from where it starts.
@@ -226,8 +241,9 @@ impl Follow for Tracker {
             Pull::Surface { .. } => Box::new(ByCost::new(shared, member, problem.frame, u)),
             Pull::Mixture { spread, outliers } => {
                 let look = member.look(shared, problem.frame);
-                let mixture = Mixture::new(&self.places, &shared.plan.body, look, u, spread, outliers);
-                Box::new(ByMixture::new(&shared.plan.body, mixture, look, u))
+                let places = self.places.at(&shared.plan.body, u);
+                let shares = self.who.shares(&sighting(look, &places, self.places.spacing), spread, outliers)?;
+                Box::new(ByMixture::new(&shared.plan.body, &shares, look, u))
             }
         };
         step(shared, &self.places, &mut equation, problem, pulls.as_ref(), u).map_err(self.failure(problem.frame))
@@ -260,13 +276,15 @@ impl Follow for Tracker {
             .map_err(self.failure(problem.frame))
     }
 
-    fn pierced(&mut self, frame: usize, u: &[DVec3]) -> f64 {
+    fn pierced(&mut self, frame: usize, u: &[DVec3]) -> Result<f64, Failure> {
         let (shared, member) = (&self.world.shared, &self.world.members[0]);
-        self.places.pierced(&shared.plan.body, member.look(shared, frame), u)
+        let places = self.places.at(&shared.plan.body, u);
+        Ok(self.who.rays(&sighting(member.look(shared, frame), &places, self.places.spacing))?.share())
     }
 
-    fn seen(&mut self, frame: usize, u: &[DVec3]) -> Vec<bool> {
+    fn seen(&mut self, frame: usize, u: &[DVec3]) -> Result<Vec<bool>, Failure> {
         let (shared, member) = (&self.world.shared, &self.world.members[0]);
-        self.places.read(&shared.plan.body, member.look(shared, frame), u)
+        let places = self.places.at(&shared.plan.body, u);
+        self.who.read(&sighting(member.look(shared, frame), &places, self.places.spacing))
     }
 }

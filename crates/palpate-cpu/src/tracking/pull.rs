@@ -1,10 +1,10 @@
 //! What draws the body: a function of the displacement with a gradient and a positive semidefinite curvature.
 
-use super::mixture::Mixture;
 use crate::costs::{Along, Compared, Look};
 use crate::linear::vector::Nodes;
 use crate::world::{Member, Shared};
 use glam::DVec3;
+use palpate_engine::tracking::Share;
 use palpate_model::observation::ReadingKind;
 use palpate_model::space::body::Body;
 
@@ -65,10 +65,10 @@ pub struct ByMixture<'a> {
 }
 
 impl<'a> ByMixture<'a> {
-    pub fn new(body: &'a Body, mixture: Mixture, look: Look, u: &[DVec3]) -> ByMixture<'a> {
+    pub fn new(body: &'a Body, shares: &[Share], look: Look, u: &[DVec3]) -> ByMixture<'a> {
         let noise = look.observation.noise(ReadingKind::Depth);
-        let some = |(k, s): (usize, &(f64, DVec3))| (s.0 > 0.0).then(|| (k, s.0 / (noise * noise), s.1 / s.0));
-        ByMixture { body, drawn: mixture.shares.iter().enumerate().filter_map(some).collect(), at: u.to_vec() }
+        let some = |(k, s): (usize, &Share)| (s.0 > 0.0).then(|| (k, s.0 / (noise * noise), s.1 / s.0));
+        ByMixture { body, drawn: shares.iter().enumerate().filter_map(some).collect(), at: u.to_vec() }
     }
 
     fn away(&self, u: &[DVec3], k: usize, goal: DVec3) -> DVec3 {

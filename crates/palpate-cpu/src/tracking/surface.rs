@@ -1,20 +1,12 @@
 //! Places of the surface as cameras see them: which of them are visible, and which rays prove that the body is not where it is claimed to be.
 
 use super::cubes::Cubes;
-use crate::costs::Look;
 use glam::{DMat3, DVec3};
+use palpate_engine::tracking::{Eye, PIXEL, Place, Rays, Sighting};
 use palpate_model::cutcells::grid::SIGNS;
-use palpate_model::observation::{Camera, ReadingKind};
 use palpate_model::space::body::{Body, Patch};
 use palpate_model::space::stencil::{Stencil, Stencils};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// A place may lie this many spacings behind the nearest one on its line of sight and still be seen: surfaces are slanted.
-const BEHIND: f64 = 2.0;
-/// Edge of a pixel of the picture that visibility is judged by, in spacings: few pixels between places stay empty.
-const PIXEL: f64 = 1.5;
-/// Noise of a reading beyond which a ray has passed through the body.
-const THROUGH: f64 = 3.0;
 
 /// The pieces of a body's surface.
 #[derive(Debug)]
@@ -25,71 +17,27 @@ pub struct Places {
     gradients: Stencils,
 }
 
-/// A piece where the body is now.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// Its middle [m].
-    pub position: DVec3,
-    /// Outward normal, of any length.
-    pub normal: DVec3,
-    /// Area at rest [m²].
-    pub area: f64,
-}
-
-/// What a camera sees, in pixels that are as wide as places are apart.
+/// What a camera sees.
 struct Picture {
-    center: DVec3,
-    axis: DVec3,
-    right: DVec3,
-    down: DVec3,
-    /// Tangent of the angle that a pixel takes.
-    pixel: f64,
+    eye: Eye,
     /// Distance along the axis of the nearest place that faces the camera, by pixel [m].
     nearest: BTreeMap<(i64, i64), f64>,
 }
 
 impl Picture {
-    /// `None` where there are no lines of sight.
-    fn new(camera: &Camera, places: &[Place], spacing: f64) -> Option<Picture> {
-        let center = camera.center()?;
-        let axis = match camera {
-            Camera::Pinhole { axis, .. } => *axis,
-            // A scanner looks at the body.
-            _ => {
-                let middle = places.iter().map(|p| p.position).sum::<DVec3>() / places.len().max(1) as f64;
-                (middle - center).try_normalize()?
-            }
-        };
-        let right = axis.any_orthonormal_vector();
-        let mut mean = 0.0;
-        places.iter().for_each(|p| mean += (p.position - center).length() / places.len() as f64);
-        let pixel = PIXEL * spacing / mean.max(spacing);
-        let mut picture = Picture { center, axis, right, down: axis.cross(right), pixel, nearest: BTreeMap::new() };
-        let facing = places.iter().filter(|p| picture.faces(p));
-        let at: Vec<((i64, i64), f64)> = facing.filter_map(|p| picture.pixel_of(p.position)).collect();
-        for (at, depth) in at {
-            let nearest = picture.nearest.entry(at).or_insert(depth);
+    fn new(eye: Eye, places: &[Place]) -> Picture {
+        let mut nearest = BTreeMap::new();
+        let facing = places.iter().filter(|p| eye.faces(p));
+        for (at, depth) in facing.filter_map(|p| eye.pixel_of(p.position)) {
+            let nearest = nearest.entry(at).or_insert(depth);
             *nearest = nearest.min(depth);
         }
-        Some(picture)
-    }
-
-    fn faces(&self, p: &Place) -> bool {
-        p.normal.dot(p.position - self.center) < 0.0
-    }
-
-    fn pixel_of(&self, p: DVec3) -> Option<((i64, i64), f64)> {
-        let away = p - self.center;
-        let depth = away.dot(self.axis);
-        let at = |side: DVec3| (away.dot(side) / depth / self.pixel).round() as i64;
-        (depth > 0.0).then(|| ((at(self.right), at(self.down)), depth))
+        Picture { eye, nearest }
     }
 
     fn sees(&self, p: &Place, slack: f64) -> bool {
-        self.faces(p)
-            && self
-                .pixel_of(p.position)
-                .is_some_and(|(at, depth)| depth <= self.nearest.get(&at).copied().unwrap_or(depth) + slack)
+        let before = |(at, depth)| depth <= self.nearest.get(&at).copied().unwrap_or(depth) + slack;
+        self.eye.faces(p) && self.eye.pixel_of(p.position).is_some_and(before)
     }
 }
 
@@ -123,68 +71,66 @@ impl Places {
         };
         body.pieces().map(place).collect()
     }
+}
 
-    /// For every camera which places it sees; all, where there are no lines of sight.
-    pub fn seen(&self, places: &[Place], cameras: &[Camera]) -> Vec<Vec<bool>> {
-        let slack = BEHIND * self.spacing;
-        let of_camera = |c: &Camera| match Picture::new(c, places, self.spacing) {
-            Some(picture) => places.iter().map(|p| picture.sees(p, slack)).collect(),
-            None => vec![true; places.len()],
+/// The picture of every camera; `None` where there are no lines of sight.
+fn pictures(s: &Sighting) -> Vec<Option<Picture>> {
+    s.eyes().into_iter().map(|eye| Some(Picture::new(eye?, s.places))).collect()
+}
+
+/// For every camera which places it sees; all, where there are no lines of sight.
+pub fn visible(s: &Sighting) -> Vec<Vec<bool>> {
+    let of_picture = |picture: &Option<Picture>| match picture {
+        Some(picture) => s.places.iter().map(|p| picture.sees(p, s.slack())).collect(),
+        None => vec![true; s.places.len()],
+    };
+    pictures(s).iter().map(of_picture).collect()
+}
+
+/// Which places have one of the frame's readings on their line of sight, or near them where there is none.
+pub fn read(s: &Sighting) -> Vec<bool> {
+    let mut read = vec![false; s.places.len()];
+    for (c, picture) in pictures(s).iter().enumerate() {
+        let of_camera = s.points.iter().filter(|p| p.camera as usize == c);
+        let Some(picture) = picture else {
+            let all: Vec<DVec3> = of_camera.map(|p| p.position).collect();
+            let (reach, cubes) = (PIXEL * s.spacing, Cubes::new(&all, PIXEL * s.spacing));
+            for (read, place) in read.iter_mut().zip(s.places).filter(|_| !all.is_empty()) {
+                cubes.near(place.position, |k| *read |= (all[k] - place.position).length() <= reach);
+            }
+            continue;
         };
-        cameras.iter().map(of_camera).collect()
+        let filled: BTreeSet<(i64, i64)> = of_camera.filter_map(|p| Some(picture.eye.pixel_of(p.position)?.0)).collect();
+        for (read, place) in read.iter_mut().zip(s.places) {
+            let at = picture.eye.pixel_of(place.position).map(|p| p.0);
+            *read |= at.is_some_and(|at| filled.contains(&at)) && picture.sees(place, s.slack());
+        }
     }
+    read
+}
 
-    /// Which places at displacement u have one of the frame's readings on their line of sight, or near them where there is none.
-    pub fn read(&self, body: &Body, look: Look, u: &[DVec3]) -> Vec<bool> {
-        let (points, cameras) = (&look.seen().points, &look.observation.cameras);
-        let places = self.at(body, u);
-        let mut read = vec![false; places.len()];
-        for (c, camera) in cameras.iter().enumerate() {
-            let of_camera = points.iter().filter(|p| p.camera as usize == c);
-            let Some(picture) = Picture::new(camera, &places, self.spacing) else {
-                let all: Vec<DVec3> = of_camera.map(|p| p.position).collect();
-                let (reach, cubes) = (PIXEL * self.spacing, Cubes::new(&all, PIXEL * self.spacing));
-                for (read, place) in read.iter_mut().zip(&places).filter(|_| !all.is_empty()) {
-                    cubes.near(place.position, |k| *read |= (all[k] - place.position).length() <= reach);
-                }
-                continue;
-            };
-            let filled: BTreeSet<(i64, i64)> = of_camera.filter_map(|p| Some(picture.pixel_of(p.position)?.0)).collect();
-            for (read, place) in read.iter_mut().zip(&places) {
-                let at = picture.pixel_of(place.position).map(|p| p.0);
-                *read |= at.is_some_and(|at| filled.contains(&at)) && picture.sees(place, BEHIND * self.spacing);
-            }
-        }
-        read
+/// How a frame's rays meet the body.
+pub fn rays(s: &Sighting) -> Rays {
+    let mut rays = Rays::default();
+    if s.points.is_empty() {
+        return rays;
     }
-
-    /// Of a frame's rays that meet the body, the share that pass through: their reading lies behind it, and no part of the surface is where it
-    /// lies.
-    pub fn pierced(&self, body: &Body, look: Look, u: &[DVec3]) -> f64 {
-        let (points, cameras) = (&look.seen().points, &look.observation.cameras);
-        if points.is_empty() {
-            return 0.0;
+    let (pictures, slack) = (pictures(s), s.depth());
+    let all: Vec<DVec3> = s.places.iter().map(|p| p.position).collect();
+    let cubes = Cubes::new(&all, slack);
+    for p in s.points {
+        let Some(picture) = &pictures[p.camera as usize] else { continue };
+        let Some((at, depth)) = picture.eye.pixel_of(p.position) else { continue };
+        let Some(nearest) = picture.nearest.get(&at) else { continue };
+        rays.met += 1;
+        if depth <= nearest + slack {
+            continue;
         }
-        let places = self.at(body, u);
-        let pictures: Vec<Option<Picture>> = cameras.iter().map(|c| Picture::new(c, &places, self.spacing)).collect();
-        let slack = BEHIND * self.spacing + THROUGH * look.observation.noise(ReadingKind::Depth);
-        let all: Vec<DVec3> = places.iter().map(|p| p.position).collect();
-        let cubes = Cubes::new(&all, slack);
-        let (mut met, mut through) = (0usize, 0usize);
-        for p in points {
-            let Some(picture) = &pictures[p.camera as usize] else { continue };
-            let Some((at, depth)) = picture.pixel_of(p.position) else { continue };
-            let Some(nearest) = picture.nearest.get(&at) else { continue };
-            met += 1;
-            if depth <= nearest + slack {
-                continue;
-            }
-            let mut away = f64::INFINITY;
-            cubes.near(p.position, |k| away = away.min((all[k] - p.position).length()));
-            through += usize::from(away > slack);
-        }
-        through as f64 / met.max(1) as f64
+        let mut away = f64::INFINITY;
+        cubes.near(p.position, |k| away = away.min((all[k] - p.position).length()));
+        rays.through += usize::from(away > slack);
     }
+    rays
 }
 
 /// det(F) F⁻ᵀ: it turns normals with their areas.

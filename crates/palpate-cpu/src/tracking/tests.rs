@@ -24,6 +24,12 @@ fn draws(count: usize, nodes: usize) -> Vec<Nodes> {
     (0..count).map(|_| (0..nodes).map(|_| 3f64.sqrt() * noise.vector()).collect()).collect()
 }
 
+/// Who belongs to whom at a displacement.
+fn mixture(tracker: &Tracker, look: Look, u: &[DVec3], spread: f64, outliers: f64) -> Mixture {
+    let places = tracker.places.at(&tracker.world.shared.plan.body, u);
+    Mixture::new(&sighting(look, &places, tracker.places.spacing), spread, outliers)
+}
+
 /// The columns of an operator.
 fn dense(n: usize, f: impl Fn(&[DVec3]) -> Nodes) -> Mat<f64> {
     let mut m = Mat::zeros(3 * n, 3 * n);
@@ -91,9 +97,9 @@ fn the_mixture_pulls_as_the_gradient_of_its_likelihood() {
     let (body, look) = (&shared.plan.body, member.look(shared, 1));
     // With the spread of the mixture as the noise of a reading, what the shares weigh is the likelihood's own.
     let spread = look.observation.noise(palpate_model::observation::ReadingKind::Depth) * 4.0;
-    let mixture = |u: &[DVec3]| Mixture::new(&tracker.places, body, look, u, spread, 0.1);
+    let mixture = |u: &[DVec3]| mixture(&tracker, look, u, spread, 0.1);
     let slope = |u: &[DVec3]| {
-        let pulls = ByMixture::new(body, mixture(u), look, u);
+        let pulls = ByMixture::new(body, &mixture(u).shares, look, u);
         pulls.gradient().iter().map(|g| *g / 16.0).collect::<Nodes>()
     };
     let (gradient, mut noise) = (slope(&u), Noise(9));
@@ -115,7 +121,7 @@ fn the_bound_that_shares_make_is_a_quadratic_with_its_own_derivatives() {
     let (tracker, u) = tracker();
     let (shared, member) = (&tracker.world.shared, &tracker.world.members[0]);
     let (body, look) = (&shared.plan.body, member.look(shared, 1));
-    let pulls = ByMixture::new(body, Mixture::new(&tracker.places, body, look, &u, 0.01, 0.05), look, &u);
+    let pulls = ByMixture::new(body, &mixture(&tracker, look, &u, 0.01, 0.05).shares, look, &u);
     let mut noise = Noise(4);
     let direction: Nodes = u.iter().map(|_| 1e-3 * noise.vector()).collect();
     let mut moved = u.clone();

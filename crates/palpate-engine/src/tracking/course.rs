@@ -161,8 +161,8 @@ impl Course<'_> {
             frame,
             time,
             met,
-            seen: body.seen(frame, &u),
-            doubts: doubts(body, settings, frame, &u, &met, (&certainty, problem.temperature, self.energy)),
+            seen: body.seen(frame, &u)?,
+            doubts: doubts(body, settings, frame, &u, &met, (&certainty, problem.temperature, self.energy))?,
             temperature: problem.temperature,
             steps,
             cold,
@@ -282,15 +282,15 @@ fn doubts(
     u: &[DVec3],
     met: &Met,
     (certainty, temperature, before): (&Certainty, f64, Option<f64>),
-) -> Vec<Doubt> {
+) -> Result<Vec<Doubt>, Failure> {
     if met.readings == 0 {
-        return vec![Doubt::Unseen];
+        return Ok(vec![Doubt::Unseen]);
     }
     let mut doubts = Vec::new();
     if met.rms > FAR * settings.noise.max(0.1 * settings.spacing) {
         doubts.push(Doubt::Far(met.rms));
     }
-    let pierced = body.pierced(frame, u);
+    let pierced = body.pierced(frame, u)?;
     if pierced > PIERCED + settings.outliers {
         doubts.push(Doubt::Pierced(pierced));
     }
@@ -302,5 +302,5 @@ fn doubts(
     {
         doubts.push(Doubt::Jumped(certainty.energy / before));
     }
-    doubts
+    Ok(doubts)
 }

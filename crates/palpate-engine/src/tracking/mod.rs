@@ -12,10 +12,12 @@
 //! D is the cost that a fit has, in a band that shrinks.
 
 mod course;
+mod sighting;
 #[cfg(test)]
 mod tests;
 
 pub use course::track;
+pub use sighting::{BEHIND, Correspond, Eye, Mixing, PIXEL, Place, REACH, Rays, Share, Sighting, THROUGH};
 
 use crate::failure::Failure;
 use glam::DVec3;
@@ -123,9 +125,15 @@ pub trait Follow {
     /// A solve fails.
     fn certainty(&mut self, problem: &Problem, band: f64, u: &[DVec3], draws: &[Vec<DVec3>]) -> Result<Certainty, Failure>;
     /// Share of the frame's rays that pass through the body at u, and so prove that it is not there, over all rays that meet it.
-    fn pierced(&mut self, frame: usize, u: &[DVec3]) -> f64;
+    ///
+    /// # Errors
+    /// A device breaks.
+    fn pierced(&mut self, frame: usize, u: &[DVec3]) -> Result<f64, Failure>;
     /// Which patches of the surface have a reading on their line of sight `[patches]`.
-    fn seen(&mut self, frame: usize, u: &[DVec3]) -> Vec<bool>;
+    ///
+    /// # Errors
+    /// A device breaks.
+    fn seen(&mut self, frame: usize, u: &[DVec3]) -> Result<Vec<bool>, Failure>;
 }
 
 /// Choices of a tracker.

@@ -50,13 +50,13 @@ impl Follow for Point {
         Ok(Certainty { posterior: prior.clone(), prior, determined: 1.0, excess: 0.5 * p.temperature, energy: 0.0 })
     }
 
-    fn pierced(&mut self, frame: usize, _: &[DVec3]) -> f64 {
+    fn pierced(&mut self, frame: usize, _: &[DVec3]) -> Result<f64, Failure> {
         let cold = self.asked.iter().any(|(f, pull)| *f == frame && matches!(pull, Pull::Mixture { .. }));
-        if cold { 0.0 } else { self.pierced[frame] }
+        Ok(if cold { 0.0 } else { self.pierced[frame] })
     }
 
-    fn seen(&mut self, frame: usize, _: &[DVec3]) -> Vec<bool> {
-        vec![self.readings[frame].is_some()]
+    fn seen(&mut self, frame: usize, _: &[DVec3]) -> Result<Vec<bool>, Failure> {
+        Ok(vec![self.readings[frame].is_some()])
     }
 }
 
@@ -132,10 +132,10 @@ fn what_stays_lost_moves_nothing() {
         fn certainty(&mut self, p: &Problem, band: f64, u: &[DVec3], d: &[Vec<DVec3>]) -> Result<Certainty, Failure> {
             self.0.certainty(p, band, u, d)
         }
-        fn pierced(&mut self, frame: usize, _: &[DVec3]) -> f64 {
-            if frame == 1 { 0.4 } else { 0.0 }
+        fn pierced(&mut self, frame: usize, _: &[DVec3]) -> Result<f64, Failure> {
+            Ok(if frame == 1 { 0.4 } else { 0.0 })
         }
-        fn seen(&mut self, frame: usize, u: &[DVec3]) -> Vec<bool> {
+        fn seen(&mut self, frame: usize, u: &[DVec3]) -> Result<Vec<bool>, Failure> {
             self.0.seen(frame, u)
         }
     }
