@@ -2,6 +2,7 @@
 
 use crate::device::{Choice, Gpu, GpuError};
 use crate::solve::{backward, forward};
+use crate::tracking::Correspondence;
 use crate::world::{Adjoint, LEVELS, Level, State, Tally, Tangent, Tuning, World};
 use crate::{read, solve};
 use glam::DVec3;
@@ -87,6 +88,11 @@ impl GpuBackend {
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// Who says, on its device, which readings of a frame belong to which part of a surface.
+    pub fn correspondence(&self) -> Correspondence {
+        Correspondence::on(self.gpu.clone())
     }
 }
 

@@ -1,8 +1,10 @@
 //! Structs that host and kernels share. The build script asserts that every field lies where WGSL has it.
 
+mod crowd;
 mod looks;
 
 use bytemuck::{Pod, Zeroable};
+pub use crowd::{Crowd, Eye};
 pub use looks::{BandCell, Carried, Found, Look, Mark, Shot, Sight, Site};
 
 /// Arguments of one dispatch.

@@ -21,6 +21,7 @@ mod terms;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod tracking;
 mod world;
 
 pub use backend::GpuBackend;
@@ -28,4 +29,5 @@ pub use device::{AdapterReport, Bare, Choice, Dispatches, Gpu, GpuError, Host, L
 pub use memory::{Load, Memory, memory, memory_of_product};
 pub use solve::{CgSpeed, Traffic};
 pub use trace::{TracedStep, trace_step};
+pub use tracking::Correspondence;
 pub use world::{Adjoint, Product, State, Tally, Tangent, Tuning, World};

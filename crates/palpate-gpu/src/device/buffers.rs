@@ -37,7 +37,11 @@ impl Gpu {
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST
             | if ["arguments", "gate"].contains(&label) { wgpu::BufferUsages::INDIRECT } else { wgpu::BufferUsages::empty() }
-            | if ["shape", "sight"].contains(&label) { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::empty() };
+            | if ["shape", "sight", "crowd"].contains(&label) {
+                wgpu::BufferUsages::UNIFORM
+            } else {
+                wgpu::BufferUsages::empty()
+            };
         let size = whole(bytes);
         let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let buffer =

@@ -4,6 +4,7 @@
 use crate::costs::{MOST_DIRECTIONS, MOST_LOOPS, POINTS_OF_STRIPE, Seen};
 use crate::device::pipelines::PASSES;
 use crate::device::pipelines::shared::{laws, pulls};
+use crate::tracking::MOST_ITEMS;
 use crate::world::KINDS;
 use crate::world::{LOOPS, MOST_GROUPS, MOST_SYSTEMS, Most, columns};
 use palpate_model::cutcells::{front, pullback};
@@ -22,12 +23,15 @@ fn bound(header: &str, most: &Most, seen: &Seen) -> Option<f64> {
         () if has("c.low.y") => return mean(seen.rows_of_cubes, seen.layers),
         () if has("row.x + 8u * stripe") => return mean(seen.points, 8 * seen.stripes * seen.rows_of_cubes).map(|n| n + 1.0),
         () if has("row.x + stripe") => return mean(seen.points, seen.stripes * seen.rows_of_cubes).map(|n| n + 1.0),
+        // All places or points together, of nine rows of cubes, by eight lanes.
+        () if has("i < run.y; i += 8u") => return mean(MOST_ITEMS as u64, 8 * 9).map(|n| n + 1.0),
         // A marker belongs to one site.
         () if has("mark_rows[") && !has("m += 64u") => return mean(seen.markers, seen.sites),
         () => {}
     }
     let count = match () {
         () if has("> 0u; s /= 2u") || has("> 0u; step >>= 1u") => 8,
+        () if has("k < crowd.places; k += 64u") => (MOST_ITEMS as u64).div_ceil(64),
         () if has("elastic_rows[") => most.valence,
         () if has("pair_rows[") => most.pairs,
         () if has("held_rows[") => most.holders,
