@@ -6,6 +6,7 @@ use crate::host::host;
 use crate::memory::Demand;
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
+use palpate_engine::tracking::Correspond;
 use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
 use palpate_model::plan::Plan;
@@ -106,6 +107,17 @@ impl Backend {
             Ok(device) => auto::choose(device, plan, demand, hear),
             Err(e) => (Backend::Cpu, e.to_string()),
         }
+    }
+
+    /// Who says, for a tracker, which readings belong to which part of the surface: the device only where it is asked for.
+    ///
+    /// # Errors
+    /// There is no usable adapter.
+    pub(crate) fn correspondence(self) -> Result<Box<dyn Correspond>, Error> {
+        Ok(match self {
+            Backend::Gpu => Box::new(gpu().map_err(Error::Device)?.correspondence()),
+            Backend::Cpu | Backend::Auto => Box::new(palpate_cpu::Correspondence),
+        })
     }
 
     /// How many simulations of a fit run at once, with so many threads (0 = one per core).

@@ -80,4 +80,4 @@ pub use interrupt::{Clock, Interrupt};
 pub use objective::{Coordinates, Objective};
 pub use progress::Liveliness;
 pub use residuals::{FrameResidual, ResidualSummary};
-pub use tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, refine, track};
+pub use tracking::{Refined, Round, RoundValue, TrackedBody, TrackedFrame, refine, track, track_on};

@@ -5,6 +5,7 @@ mod refine;
 pub use refine::{Refined, Round, RoundValue, refine};
 
 use crate::embed::Embedding;
+use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use glam::DVec3;
@@ -101,7 +102,19 @@ fn nearest_patches(experiment: &Experiment, places: &[DVec3]) -> Vec<usize> {
 ///
 /// # Errors
 /// [`Error::Scene`] without a recording, [`Error::Simulation`] where a solve fails.
-pub fn track(experiment: &Experiment, mut progress: impl FnMut(usize) -> ControlFlow<()>) -> Result<TrackedBody, Error> {
+pub fn track(experiment: &Experiment, progress: impl FnMut(usize) -> ControlFlow<()>) -> Result<TrackedBody, Error> {
+    track_on(experiment, Backend::Cpu, progress)
+}
+
+/// The same with a backend that says which readings belong to which part of the surface; the body is moved on the CPU.
+///
+/// # Errors
+/// As [`track`], or [`Error::Device`] where the device cannot be had.
+pub fn track_on(
+    experiment: &Experiment,
+    backend: Backend,
+    mut progress: impl FnMut(usize) -> ControlFlow<()>,
+) -> Result<TrackedBody, Error> {
     let plan = experiment.plan();
     let frames: Vec<(usize, f64)> = plan.observation.frames.iter().enumerate().map(|(k, f)| (k, f.time)).collect();
     if frames.is_empty() {
@@ -113,7 +126,7 @@ pub fn track(experiment: &Experiment, mut progress: impl FnMut(usize) -> Control
     if !dynamic && !held {
         return Err(experiment.fault("track.prior", "\"elastic\" needs a clamp: nothing else holds the body in its equilibrium"));
     }
-    let mut body = Tracker::new(plan);
+    let mut body = Tracker::with(plan, backend.correspondence()?);
     let settings = Settings {
         dynamic,
         temperature: wish.temperature,

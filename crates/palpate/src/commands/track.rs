@@ -8,7 +8,7 @@ use crate::options::{count, out_folder};
 use crate::report::tracking_document;
 use crate::results;
 use crate::results::tracking::{FrameRow, RoundNumber, TrackingDocument};
-use crate::tracking::{Refined, TrackedBody, refine, track};
+use crate::tracking::{Refined, TrackedBody, refine, track_on};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_diagnose::stated;
@@ -54,6 +54,18 @@ pub struct Arguments {
     /// Files per frame, separated by commas
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<Format>,
+    /// What finds out which readings belong to which part of the surface
+    #[arg(long, value_enum, default_value = "cpu")]
+    backend: Who,
+}
+
+/// The body itself is moved on the CPU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Who {
+    /// Double precision, on all cores
+    Cpu,
+    /// WGSL kernels on a graphics adapter (PALPATE_ADAPTER chooses one by index, PCI address or name), which also fits with --refine
+    Gpu,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -128,10 +140,14 @@ pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let clock = Instant::now();
     let mut progress = console.progress(experiment.plan().observation.frames.len() as u64, "tracking");
     let interrupt = console.interrupt.clone();
+    let backend = match a.backend {
+        Who::Cpu => Backend::Cpu,
+        Who::Gpu => Backend::Gpu,
+    };
     let refined = match a.refine {
-        Some(most) => refine(&experiment, most as usize, Backend::Cpu, &interrupt, &folder, |text| progress.on(0, text))?,
+        Some(most) => refine(&experiment, most as usize, backend, &interrupt, &folder, |text| progress.on(0, text))?,
         None => {
-            let tracked = track(&experiment, |done| {
+            let tracked = track_on(&experiment, backend, |done| {
                 progress.at(done as u64, "");
                 if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;

@@ -5,7 +5,7 @@
 //! settled:  max_i |v_i − v_i of the round before| / standard error_i < SETTLED
 //! ```
 
-use super::{TrackedBody, track};
+use super::{TrackedBody, track_on};
 use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -91,10 +91,10 @@ fn round(fitted: &Fitted, tracked: &TrackedBody, before: Option<&Round>) -> Roun
     }
 }
 
-/// Tracks and fits in turns, `most` fits at most; `hear` is told in words what is being done and may end it.
+/// Tracks and fits in turns on a backend, `most` fits at most; `hear` is told in words what is being done and may end it.
 ///
 /// # Errors
-/// As of [`track`] and of a fit: there must be a `[fit]` with free numbers.
+/// As of [`track_on`] and of a fit: there must be a `[fit]` with free numbers.
 pub fn refine(
     experiment: &Experiment,
     most: usize,
@@ -106,7 +106,7 @@ pub fn refine(
     check(std::slice::from_ref(experiment))?;
     let frames = experiment.plan().observation.frames.len();
     let mut look = |e: &Experiment, number: usize| {
-        track(e, |done| {
+        track_on(e, backend, |done| {
             hear(&format!("round {number}: tracking, frame {done} of {frames}"));
             if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })

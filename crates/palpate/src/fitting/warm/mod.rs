@@ -171,7 +171,7 @@ fn by_tracking(
                     return Ok(all);
                 }
                 let frames = e.plan().observation.frames.len();
-                let tracked = tracking::track(e, |done| {
+                let tracked = tracking::track_on(e, backend, |done| {
                     say(format!("tracking, frame {done} of {frames}"));
                     if interrupt.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 })?;
