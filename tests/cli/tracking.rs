@@ -154,10 +154,12 @@ fn a_bar_that_is_far_from_where_it_is_thought_is_found() {
     assert_eq!(on_device["frames"][0]["cold"], true, "{on_device}");
     let surface = |out: &str| read_array(&file(out).join("tracked.npz"), Some("surface")).unwrap().values;
     let (a, b) = (surface("late"), surface("late-gpu"));
-    let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    println!("{apart} m apart");
-    // Both settle until a step promises next to nothing; the mixture only leads there.
-    assert!(a.len() == b.len() && apart < 1e-4, "{apart}");
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let first = a.len() / rows["frames"].as_array().unwrap().len();
+    let (cold, all) = (apart(&a[..first], &b[..first]), apart(&a, &b));
+    println!("{cold} m apart in the cold frame, {all} m in all");
+    // Shares agree to 1e-5. In frames after the first a reading at the edge of the band may belong or not, which is worth a part of its noise.
+    assert!(a.len() == b.len() && cold < 1e-5 && all < 1e-3, "{cold} {all}");
 }
 
 /// The bar with two free numbers, begun at this modulus and without a word on damping.
