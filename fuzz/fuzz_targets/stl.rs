@@ -1,3 +1,5 @@
+//! Damaged bytes as a file of the reader `stl`, by cargo-fuzz.
+
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {

@@ -36,10 +36,11 @@ fn a_report_holds_what_it_shows_and_pictures_are_drawn_of_it_alone() {
     }
     let of = |topic: Topic| data.charts.iter().filter(move |c| c.topic == topic);
     assert!(of(Topic::Histogram).count() == 1 && of(Topic::Residual).count() == 1 && of(Topic::Search).count() == 2);
-    // Columns of the histogram are shares of all readings.
+    // Columns of the histogram are shares of all readings; some may lie beyond its ends.
     let histogram = of(Topic::Histogram).next().unwrap();
     let fitted = histogram.series.iter().find(|s| s.role == Role::After).unwrap();
-    assert!((fitted.y.numbers().sum::<f64>() - 100.0).abs() < 1e-3);
+    let within = fitted.y.numbers().sum::<f64>();
+    assert!(within > 90.0 && within < 100.0 + 1e-3, "{within}");
 
     // Neither scene nor recording are needed any more.
     let moved = folder.path().join("moved");

@@ -212,7 +212,7 @@ fn simulate_writes_what_was_asked_for() {
         assert!(out.join(name).exists(), "{name}");
     }
     // Hexahedra with the share of each that the body fills, and no arrays of fields that the scene does not have.
-    let fractions = palpate_io::vtk::read_vtu_array(&out.join("frame_00010.vtu"), None, true).unwrap();
+    let fractions = palpate_io::vtk::read_vtu_array(&out.join("frame_00010.vtu"), Some("fraction"), true).unwrap();
     assert_eq!(fractions, [1.0; 16]);
     let picture = image::open(out.join("frame_00010.png")).unwrap().to_rgb8();
     let body = picture.pixels().filter(|p| p.0[2] > p.0[0].saturating_add(20)).count();

@@ -38,6 +38,7 @@ const SURPRISING: f64 = 3.0;
 
 pub use answer::{Headline, Parts};
 use counted::Counted;
+pub use free::FreeNumber;
 pub(crate) use free::free_parameters;
 pub use held_out::{Distances, HeldOut};
 pub(crate) use verdict::held_whole;
@@ -75,22 +76,6 @@ pub struct FitOptions<'a> {
     pub on_stage: Option<&'a mut (dyn FnMut(&str) + Send)>,
     /// Hears of every iteration of every start.
     pub on_iteration: Option<&'a mut (dyn FnMut(&Progress) + Send)>,
-}
-
-/// One free number, or field, of a fit over one or several scenes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FreeNumber {
-    /// Path in the scene file.
-    pub path: String,
-    /// The scene it belongs to; `None` when all scenes that name it share it.
-    pub scene: Option<usize>,
-}
-
-impl FreeNumber {
-    /// Path, with the number of its scene (from 1) where it is not shared.
-    pub fn label(&self) -> String {
-        self.scene.map_or_else(|| self.path.clone(), |s| format!("{} [scene {}]", self.path, s + 1))
-    }
 }
 
 /// A finished (or interrupted) fit.

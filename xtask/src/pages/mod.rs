@@ -35,7 +35,7 @@ fn below(root: &Path, folder: &str, files: &mut Vec<String>) {
 pub fn check(root: &Path, found: &mut Vec<String>) {
     let all = pages(root);
     let mut files = Vec::new();
-    for folder in ["crates", "shaders", "tests", "xtask", "python"] {
+    for folder in ["crates", "shaders", "tests", "xtask", "python", "fuzz"] {
         below(root, folder, &mut files);
     }
     for (name, text) in &all {

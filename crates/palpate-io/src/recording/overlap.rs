@@ -55,8 +55,12 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     if all.is_empty() {
         return Ok(());
     }
+    // About the origin a small multiple of anything lies at the object: it must be of the object's size as well.
+    let (low, high) = bounds(&observation.frames.iter().flat_map(positions).collect::<Vec<_>>());
+    let spread = (high - low).length();
+    let fits = |factor: f64| factor * spread > 0.1 * size && meets(observation, factor, distance, 0.5 * size);
     let units = [(0.001, "millimetres"), (0.01, "centimetres")];
-    let unit = match units.into_iter().find(|u| meets(observation, u.0, distance, 0.5 * size)) {
+    let unit = match units.into_iter().find(|u| fits(u.0)) {
         Some((factor, name)) => {
             format!("is the recording in {name}? Multiplied by {factor} it lies at the object: convert it to metres")
         }

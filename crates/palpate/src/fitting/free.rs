@@ -1,12 +1,28 @@
 //! Free numbers of one or several experiments: what is shared, where each acts.
 
-use super::{FreeNumber, specs};
+use super::specs;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use palpate_fit::{FieldPrior, FreeParameter, Mean, Slot};
 use palpate_model::params::ParamKey;
 use palpate_model::params::fields::Prior;
 use std::sync::Arc;
+
+/// One free number, or field, of a fit over one or several scenes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeNumber {
+    /// Path in the scene file.
+    pub path: String,
+    /// The scene it belongs to; `None` when all scenes that name it share it.
+    pub scene: Option<usize>,
+}
+
+impl FreeNumber {
+    /// Path, with the number of its scene (from 1) where it is not shared.
+    pub fn label(&self) -> String {
+        self.scene.map_or_else(|| self.path.clone(), |s| format!("{} [scene {}]", self.path, s + 1))
+    }
+}
 
 /// A number or field that reaches θ: its first place with θ per unit, and how many values it has.
 fn slot(experiment: &Experiment, scene: usize, path: &str) -> Option<(ParamKey, Slot, usize)> {
