@@ -77,12 +77,12 @@ mod tests {
         });
         let all = [
             "cameras",
+            "clouds",
             "depth_readings",
             "facts",
             "format",
             "guesses",
             "images",
-            "clouds",
             "losses",
             "marker_readings",
             "recording",
