@@ -83,32 +83,30 @@ fn started(plan: &Plan) -> (World, Result<Vec<DVec3>, String>) {
 /// A shape that was measured with an error: the start is an equilibrium all the same, and away from the shape given by about the error.
 #[test]
 fn a_shape_that_departs_from_the_equilibrium_starts_in_its_own() {
-    for of_tetrahedra in [false, true] {
-        let plan = seen(of_tetrahedra, true);
-        let mut states = Vec::new();
-        let visit = |_: usize, s: Snapshot, _| {
-            states.push(s.displacement);
-            ControlFlow::Continue(())
-        };
-        let mut rollout = Rollout::new(CpuBackend, &plan, 1).unwrap();
-        rollout.visit(&plan.theta, visit).unwrap();
-        let mut theta = plan.theta.clone();
-        let still = |key: &ParamKey| matches!(key, ParamKey::Velocity(_));
-        plan.layout.keys.iter().zip(&mut theta).filter(|(k, _)| still(k)).for_each(|(_, t)| *t = 0.0);
-        let first = states.remove(0);
-        states.clear();
-        let visit = |_: usize, s: Snapshot, _| {
-            states.push(s.displacement);
-            ControlFlow::Continue(())
-        };
-        rollout.visit(&theta, visit).unwrap();
-        let moved = states.iter().flat_map(|s| s.iter().zip(&first)).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
-        println!("tetrahedra {of_tetrahedra}: starts {:.4} of the length away, then moves {:.1e} m", largest(&first), moved);
-        // Bent by ½ · 0.4 /m · (0.18 m)², which is 0.032 of the length; the load, which presses another shape, changes it by a part of that.
-        assert!((0.02..0.05).contains(&largest(&first)), "{}", largest(&first));
-        // What Newton's tolerance of 1e-8 of the forces leaves of a bar of 0.2 m.
-        assert!(moved < 1e-7, "{moved:e}");
-    }
+    let plan = seen(false, true);
+    let mut states = Vec::new();
+    let visit = |_: usize, s: Snapshot, _| {
+        states.push(s.displacement);
+        ControlFlow::Continue(())
+    };
+    let mut rollout = Rollout::new(CpuBackend, &plan, 1).unwrap();
+    rollout.visit(&plan.theta, visit).unwrap();
+    let mut theta = plan.theta.clone();
+    let still = |key: &ParamKey| matches!(key, ParamKey::Velocity(_));
+    plan.layout.keys.iter().zip(&mut theta).filter(|(k, _)| still(k)).for_each(|(_, t)| *t = 0.0);
+    let first = states.remove(0);
+    states.clear();
+    let visit = |_: usize, s: Snapshot, _| {
+        states.push(s.displacement);
+        ControlFlow::Continue(())
+    };
+    rollout.visit(&theta, visit).unwrap();
+    let moved = states.iter().flat_map(|s| s.iter().zip(&first)).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+    println!("starts {:.4} of the length away, then moves {:.1e} m", largest(&first), moved);
+    // Bent by ½ · 0.4 /m · (0.18 m)², which is 0.032 of the length; the load, which presses another shape, changes it by a part of that.
+    assert!((0.02..0.05).contains(&largest(&first)), "{}", largest(&first));
+    // What Newton's tolerance of 1e-8 of the forces leaves of a bar of 0.2 m.
+    assert!(moved < 1e-7, "{moved:e}");
 }
 
 /// Largest displacement over the body's length.
@@ -159,6 +157,14 @@ fn a_body_too_soft_for_its_shape_is_refused_with_the_stiffness_that_will_do() {
 }
 
 #[test]
+fn tetrahedra_do_not_depart_from_the_shape_given() {
+    let mut scene = bar(0.2, true);
+    scene.effects = vec![Effect::absent(effects::find("rest-shape").unwrap())];
+    let told = build_plan(&scene, Observation::default(), &[]).map(|_| ()).unwrap_err().to_string();
+    assert!(told.contains("effect.0.kind") && told.contains("tetrahedra"), "{told}");
+}
+
+#[test]
 fn a_body_that_nothing_holds_is_refused() {
     let mut scene = bar(0.2, false);
     scene.clamps.clear();
@@ -176,8 +182,6 @@ fn seen(of_tetrahedra: bool, away: bool) -> Plan {
         let mut effect = Effect::absent(effects::find("rest-shape").unwrap());
         AWAY.iter().for_each(|(slot, x)| effect.values[*slot] = Some(*x));
         scene.effects = vec![effect];
-        // Differences of a start that is solved for see what its solver leaves.
-        scene.solver.tolerance = 1e-12;
     }
     scene.initial.velocity.z = 0.2;
     scene.masses = vec![PointMass { point: DVec3::new(0.19, 0.02, 0.02), mass: 0.01 }];
@@ -206,7 +210,7 @@ fn gradients_and_sensitivities_go_through_the_stress_free_shape() {
         ParamKey::PointMass(0),
         ParamKey::Velocity(2),
     ];
-    for (of_tetrahedra, away) in [(false, false), (true, false), (false, true), (true, true)] {
+    for (of_tetrahedra, away) in [(false, false), (true, false), (false, true)] {
         let plan = seen(of_tetrahedra, away);
         let of_effect = |key: &&ParamKey| match key {
             ParamKey::Effect { slot, .. } => AWAY.iter().any(|(k, _)| k == &usize::from(*slot)),
