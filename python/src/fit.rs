@@ -47,6 +47,9 @@ impl Fit {
     }
 }
 
+/// A signature that Python shows needs the number itself.
+const _: () = assert!(palpate::report::FRAMES == 24);
+
 #[pymethods]
 impl Fit {
     /// What the command line writes as `result.json`.
@@ -138,7 +141,7 @@ impl Fit {
     }
 
     /// Writes what the command line writes: `result.json`, `model.toml`, `history.csv`, fields, and `report.html` with so many frames of a scene in space.
-    #[pyo3(signature = (folder, *, pictures = palpate::report::FRAMES))]
+    #[pyo3(signature = (folder, *, pictures = 24))]
     fn save(&self, py: Python<'_>, folder: PathBuf, pictures: usize) -> PyResult<()> {
         let (experiments, fitted) = (self.experiments.clone(), self.fitted.clone());
         let write = move || {
