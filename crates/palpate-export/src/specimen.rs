@@ -173,7 +173,7 @@ impl Specimen<'_> {
     }
 
     /// Tetrahedra by what they are made of: Young's modulus [Pa], density [kg/m³] and numbers of the tetrahedra. Where a field varies them, values
-    /// within [`STEP`] of each other are one.
+    /// within `STEP` of each other are one.
     pub fn parts(&self) -> Vec<(f64, f64, Vec<u32>)> {
         if self.moduli.is_none() && self.densities.is_none() {
             return vec![(self.material.youngs_modulus, self.material.density, (0..self.mesh.tets.len() as u32).collect())];
