@@ -8,7 +8,7 @@ use crate::linear::Purpose;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::newton::{self, Effort, Reason};
-use crate::simulate::{Start, check, equation, with_matrix};
+use crate::simulate::{Start, check, equation, minus, with_matrix};
 use crate::terms::{Curvature, Equation};
 use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
@@ -101,16 +101,28 @@ pub(crate) fn step_adjoint(
     if adj.u.iter().all(|u| *u == DVec3::ZERO) {
         return Ok(());
     }
-    let still = Start::still(next.u.len());
-    let mut z = [adj.u.clone()];
-    member.effort.adjoint += with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, Some(stage), &still);
-        e.residual(&next.u);
-        let iterations = newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &next.u, &mut z)?;
-        gradient.take(&e, &next.u, &z[0]);
-        Ok::<usize, Reason>(iterations)
-    })?;
+    member.effort.adjoint += pull(shared, member, Some(stage), next, adj, gradient)?;
     Ok(())
+}
+
+/// Derivatives of J through an equilibrium, that of a stage or of the start (`None`): adds to `gradient`; the iterations that it took.
+pub(crate) fn pull(
+    shared: &Shared,
+    member: &mut Member,
+    stage: Option<&Stage>,
+    at: &MemberState,
+    adj: &MemberState,
+    gradient: &mut Gradient,
+) -> Result<usize, Reason> {
+    let still = Start::still(at.u.len());
+    let mut z = [adj.u.clone()];
+    with_matrix(member, |member, matrix| {
+        let mut e = equation(shared, member, stage, &still);
+        e.residual(&at.u);
+        let iterations = newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut z)?;
+        gradient.take(&e, &at.u, &z[0]);
+        Ok(iterations)
+    })
 }
 
 /// Its tangent.
@@ -121,16 +133,23 @@ pub(crate) fn step_tangent(
     next: &MemberState,
     t: &mut MemberTangent,
 ) -> Result<(), Reason> {
-    let still = Start::still(next.u.len());
     t.dv.iter_mut().for_each(|v| v.fill(DVec3::ZERO));
+    along(shared, member, Some(stage), next, t)
+}
+
+/// Displacements of an equilibrium, that of a stage or of the start (`None`), along `t`'s directions.
+pub(crate) fn along(
+    shared: &Shared,
+    member: &mut Member,
+    stage: Option<&Stage>,
+    at: &MemberState,
+    t: &mut MemberTangent,
+) -> Result<(), Reason> {
+    let still = Start::still(at.u.len());
     with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, Some(stage), &still);
-        e.residual(&next.u);
-        let minus = |mut v: Nodes| {
-            v.iter_mut().for_each(|v| *v = -*v);
-            v
-        };
-        t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&next.u, r))).collect();
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &next.u, &mut t.du).map(|_| ())
+        let mut e = equation(shared, member, stage, &still);
+        e.residual(&at.u);
+        t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&at.u, r))).collect();
+        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut t.du).map(|_| ())
     })
 }

@@ -211,15 +211,7 @@ pub fn start_adjoint(
     }
     let given = stress_free::applies(&shared.plan);
     if !at_rest && (!given || member.balanced.is_some()) {
-        let still = Start::still(s.u.len());
-        with_matrix(member, |member, matrix| -> Result<(), Reason> {
-            let mut e = equation(shared, member, None, &still);
-            e.residual(&s.u);
-            let mut z = [adj.u.clone()];
-            newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut z)?;
-            gradient.take(&e, &s.u, &z[0]);
-            Ok(())
-        })?;
+        quasi_static::pull(shared, member, None, s, adj, gradient)?;
     }
     if given { stress_free::pull(shared, member, gradient) } else { Ok(()) }
 }
@@ -260,16 +252,10 @@ pub fn start_tangent(shared: &Shared, member: &mut Member, s: &MemberState, t: &
     if at_rest || (stress_free::applies(&shared.plan) && member.balanced.is_none()) {
         return Ok(());
     }
-    let still = Start::still(s.u.len());
-    with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, None, &still);
-        e.residual(&s.u);
-        t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&s.u, r))).collect();
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &s.u, &mut t.du).map(|_| ())
-    })
+    quasi_static::along(shared, member, None, s, t)
 }
 
-fn minus(mut v: Nodes) -> Nodes {
+pub(crate) fn minus(mut v: Nodes) -> Nodes {
     v.iter_mut().for_each(|v| *v = -*v);
     v
 }

@@ -12,6 +12,7 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted};
 use crate::interrupt::Interrupt;
 use crate::objective::{Coordinates, Objective};
+use crate::tracking::spread;
 use glam::DVec3;
 use palpate_fit::{Controls, Zones};
 use palpate_io::scene_with_regions;
@@ -92,18 +93,9 @@ pub struct Placement {
 /// Middles of zones: farthest-point sampling of the places where the number varies, from the one next to their mean.
 fn middles(places: &[DVec3]) -> Vec<DVec3> {
     let mean = places.iter().sum::<DVec3>() / places.len().max(1) as f64;
-    let mut distance: Vec<f64> = places.iter().map(|p| -(*p - mean).length_squared()).collect();
-    let farthest = |d: &[f64]| (0..d.len()).max_by(|a, b| d[*a].total_cmp(&d[*b]).then(b.cmp(a)));
-    let mut chosen = Vec::new();
-    let Some(first) = farthest(&distance) else { return chosen };
-    distance.fill(f64::INFINITY);
-    let mut next = first;
-    while chosen.len() < ZONES.min(places.len()) {
-        chosen.push(places[next]);
-        distance.iter_mut().zip(places).for_each(|(d, p)| *d = d.min((*p - places[next]).length_squared()));
-        next = farthest(&distance).unwrap_or(next);
-    }
-    chosen
+    let away = |k: &usize| (places[*k] - mean).length_squared();
+    let first = (0..places.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+    spread(places, first, ZONES).into_iter().map(|k| places[k]).collect()
 }
 
 /// Balls around the centres that do not meet.

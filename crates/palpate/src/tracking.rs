@@ -203,11 +203,11 @@ fn doubt_the_sparse(frames: &mut [TrackedFrame]) {
     }
 }
 
-/// Farthest-point sampling of the surface: `count` vertices, spread evenly.
-fn spread(places: &[DVec3], count: usize) -> Vec<usize> {
+/// Farthest-point sampling: `count` places from `first` on, each the one farthest from those before.
+pub(crate) fn spread(places: &[DVec3], first: usize, count: usize) -> Vec<usize> {
     let mut distance = vec![f64::INFINITY; places.len()];
     let mut chosen = Vec::new();
-    let mut next = 0;
+    let mut next = first;
     while chosen.len() < count.min(places.len()) {
         chosen.push(next);
         for (d, p) in distance.iter_mut().zip(places) {
@@ -215,7 +215,6 @@ fn spread(places: &[DVec3], count: usize) -> Vec<usize> {
         }
         next = (0..places.len()).max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0);
     }
-    chosen.sort_unstable();
     chosen
 }
 
@@ -233,7 +232,8 @@ impl TrackedBody {
     pub fn recording(&self, title: &str, noise: f64) -> Result<Recording, Error> {
         let sound: Vec<&TrackedFrame> = self.frames.iter().filter(|f| f.doubts.is_empty()).collect();
         let mean = sound.iter().map(|f| f.determined).sum::<f64>() / sound.len().max(1) as f64;
-        let chosen = spread(&self.surface.rest, ((mean / 3.0).ceil() as usize).clamp(POINTS.0, POINTS.1));
+        let mut chosen = spread(&self.surface.rest, 0, ((mean / 3.0).ceil() as usize).clamp(POINTS.0, POINTS.1));
+        chosen.sort_unstable();
         let (mut squares, mut count) = (0.0, 0usize);
         let mut vectors = Vec::new();
         for f in &sound {

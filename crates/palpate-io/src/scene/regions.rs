@@ -1,11 +1,11 @@
 //! A scene with another field of regions, and with other numbers free.
 
-use super::write::vector;
+use super::write::{document, rebase, vector};
 use crate::error::InputError;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale};
 use palpate_model::scene::Scene;
 use std::path::Path;
-use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
+use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table, Value};
 
 /// The text of `scene` with `spec`, a field of regions, as field number `number`, or as one more behind the last; the numbers of [fit] that `bound`
 /// names are free no more, and the values of the regions are. What else there is stays.
@@ -20,8 +20,7 @@ pub fn scene_with_regions(
     bound: impl Fn(&str) -> bool,
 ) -> Result<String, InputError> {
     let wrong = |key: &str, message: String| InputError { key: key.into(), ..InputError::file(&scene.path, message) };
-    let mut doc: DocumentMut =
-        text.parse().map_err(|e: toml_edit::TomlError| wrong("", format!("not valid TOML: {}", e.message())))?;
+    let mut doc = document(text, scene)?;
     let Basis::Regions(regions, blend) = &spec.basis else {
         return Err(wrong("field", "has no regions".into()));
     };
@@ -63,10 +62,8 @@ pub fn scene_with_regions(
 /// # Errors
 /// A text that is no TOML.
 pub fn scene_in(text: &str, scene: &Scene, folder: &Path) -> Result<String, InputError> {
-    let mut doc: DocumentMut = text
-        .parse()
-        .map_err(|e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message())))?;
-    super::write::rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
+    let mut doc = document(text, scene)?;
+    rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
     Ok(doc.to_string())
 }
 

@@ -1,6 +1,6 @@
 //! A scene as the template of another one.
 
-use super::write::{rebase, section, set};
+use super::write::{document, rebase, section, set};
 use crate::error::InputError;
 use palpate_model::scene::{Resolution, Scene};
 use std::path::Path;
@@ -19,7 +19,7 @@ pub fn recast_scene(
     free: &[String],
     folder: &Path,
 ) -> Result<String, InputError> {
-    let mut doc = parsed(template, scene)?;
+    let mut doc = document(template, scene)?;
     for key in ["observation", "target", "fit"] {
         doc.remove(key);
     }
@@ -48,16 +48,11 @@ pub fn recast_scene(
 /// # Errors
 /// A template that is no TOML.
 pub fn scene_of_tracks(template: &str, scene: &Scene, recording: &str, folder: &Path) -> Result<String, InputError> {
-    let mut doc = parsed(template, scene)?;
+    let mut doc = document(template, scene)?;
     doc.remove("observation");
     rebase(&mut doc, scene.path.parent().unwrap_or(Path::new("")), folder);
     compare_with(&mut doc, scene, recording)?;
     Ok(doc.to_string())
-}
-
-fn parsed(template: &str, scene: &Scene) -> Result<DocumentMut, InputError> {
-    let wrong = |e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message()));
-    template.parse().map_err(wrong)
 }
 
 fn compare_with(doc: &mut DocumentMut, scene: &Scene, recording: &str) -> Result<(), InputError> {

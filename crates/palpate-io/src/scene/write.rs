@@ -37,7 +37,8 @@ pub fn scene_with_values(template: &str, scene: &Scene, values: &[(String, f64)]
     Ok(doc.to_string())
 }
 
-fn document(template: &str, scene: &Scene) -> Result<DocumentMut, InputError> {
+/// The text of a scene as a document that keeps comments and layout.
+pub(super) fn document(template: &str, scene: &Scene) -> Result<DocumentMut, InputError> {
     let wrong = |e: toml_edit::TomlError| InputError::file(&scene.path, format!("not valid TOML: {}", e.message()));
     template.parse().map_err(wrong)
 }
