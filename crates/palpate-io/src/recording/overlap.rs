@@ -55,10 +55,10 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     if all.is_empty() {
         return Ok(());
     }
-    // About the origin a small multiple of anything lies at the object: it must be of the object's size as well.
+    // About the origin a small multiple of anything lies at the object: it must not be far smaller than the object as well.
     let (low, high) = bounds(&observation.frames.iter().flat_map(positions).collect::<Vec<_>>());
     let spread = (high - low).length();
-    let fits = |factor: f64| factor * spread > 0.1 * size && meets(observation, factor, distance, 0.5 * size);
+    let fits = |factor: f64| factor * spread > FAR_SMALLER * size && meets(observation, factor, distance, 0.5 * size);
     let units = [(0.001, "millimetres"), (0.01, "centimetres")];
     let unit = match units.into_iter().find(|u| fits(u.0)) {
         Some((factor, name)) => {
