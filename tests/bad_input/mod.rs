@@ -64,6 +64,8 @@ fn refused(arguments: &[&str], code: i32) -> String {
     assert_eq!((a.code, a.out.as_str()), (code, ""), "{arguments:?}: {}", a.err);
     let lines: Vec<&str> = a.err.lines().filter(|l| !l.starts_with("warning: ") && !l.starts_with("backend: ")).collect();
     let [line] = lines[..] else { panic!("{arguments:?}: {}", a.err) };
+    // The list of all of them: cargo test -p palpate-tests bad_input -- --nocapture
+    println!("{code} {line}");
     line.strip_prefix("error: ").unwrap_or_else(|| panic!("{line}")).to_string()
 }
 

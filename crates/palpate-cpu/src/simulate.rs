@@ -151,13 +151,16 @@ fn check_parameters(member: &Member) -> Result<(), Reason> {
     Ok(())
 }
 
+/// Solves for the stress-free shape of a member whose shape given is its equilibrium.
+pub(crate) fn make_stress_free(shared: &Shared, member: &mut Member) -> Result<(), Reason> {
+    check_parameters(member)?;
+    if stress_free::applies(&shared.plan) { stress_free::solve(shared, member) } else { Ok(()) }
+}
+
 /// The initial state.
 pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
     let plan = &shared.plan;
-    check_parameters(member)?;
-    if stress_free::applies(plan) {
-        stress_free::solve(shared, member)?;
-    }
+    make_stress_free(shared, member)?;
     s.u.fill(DVec3::ZERO);
     if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.coefficients.changes.rest) {
         // At rest is where nothing is strained.

@@ -13,6 +13,7 @@ mod residuals;
 mod rollout;
 mod rows;
 mod stop;
+mod stress_free;
 mod tape;
 pub mod tracking;
 
@@ -24,3 +25,4 @@ pub use residuals::{FrameResiduals, Misfit, ReadingResidual};
 pub use rollout::{Rollout, Snapshot};
 pub use rows::{Linearised, ResidualRow, Rows, Source, Stream};
 pub use stop::Stop;
+pub use stress_free::{StressFree, StressFreeShapes};

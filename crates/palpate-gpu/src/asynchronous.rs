@@ -19,6 +19,7 @@ impl GpuBackend {
     }
 
     async fn made(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
+        self.check_shape(plan)?;
         let world = self.dressed(solve::world_async(self.gpu.clone(), plan, members, self.ways()?).await?);
         self.gpu.trouble().await.map_or(Ok(world), Err)
     }

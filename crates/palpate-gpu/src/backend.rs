@@ -6,9 +6,10 @@ use crate::tracking::Correspondence;
 use crate::world::{Adjoint, LEVELS, Level, State, Tally, Tangent, Tuning, World};
 use crate::{read, solve};
 use glam::DVec3;
-use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows};
+use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals, ParamBatch, Request, Rows, StressFree};
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
+use palpate_model::scene::InitialShape;
 use std::sync::Arc;
 
 /// The GPU backend.
@@ -18,6 +19,7 @@ pub struct GpuBackend {
     tuning: Option<Tuning>,
     levels: Option<&'static [(usize, u32, u32)]>,
     alone: bool,
+    shapes: Option<Arc<dyn StressFree>>,
 }
 
 impl GpuBackend {
@@ -31,7 +33,7 @@ impl GpuBackend {
 
     /// On an open device.
     pub fn on(gpu: Arc<Gpu>) -> GpuBackend {
-        GpuBackend { gpu, tuning: None, levels: None, alone: false }
+        GpuBackend { gpu, tuning: None, levels: None, alone: false, shapes: None }
     }
 
     /// The same with given ways to solve, instead of those that the environment or a measurement chooses.
@@ -55,7 +57,13 @@ impl GpuBackend {
         GpuBackend { alone: true, ..self }
     }
 
+    /// The same with somebody who finds stress-free shapes, for bodies whose given shape is their equilibrium.
+    pub fn with_shapes(self, shapes: Arc<dyn StressFree>) -> GpuBackend {
+        GpuBackend { shapes: Some(shapes), ..self }
+    }
+
     fn world(&self, plan: &Plan, members: usize) -> Result<World, GpuError> {
+        self.check_shape(plan)?;
         let world = self.dressed(solve::world(self.gpu.clone(), plan, members, self.ways()?)?);
         self.gpu.take_trouble().map_or(Ok(world), Err)
     }
@@ -65,9 +73,21 @@ impl GpuBackend {
         self.tuning.map_or_else(Tuning::from_env, Ok)
     }
 
+    /// Refuses a shape that is given as the equilibrium where nobody finds the stress-free one.
+    pub(crate) fn check_shape(&self, plan: &Plan) -> Result<(), GpuError> {
+        if plan.initial == InitialShape::Given && self.shapes.is_none() {
+            let what = "a shape that is given as the equilibrium without `GpuBackend::with_shapes`, which finds the stress-free one on the host";
+            return Err(GpuError::Plan { what: what.into() });
+        }
+        Ok(())
+    }
+
     /// A world as this backend wants it.
     pub(crate) fn dressed(&self, mut world: World) -> World {
         world.alone = self.alone;
+        if world.plan.initial == InitialShape::Given {
+            world.shapes = self.shapes.as_ref().map(|s| s.open(&world.plan));
+        }
         if let Some(levels) = self.levels {
             world.effort = Level::of(levels);
         }

@@ -19,6 +19,9 @@ pub(crate) async fn state(world: &World, state: &State, member: usize) -> Result
 
 /// The failure behind a health code of `shared/structs.wgsl`.
 fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
+    if let Some(failure) = world.batch.refusal(member) {
+        return Some(failure);
+    }
     let p = &world.batch.physics[member];
     let [a, b] = h.detail;
     let (kind, what) = match h.code {
@@ -110,8 +113,10 @@ async fn try_tally(world: &World, tally: &Tally) -> Result<Vec<Evaluation>, GpuE
     world.observer.add_to(observed, q, |m| world.batch.count(m, q), &mut all);
     if let Some(own) = &tally.sums {
         for (m, e) in all.iter_mut().enumerate().filter(|(_, e)| e.failure.is_none()) {
-            let by = own.gradient(&world.plan, &world.geometry, &world.batch.theta[m], m, &sums);
-            e.gradient.iter_mut().zip(by).for_each(|(g, b)| *g += b);
+            match own.gradient(world, m, &sums) {
+                Ok(by) => e.gradient.iter_mut().zip(by).for_each(|(g, b)| *g += b),
+                Err(failure) => (e.cost, e.failure) = (f64::INFINITY, Some(failure)),
+            }
         }
     }
     Ok(all)

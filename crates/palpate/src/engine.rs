@@ -59,7 +59,8 @@ fn gpu() -> Result<GpuBackend, GpuError> {
     if open.as_ref().is_none_or(|gpu| gpu.is_lost()) {
         *open = Some(Gpu::open_for(&Choice::from_env(), None, host())?);
     }
-    Ok(GpuBackend::on(open.clone().expect("a device was just opened")))
+    let device = GpuBackend::on(open.clone().expect("a device was just opened"));
+    Ok(device.with_shapes(Arc::new(CpuBackend)))
 }
 
 /// The device for so many simulations at once.

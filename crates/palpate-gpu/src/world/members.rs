@@ -5,13 +5,14 @@ use super::geometry::Geometry;
 use crate::device::{Arena, Gpu, GpuError};
 use crate::layout::{ClampPose, Member, Plane};
 use glam::DVec3;
-use palpate_engine::{Direction, ParamBatch};
+use palpate_engine::{Direction, Failure, ParamBatch};
 use palpate_model::cutcells::corotation::M24;
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::mechanics::plane::planes;
 use palpate_model::observation::Viewed;
 use palpate_model::plan::{Physics, Plan};
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 fn vec4(v: DVec3, w: f64) -> [f32; 4] {
@@ -27,6 +28,8 @@ pub(crate) struct Batch {
     pub(crate) views: Vec<Viewed>,
     /// Places that each member wants sensitivities for; empty where all want those that are requested.
     pub(crate) own: Vec<Vec<usize>>,
+    /// Why the host has no stress-free shape, or no derivative of it, for a member; empty where none is wanted.
+    pub(crate) refused: RefCell<Vec<Option<Failure>>>,
     /// Poisson's ratio of each slot of element matrices that is on the device.
     slots: Vec<f64>,
     /// The matrices themselves, kept where effects make other clamps of them.
@@ -44,7 +47,12 @@ impl Batch {
         self.own.get(member).map_or(requested, Vec::len)
     }
 
-    /// Uploads θ and what follows from it.
+    /// Why a member has failed on the host.
+    pub(crate) fn refusal(&self, member: usize) -> Option<Failure> {
+        self.refused.borrow().get(member).cloned().flatten()
+    }
+
+    /// Uploads θ and what follows from it; `found` are stress-free shapes, of plans whose given shape is the equilibrium.
     ///
     /// # Errors
     /// More than the device has.
@@ -55,12 +63,16 @@ impl Batch {
         geometry: &Geometry,
         coarse: &mut Coarse,
         theta: &ParamBatch,
+        found: Vec<Result<Vec<DVec3>, Failure>>,
         buffers: &mut HashMap<&'static str, wgpu::Buffer>,
     ) -> Result<(), GpuError> {
         self.theta = (0..theta.members()).map(|b| theta.row(b).to_vec()).collect();
         self.own.clone_from(&theta.own);
         self.views = (0..theta.members()).map(|b| plan.viewed(&theta.view(b))).collect();
         self.physics = self.theta.iter().map(|row| Physics::new(&plan.layout, row)).collect();
+        self.refused.replace(found.iter().map(|f| f.as_ref().err().cloned()).collect());
+        let found: Vec<Vec<DVec3>> =
+            found.into_iter().map(|f| f.unwrap_or_else(|_| vec![DVec3::ZERO; plan.body.nodes.len()])).collect();
         let mut slots: Vec<f64> = Vec::new();
         let mut members = Vec::new();
         let mut all_planes: Vec<Plane> = Vec::new();
@@ -71,15 +83,15 @@ impl Batch {
         if plan.layout.is_viscous() {
             slots.push(0.0);
         }
-        for p in &self.physics {
+        for (b, p) in self.physics.iter().enumerate() {
             let slot = slots.iter().position(|nu| *nu == p.poisson_ratio).unwrap_or_else(|| {
                 slots.push(p.poisson_ratio);
                 slots.len() - 1
             });
             let ((lambda, mu), (lambda_by_nu, mu_by_nu)) = (lame(1.0, p.poisson_ratio), lame_by_nu(1.0, p.poisson_ratio));
             let shear = |s: f64| (unit * s) as f32;
-            // A ratio without matrices is refused by the kernel that refuses other parameters: no modulus goes with it.
-            let sound = p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5;
+            // A ratio without matrices, or a member without a shape, is refused by the kernel that refuses other parameters: no modulus goes with it.
+            let sound = p.poisson_ratio > -1.0 && p.poisson_ratio < 0.5 && self.refusal(b).is_none();
             members.push(Member {
                 young: if sound { p.youngs_modulus as f32 } else { f32::NAN },
                 density: p.density as f32,
@@ -106,7 +118,7 @@ impl Batch {
             masses.extend(p.masses.iter().map(|m| *m as f32));
         }
         let mut tables = Arena::new("batch_tables");
-        geometry.effects.put(plan, &geometry.mass, &self.physics, &mut tables);
+        geometry.effects.put(plan, &geometry.mass, &self.physics, &found, &mut tables);
         tables.put("members", &members);
         tables.put("lasting", &self.views.iter().map(|v| v.recording.steps as u32).collect::<Vec<_>>());
         tables.put("planes", &all_planes);

@@ -43,7 +43,7 @@ use crate::device::{Counter, Gpu, GpuError, HandedOver, Maker as _};
 use crate::layout::Shape;
 use crate::passes::Passes;
 use members::Batch;
-use palpate_engine::{Direction, ParamBatch, Request};
+use palpate_engine::{Direction, ParamBatch, Request, StressFreeShapes};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
@@ -86,6 +86,8 @@ pub struct World {
     pub(crate) effort: Level,
     /// True where its owner runs one simulation at a time.
     pub(crate) alone: bool,
+    /// Who finds stress-free shapes, where the shape given is the equilibrium.
+    pub(crate) shapes: Option<Box<dyn StressFreeShapes>>,
 }
 
 impl World {
@@ -126,6 +128,7 @@ impl World {
             product: tuning.product.unwrap_or(Product::Matrix),
             effort,
             alone: false,
+            shapes: None,
         };
         world.engage(tuning.crew).await?;
         if world.needs_matrix() || world.geometry.shape.crew != 0 {
@@ -193,7 +196,8 @@ impl World {
         // Buffers of the batch before are replaced: bind groups that hold them must go.
         self.groups.borrow_mut().clear();
         *self.rates.borrow_mut() = Known::default();
-        let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, &mut self.coarse, theta, &mut self.buffers);
+        let found = self.shapes.as_mut().map_or_else(Vec::new, |s| s.find(theta));
+        let set = self.batch.set(&self.gpu, &self.plan, &self.geometry, &mut self.coarse, theta, found, &mut self.buffers);
         if let Err(e) = set {
             self.gpu.keep(e);
         }

@@ -7,7 +7,7 @@ use crate::device::recorder::Buffers;
 use crate::device::{Arena, Maker as _, whole};
 use crate::layout::Rate;
 use glam::DVec3;
-use palpate_engine::Direction;
+use palpate_engine::{Direction, StressFreeShapes};
 use palpate_model::effects::Site;
 use palpate_model::params::ParamKey;
 use palpate_model::params::coefficients::{Coefficients, Sought};
@@ -144,6 +144,22 @@ impl Gathered {
     }
 }
 
+/// A member's coefficients along directions, with the change of its stress-free shape. Where that fails the member has failed.
+fn shaped(
+    world: &World,
+    shapes: &dyn StressFreeShapes,
+    member: usize,
+    rates: impl Iterator<Item = Coefficients>,
+) -> Vec<Coefficients> {
+    let mut rates: Vec<Coefficients> = rates.collect();
+    if world.batch.refusal(member).is_none()
+        && let Err(failure) = shapes.along(member, &mut rates)
+    {
+        world.batch.refused.borrow_mut()[member] = Some(failure);
+    }
+    rates
+}
+
 /// Where an array changes along the direction of some members, it does in all of them: by nothing where their own directions leave it.
 fn fill<T: Clone + Default>(rates: &mut [Coefficients], array: impl Fn(&mut Coefficients) -> &mut Option<Vec<T>>) {
     let Some(len) = rates.iter_mut().find_map(|r| array(r).as_ref().map(Vec::len)) else { return };
@@ -157,9 +173,18 @@ impl Rates {
     pub(crate) fn all(world: &World, directions: &[Direction]) -> Vec<Rates> {
         let (plan, theta) = (&world.plan, &world.batch.theta);
         let members: Vec<Coefficients> = theta.iter().map(|row| Coefficients::new(plan, row)).collect();
-        let one = |direction: &Direction| {
-            let along = |(b, own): (usize, &Coefficients)| own.along(plan, &direction.of(b).dense(plan.layout.len()));
-            let mut rates: Vec<Coefficients> = members.iter().enumerate().map(along).collect();
+        let along = |b: usize, direction: &Direction| members[b].along(plan, &direction.of(b).dense(plan.layout.len()));
+        // Where the stress-free shape follows from the other numbers, all directions of a member at once.
+        let mut shaped: Vec<Vec<Coefficients>> = match &world.shapes {
+            None => Vec::new(),
+            Some(shapes) => {
+                (0..members.len()).map(|b| shaped(world, shapes.as_ref(), b, directions.iter().map(|d| along(b, d)))).collect()
+            }
+        };
+        shaped.iter_mut().for_each(|s| s.reverse());
+        let mut one = |direction: &Direction| {
+            let own = |b: usize| shaped.get_mut(b).and_then(Vec::pop).unwrap_or_else(|| along(b, direction));
+            let mut rates: Vec<Coefficients> = (0..members.len()).map(own).collect();
             fill(&mut rates, |r| &mut r.changes.modulus);
             fill(&mut rates, |r| &mut r.changes.density);
             fill(&mut rates, |r| &mut r.changes.rest);
@@ -167,7 +192,7 @@ impl Rates {
             rates.iter().for_each(|r| all.add(world, r));
             all.upload(world, direction)
         };
-        directions.iter().map(one).collect()
+        directions.iter().map(&mut one).collect()
     }
 
     /// All buffers, for passes.

@@ -1,12 +1,13 @@
 //! What an adjoint sums up on the device: derivatives of the cost by the coefficients of the balance, and what the host makes of them.
 
+use super::World;
 use super::effects::Effects;
 use super::geometry::Geometry;
 use crate::device::pipelines::shared::points::{AT_CONTACT, AT_NODES};
 use crate::device::pipelines::shared::pulls::{CELL_ROWS, CELL_SLOTS, HELD_ROWS, HOLD_ROWS, PLANE_ROWS, POINT_ROWS};
 use crate::layout::Shape;
 use glam::DVec3;
-use palpate_engine::Wanted;
+use palpate_engine::{Failure, Wanted};
 use palpate_model::effects::Site;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
@@ -76,16 +77,23 @@ impl Sums {
     }
 
     /// dJ/dθ `[P]` of one member.
-    pub(crate) fn gradient(&self, plan: &Plan, geometry: &Geometry, theta: &[f64], member: usize, found: &Found) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// A linear solve for the stress-free shape fails.
+    pub(crate) fn gradient(&self, world: &World, member: usize, found: &Found) -> Result<Vec<f64>, Failure> {
+        let (plan, geometry, theta) = (&world.plan, &world.geometry, &world.batch.theta[member]);
         let own = Coefficients::new(plan, theta);
         let at = Member { shape: &geometry.shape, member, found };
         let mut g = Coefficients::zero_gradient(plan, &self.sought);
         at.add_material(plan, &own, geometry, &mut g);
         at.add_numbers(&mut g);
         self.add_effects(plan, &geometry.effects, &at, &mut g);
+        if let Some(shapes) = &world.shapes {
+            shapes.pull(member, &self.sought, &mut g)?;
+        }
         let mut out = vec![0.0; plan.layout.len()];
         own.pull_back(plan, &g, &self.wanted, &mut out);
-        out
+        Ok(out)
     }
 
     /// The numbers of effects, and what laws of points depend on beside them.

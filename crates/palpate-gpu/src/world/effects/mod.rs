@@ -15,6 +15,7 @@ use crate::device::pipelines::shared::structs::{
 use crate::device::{Arena, GpuError};
 use crate::layout::EffectSite;
 use crate::world::mass::MassTable;
+use glam::DVec3;
 use palpate_model::effects::cell::{ENERGY, Part};
 use palpate_model::effects::law::Asks;
 use palpate_model::effects::{Law, Site};
@@ -62,10 +63,6 @@ impl Effects {
             let what = format!("the material \"{}\", which the CPU backend has", plan.model.name);
             return Err(GpuError::Plan { what });
         }
-        if plan.initial == InitialShape::Given {
-            let what = "a shape that is given as the equilibrium (object.state = \"static\"), which the CPU backend has".into();
-            return Err(GpuError::Plan { what });
-        }
         if plan.clock.scheme.still {
             return Err(GpuError::Plan { what: "a quasi-static sequence (time.mode), which the CPU backend has".into() });
         }
@@ -96,6 +93,10 @@ impl Effects {
                     row = Some(e.aging_rows);
                     e.aging_rows += count;
                     None
+                }
+                Site::Rest(_) if plan.initial == InitialShape::Given => {
+                    let what = "the effect \"rest-shape\" beside object.state = \"static\", which the CPU backend has".into();
+                    return Err(GpuError::Plan { what });
                 }
                 Site::Rest(_) => {
                     e.bits |= FIELD_REST | if plan.initial == InitialShape::Rest { FIELD_STARTS } else { 0 };
@@ -129,6 +130,9 @@ impl Effects {
                 }
             }
             e.stride += count;
+        }
+        if plan.initial == InitialShape::Given {
+            e.bits |= FIELD_REST;
         }
         for field in &plan.fields {
             e.bits |= match field.varied {
@@ -214,8 +218,8 @@ impl Effects {
         all
     }
 
-    /// Adds what members' parameters make of them to an arena.
-    pub(crate) fn put(&self, plan: &Plan, mass: &MassTable, batch: &[Physics], tables: &mut Arena) {
+    /// Adds what members' parameters make of them to an arena; `found` are the stress-free shapes that follow from other numbers.
+    pub(crate) fn put(&self, plan: &Plan, mass: &MassTable, batch: &[Physics], found: &[Vec<DVec3>], tables: &mut Arena) {
         let body = &plan.body;
         let sizes = self.sizes(batch.len(), body, mass.entries(), plan.clamps.len());
         let mut data: Vec<Vec<f32>> = sizes.iter().map(|s| Vec::with_capacity(s.1)).collect();
@@ -244,7 +248,7 @@ impl Effects {
             data[4] = self.agings(plan, batch);
         }
         if self.bits & FIELD_REST != 0 {
-            self.rests(plan, batch).into_iter().enumerate().for_each(|(k, v)| data[5 + k] = v);
+            self.rests(plan, batch, found).into_iter().enumerate().for_each(|(k, v)| data[5 + k] = v);
         }
         data[7] = self.hold_slopes(plan, batch);
         data[8] = self.layers(plan, batch);

@@ -1,4 +1,4 @@
-//! The stress-free shape that effects give a body: displacement per node, deformation per cell, as kernels read them
+//! The stress-free shape that effects give a body, or that the host found for the shape given: displacement per node, deformation per cell, as kernels read them
 //! (`shared/unstrained.wgsl`).
 
 use super::Effects;
@@ -25,10 +25,11 @@ impl Effects {
     }
 
     /// W `[B][N]`, and the deformation of every cell in the shape X + W `[B][cells][8]` or of every elastic point `[B][points][3]`; vectors of four.
-    pub(super) fn rests(&self, plan: &Plan, batch: &[Physics]) -> [Vec<f32>; 2] {
+    pub(super) fn rests(&self, plan: &Plan, batch: &[Physics], found: &[Vec<DVec3>]) -> [Vec<f32>; 2] {
         let (body, mut out) = (&plan.body, [const { Vec::new() }; 2]);
-        for physics in batch {
-            let w = Changes::new(plan, physics).rest.unwrap_or_else(|| vec![DVec3::ZERO; body.nodes.len()]);
+        for (b, physics) in batch.iter().enumerate() {
+            let own = Changes::new(plan, physics).rest.or_else(|| found.get(b).cloned());
+            let w = own.unwrap_or_else(|| vec![DVec3::ZERO; body.nodes.len()]);
             put_nodes(&mut out[0], &w);
             let at = |n: u32| body.nodes[n as usize] + w[n as usize];
             body.cells().iter().for_each(|c| put(&mut out[1], &CellPose::new(&c.nodes.map(at), body.cut().grid.h).q));
