@@ -4,8 +4,8 @@ use super::specs;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use palpate_fit::{FieldPrior, FreeParameter, Mean, Slot};
-use palpate_model::params::ParamKey;
 use palpate_model::params::fields::Prior;
+use palpate_model::params::{ParamKey, Transform};
 use std::sync::Arc;
 
 /// One free number, or field, of a fit over one or several scenes.
@@ -125,6 +125,11 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                 continue;
             }
             let spec = key.spec();
+            // Who expects more than is usual has the search go as far in a step.
+            let expected = match p.known {
+                Some((_, sd)) if spec.transform == Transform::Linear && sd.is_finite() => sd,
+                _ => 0.0,
+            };
             let is_mass = p.path == "material.mass";
             let number = FreeNumber { path: p.path.clone(), scene: own.then_some(scene) };
             let vector = |path| FreeNumber { path, scene: number.scene }.label();
@@ -133,7 +138,7 @@ pub(crate) fn free_parameters(experiments: &[Experiment]) -> Result<Free, Error>
                 path: number.label(),
                 unit: if is_mass { "kg".into() } else { spec.unit.into() },
                 transform: spec.transform,
-                typical: spec.typical / slot.factor,
+                typical: (spec.typical / slot.factor).max(expected),
                 bounds: p.bounds,
                 start: p.start,
                 known: p.known,
