@@ -1,7 +1,8 @@
 //! Acceptance of what came with Wang et al., Deformation Capture and Modeling of Soft Objects (SIGGRAPH 2015): tracking without correspondences, starts
-//! by vibrations, rounds of tracking and fitting, and control regions on their synthetic bar. `bench/capture.jsonl` holds a row a case and commit.
+//! by vibrations, rounds of tracking and fitting, control regions on their synthetic bar, and motions that are made. `bench/capture.jsonl` holds a row a case and commit.
 
 mod controls;
+mod keyframes;
 mod tracking;
 mod vibrations;
 
@@ -15,7 +16,7 @@ use crate::rows::Measured;
 pub const SET: Set =
     Set { name: "capture", page: "docs/capture.md", cases: &CASES, aims: AIMS, more: &[], measured: Measured::Tracking };
 
-const CASES: [(&str, Case); 16] = [
+const CASES: [(&str, Case); 17] = [
     ("controls-1", |_, folder| controls::run(folder, 1, controls::Truth::Finer)),
     ("controls-2", |_, folder| controls::run(folder, 2, controls::Truth::Finer)),
     ("controls-8", |_, folder| controls::run(folder, 8, controls::Truth::Finer)),
@@ -32,6 +33,7 @@ const CASES: [(&str, Case); 16] = [
     ("vibrations-14", |_, folder| vibrations::run(folder, 0.14)),
     ("vibrations-47", |_, folder| vibrations::run(folder, 0.47)),
     ("vibrations-94", |_, folder| vibrations::run(folder, 0.94)),
+    ("keyframes", |_, folder| keyframes::run(folder)),
 ];
 
 const RMS: &str = "rms of the surface [mm]";
@@ -43,6 +45,7 @@ const WORST: &str = "worst E, off [%]";
 const DAMPING: &str = "stiffness damping, off [%]";
 const EVALUATIONS: &str = "evaluations";
 const SECONDS: &str = "seconds of the fit";
+const MISS: &str = "worst keyframe, off [mm]";
 const START: &str = "worst start, E off [%]";
 
 const AIMS: &[Aim] = &[
@@ -88,6 +91,8 @@ const AIMS: &[Aim] = &[
     ("G", "47 %", "vibrations-47", Of(START), "–", AtMost(5.0)),
     ("G", "94 %", "vibrations-94", Of(START), "–", AtMost(5.0)),
     ("G", "94 %: starts that found the vibration", "vibrations-94", Of("starts that found it"), "–", AtLeast(3.0)),
+    ("J", "five keyframes: worst miss [mm]", "keyframes", Of(MISS), "–", AtMost(1.0)),
+    ("J", "bar of 756 nodes: steps a second", "keyframes", Of("steps a second"), "–", AtLeast(30.0)),
 ];
 
 /// How far a value is from the truth [%].
