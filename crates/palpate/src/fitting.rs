@@ -9,7 +9,7 @@ use crate::grid::{GridCheck, grid_check};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::{FitStatus, Verdict};
+use crate::results::fit::{FitStatus, FoundNormal, Verdict};
 use crate::scatter::Excess;
 use palpate_engine::{FailureKind, MOST_SENSITIVITIES, Stop};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
@@ -27,6 +27,7 @@ mod counted;
 mod free;
 mod held_out;
 mod lead;
+mod normals;
 mod verdict;
 mod warm;
 
@@ -90,6 +91,8 @@ pub struct Fitted {
     /// What was chosen for this fit and why, in sentences: the optimiser, where it is not the usual one and nobody named it, and start values
     /// that were not stated.
     pub notes: Vec<String>,
+    /// Normals of planes of which an angle was free.
+    pub normals: Vec<FoundNormal>,
     /// What a fit of tracked points found, by free number; empty where nothing was tracked.
     pub tracked: Vec<FromTracks>,
     /// θ of every scene at the first start.
@@ -320,6 +323,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
         free,
         fields,
         notes: chosen.into_iter().chain(warm.notes).collect(),
+        normals: normals::found(experiments, &free, &result),
         tracked: warm.tracked,
         theta_start,
         optimizer: settings.optimizer,

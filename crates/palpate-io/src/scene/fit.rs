@@ -3,6 +3,7 @@
 use crate::document::Table;
 use crate::error::{InputError, number};
 use crate::keys::suggest;
+use crate::scene::normal;
 use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
 use palpate_model::params::{On, ParamKey, Transform, is_component};
@@ -10,8 +11,8 @@ use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, TrainFrames, WarmStart};
 
 /// One number of a scene that can be fitted.
-struct Target {
-    path: String,
+pub(super) struct Target {
+    pub path: String,
     /// What the scene states: one value, or the range of a field's.
     value: (f64, f64),
     lower: f64,
@@ -166,12 +167,18 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
         true => t.optional_ranges(key, 1).map(|r| r.map(|r| vec![r[0]; chosen.len()])),
         false => t.optional_ranges(key, chosen.len()),
     };
-    let starts = ranges("start")?;
+    // The start of a normal is in its angles already.
+    let starts = if of_normal.is_some() { None } else { ranges("start")? };
     let bounds = ranges("bounds")?;
     let known_values = known_values(t, chosen.len(), shared)?;
     let per_scene = t.optional_bool("per_scene")?.unwrap_or(false);
     let mut out = Vec::new();
     for (i, k) in chosen.iter().enumerate() {
+    let of_normal = normal::targets(t, path, scene, known)?;
+    if of_normal.is_none() && t.has("within") {
+        return Err(t.error("within", format!("belongs to the normal of a plane, not to {path}; bounds say where that may lie")));
+    }
+    let own = of_field.as_ref().or(of_normal.as_ref());
         let beforehand = known_values.as_ref().map(|v| v[i]);
         // What the scene does not state starts where it is known to be.
         let stated = if k.value.0.is_nan() { beforehand.map_or(k.value, |(v, _)| (v, v)) } else { k.value };
