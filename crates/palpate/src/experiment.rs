@@ -131,7 +131,12 @@ impl Experiment {
                 ObservationError::Scene { key, message } => fault(&key, message),
             })?;
             leave_out_what_is_held(&scene, rest.len(), &mut observation);
-            if let Some(chosen) = scene.fit.as_ref().and_then(|f| f.frames) {
+            if let Some(chosen) = scene.fit.as_ref().and_then(|f| f.frames.as_ref()) {
+                let there = observation.frames.len();
+                if let Some(last) = chosen.numbers.iter().flatten().find(|k| **k >= there) {
+                    let text = format!("there is no frame {last}: {there} are used, and counted from 0");
+                    return Err(fault("fit.frames", text));
+                }
                 let mut number = 0..;
                 observation.frames.retain(|_| number.next().is_some_and(|k| chosen.holds(k)));
             }
