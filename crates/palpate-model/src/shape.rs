@@ -9,12 +9,14 @@ mod mesh;
 mod pseudonormal;
 mod repair;
 mod trimesh;
+mod spread;
 
 pub use analytic::Placed;
 pub use mesh::MeshShape;
 pub use repair::{MeshReport, Repaired, diagnose, repair};
 pub use trimesh::TriMesh;
 
+pub use spread::spread;
 use crate::scene::{BodySource, Object};
 use glam::DVec3;
 use std::sync::Arc;

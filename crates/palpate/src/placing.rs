@@ -12,10 +12,10 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted};
 use crate::interrupt::Interrupt;
 use crate::objective::{Coordinates, Objective};
-use crate::tracking::spread;
 use glam::DVec3;
 use palpate_fit::{Controls, Zones};
 use palpate_io::scene_with_regions;
+use palpate_model::shape::spread;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::WarmStart;
 

@@ -6,9 +6,11 @@ mod cdr;
 mod folder;
 mod mcap;
 mod npy;
+mod nozzle;
 mod optitrack;
 mod pcd;
 mod ply;
+mod plush;
 mod qualisys;
 mod realsense;
 mod table;
@@ -34,8 +36,9 @@ pub struct Format {
 }
 
 /// Every format, the more particular before the more general: the first that knows a source reads it.
-pub const ALL: [&Format; 11] = [
+pub const ALL: [&Format; 12] = [
     &mcap::FORMAT,
+    &plush::FORMAT,
     &tum::FORMAT,
     &azure::FORMAT,
     &npy::FORMAT,
