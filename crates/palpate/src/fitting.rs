@@ -308,7 +308,9 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let cut = interrupt.is_urgent();
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
-    warnings.extend(result.warnings.iter().cloned().chain(notes));
+    let blind = result.runs[result.best].status == palpate_fit::Status::Blind;
+    // Who saw nothing has no errors either.
+    warnings.extend(result.warnings.iter().filter(|w| !(blind && w.starts_with("no standard errors"))).cloned().chain(notes));
     let held_out = match cut {
         true => None,
         false => held_out::held_out(experiments, &result.theta, &after, backend).unwrap_or_else(|e| {
@@ -363,7 +365,8 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     let points = fitted.residual().2;
     let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
     // Of the larger part the verdict speaks.
-    if unmatched * 20 > points + unmatched && unmatched <= points {
+    let blind = fitted.result.runs[fitted.result.best].status == palpate_fit::Status::Blind;
+    if unmatched * 20 > points + unmatched && unmatched <= points && !blind {
         fitted.warnings.push(format!(
             "{unmatched} of {} observed points met no part of the simulated body; is something else in the images, or is the band too narrow?",
             points + unmatched
