@@ -86,10 +86,13 @@ struct Runner<'a> {
     /// Where it starts, if not where the draw says; and then it goes on whether it sees anything or not.
     given: Option<&'a Vec<f64>>,
     sight: bool,
+    /// What the starts are part of, for who traces: each has a thread of its own.
+    within: tracing::Span,
 }
 
 impl Runner<'_> {
     fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Answer, Stop>>) -> StartRun {
+        let _span = tracing::info_span!(parent: &self.within, "start", number = self.number).entered();
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
         rng.set_stream(self.number as u64);
         let fixed = self.given.is_some() || self.free.iter().all(|f| f.start.0 == f.start.1);
@@ -255,6 +258,7 @@ fn run_some(
                 line,
                 given: given.as_ref(),
                 sight,
+                within: tracing::Span::current(),
             };
             let work = move || {
                 let run = std::panic::AssertUnwindSafe(|| runner.run(&tell, &answers));

@@ -206,6 +206,7 @@ pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
 /// [`FitResult::broken`].
 pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
     let _stage = Stage::begin("fit");
+    let _span = tracing::info_span!("fit", scenes = experiments.len()).entered();
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     check(experiments)?;
     let spec = specs(first).expect("every scene was just found to have a [fit]");
@@ -322,10 +323,10 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let interrupted = cut || result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
+        normals: normals::found(experiments, &free, &result),
         free,
         fields,
         notes: chosen.into_iter().chain(warm.notes).collect(),
-        normals: normals::found(experiments, &free, &result),
         tracked: warm.tracked,
         theta_start,
         optimizer: settings.optimizer,
