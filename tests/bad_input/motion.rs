@@ -43,7 +43,11 @@ fn a_clamp_that_leaps_is_named_and_not_a_pivot() {
     let out = folder.path().join("out");
     let a = palpate(&["simulate", arg(&path), "--backend", "cpu", "--out", arg(&out)]);
     let error = a.err.lines().find(|l| l.starts_with("error: ")).unwrap_or_default();
-    assert!(a.code == 0 || error.contains("clamp.0 jumps by 3") && error.contains("check the rows of the clamp's motion file"), "{}", a.err);
+    assert!(
+        a.code == 0 || error.contains("clamp.0 jumps by 3") && error.contains("check the rows of the clamp's motion file"),
+        "{}",
+        a.err
+    );
     assert!(error.len() < 350 && !error.contains("pivot"), "{error}");
     // Places in the world instead of ways from the rest place.
     let path = scene(folder.path(), &format!("{HEADER}\n0, 0,0.5,0, 0,0,0,1\n0.1, 0,0.5,0, 0,0,0,1\n"));

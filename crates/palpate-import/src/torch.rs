@@ -143,10 +143,13 @@ impl Reader<'_> {
             Value::Whole(x) => usize::try_from(*x).map_err(|_| format!("has a negative length or stride, {x}")),
             other => Err(format!("has {} for a length or stride", other.kind())),
         };
-        let numbers = |at: At| p.list(at).ok_or("has no list of lengths")?.iter().map(|x| whole(*x)).collect::<Result<Vec<_>, String>>();
+        let numbers =
+            |at: At| p.list(at).ok_or("has no list of lengths")?.iter().map(|x| whole(*x)).collect::<Result<Vec<_>, String>>();
         let (offset, size, stride) = (whole(offset)?, numbers(size)?, numbers(stride)?);
         let Value::Elsewhere(by) = p.at(storage) else { return Err("has no storage".into()) };
-        let Some([_, kind, key, _, count, ..]) = p.list(*by) else { return Err("has a storage that is described in another way".into()) };
+        let Some([_, kind, key, _, count, ..]) = p.list(*by) else {
+            return Err("has a storage that is described in another way".into());
+        };
         let (Value::Name(kind), Value::Text(key)) = (p.at(*kind), p.at(*key)) else {
             return Err("has a storage without kind or name".into());
         };

@@ -15,9 +15,9 @@ use crate::objective::{Coordinates, Objective};
 use glam::DVec3;
 use palpate_fit::{Controls, Zones};
 use palpate_io::scene_with_regions;
-use palpate_model::shape::spread;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::WarmStart;
+use palpate_model::shape::spread;
 
 /// Zones that a body is cut into: each costs a direction of one evaluation, and bodies of more parts than this are fitted as fields by cells.
 const ZONES: usize = 24;

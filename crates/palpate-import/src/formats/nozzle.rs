@@ -69,7 +69,9 @@ pub fn read(path: &Path, rate: f64, frames: usize, capture: &mut Capture) -> Res
         seen += 1;
     }
     if poses.len() != frames {
-        capture.facts.push(format!("the nozzle's path has {} entries for {frames} frames; both begin at the same time", poses.len()));
+        capture
+            .facts
+            .push(format!("the nozzle's path has {} entries for {frames} frames; both begin at the same time", poses.len()));
     }
     if seen > 0 {
         capture.beside.push((FILE.into(), text));

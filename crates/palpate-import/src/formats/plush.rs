@@ -76,7 +76,12 @@ fn read(place: &Place, o: &Options, watch: &mut Watch) -> Result<Capture, Import
         watch.at(k, files.len(), "vertices")?;
         let all = if k == 0 { rest.clone() } else { vertices(path)? };
         if all.len() != rest.len() {
-            let text = format!("holds {} vertices, {} holds {}: the same ones are tracked in all frames", all.len(), place.name(first), rest.len());
+            let text = format!(
+                "holds {} vertices, {} holds {}: the same ones are tracked in all frames",
+                all.len(),
+                place.name(first),
+                rest.len()
+            );
             return refuse(path, text);
         }
         // What a tracker lost has no place at that time.
@@ -162,7 +167,12 @@ fn choose(place: &Place, o: &Options, first: &Path, rest: &[DVec3], capture: &mu
     let text = format!("{} vertices, {told} of them the object's, {} of these fixed", rest.len(), fixed.len());
     capture.facts.push(text);
     if all.len() < object.len() {
-        let text = format!("{} of the object's {} vertices, far from each other, {} fixed ones among them", all.len(), object.len(), places.len());
+        let text = format!(
+            "{} of the object's {} vertices, far from each other, {} fixed ones among them",
+            all.len(),
+            object.len(),
+            places.len()
+        );
         capture.guesses.push(Guess::recording("thinning", "points.file", text, "--points"));
     }
     Ok(Chosen { all, fixed: places })
@@ -190,14 +200,22 @@ fn known(entries: &Entries) -> String {
 }
 
 /// Vertices that an entry names, rising: by their numbers, or by a truth value for each of all `count`, or each of the object's.
-fn set(path: &Path, entries: &Entries, name: &str, count: usize, object: Option<&[usize]>) -> Result<Option<Vec<usize>>, ImportError> {
+fn set(
+    path: &Path,
+    entries: &Entries,
+    name: &str,
+    count: usize,
+    object: Option<&[usize]>,
+) -> Result<Option<Vec<usize>>, ImportError> {
     let Some((_, found)) = entries.iter().find(|e| e.0 == name) else { return Ok(None) };
     let fault = |text: String| refuse(path, format!("entry \"{name}\" {text}"));
     let array = match found {
         Ok(a) => a,
         Err(e) => return fault(e.clone()),
     };
-    let Numbers::Whole(numbers) = &array.numbers else { return fault("holds fractions, expected numbers of vertices or truth values".into()) };
+    let Numbers::Whole(numbers) = &array.numbers else {
+        return fault("holds fractions, expected numbers of vertices or truth values".into());
+    };
     let truths = numbers.iter().all(|x| *x == 0 || *x == 1);
     let ones = numbers.iter().enumerate().filter(|(_, x)| **x == 1).map(|(k, _)| k);
     if truths && numbers.len() == count {

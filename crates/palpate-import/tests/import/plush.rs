@@ -135,14 +135,16 @@ fn what_is_wrong_is_named() {
         change(&bench);
         bench.bad("toy", &Options { format: Some("plush".into()), ..Options::default() })
     };
-    let masked = |entries: Vec<(&'static str, Entry)>| {
-        with(&|b| drop(b.write("toy/reconstruction/mask.pt", file(&entries, Stored))))
-    };
+    let masked =
+        |entries: Vec<(&'static str, Entry)>| with(&|b| drop(b.write("toy/reconstruction/mask.pt", file(&entries, Stored))));
     let one = |entry: Entry| masked(vec![("objectInd", entry)]);
     for (e, wanted) in [
         (with(&|b| frame(b, 4, ALL - 1)), "00004.npz: holds 399 vertices, reconstruction/00000.npz holds 400"),
         (with(&|b| drop(b.write("toy/reconstruction/00000.npz", "PK"))), "is not a readable .npz file"),
-        (with(&|b| drop(b.write("toy/capture/aruco_path.json", "[{\"rvecs\": [1, 2, 3]}]"))), "0.rvecs: holds 3 finite numbers, expected 9"),
+        (
+            with(&|b| drop(b.write("toy/capture/aruco_path.json", "[{\"rvecs\": [1, 2, 3]}]"))),
+            "0.rvecs: holds 3 finite numbers, expected 9",
+        ),
         (
             with(&|b| drop(b.write("toy/capture/aruco_path.json", "[{\"rvecs\": [1,0,0,0,2,0,0,0,1], \"tvecs\": [0,0,0]}]"))),
             "is no rotation matrix",
@@ -150,12 +152,21 @@ fn what_is_wrong_is_named() {
         (one(Entry::Longs(vec![0, 400])), "names vertex 400; there are 400"),
         (one(Entry::Longs(vec![-1])), "names vertex -1"),
         (one(Entry::Halved(vec![0.5, 1.0, 2.0])), "holds fractions"),
-        (one(Entry::Raw(b"cnumpy.core.multiarray\n_reconstruct\n)R".to_vec())), "is made by numpy.core.multiarray._reconstruct, which is not read"),
+        (
+            one(Entry::Raw(b"cnumpy.core.multiarray\n_reconstruct\n)R".to_vec())),
+            "is made by numpy.core.multiarray._reconstruct, which is not read",
+        ),
         (one(Entry::Raw(b")\x81".to_vec())), "opcode NEWOBJ at byte"),
         (one(Entry::Raw(b"cposix\nsystem\nX\x04\x00\x00\x00true\x85R".to_vec())), "is made by posix.system, which is not read"),
         (masked(vec![("other", Entry::List(vec![1]))]), "has no entry \"objectInd\"; there are: other (1,)"),
-        (with(&|b| drop(b.write("toy/reconstruction/mask.pt", file(&mask(), Deflated)))), "is compressed, which torch.save does not do"),
-        (with(&|b| drop(b.write("toy/reconstruction/mask.pt", b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19."))), "before 1.6; load it and save it again"),
+        (
+            with(&|b| drop(b.write("toy/reconstruction/mask.pt", file(&mask(), Deflated)))),
+            "is compressed, which torch.save does not do",
+        ),
+        (
+            with(&|b| drop(b.write("toy/reconstruction/mask.pt", b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19."))),
+            "before 1.6; load it and save it again",
+        ),
         (with(&|b| drop(b.write("toy/reconstruction/mask.pt", "text"))), "is no file of torch.save"),
     ] {
         assert!(e.contains(wanted), "{wanted}: {e}");

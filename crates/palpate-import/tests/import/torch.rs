@@ -50,7 +50,9 @@ pub fn file(entries: &[(&str, Entry)], method: CompressionMethod) -> Vec<u8> {
         pickle.extend(text(name));
         let key = storages.len();
         let (opcodes, bytes): (Vec<u8>, Vec<u8>) = match entry {
-            Entry::Longs(v) => (tensor("LongStorage", key, v.len(), v.len(), 1), v.iter().flat_map(|x| x.to_le_bytes()).collect()),
+            Entry::Longs(v) => {
+                (tensor("LongStorage", key, v.len(), v.len(), 1), v.iter().flat_map(|x| x.to_le_bytes()).collect())
+            }
             Entry::Bools(v) => (tensor("BoolStorage", key, v.len(), v.len(), 1), v.iter().map(|x| u8::from(*x)).collect()),
             Entry::Halved(v) => {
                 (tensor("FloatStorage", key, v.len(), v.len().div_ceil(2), 2), v.iter().flat_map(|x| x.to_le_bytes()).collect())

@@ -134,7 +134,8 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
 /// `frames`: which of them the fit sees.
 fn frames(t: &Table) -> Result<Option<TrainFrames>, InputError> {
     let Some(f) = t.optional_table("frames")? else { return Ok(None) };
-    let train = f.optional_table("train")?.ok_or_else(|| f.missing("train", "{ every = n, count = m } or { numbers = [0, 5, …] }"))?;
+    let train =
+        f.optional_table("train")?.ok_or_else(|| f.missing("train", "{ every = n, count = m } or { numbers = [0, 5, …] }"))?;
     let count = |key: &str| train.optional_count(key, 1..=u64::MAX).map(|n| n.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
     let (every, most) = (count("every")?, count("count")?);
     let numbers = train.optional_list("numbers")?.map(|all| numbers(&train, all)).transpose()?;
@@ -178,8 +179,7 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
         return Err(t.error("within", format!("belongs to the normal of a plane, not to {path}; bounds say where that may lie")));
     }
     let own = of_field.as_ref().or(of_normal.as_ref());
-    let chosen: Vec<&Target> =
-        own.map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
+    let chosen: Vec<&Target> = own.map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
     if chosen.is_empty() {
         return Err(t.error("path", unknown_path(path, scene, known)));
     }

@@ -21,7 +21,8 @@ pub(super) fn targets(t: &Table, path: &str, scene: &Scene, known: &[Target]) ->
     let (i, normal) = (plane.0, plane.1.normal);
     for key in ["bounds", "known"] {
         if t.has(key) {
-            let text = format!("{path} is a direction: say within (rad) how far it may turn; plane.{i}.theta and .phi take {key}");
+            let text =
+                format!("{path} is a direction: say within (rad) how far it may turn; plane.{i}.theta and .phi take {key}");
             return Err(t.error(key, text));
         }
     }
@@ -29,12 +30,15 @@ pub(super) fn targets(t: &Table, path: &str, scene: &Scene, known: &[Target]) ->
     let site = PlaneSite { polar_axis: PlaneSite::polar_axis_for(normal), stiffness: None };
     let start = match t.optional_vec3("start")? {
         None => normal,
-        Some(v) => v.try_normalize().ok_or_else(|| t.error("start", "has no length; give a direction out of the forbidden half-space"))?,
+        Some(v) => v
+            .try_normalize()
+            .ok_or_else(|| t.error("start", "has no length; give a direction out of the forbidden half-space"))?,
     };
     let (theta, phi) = site.angles(start);
     if theta.sin() < CLOSE {
         let axis = ["x", "y", "z"][site.polar_axis];
-        let text = format!("is nearly along {axis}, far from the plane's normal; state it as [[plane]] normal, and leave out start");
+        let text =
+            format!("is nearly along {axis}, far from the plane's normal; state it as [[plane]] normal, and leave out start");
         return Err(t.error("start", text));
     }
     let within = t.f64_where("within", |x| x > 0.0 && x <= std::f64::consts::PI, "must be in (0, π] (rad)")?;

@@ -28,8 +28,16 @@ impl fmt::Display for Jump {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Jump { clamp, from, to, distance } = self;
         match from < to {
-            true => write!(f, "clamp.{clamp} jumps by {} m within a step, from {} s to {} s", digits(*distance), digits(*from), digits(*to)),
-            false => write!(f, "clamp.{clamp} is {} m away from its rest place at the start, {} s", digits(*distance), digits(*from)),
+            true => write!(
+                f,
+                "clamp.{clamp} jumps by {} m within a step, from {} s to {} s",
+                digits(*distance),
+                digits(*from),
+                digits(*to)
+            ),
+            false => {
+                write!(f, "clamp.{clamp} is {} m away from its rest place at the start, {} s", digits(*distance), digits(*from))
+            }
         }
     }
 }
@@ -82,7 +90,8 @@ fn way(points: &[DVec3], a: (DMat3, DVec3), b: (DMat3, DVec3)) -> f64 {
 fn corners(body: &Body, clamp: &ClampSite) -> Option<Vec<DVec3>> {
     let of_cells = clamp.cells.iter().flat_map(|c| body.cells()[c.cell as usize].nodes);
     let held = of_cells.chain(clamp.nodes.iter().map(|n| n.0)).map(|n| body.nodes[n as usize]);
-    let (low, high) = held.fold(None, |ends: Option<(DVec3, DVec3)>, x| Some(ends.map_or((x, x), |(a, b)| (a.min(x), b.max(x)))))?;
+    let (low, high) =
+        held.fold(None, |ends: Option<(DVec3, DVec3)>, x| Some(ends.map_or((x, x), |(a, b)| (a.min(x), b.max(x)))))?;
     let pick = |k: usize, axis: usize| if k >> axis & 1 == 0 { low[axis] } else { high[axis] };
     Some((0..8).map(|k| DVec3::new(pick(k, 0), pick(k, 1), pick(k, 2))).collect())
 }

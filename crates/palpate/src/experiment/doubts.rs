@@ -50,7 +50,11 @@ pub(super) fn doubts(e: &Experiment) -> Vec<String> {
     // States of a sequence may lie far apart.
     if e.plan().clock.moves() {
         let leaps = e.plan().jumps(e.scene().time.start, f64::INFINITY);
-        out.extend(leaps.iter().map(|leap| format!("{name}: {leap}; is its motion in metres and seconds, and relative to the rest place?")));
+        out.extend(
+            leaps
+                .iter()
+                .map(|leap| format!("{name}: {leap}; is its motion in metres and seconds, and relative to the rest place?")),
+        );
     }
     if held_whole(e) {
         out.push(format!("{name}: clamp: clamps hold the whole surface; nothing of the body can move by itself"));

@@ -23,7 +23,8 @@ pub(super) fn found(experiments: &[Experiment], free: &[FreeNumber], result: &Fi
             let [theta, phi] = keys.map(|k| result.theta[s][plan.layout.index(k)]);
             // On the sphere a step of φ is sin θ as long as one of θ; across each other their errors add as squares.
             let lengths = [1.0, theta.sin()];
-            let errors = places.iter().zip(lengths).filter_map(|(p, l)| p.map(|p| result.parameters[p].standard_error.map(|e| e * l)));
+            let errors =
+                places.iter().zip(lengths).filter_map(|(p, l)| p.map(|p| result.parameters[p].standard_error.map(|e| e * l)));
             out.push(FoundNormal {
                 path: format!("plane.{i}.normal"),
                 scene: s,
@@ -40,7 +41,8 @@ impl FoundNormal {
     /// In a line, of one of so many scenes.
     pub fn line(&self, scenes: usize) -> String {
         let [x, y, z] = self.normal.map(|x| number((x * 1e5).round() / 1e5));
-        let error = self.standard_error.map_or(String::new(), |e| format!(" ± {} rad", number(format!("{e:.1e}").parse().unwrap_or(e))));
+        let error =
+            self.standard_error.map_or(String::new(), |e| format!(" ± {} rad", number(format!("{e:.1e}").parse().unwrap_or(e))));
         let of = if scenes > 1 { format!(" of scene {}", self.scene + 1) } else { String::new() };
         format!("{}{of} = ({x}, {y}, {z}){error}", self.path)
     }
