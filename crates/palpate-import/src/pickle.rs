@@ -326,7 +326,7 @@ impl<'a> Machine<'a> {
                 }
                 // Attributes of a dictionary, as those of a network's parameters, say nothing about its entries.
                 b'b' if self.stack.iter().rev().nth(1).is_some_and(|at| matches!(self.values[*at], Value::Dict(_))) => {
-                    drop(self.pop()?)
+                    self.pop()?;
                 }
                 other => return Err(format!("opcode {} at byte {} is not read", name_of(other), self.place - 1)),
             }
