@@ -10,7 +10,7 @@ use std::path::Path;
 pub type Target = fn(&Path, &[u8]);
 
 /// Every target by name; `corpus/NAME` holds files that it begins with.
-pub const TARGETS: [(&str, Target); 14] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("scene", scene),
     ("recording", recording),
     ("ply", |dir, data| mesh(dir, "mesh.ply", data)),
@@ -25,6 +25,7 @@ pub const TARGETS: [(&str, Target); 14] = [
     ("markers", markers),
     ("c3d", c3d),
     ("import", import),
+    ("torch", torch),
 ];
 
 fn put(dir: &Path, name: &str, data: &[u8]) -> std::path::PathBuf {
@@ -92,4 +93,17 @@ fn import(dir: &Path, data: &[u8]) {
         &mut Watch::new(&mut look),
     ));
     drop(fs::remove_file(source));
+}
+
+/// A folder with tracks of three vertices, and these bytes for the file that says which of them are the object.
+fn torch(dir: &Path, data: &[u8]) {
+    let (source, frames) = (dir.join("toy"), dir.join("toy/reconstruction"));
+    fs::create_dir_all(&frames).expect("the folder is writable");
+    let values = vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1, 0.1];
+    let vertices = palpate_io::npy::Array { shape: vec![3, 3], values };
+    palpate_io::npy::write_npz(frames.join("0.npz"), &[("vertices", &vertices)]).expect("the folder is writable");
+    put(&frames, "mask.pt", data);
+    let mut look = |_: f64, _: &str| ControlFlow::Continue(());
+    let options = Options { force: true, ..Options::default() };
+    any(palpate_import::import(&source, &dir.join("out"), &options, &mut Watch::new(&mut look)));
 }

@@ -3,7 +3,7 @@
 use super::{SCENE, changed, folder, refused, write};
 use palpate::{Backend, Experiment};
 use std::path::{Path, PathBuf};
-use support::command::{arg, succeed};
+use support::command::{arg, palpate, succeed};
 
 const HEADER: &str = "time,x,y,z,qx,qy,qz,qw";
 
@@ -28,6 +28,28 @@ fn a_clamp_takes_the_body_along() {
     let moved: Vec<f64> = held.map(|(_, u)| u.y).collect();
     // The penalty of the clamp yields by some per cent of a millimetre.
     assert!(!moved.is_empty() && moved.iter().all(|y| (y - 0.01).abs() < 5e-4), "{moved:?}");
+}
+
+#[test]
+fn a_clamp_that_leaps_is_named_and_not_a_pivot() {
+    let folder = folder();
+    // Metres that were meant as millimetres: the held end is thirty body lengths away within a step.
+    let motion = format!("{HEADER}\n0, 0,0,0, 0,0,0,1\n0.05, 0,0,0, 0,0,0,1\n0.051, 0,3,0, 0,0,0,1\n0.1, 0,3,0, 0,0,0,1\n");
+    let path = scene(folder.path(), &motion);
+    let a = palpate(&["inspect", arg(&path)]);
+    assert!(a.code == 0 && a.out.contains("clamp.0 jumps by 3"), "{}", a.out);
+    assert!(a.out.contains("is its motion in metres and seconds, and relative to the rest place?"), "{}", a.out);
+    // Where the body cannot follow, the error says so and no more. The curve through the rows swings back before a leap of kilometres.
+    let path = scene(folder.path(), &motion.replace(" 0,3,0,", " 0,3000,0,"));
+    let out = folder.path().join("out");
+    let error = refused(&["simulate", arg(&path), "--backend", "cpu", "--out", arg(&out)], 1);
+    assert!(error.contains("clamp.0 jumps by 94.1176 m within a step, from 0 s to 0.01 s"), "{error}");
+    assert!(error.contains("check the rows of the clamp's motion file"), "{error}");
+    assert!(error.len() < 350 && !error.contains("pivot"), "{error}");
+    // Places in the world instead of ways from the rest place.
+    let path = scene(folder.path(), &format!("{HEADER}\n0, 0,0.5,0, 0,0,0,1\n0.1, 0,0.5,0, 0,0,0,1\n"));
+    let a = palpate(&["inspect", arg(&path)]);
+    assert!(a.code == 0 && a.out.contains("clamp.0 is 0.5 m away from its rest place at the start, 0 s"), "{}", a.out);
 }
 
 #[test]

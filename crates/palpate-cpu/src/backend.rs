@@ -52,8 +52,7 @@ impl CpuBackend {
         world.set_params(&ParamBatch::from_rows(&[theta.to_vec()]));
         let mut first = State { members: blank(&world) };
         let (shared, member) = (&world.shared, &mut world.members[0]);
-        simulate::start(shared, member, &mut first.members[0])
-            .map_err(|reason| newton::at(0.0)(reason).with_values(&plan.layout, theta))?;
+        simulate::start(shared, member, &mut first.members[0]).map_err(|reason| newton::at(0.0)(reason).in_plan(plan, theta))?;
         Ok(world.members.remove(0).coefficients.changes.rest.unwrap_or_default())
     }
 }

@@ -55,7 +55,7 @@ impl CpuBackend {
             (physics.mass_damping, physics.stiffness_damping) = (0.0, 0.0);
             lowest(shared, member, &at.u, count.min(3 * n))
         });
-        let (frequencies, shapes) = found.map_err(|r| newton::at(0.0)(r).with_values(&plan.layout, theta))?;
+        let (frequencies, shapes) = found.map_err(|r| newton::at(0.0)(r).in_plan(plan, theta))?;
         Ok(Modes { equilibrium: at.u, frequencies, shapes })
     }
 }

@@ -257,6 +257,6 @@ impl MemberTally {
 
     /// Marks the member as failed; the values of its parameters go into the message.
     pub(crate) fn fail(&mut self, failure: Failure, plan: &Plan, theta: &[f64]) {
-        self.evaluation.failure = Some(failure.with_values(&plan.layout, theta));
+        self.evaluation.failure = Some(failure.in_plan(plan, theta));
     }
 }

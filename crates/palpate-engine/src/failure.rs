@@ -1,6 +1,7 @@
 //! Why a member of a batch stopped.
 
 use palpate_model::params::{Layout, unit_behind};
+use palpate_model::plan::{Physics, Plan};
 use std::borrow::Cow;
 use std::fmt;
 
@@ -63,8 +64,31 @@ impl Failure {
         format!("{what} at t = {} s: {}", number(self.time), self.detail)
     }
 
+    /// With what is behind it, as far as the plan tells: a clamp that leaps until then, else the values θ `[P]`, one of which is to blame.
+    pub fn in_plan(self, plan: &Plan, theta: &[f64]) -> Failure {
+        let about_motion = matches!(
+            self.kind,
+            FailureKind::NotFinite
+                | FailureKind::NewtonStalled
+                | FailureKind::LinearSolve
+                | FailureKind::FellOut
+                | FailureKind::NoEquilibrium
+                | FailureKind::Unstable
+        );
+        let start = Physics::new(&plan.layout, theta).start;
+        let leaps = if about_motion { plan.jumps(start, self.time) } else { Vec::new() };
+        let Some(leap) = leaps.into_iter().max_by(|a, b| a.distance.total_cmp(&b.distance)) else {
+            return self.with_values(&plan.layout, theta);
+        };
+        Failure {
+            detail: leap.to_string(),
+            hint: "check the rows of the clamp's motion file (metres, seconds, relative to the rest place), or use a smaller [time] step".into(),
+            ..self
+        }
+    }
+
     /// Adds the values θ `[P]` of the parameters that are not zero to the details.
-    pub fn with_values(mut self, layout: &Layout, theta: &[f64]) -> Failure {
+    fn with_values(mut self, layout: &Layout, theta: &[f64]) -> Failure {
         let stated = layout.keys.iter().zip(theta).filter(|(_, v)| **v != 0.0).map(|(k, v)| {
             let spec = k.spec();
             format!("{} = {}{}", spec.path, number(*v), unit_behind(spec.unit))

@@ -91,6 +91,7 @@ impl<B: Backend> Forward<'_, B> {
         let now = states.last();
         let mut flow = visit(Moment { world: w, step: None, ends: [now; 2], tangents: start, tally });
         for s in self.stages {
+            let _step = tracing::trace_span!("step", number = s.step).entered();
             if self.stop.can_end() {
                 b.keep_pace(w);
             }
@@ -202,6 +203,8 @@ impl<B: Backend> Rollout<B> {
 
     /// Evaluates a batch of at most as many members as there is room for.
     fn run(&mut self, theta: &ParamBatch, request: &Request) -> Vec<Evaluation> {
+        let (members, sensitivities) = (theta.members(), request.sensitivities.len());
+        let _span = tracing::debug_span!("evaluation", members, sensitivities, gradient = request.gradient.any()).entered();
         self.let_go();
         let (b, stop, stages) = (&self.backend, &self.stop, &self.stages);
         let directions = theta.directions(&request.sensitivities);
@@ -239,6 +242,7 @@ impl<B: Backend> Rollout<B> {
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
+        let _span = tracing::debug_span!("evaluation", members = 1).entered();
         self.let_go();
         let (b, dt, times) = (&self.backend, self.plan.clock.step, &self.plan.times);
         let (stages, stop) = (&self.stages, &self.stop);

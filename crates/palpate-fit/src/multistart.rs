@@ -6,7 +6,7 @@
 use crate::chart::Chart;
 use crate::fit::{FitError, Hooks, Progress};
 use crate::journal::Journal;
-use crate::optimise::{Outcome, Sample, Search, Status, Stop, want};
+use crate::optimise::{Outcome, Sample, Search, Status, Stop, is_unmoved, want};
 use crate::priors::Priors;
 use crate::problem::{FreeParameter, Problem};
 use crate::settings::{Settings, Walk};
@@ -86,10 +86,13 @@ struct Runner<'a> {
     /// Where it starts, if not where the draw says; and then it goes on whether it sees anything or not.
     given: Option<&'a Vec<f64>>,
     sight: bool,
+    /// What the starts are part of, for who traces: each has a thread of its own.
+    within: tracing::Span,
 }
 
 impl Runner<'_> {
     fn run(&self, tell: &Sender<(usize, Message)>, answers: &Receiver<Result<Answer, Stop>>) -> StartRun {
+        let _span = tracing::info_span!(parent: &self.within, "start", number = self.number).entered();
         let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
         rng.set_stream(self.number as u64);
         let fixed = self.given.is_some() || self.free.iter().all(|f| f.start.0 == f.start.1);
@@ -165,7 +168,24 @@ pub fn run(
             ..Begin::given(led.unwrap_or(own), 0, 0)
         })
         .collect();
-    for (begin, mut run) in again.iter().zip(run_some(problem, settings, hooks, journal, &again)?) {
+    let mut found = run_some(problem, settings, hooks, journal.as_deref_mut(), &again)?;
+    // A way that ended above where it was to begin was none: clutter has few readings that belong to the body, and is followed by a wide band.
+    let astray: Vec<usize> = (0..again.len())
+        .filter(|k| found[*k].outcome.sample.is_some() && found[*k].outcome.cost > runs[again[*k].number].outcome.start_cost)
+        .collect();
+    if !astray.is_empty() {
+        let own = |k: &usize| {
+            let first = &runs[again[*k].number];
+            let served = first.outcome.evaluations + found[*k].outcome.evaluations;
+            Begin { number: again[*k].number, served, ..Begin::given(problem.values(&first.start), 0, 0) }
+        };
+        let back: Vec<Begin> = astray.iter().map(own).collect();
+        for (k, mut run) in astray.iter().zip(run_some(problem, settings, hooks, journal, &back)?) {
+            run.outcome.evaluations += found[*k].outcome.evaluations;
+            found[*k] = run;
+        }
+    }
+    for (begin, mut run) in again.iter().zip(found) {
         let first = &mut runs[begin.number];
         if run.outcome.sample.is_none() {
             // Stopped before it could look again: its first look is what there is.
@@ -173,7 +193,7 @@ pub fn run(
             continue;
         }
         // A search that never saw anything has not converged, whatever ended it.
-        if run.outcome.sample.as_ref().is_some_and(|s| s.residuals > 0 && s.unmatched == s.residuals) {
+        if run.outcome.sample.as_ref().is_some_and(is_unmoved) {
             run.outcome.status = Status::Blind;
         }
         (run.start, run.outcome.start_cost) = (first.start.clone(), first.outcome.start_cost);
@@ -238,6 +258,7 @@ fn run_some(
                 line,
                 given: given.as_ref(),
                 sight,
+                within: tracing::Span::current(),
             };
             let work = move || {
                 let run = std::panic::AssertUnwindSafe(|| runner.run(&tell, &answers));

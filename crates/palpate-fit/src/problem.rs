@@ -205,7 +205,8 @@ impl<'a> Problem<'a> {
     /// True where a search from values `[q]` is moved by what it sees; see [`crate::Status::Blind`].
     pub fn sees(&mut self, values: &[f64], optimizer: Optimizer) -> bool {
         let sample = self.evaluate_values(&[values.to_vec()], want(optimizer)).remove(0);
-        sample.failure.is_none() && !is_blind(&sample)
+        // In a band so wide that all is met, what changes nothing still leads nowhere.
+        sample.failure.is_none() && !is_blind(&sample) && !sample.gradient.contains(&0.0)
     }
 
     /// True where every scene's physics has [`Problem::product`].

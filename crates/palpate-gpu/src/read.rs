@@ -65,7 +65,7 @@ fn failure(world: &World, member: usize, h: &Health) -> Option<Failure> {
     };
     let stages = world.plan.clock.stages();
     let time = (h.step as usize).checked_sub(1).and_then(|k| stages.get(k)).map_or(0.0, |s| s.time);
-    Some(Failure::new(kind, time, what).with_values(&world.plan.layout, &world.batch.theta[member]))
+    Some(Failure::new(kind, time, what).in_plan(&world.plan, &world.batch.theta[member]))
 }
 
 /// Costs, gradients and health of every member.

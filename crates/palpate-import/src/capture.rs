@@ -20,6 +20,10 @@ pub struct Capture {
     pub markers: Option<Markers>,
     /// Points that are followed without markers.
     pub tracks: Option<Tracks>,
+    /// Where the frames of the tracks are equilibria one after another, and no motion: what is known of them.
+    pub equilibria: Option<Equilibria>,
+    /// Files that come to lie beside the recording: name and text.
+    pub beside: Vec<(String, String)>,
     /// Unit of clouds, markers and tracks, where the source says it, and what it says.
     pub unit: Option<(Unit, String)>,
     /// Unit where it does not.
@@ -118,6 +122,15 @@ pub struct Tracks {
     pub count: usize,
     /// Places `[times, count]`; NaN = not seen.
     pub places: Vec<DVec3>,
+}
+
+/// What is known of a sequence of equilibria.
+#[derive(Clone, Debug, Default)]
+pub struct Equilibria {
+    /// Numbers of the tracks that something outside moves: strings, a stand.
+    pub fixed: Vec<usize>,
+    /// Numbers of the frames that a fit shall see; none = all.
+    pub train: Vec<usize>,
 }
 
 /// Which file a guess is marked in, and at which key.

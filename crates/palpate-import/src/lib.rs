@@ -12,9 +12,11 @@ mod images;
 mod intrinsics;
 mod lens;
 mod options;
+mod pickle;
 mod place;
 mod stages;
 mod times;
+mod torch;
 mod write;
 
 pub use capture::{Guess, Spot};
@@ -149,9 +151,21 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     said.facts.extend(plane.as_ref().map(masks::describe));
     crop::apply(&mut r, &mut said);
     r.source = format!("imported by palpate from {} ({})", place.title(), format.name);
-    let motion = release::find(&r, o, &mut said);
     let times = times(&r);
     let Some([first, last]) = times else { return refuse(&place.path, "holds no reading") };
+    let motion = match &capture.equilibria {
+        None => release::find(&r, o, &mut said),
+        Some(_) => {
+            for (option, given) in [("release", o.release), ("duration", o.duration)] {
+                if let Some(x) = given {
+                    return refuse_option(option, x, "belongs to a motion; the frames of this source are equilibria");
+                }
+            }
+            let text = "every frame is an equilibrium, as the source's were simulated; nothing moves by itself between them";
+            said.facts.push(text.into());
+            Motion::Sequence { first }
+        }
+    };
     if let Motion::Moving { from, .. } = motion
         && from >= last
     {
@@ -168,7 +182,12 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
     let seen = Seen { points: &at_rest, bounds, sight, on_surface: r.markers.is_none() };
     let body = body::make(o, &seen, &mut said)?;
     let window = write::scene::window(motion, last, o, &mut said);
-    let thinned = thin::choose(&r, window.0, window.1, o, &mut said);
+    // Frames to train on are counted among those that are compared.
+    let counted = capture.equilibria.as_ref().is_some_and(|e| !e.train.is_empty());
+    let thinned = match counted {
+        true => thin::Thinned { stride: 1, every: 1 },
+        false => thin::choose(&r, window.0, window.1, o, &mut said),
+    };
     let lowest = lowest(&everything, up);
     let cost = if r.markers.is_some() {
         "markers"
@@ -187,12 +206,17 @@ pub fn import(source: &Path, out: &Path, o: &Options, watch: &mut Watch) -> Resu
         lowest,
         plane,
         held: if motion == Motion::Still { None } else { points::held(&r) },
+        equilibria: capture.equilibria.as_ref(),
+        tracks: r.points.as_ref().map_or(0, |p| p.rest.len()),
         cost,
         thinned,
     };
     let scene = write::scene::text(&parts, o, &mut said);
     watch.at(0, 1, WRITING)?;
     write_all(out, &r, &body, &scene, &said)?;
+    for (name, text) in &capture.beside {
+        write_file(out.join(name), |w| w.write_all(text.as_bytes()))?;
+    }
     Ok(Imported {
         format: format.name,
         why,
@@ -283,6 +307,9 @@ fn thin_frames(c: &mut Capture, o: &Options) -> Result<(), ImportError> {
     if let Some(t) = &mut c.tracks {
         t.places = t.places.chunks(t.count.max(1)).step_by(n).flatten().copied().collect();
         nth(&mut t.times, n);
+    }
+    if let Some(e) = &mut c.equilibria {
+        e.train = e.train.iter().filter(|k| k.is_multiple_of(n)).map(|k| k / n).collect();
     }
     Ok(())
 }

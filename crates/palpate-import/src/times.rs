@@ -59,7 +59,7 @@ fn number_in(file: &Path) -> Option<f64> {
 }
 
 /// Frames that are numbered in their names and have gaps keep the gaps.
-fn by_rate(files: &[PathBuf], rate: f64, fact: String, guess: Option<Guess>) -> Result<Times, ImportError> {
+pub fn by_rate(files: &[PathBuf], rate: f64, fact: String, guess: Option<Guess>) -> Result<Times, ImportError> {
     if !(rate > 0.0 && rate <= 1e6) {
         return refuse_option("fps", rate, "must be > 0 and at most 1000000 (1/s)");
     }

@@ -103,8 +103,8 @@ pub(crate) const SCENE: Schema = Schema {
             Schema {
                 keys: &["optimizer", "iterations", "starts", "seed", "threads", "warm_start"],
                 tables: &[
-                    ("parameter", table(&["path", "start", "bounds", "known", "per_scene"])),
-                    ("frames", Schema { keys: &["test"], tables: &[("train", table(&["every", "count"]))] }),
+                    ("parameter", table(&["path", "start", "bounds", "within", "known", "per_scene"])),
+                    ("frames", Schema { keys: &["test"], tables: &[("train", table(&["every", "count", "numbers"]))] }),
                 ],
             },
         ),

@@ -18,11 +18,12 @@ use crate::observation::{MarkerRest, ReadingKind};
 use crate::params::Layout;
 use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
-use crate::shape::TriMesh;
+use crate::shape::{MeshShape, TriMesh};
 use crate::space::points::TetMesh;
 pub use crate::space::tets::Tetrahedron;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// One experiment; SI units.
 #[derive(Clone, Debug)]
@@ -127,7 +128,7 @@ pub enum BodySource {
         /// The file it was read from.
         path: PathBuf,
         /// The surface, before `pose`.
-        mesh: TriMesh,
+        shape: Arc<MeshShape>,
         /// Edges with one triangle in the file, which the repair has closed.
         open_edges: usize,
     },

@@ -1,6 +1,7 @@
 //! Rest shapes as signed distances: analytic bodies and triangle meshes.
 
 mod analytic;
+mod clusters;
 pub(crate) mod components;
 mod contacts;
 mod edges;
@@ -8,15 +9,18 @@ mod joining;
 mod mesh;
 mod pseudonormal;
 mod repair;
+mod spread;
 mod trimesh;
+mod turned;
 
 pub use analytic::Placed;
 pub use mesh::MeshShape;
 pub use repair::{MeshReport, Repaired, diagnose, repair};
+pub use spread::spread;
 pub use trimesh::TriMesh;
 
 use crate::scene::{BodySource, Object};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
 /// Longest side from which on an object may be one in another unit [m]: soft bodies in front of cameras are smaller.
@@ -69,7 +73,8 @@ pub trait Shape: Send + Sync + std::fmt::Debug {
 /// The rest shape of a scene's object, placed by its pose.
 pub fn shape_of(object: &Object) -> Arc<dyn Shape> {
     match &object.source {
-        BodySource::Mesh { mesh, .. } => Arc::new(MeshShape::new(mesh.transformed(&object.pose))),
+        BodySource::Mesh { shape, .. } if object.pose == DAffine3::IDENTITY => shape.clone(),
+        BodySource::Mesh { shape, .. } => Arc::new(shape.placed(&object.pose)),
         BodySource::Tetrahedra { surface, .. } => Arc::new(MeshShape::new(surface.transformed(&object.pose))),
         BodySource::Analytic(body) => Arc::new(Placed::new(body.clone(), object.pose)),
     }

@@ -251,7 +251,10 @@ pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) ->
     }
     let threads = threads.min(most_threads());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    Ok(pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?.install(work))
+    let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
+    // The work goes on in the caller's span.
+    let span = tracing::Span::current();
+    Ok(pool.install(|| span.in_scope(work)))
 }
 
 #[cfg(test)]

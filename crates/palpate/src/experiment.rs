@@ -74,6 +74,7 @@ impl Experiment {
     /// # Errors
     /// [`Error::File`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
     pub fn open(path: impl AsRef<Path>) -> Result<Experiment, Error> {
+        let _span = tracing::info_span!("open", scene = %path.as_ref().display()).entered();
         Experiment::from_toml(&read_text(&path)?, path)
     }
 
@@ -84,7 +85,8 @@ impl Experiment {
     pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
         let text = read_text(&path)?;
         let _stage = Stage::begin("read the scene");
-        let loaded = parse_scene(&text, path)?;
+        let _span = tracing::info_span!("open", scene = %path.as_ref().display()).entered();
+        let loaded = tracing::info_span!("load").in_scope(|| parse_scene(&text, path))?;
         let scene = Scene { observation: None, ..loaded.value };
         Experiment::new(scene, text, loaded.warnings)
     }
@@ -94,7 +96,7 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::open`].
     pub fn from_toml(text: &str, path: impl AsRef<Path>) -> Result<Experiment, Error> {
-        let loaded = parse_scene(text, path)?;
+        let loaded = tracing::info_span!("load").in_scope(|| parse_scene(text, path))?;
         Experiment::new(loaded.value, text.to_string(), loaded.warnings)
     }
 
@@ -122,7 +124,10 @@ impl Experiment {
         if let Some(spec) = &mut scene.observation {
             let read = match known {
                 Some(known) => known,
-                None => Arc::new(read_recording(place_of(spec).map_err(|e| fault("observation.recording", e))?)?),
+                None => {
+                    let place = place_of(spec).map_err(|e| fault("observation.recording", e))?;
+                    Arc::new(tracing::info_span!("load", recording = %place.display()).in_scope(|| read_recording(&place))?)
+                }
             };
             warnings.extend(read.warnings.iter().cloned());
             warnings.extend(doubts::thin(&read, spec, &path, &text));
@@ -131,7 +136,12 @@ impl Experiment {
                 ObservationError::Scene { key, message } => fault(&key, message),
             })?;
             leave_out_what_is_held(&scene, rest.len(), &mut observation);
-            if let Some(chosen) = scene.fit.as_ref().and_then(|f| f.frames) {
+            if let Some(chosen) = scene.fit.as_ref().and_then(|f| f.frames.as_ref()) {
+                let there = observation.frames.len();
+                if let Some(last) = chosen.numbers.iter().flatten().find(|k| **k >= there) {
+                    let text = format!("there is no frame {last}: {there} are used, and counted from 0");
+                    return Err(fault("fit.frames", text));
+                }
                 let mut number = 0..;
                 observation.frames.retain(|_| number.next().is_some_and(|k| chosen.holds(k)));
             }
@@ -168,7 +178,7 @@ impl Experiment {
                 "take coarser cells: object.cell_size",
             )?;
         }
-        let cutting = Stage::begin("cut the body");
+        let cutting = (Stage::begin("cut the body"), tracing::info_span!("assemble").entered());
         let plan = build_plan_of(&scene, shape.clone(), observation, &rest)
             .map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;
         drop(cutting);

@@ -9,7 +9,7 @@ use crate::grid::{GridCheck, grid_check};
 use crate::interrupt::Interrupt;
 use crate::memory::Demand;
 use crate::residuals::ResidualSummary;
-use crate::results::fit::{FitStatus, Verdict};
+use crate::results::fit::{FitStatus, FoundNormal, Verdict};
 use crate::scatter::Excess;
 use palpate_engine::{FailureKind, MOST_SENSITIVITIES, Stop};
 use palpate_fit::{ErrorModel, FitResult, FitScene, FreeParameter, Hooks, JournalFile, Problem, Progress, Settings, Tolerance};
@@ -27,6 +27,7 @@ mod counted;
 mod free;
 mod held_out;
 mod lead;
+mod normals;
 mod verdict;
 mod warm;
 
@@ -90,6 +91,8 @@ pub struct Fitted {
     /// What was chosen for this fit and why, in sentences: the optimiser, where it is not the usual one and nobody named it, and start values
     /// that were not stated.
     pub notes: Vec<String>,
+    /// Normals of planes of which an angle was free.
+    pub normals: Vec<FoundNormal>,
     /// What a fit of tracked points found, by free number; empty where nothing was tracked.
     pub tracked: Vec<FromTracks>,
     /// θ of every scene at the first start.
@@ -203,6 +206,7 @@ pub(crate) fn check(experiments: &[Experiment]) -> Result<(), Error> {
 /// [`FitResult::broken`].
 pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted, Error> {
     let _stage = Stage::begin("fit");
+    let _span = tracing::info_span!("fit", scenes = experiments.len()).entered();
     let first = experiments.first().ok_or_else(|| Error::Input("no scene is given".into()))?;
     check(experiments)?;
     let spec = specs(first).expect("every scene was just found to have a [fit]");
@@ -305,7 +309,9 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let cut = interrupt.is_urgent();
     history.sort_by_key(|p| (p.start, p.iteration));
     warnings.extend(experiments.iter().flat_map(|e| e.warnings().iter().cloned()));
-    warnings.extend(result.warnings.iter().cloned().chain(notes));
+    let blind = result.runs[result.best].status == palpate_fit::Status::Blind;
+    // Who saw nothing has no errors either.
+    warnings.extend(result.warnings.iter().filter(|w| !(blind && w.starts_with("no standard errors"))).cloned().chain(notes));
     let held_out = match cut {
         true => None,
         false => held_out::held_out(experiments, &result.theta, &after, backend).unwrap_or_else(|e| {
@@ -317,6 +323,7 @@ pub fn fit(experiments: &[Experiment], mut options: FitOptions) -> Result<Fitted
     let interrupted = cut || result.runs.iter().any(|r| r.status == palpate_fit::Status::Interrupted);
     let fitted = Fitted {
         backend: backend.name(),
+        normals: normals::found(experiments, &free, &result),
         free,
         fields,
         notes: chosen.into_iter().chain(warm.notes).collect(),
@@ -359,7 +366,8 @@ fn with_residual_warnings(mut fitted: Fitted) -> Fitted {
     let points = fitted.residual().2;
     let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
     // Of the larger part the verdict speaks.
-    if unmatched * 20 > points + unmatched && unmatched <= points {
+    let blind = fitted.result.runs[fitted.result.best].status == palpate_fit::Status::Blind;
+    if unmatched * 20 > points + unmatched && unmatched <= points && !blind {
         fitted.warnings.push(format!(
             "{unmatched} of {} observed points met no part of the simulated body; is something else in the images, or is the band too narrow?",
             points + unmatched

@@ -2,7 +2,9 @@
 
 use crate::cli::Console;
 use crate::error::Error;
+use crate::experiment::Experiment;
 use crate::lock::{self, Held, Lock, PATIENCE, Taken};
+use crate::progress::Track;
 use palpate_io::output::make_folder;
 use std::path::Path;
 
@@ -26,6 +28,28 @@ pub(crate) fn check(folder: &Path) -> Result<(), Error> {
 fn taken(folder: &Path, held: &Held) -> Error {
     let message = format!("{held} writes into it; wait until that has ended, or give another folder");
     Error::option("out", folder.display(), message)
+}
+
+/// How a command of one scene begins: nothing is in its way, the scene is read and its warnings are told, the folder is its own, and from then on
+/// an interrupt is served, and is one as well where another process has taken the folder.
+///
+/// # Errors
+/// As [`check`] and [`take`], or what `read` says.
+pub(crate) fn begin(
+    folder: &Path,
+    what: &str,
+    console: &mut Console,
+    read: impl FnOnce() -> Result<Experiment, Error>,
+) -> Result<(Experiment, Track, Lock), Error> {
+    check(folder)?;
+    let mut track = console.progress(0, what);
+    track.on(0, "reading");
+    let experiment = read()?;
+    track.aside(|| console.warn(experiment.warnings()));
+    let lock = take(folder, console)?;
+    console.interrupt.serve();
+    console.interrupt = lock.guard(&console.interrupt);
+    Ok((experiment, track, lock))
 }
 
 /// Makes a folder and takes its lock, which is released with the value. Of a process that this machine cannot ask for, a sign of life is

@@ -30,6 +30,9 @@
 //! With a recording in the scene, [`Experiment::fit`] finds the free parameters of its `[fit]` table, and [`fit`] does so for
 //! several scenes at once. The command line is the same library behind [`cli::run`].
 //!
+//! Who subscribes to the crate [`tracing`](https://docs.rs/tracing) sees what takes how long, as spans: `open` with `load` and `assemble`, `fit`
+//! with `start` (level info), `evaluation` (debug) and `step` (trace). Without a subscriber they cost nothing.
+//!
 //! Invariant: this room reads options, chooses a backend and talks to people. It computes no physics.
 
 mod auto;

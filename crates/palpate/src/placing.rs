@@ -12,12 +12,12 @@ use crate::experiment::Experiment;
 use crate::fitting::{FitOptions, Fitted};
 use crate::interrupt::Interrupt;
 use crate::objective::{Coordinates, Objective};
-use crate::tracking::spread;
 use glam::DVec3;
 use palpate_fit::{Controls, Zones};
 use palpate_io::scene_with_regions;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Varied};
 use palpate_model::scene::WarmStart;
+use palpate_model::shape::spread;
 
 /// Zones that a body is cut into: each costs a direction of one evaluation, and bodies of more parts than this are fitted as fields by cells.
 const ZONES: usize = 24;

@@ -13,6 +13,7 @@ use palpate_cpu::Tracker;
 use palpate_engine::number;
 use palpate_engine::tracking::{self, Doubt, Met, Settings, Tracked};
 use palpate_io::recording::{RecordedPoints, Recording, Sequence};
+use palpate_model::shape::spread;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -201,21 +202,6 @@ fn doubt_the_sparse(frames: &mut [TrackedFrame]) {
     for f in frames.iter_mut().filter(|f| f.met.readings > 0 && f.met.share() < FEW * median) {
         f.doubts.push(Doubt::Unmatched(f.met.share()));
     }
-}
-
-/// Farthest-point sampling: `count` places from `first` on, each the one farthest from those before.
-pub(crate) fn spread(places: &[DVec3], first: usize, count: usize) -> Vec<usize> {
-    let mut distance = vec![f64::INFINITY; places.len()];
-    let mut chosen = Vec::new();
-    let mut next = first;
-    while chosen.len() < count.min(places.len()) {
-        chosen.push(next);
-        for (d, p) in distance.iter_mut().zip(places) {
-            *d = d.min((*p - places[next]).length_squared());
-        }
-        next = (0..places.len()).max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0);
-    }
-    chosen
 }
 
 impl TrackedBody {

@@ -17,11 +17,12 @@ use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, BodySource, Clamp, LinearSolver, Scene};
-use palpate_model::shape::Shape;
+use palpate_model::shape::{MeshShape, Shape};
 use palpate_model::space::body::Body;
 use palpate_model::space::stuffing::stuff;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Steps that are counted: the bodies land in the third or fourth. Of large bodies as many as reach the ground.
 const STEPS: [usize; 2] = [5, 4];
@@ -105,7 +106,7 @@ fn clamped_dragon() -> Result<Plan, String> {
     let surface = stuff(&sdf, 0.004).map_err(|e| e.to_string())?.surface();
     let (low, high) = sdf.bounds();
     let mut scene = scene_of(Analytic::Ball { radius: 0.1, center: DVec3::ZERO }, 0.01, 5e4);
-    scene.object.source = BodySource::Mesh { path: "dragon".into(), mesh: surface, open_edges: 0 };
+    scene.object.source = BodySource::Mesh { path: "dragon".into(), shape: Arc::new(MeshShape::new(surface)), open_edges: 0 };
     let top = DVec3::new(high.x, high.y, low.z + 0.1 * (high.z - low.z));
     scene.clamps = vec![Clamp::still(low - DVec3::ONE, top + DVec3::new(1.0, 1.0, 0.0))];
     clamped(&scene)

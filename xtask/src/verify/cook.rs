@@ -4,7 +4,8 @@ use super::report::{Requirement, Row};
 use super::scenes;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{BodySource, Clamp, InitialShape, PointMass};
-use palpate_model::shape::TriMesh;
+use palpate_model::shape::{MeshShape, TriMesh};
+use std::sync::Arc;
 
 /// Thickness, in the panel's own units (48 wide, 44 high at its root and 16 at its end).
 const THICK: f64 = 2.0;
@@ -32,7 +33,7 @@ fn panel() -> TriMesh {
 /// Vertical displacement of the middle of the right edge for E = 1, a load of 1 per thickness, of the small load that keeps it linear.
 fn deflect(cell: f64) -> Result<f64, String> {
     let mesh = panel();
-    let source = BodySource::Mesh { path: "cook.obj".into(), mesh, open_edges: 0 };
+    let source = BodySource::Mesh { path: "cook.obj".into(), shape: Arc::new(MeshShape::new(mesh)), open_edges: 0 };
     let mut s = scenes::of(source, cell);
     s.object.pose = DAffine3::IDENTITY;
     s.material.youngs_modulus = 1.0;

@@ -7,8 +7,9 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, ParamBatch};
 use palpate_model::scene::{BodySource, Inertia, Time};
-use palpate_model::shape::TriMesh;
+use palpate_model::shape::{MeshShape, TriMesh};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 const INNER: f64 = 1.8;
 const OUTER: f64 = 6.0;
@@ -49,7 +50,8 @@ fn frequency(cell: f64) -> Result<f64, String> {
     let n = mesh.vertices.len() as u32;
     mesh.vertices.extend(inner.vertices);
     mesh.triangles.extend(inner.triangles.iter().map(|[a, b, c]| [a + n, c + n, b + n]));
-    let mut s = scenes::of(BodySource::Mesh { path: "fv42.obj".into(), mesh, open_edges: 0 }, cell);
+    let mut s =
+        scenes::of(BodySource::Mesh { path: "fv42.obj".into(), shape: Arc::new(MeshShape::new(mesh)), open_edges: 0 }, cell);
     s.material.youngs_modulus = 2e11;
     s.material.inertia = Inertia::Density(8000.0);
     s.time = Time { steps: 1, ..s.time };

@@ -223,8 +223,7 @@ impl Follow for Tracker {
         let n = self.world.shared.plan.body.nodes.len();
         let mut first = MemberState { u: zeros(n), v: zeros(n) };
         let (shared, member) = (&self.world.shared, &mut self.world.members[0]);
-        simulate::start(shared, member, &mut first)
-            .map_err(|r| newton::at(0.0)(r).with_values(&shared.plan.layout, &member.theta))?;
+        simulate::start(shared, member, &mut first).map_err(|r| newton::at(0.0)(r).in_plan(&shared.plan, &member.theta))?;
         debug_assert!(shared.plan.initial != InitialShape::Given || member.coefficients.changes.rest.is_some());
         Ok(Pose { displacement: first.u, velocity: first.v })
     }

@@ -20,6 +20,8 @@ const LENGTHS: f64 = 1e-10;
 
 /// Share of readings that meet nothing up to which a start sees enough: outliers and the edges of images.
 const LOST: f64 = 0.05;
+/// Share from which on the few that are met are chance: a body that was thrown away passes some of them on its way.
+const NEARLY_ALL: f64 = 0.9;
 
 /// Cost and derivatives at one point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -210,9 +212,14 @@ pub struct Outcome {
 }
 
 /// True where readings meet nothing, and a parameter changes none of those that do: a search would not move it.
-pub(crate) fn is_blind(sample: &Sample) -> bool {
+pub(crate) fn is_unmoved(sample: &Sample) -> bool {
     let (n, lost) = (sample.residuals, sample.unmatched);
     n > 0 && (lost == n || lost as f64 > LOST * n as f64 && sample.gradient.contains(&0.0))
+}
+
+/// The same, or where next to none of the readings meet anything: a search would settle on chance.
+pub(crate) fn is_blind(sample: &Sample) -> bool {
+    is_unmoved(sample) || sample.residuals > 0 && sample.unmatched as f64 > NEARLY_ALL * sample.residuals as f64
 }
 
 impl<'a> Search<'a> {

@@ -5,9 +5,11 @@ mod c3d;
 mod cdr;
 mod folder;
 mod mcap;
+mod nozzle;
 mod npy;
 mod optitrack;
 mod pcd;
+mod plush;
 mod ply;
 mod qualisys;
 mod realsense;
@@ -34,8 +36,9 @@ pub struct Format {
 }
 
 /// Every format, the more particular before the more general: the first that knows a source reads it.
-pub const ALL: [&Format; 11] = [
+pub const ALL: [&Format; 12] = [
     &mcap::FORMAT,
+    &plush::FORMAT,
     &tum::FORMAT,
     &azure::FORMAT,
     &npy::FORMAT,

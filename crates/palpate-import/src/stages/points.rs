@@ -107,10 +107,12 @@ pub fn tracks(t: &Tracks, metres: f64, o: &Options, said: &mut Said) -> Recorded
 pub fn at_rest(r: &mut Recording, motion: Motion, place: &Place, said: &mut Said) -> Result<(), ImportError> {
     let until = match motion {
         Motion::Still => f64::INFINITY,
+        Motion::Sequence { first } => first + 1e-9,
         Motion::Moving { from, .. } => from + 1e-9,
     };
     let when = match motion {
         Motion::Still => "the mean of all times, since nothing moves".to_string(),
+        Motion::Sequence { .. } => "the first frame, in which the body hangs under its weight".to_string(),
         Motion::Moving { rested: true, .. } => "the mean of the times before the release".to_string(),
         Motion::Moving { rested: false, .. } => "the first time; the body may have moved or sagged already".to_string(),
     };

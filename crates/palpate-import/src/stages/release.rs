@@ -21,6 +21,11 @@ const SHARE: f64 = 0.02;
 pub enum Motion {
     /// Nothing moves.
     Still,
+    /// Every frame is an equilibrium of its own, the first one at this time [s].
+    Sequence {
+        /// On the source's clock.
+        first: f64,
+    },
     /// Something moves from a time on [s]; `rested` where it stood still before.
     Moving {
         /// The moment of release [s].

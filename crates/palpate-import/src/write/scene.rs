@@ -1,6 +1,6 @@
 //! A first scene for a recording: it can be fitted as it is, and says what of it nobody measured.
 
-use crate::capture::Guess;
+use crate::capture::{Equilibria, Guess};
 use crate::options::{Floor, Options};
 use crate::stages::body::Body;
 use crate::stages::plane::Plane;
@@ -37,6 +37,10 @@ pub struct Parts<'a> {
     pub cost: &'a str,
     /// What of the recording is used.
     pub thinned: Thinned,
+    /// Where it is a sequence of equilibria, what is known of them.
+    pub equilibria: Option<&'a Equilibria>,
+    /// Number of tracked points.
+    pub tracks: usize,
 }
 
 /// The time that a scene covers: start and end [s].
@@ -64,6 +68,9 @@ fn matrix(a: &DAffine3) -> String {
     let row = |i: usize| format!("  [{:?}, {:?}, {:?}, {:?}],\n", m.col(0)[i], m.col(1)[i], m.col(2)[i], a.translation[i]);
     format!("[\n{}{}{}  [0, 0, 0, 1],\n]", row(0), row(1), row(2))
 }
+
+/// Stiffness of a spring over that of the body between two points.
+const STIFFER: f64 = 300.0;
 
 /// A number with as many digits as a guess deserves.
 fn short(x: f64) -> f64 {
@@ -93,7 +100,9 @@ fn supports(p: &Parts, o: &Options, said: &mut Said) -> Supports {
         said.guesses.push(Guess::scene("clamp", "clamp", text, "--clamp"));
     }
     let wants_floor = matches!(o.floor, Some(Floor::At(_)));
-    if clamp.is_none() && p.motion == Motion::Still && !wants_floor {
+    let attached = p.equilibria.is_some_and(|e| !e.fixed.is_empty());
+    let at_rest = matches!(p.motion, Motion::Still | Motion::Sequence { .. });
+    if clamp.is_none() && at_rest && !attached && !wants_floor {
         // What hangs at rest is held somewhere: at its top, where nothing says otherwise.
         let height = |v: DVec3| v.dot(p.up);
         let (bottom, top) = (
@@ -119,7 +128,7 @@ fn supports(p: &Parts, o: &Options, said: &mut Said) -> Supports {
             said.guesses.push(Guess::scene("floor", "plane", "the plane that was taken out of the images", "--floor"));
             Some((plane.normal * plane.offset, plane.normal))
         }
-        (None, _) if clamp.is_none() => {
+        (None, _) if clamp.is_none() && !attached => {
             let under = p.lowest.min(corner(p.body.bounds, p.up));
             let text =
                 format!("{under:.4} m along the upward direction, the lowest that is ever seen; nothing else holds the body");
@@ -134,6 +143,19 @@ fn supports(p: &Parts, o: &Options, said: &mut Said) -> Supports {
 /// Height of the lowest corner of a box.
 fn corner([low, high]: [DVec3; 2], up: DVec3) -> f64 {
     DVec3::select(up.cmpge(DVec3::ZERO), low, high).dot(up)
+}
+
+/// Springs that draw what was fixed to where it was seen. They must hardly give way beside the body.
+fn attach(t: &mut String, e: &Equilibria, p: &Parts, shear: f64, said: &mut Said) {
+    let [low, high] = p.body.bounds;
+    let size = high - low;
+    let spacing = (size.x * size.y * size.z / p.tracks.max(1) as f64).cbrt();
+    let stiffness: f64 = format!("{:.0e}", STIFFER * shear * spacing).parse().unwrap_or(1e4);
+    let _ = write!(t, "\n[[attach]]\ntrack = \"recording\"\npoints = {:?}\nstiffness = {stiffness:?}\n", e.fixed);
+    let text = format!(
+        "{stiffness} N/m a point, {STIFFER} times what the body between two points has; larger ones hold tighter and need more iterations"
+    );
+    said.guesses.push(Guess::scene("attachment", "attach.0.stiffness", text, "the number in [[attach]]"));
 }
 
 /// The text of the scene, without its marks.
@@ -167,7 +189,8 @@ pub fn text(p: &Parts, o: &Options, said: &mut Said) -> String {
         "\n[material]\nmodel = \"corotated-linear\"\ndensity = {density:?}\nyoungs_modulus = {young:?}\npoisson_ratio = {poisson:?}\n"
     );
     let still = p.motion == Motion::Still;
-    if !still {
+    let sequence = matches!(p.motion, Motion::Sequence { .. });
+    if !still && !sequence {
         let _ = writeln!(t, "stiffness_damping = 0.001");
         let text = "0.001 s, a little; free it beside the modulus where the motion is seen to die away";
         said.guesses.push(Guess::scene("material", "material.stiffness_damping", text, "a [[fit.parameter]] of scene.toml"));
@@ -179,11 +202,18 @@ pub fn text(p: &Parts, o: &Options, said: &mut Said) -> String {
     if let Some((point, normal)) = held.floor {
         let _ = write!(t, "\n[[plane]]\npoint = {}\nnormal = {}\n", vector(point), vector(normal));
     }
-    let _ = write!(t, "\n[initial]\nstate = \"{}\"\n\n[time]\n", if still { "static-equilibrium" } else { "rest" });
+    if let Some(e) = p.equilibria.filter(|e| !e.fixed.is_empty()) {
+        attach(&mut t, e, p, young / (2.0 * (1.0 + poisson)), said);
+    }
+    if !sequence {
+        let _ = write!(t, "\n[initial]\nstate = \"{}\"\n", if still { "static-equilibrium" } else { "rest" });
+    }
+    t += "\n[time]\n";
     match p.motion {
         Motion::Still => {
             let _ = writeln!(t, "duration = 0");
         }
+        Motion::Sequence { .. } => t += "mode = \"quasi-static\"\n",
         Motion::Moving { from, .. } => {
             let to = p.window.1;
             let duration = f64::max(to - from, 1e-3);
@@ -200,14 +230,22 @@ pub fn text(p: &Parts, o: &Options, said: &mut Said) -> String {
             let to = p.window.1;
             let _ = writeln!(t, "frames = {{ from = {from:?}, to = {:?}{every} }}", to.min(p.last));
         }
-        Motion::Still if p.thinned.every > 1 => {
+        _ if p.thinned.every > 1 => {
             let _ = writeln!(t, "frames = {{ every = {} }}", p.thinned.every);
         }
-        Motion::Still => {}
+        _ => {}
+    }
+    t += "\n[fit]\niterations = 30\n";
+    if let Some(e) = p.equilibria.filter(|e| !e.train.is_empty()) {
+        let _ = writeln!(t, "frames = {{ train = {{ numbers = {:?} }} }}", e.train);
+    }
+    t += "\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nbounds = [1.0e2, 1.0e8]\n";
+    if sequence {
+        return t;
     }
     let _ = write!(
         t,
-        "\n[fit]\niterations = 30\n\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nbounds = [1.0e2, 1.0e8]\n\n\
+        "\n\
          # More that may be free, once the shape, the pose and what holds the body are right:\n\
          # [[fit.parameter]]\n# path = \"material.stiffness_damping\"\n#\n# [[fit.parameter]]\n# path = \"time.start\"\n"
     );

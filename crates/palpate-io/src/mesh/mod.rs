@@ -1,5 +1,6 @@
 //! Surface meshes: OBJ, PLY and STL files to a closed triangle mesh; and volume meshes to tetrahedra.
 
+mod fast;
 mod parse;
 #[cfg(test)]
 mod tests;
@@ -10,7 +11,7 @@ pub use volume::read_tets;
 use crate::error::{InputError, Loaded, number};
 use crate::input::read_bytes;
 use glam::DVec3;
-use palpate_model::shape::{MeshReport, Repaired, TriMesh, diagnose, repair};
+use palpate_model::shape::{MeshReport, MeshShape, TriMesh, repair};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -35,15 +36,23 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<Loaded<TriMesh>, InputError> 
 /// As [`read_mesh`].
 pub fn read_mesh_in(path: impl AsRef<Path>, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<TriMesh>, InputError> {
     let Loaded { value, warnings } = read_scaled(path.as_ref(), metres)?;
-    Ok(Loaded { value: value.mesh, warnings })
+    Ok(Loaded { value: value.shape.into_mesh(), warnings })
+}
+
+/// A surface that was read.
+pub(crate) struct Surface {
+    /// Repaired, and ready to be asked for distances.
+    pub shape: MeshShape,
+    /// Edges with one triangle in the file, which the repair has closed.
+    pub open_edges: usize,
 }
 
 /// As [`read_mesh`], with what the file was like.
-pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Repaired>, InputError> {
+pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Surface>, InputError> {
     read_scaled(path, |_| 1.0)
 }
 
-fn read_scaled(path: &Path, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<Repaired>, InputError> {
+fn read_scaled(path: &Path, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<Surface>, InputError> {
     let bytes = read_bytes(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.as_str() {
@@ -92,7 +101,7 @@ fn merge(mesh: TriMesh) -> TriMesh {
     out
 }
 
-fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<Repaired>, InputError> {
+fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<Surface>, InputError> {
     let refuse = |message: String| Err(InputError::file(path, message));
     if mesh.triangles.is_empty() {
         return refuse("holds no triangle with area".to_string());
@@ -114,7 +123,8 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<Repaired>, InputError> {
     }
     let repaired = repair(&mesh);
     let mut warnings: Vec<String> = repaired.done.iter().map(|r| format!("repaired: {r}")).collect();
-    let report = diagnose(&repaired.mesh);
+    let open_edges = repaired.open_edges;
+    let (shape, report) = MeshShape::examined(repaired.mesh);
     if let Some(fault) = fault(&report, side) {
         return refuse(fault);
     }
@@ -129,7 +139,7 @@ fn check(path: &Path, mesh: TriMesh) -> Result<Loaded<Repaired>, InputError> {
         ));
     }
     let warnings = warnings.into_iter().map(|w| InputError::file(path, w).to_string()).collect();
-    Ok(Loaded { value: repaired, warnings })
+    Ok(Loaded { value: Surface { shape, open_edges }, warnings })
 }
 
 /// What keeps a repaired mesh from enclosing a solid.

@@ -1,5 +1,6 @@
 //! The three mesh formats to vertices and triangles, nothing more.
 
+use super::fast;
 use glam::DVec3;
 use palpate_model::shape::TriMesh;
 use ply_rs_bw::parser::Parser;
@@ -7,7 +8,7 @@ use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use std::io::Cursor;
 
 /// Fan of a polygon with vertices `at(0..n)`; the solid is the same for planar polygons that are convex.
-fn fan(n: usize, at: impl Fn(usize) -> u32, out: &mut Vec<[u32; 3]>) {
+pub(super) fn fan(n: usize, at: impl Fn(usize) -> u32, out: &mut Vec<[u32; 3]>) {
     out.extend((2..n).map(|i| [at(0), at(i - 1), at(i)]));
 }
 
@@ -20,6 +21,10 @@ fn finite(mesh: TriMesh) -> Result<TriMesh, String> {
 
 /// Wavefront OBJ; materials, normals, groups are passed over.
 pub(super) fn obj(bytes: &[u8]) -> Result<TriMesh, String> {
+    fast::obj(bytes).map_or_else(|| slow_obj(bytes), finite)
+}
+
+pub(super) fn slow_obj(bytes: &[u8]) -> Result<TriMesh, String> {
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
@@ -72,6 +77,10 @@ impl PropertyAccess for Row {
 
 /// Stanford PLY, ASCII or binary.
 pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
+    fast::ply(bytes).map_or_else(|| slow_ply(bytes), finite)
+}
+
+pub(super) fn slow_ply(bytes: &[u8]) -> Result<TriMesh, String> {
     let ply = Parser::<Row>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| format!("not a readable PLY file: {e}"))?;
     let part = |name: &str| ply.payload.get(name).ok_or_else(|| format!("has no element \"{name}\""));
     let mut mesh = TriMesh::default();
@@ -98,13 +107,11 @@ pub(super) fn stl(bytes: &[u8]) -> Result<TriMesh, String> {
     if !binary && !bytes.starts_with(b"solid") {
         return Err("not a readable STL file: neither text nor a whole binary file (truncated?)".to_string());
     }
-    let mut bytes = bytes.to_vec();
     if binary {
-        // The crate takes any file that begins with "solid " for text; the header is free text anyway.
-        bytes[0] = b' ';
+        return finite(fast::stl(bytes));
     }
     let broken = |e: std::io::Error| format!("not a readable STL file: {e}");
-    let mut cursor = Cursor::new(&bytes[..]);
+    let mut cursor = Cursor::new(bytes);
     let mut mesh = TriMesh::default();
     for triangle in stl_io::create_stl_reader(&mut cursor).map_err(broken)? {
         let corners = triangle.map_err(broken)?.vertices;

@@ -176,3 +176,46 @@ fn other_values_are_as_if_somebody_had_typed_them() {
     let refused = scene_with_values(&text, &scene, &[("plane.3.height".to_string(), 0.0)]).unwrap_err().to_string();
     assert_eq!(refused, "some/scene.toml: plane.3.height: not a number of this scene");
 }
+
+#[test]
+fn a_normal_is_freed_as_a_direction() {
+    let read = |more: &str| {
+        let text = format!("{BASE}[fit]\n[[fit.parameter]]\npath = \"plane.0.normal\"\n{more}");
+        (parse_scene(&text, "scene.toml").map(|s| s.value.fit.unwrap().parameters), text)
+    };
+    // The scene's plane is level: its angles are measured from x.
+    let angles = |p: &[palpate_model::scene::FitParameter]| {
+        assert_eq!(p.iter().map(|p| p.path.as_str()).collect::<Vec<_>>(), ["plane.0.theta", "plane.0.phi"]);
+        let site = palpate_model::plan::PlaneSite { polar_axis: 0, stiffness: None };
+        site.normal(p[0].start.0, p[1].start.0)[0]
+    };
+    let p = read("").0.unwrap();
+    // Sines and cosines of a right angle round.
+    assert!((angles(&p) - DVec3::Z).length() < 1e-15, "{p:?}");
+    assert_eq!(p[0].bounds, (f64::NEG_INFINITY, f64::INFINITY));
+    let tilted = DVec3::new(0.3, 0.5, 0.9);
+    let (p, text) = read("start = [0.3, 0.5, 0.9]\nwithin = 0.2\n");
+    let p = p.unwrap();
+    assert!((angles(&p) - tilted.normalize()).length() < 1e-15, "{p:?}");
+    let far = |k: usize| p[k].bounds.1 - p[k].start.0;
+    assert!((far(0) - 0.2).abs() < 1e-12 && (far(1) * p[0].start.0.sin() - 0.2).abs() < 1e-12, "{p:?}");
+    // What was found goes into the plane; the start has served.
+    let scene = parse_scene(&text, "scene.toml").unwrap().value;
+    let found = [("plane.0.theta".to_string(), p[0].start.0), ("plane.0.phi".to_string(), p[1].start.0)];
+    let text = write_scene(&text, &scene, &found, Path::new(".")).unwrap();
+    let again = parse_scene(&text, "model.toml").unwrap().value;
+    assert!((again.planes[0].normal - tilted.normalize()).length() < 1e-14 && !text.contains("start = [0.3"), "{text}");
+    for (more, wanted) in [
+        ("start = [0, 0, 0]", "fit.parameter.0.start: has no length"),
+        ("start = [1, 0, 0.01]", "is nearly along x, far from the plane's normal"),
+        ("bounds = [0, 1]", "say within (rad) how far it may turn"),
+        ("known = [0, 1]", "plane.0.theta and .phi take known"),
+        ("within = 4", "must be in (0, π] (rad)"),
+    ] {
+        let e = read(more).0.unwrap_err().to_string();
+        assert!(e.contains(wanted), "{more}: {e}");
+    }
+    let text = format!("{BASE}[fit]\n[[fit.parameter]]\npath = \"world.gravity\"\nwithin = 0.1\n");
+    let e = parse_scene(&text, "scene.toml").unwrap_err().to_string();
+    assert!(e.contains("belongs to the normal of a plane, not to world.gravity"), "{e}");
+}

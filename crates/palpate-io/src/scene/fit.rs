@@ -3,6 +3,7 @@
 use crate::document::Table;
 use crate::error::{InputError, number};
 use crate::keys::suggest;
+use crate::scene::normal;
 use palpate_model::effects::{ALL, Unstated};
 use palpate_model::params::fields::Basis;
 use palpate_model::params::{On, ParamKey, Transform, is_component};
@@ -10,13 +11,13 @@ use palpate_model::plan::PlaneSite;
 use palpate_model::scene::{FitParameter, FitSpec, Inertia, Optimizer, Scene, TrainFrames, WarmStart};
 
 /// One number of a scene that can be fitted.
-struct Target {
-    path: String,
+pub(super) struct Target {
+    pub path: String,
     /// What the scene states: one value, or the range of a field's.
-    value: (f64, f64),
-    lower: f64,
-    upper: f64,
-    positive: bool,
+    pub value: (f64, f64),
+    pub lower: f64,
+    pub upper: f64,
+    pub positive: bool,
 }
 
 /// The numbers of this scene that can be fitted, in the order of its layout.
@@ -133,14 +134,32 @@ pub(super) fn fit(root: &Table, scene: &Scene) -> Result<Option<FitSpec>, InputE
 /// `frames`: which of them the fit sees.
 fn frames(t: &Table) -> Result<Option<TrainFrames>, InputError> {
     let Some(f) = t.optional_table("frames")? else { return Ok(None) };
-    let train = f.optional_table("train")?.ok_or_else(|| f.missing("train", "{ every = n, count = m }"))?;
+    let train =
+        f.optional_table("train")?.ok_or_else(|| f.missing("train", "{ every = n, count = m } or { numbers = [0, 5, …] }"))?;
     let count = |key: &str| train.optional_count(key, 1..=u64::MAX).map(|n| n.map(|n| usize::try_from(n).unwrap_or(usize::MAX)));
     let (every, most) = (count("every")?, count("count")?);
-    if (every, most) == (None, None) {
-        return Err(f.error("train", "says neither every nor count: which frames is the fit to see?"));
+    let numbers = train.optional_list("numbers")?.map(|all| numbers(&train, all)).transpose()?;
+    if numbers.is_some() && (every, most) != (None, None) {
+        return Err(train.error("numbers", "excludes every and count: it names each frame itself"));
+    }
+    if numbers.is_none() && (every, most) == (None, None) {
+        return Err(f.error("train", "says neither every, count nor numbers: which frames is the fit to see?"));
     }
     f.optional_choice("test", &[("rest", ())])?;
-    Ok(Some(TrainFrames { every: every.unwrap_or(1), count: most.unwrap_or(usize::MAX), others: false }))
+    Ok(Some(TrainFrames { every: every.unwrap_or(1), count: most.unwrap_or(usize::MAX), numbers, others: false }))
+}
+
+/// Numbers of frames in rising order.
+fn numbers(t: &Table, all: Vec<f64>) -> Result<Vec<usize>, InputError> {
+    // Beyond this, floats skip whole numbers.
+    let whole = |x: &f64| x.fract() == 0.0 && (0.0..9e15).contains(x);
+    if let Some(x) = all.iter().find(|x| !whole(x)) {
+        return Err(t.error("numbers", format!("{} is no number of a frame: they are counted from 0", number(*x))));
+    }
+    let mut out: Vec<usize> = all.into_iter().map(|x| x as usize).collect();
+    out.sort_unstable();
+    out.dedup();
+    if out.is_empty() { Err(t.error("numbers", "names no frame")) } else { Ok(out) }
 }
 
 /// One `[[fit.parameter]]`: a number, the three components of a vector, or a field, whose values share one start and one pair of bounds.
@@ -155,8 +174,12 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
     }
     let component = |k: &Target| k.path.strip_prefix(path).is_some_and(is_component);
     let of_field = field_targets(path, scene);
-    let chosen: Vec<&Target> =
-        of_field.as_ref().map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
+    let of_normal = normal::targets(t, path, scene, known)?;
+    if of_normal.is_none() && t.has("within") {
+        return Err(t.error("within", format!("belongs to the normal of a plane, not to {path}; bounds say where that may lie")));
+    }
+    let own = of_field.as_ref().or(of_normal.as_ref());
+    let chosen: Vec<&Target> = own.map_or_else(|| known.iter().filter(|k| component(k)).collect(), |f| f.iter().collect());
     if chosen.is_empty() {
         return Err(t.error("path", unknown_path(path, scene, known)));
     }
@@ -166,7 +189,8 @@ fn parameter(t: &Table, scene: &Scene, known: &[Target]) -> Result<Vec<FitParame
         true => t.optional_ranges(key, 1).map(|r| r.map(|r| vec![r[0]; chosen.len()])),
         false => t.optional_ranges(key, chosen.len()),
     };
-    let starts = ranges("start")?;
+    // The start of a normal is in its angles already.
+    let starts = if of_normal.is_some() { None } else { ranges("start")? };
     let bounds = ranges("bounds")?;
     let known_values = known_values(t, chosen.len(), shared)?;
     let per_scene = t.optional_bool("per_scene")?.unwrap_or(false);

@@ -124,7 +124,7 @@ fn what_does_not_go_together_is_refused() {
         (of_attach("stiffness = 1\n"), "attach.0.track: missing"),
         (error("[[effect]]\nkind = \"file-load\"\n".into()), "is written as a table [[load]]"),
         (error("[fit]\n[[fit.parameter]]\npath = \"load.0.factor\"\n".into()), "this scene has no [[load]] number 0"),
-        (error("[fit]\nframes = { train = {} }\n".into()), "says neither every nor count"),
+        (error("[fit]\nframes = { train = {} }\n".into()), "says neither every, count nor numbers"),
     ] {
         assert!(said.contains(message), "{message}: {said}");
     }

@@ -11,6 +11,7 @@ mod load_tests;
 mod loads;
 mod material;
 mod motion;
+mod normal;
 mod object;
 mod path;
 mod regions;

@@ -3,13 +3,13 @@
 use super::corners;
 use crate::document::Table;
 use crate::error::{InputError, number};
-use crate::mesh::{LARGEST_SIDE, read_repaired, read_tets};
+use crate::mesh::{LARGEST_SIDE, Surface, read_repaired, read_tets};
 use crate::rigid::rigid;
 use glam::{DAffine3, DVec3};
 use palpate_model::scene::{Analytic, BodySource, Object, Resolution};
-use palpate_model::shape::Repaired;
 use palpate_model::shape::unit_hint;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
@@ -25,9 +25,9 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
         (Some(path), _) => {
             let loaded = read_repaired(&path)?;
             warnings.extend(loaded.warnings);
-            let Repaired { mesh, open_edges, .. } = loaded.value;
-            let (min, max) = crate::mesh::bounds(&mesh.vertices);
-            (BodySource::Mesh { path, mesh, open_edges }, max - min)
+            let Surface { shape, open_edges } = loaded.value;
+            let (min, max) = crate::mesh::bounds(&shape.mesh().vertices);
+            (BodySource::Mesh { path, shape: Arc::new(shape), open_edges }, max - min)
         }
         (None, Some(shape)) => {
             let analytic = analytic(&shape)?;

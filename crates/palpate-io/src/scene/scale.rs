@@ -16,8 +16,8 @@ pub(crate) const FAR_SMALLER: f64 = 0.01;
 /// Warns of an object of some metres with its size and mass, and refuses one beside clamps or planes that are far smaller.
 pub(super) fn check(source: &Source, scene: &Scene, warnings: &mut Vec<String>) -> Result<(), InputError> {
     let (key, own) = match &scene.object.source {
-        BodySource::Mesh { mesh, .. } => {
-            let (min, max) = bounds(&mesh.vertices);
+        BodySource::Mesh { shape, .. } => {
+            let (min, max) = bounds(&shape.mesh().vertices);
             ("object.mesh", max - min)
         }
         BodySource::Tetrahedra { surface, .. } => {

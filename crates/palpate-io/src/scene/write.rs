@@ -157,7 +157,8 @@ fn start_there(doc: &mut DocumentMut, values: &[(String, f64)]) {
             continue;
         };
         let components: Option<Vec<f64>> = ["x", "y", "z"].iter().map(|a| found(&format!("{path}.{a}"))).collect();
-        let says_it = !(path.starts_with("field.") || path.ends_with(".theta") || path.ends_with(".phi"));
+        let of_normal = path.starts_with("plane.") && [".theta", ".phi", ".normal"].iter().any(|end| path.ends_with(end));
+        let says_it = !(path.starts_with("field.") || of_normal);
         match (found(&path), components) {
             (Some(value), _) if says_it => set(t, "start", Value::from(value)),
             (None, Some(all)) => set(t, "start", Value::from(all.into_iter().collect::<Array>())),

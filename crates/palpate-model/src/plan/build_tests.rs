@@ -113,6 +113,31 @@ fn boxes_in_the_object_frame_turn_with_it() {
 }
 
 #[test]
+fn clamps_that_leap_are_found_with_the_step_in_which_they_do() {
+    let region = Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.02, 0.1, 0.1));
+    let leaps = |rows: &[(f64, DVec3)]| {
+        let motion = RigidMotion {
+            times: rows.iter().map(|r| r.0).collect(),
+            translations: rows.iter().map(|r| r.1).collect(),
+            rotations: vec![DQuat::IDENTITY; rows.len()],
+        };
+        let plan = plan(&Scene { clamps: vec![region.clone().moved(Some(motion))], ..scene() }).unwrap();
+        // The scene starts at half a second and has ten steps of ten milliseconds.
+        plan.jumps(0.5, 0.1)
+    };
+    // Ten centimetres a second: a millimetre a step, evenly.
+    assert!(leaps(&[(0.5, DVec3::ZERO), (0.6, 0.01 * DVec3::Y)]).is_empty());
+    // Still, and 3 cm away from one step to the next; held again.
+    let sudden = leaps(&[(0.5, DVec3::ZERO), (0.54, DVec3::ZERO), (0.55, 0.03 * DVec3::Y), (0.6, 0.03 * DVec3::Y)]);
+    assert!(sudden.len() == 1 && (sudden[0].from - 0.54).abs() < 1e-9 && (sudden[0].to - 0.55).abs() < 1e-9, "{sudden:?}");
+    assert!((sudden[0].distance - 0.03).abs() < 1e-9, "{sudden:?}");
+    assert_eq!(sudden[0].to_string(), "clamp.0 jumps by 0.03 m within a step, from 0.54 s to 0.55 s");
+    // Half a metre away from the rest place from the beginning: places instead of ways.
+    let away = leaps(&[(0.5, 0.5 * DVec3::Z)]);
+    assert_eq!(away[0].to_string(), "clamp.0 is 0.5 m away from its rest place at the start, 0.5 s");
+}
+
+#[test]
 fn clamp_beside_the_body_is_an_error_that_names_it() {
     let mut scene = scene();
     scene.clamps.push(Clamp::still(DVec3::new(-0.1, -0.1, -0.1), DVec3::new(0.01, 0.1, 0.1)));

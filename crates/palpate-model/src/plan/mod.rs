@@ -2,6 +2,7 @@
 
 pub mod build;
 pub mod join;
+pub mod jumps;
 pub mod locking;
 pub mod scheme;
 

@@ -22,12 +22,14 @@ pub struct FitSpec {
 }
 
 /// Frames that a fit sees, out of those that the scene's `[observation]` uses. It is tried on the others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TrainFrames {
     /// From the first on every n-th.
     pub every: usize,
     /// So many at most.
     pub count: usize,
+    /// Instead of both, their numbers in rising order.
+    pub numbers: Option<Vec<usize>>,
     /// The other way round: the frames that the fit does not see.
     pub others: bool,
 }
@@ -35,7 +37,10 @@ pub struct TrainFrames {
 impl TrainFrames {
     /// True where frame `number` is one of these.
     pub fn holds(&self, number: usize) -> bool {
-        let trains = number.is_multiple_of(self.every) && number / self.every < self.count;
+        let trains = match &self.numbers {
+            Some(all) => all.binary_search(&number).is_ok(),
+            None => number.is_multiple_of(self.every) && number / self.every < self.count,
+        };
         trains != self.others
     }
 }

@@ -8,41 +8,45 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Distance at which a segment touches a triangle, over their size: rounding of coordinates in f64.
 const TOUCHING: f64 = 1e-9;
 
-fn shares_vertex(mesh: &TriMesh, s: usize, t: usize) -> bool {
-    mesh.triangles[s].iter().any(|v| mesh.triangles[t].contains(v))
+/// What a mesh does to itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Contacts {
+    /// Pairs of triangles without common vertex of which an edge of one meets the other.
+    pub pairs: usize,
+    /// True if a vertex lies within a tolerance of a triangle that it is no corner of.
+    pub touches: bool,
 }
 
-/// Number of pairs of triangles without common vertex of which an edge of one meets the other. `tree` holds the same mesh.
-pub(super) fn intersecting_pairs(mesh: &TriMesh, tree: &MeshShape) -> usize {
-    let pierces = |s: usize, t: usize| {
-        let ([a, b, c], other) = (mesh.corners(s), mesh.corners(t));
-        [(a, b), (b, c), (c, a)].iter().any(|&(p, q)| meets(p, q, other))
-    };
-    let count = |s: usize, t: usize| usize::from(!shares_vertex(mesh, s, t) && (pierces(s, t) || pierces(t, s)));
-    tree.count_close(TOUCHING * mesh.size(), &count)
-}
-
-/// True if a vertex lies within `tolerance` [m] of a triangle that it is no corner of.
-pub(super) fn touches_itself(mesh: &TriMesh, tree: &MeshShape, tolerance: f64) -> bool {
+/// Looks at all pairs of triangles that are close to each other; `tolerance` [m] of touching is more than rounding. `tree` holds the same mesh.
+pub(super) fn contacts(mesh: &TriMesh, tree: &MeshShape, tolerance: f64) -> Contacts {
     // Whoever finds one first: the answer is the same.
     let found = AtomicBool::new(false);
-    let near = |s: usize, t: usize| {
-        let corners = mesh.corners(t);
-        let (lo, hi) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-        mesh.triangles[s].iter().filter(|v| !mesh.triangles[t].contains(v)).any(|&v| {
-            let p = mesh.vertices[v as usize];
-            (p.clamp(lo, hi) - p).length_squared() <= tolerance * tolerance
-                && closest_on_triangle(p, corners).0.distance(p) <= tolerance
-        })
-    };
+    let size = mesh.size();
     let look = |s: usize, t: usize| {
-        if !found.load(Ordering::Relaxed) && (near(s, t) || near(t, s)) {
+        let ((a, of_a), (b, of_b)) = (tree.triangle(s), tree.triangle(t));
+        if !found.load(Ordering::Relaxed) && (near(a, of_a, b, of_b, tolerance) || near(b, of_b, a, of_a, tolerance)) {
             found.store(true, Ordering::Relaxed);
         }
-        0
+        let shared = of_a.iter().any(|v| of_b.contains(v));
+        usize::from(!shared && (pierces(a, b) || pierces(b, a)))
     };
-    tree.count_close(tolerance, &look);
-    found.into_inner()
+    let pairs = tree.count_close(tolerance.max(TOUCHING * size), &look);
+    Contacts { pairs, touches: found.into_inner() }
+}
+
+/// True if an edge of a triangle meets another triangle.
+fn pierces([a, b, c]: [DVec3; 3], other: [DVec3; 3]) -> bool {
+    [(a, b), (b, c), (c, a)].iter().any(|&(p, q)| meets(p, q, other))
+}
+
+/// True if a corner of the first triangle, which is none of the second, lies within `tolerance` [m] of that.
+fn near(first: [DVec3; 3], of_first: [u32; 3], second: [DVec3; 3], of_second: [u32; 3], tolerance: f64) -> bool {
+    let [a, b, c] = second;
+    let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+    first.iter().zip(of_first).filter(|(_, v)| !of_second.contains(v)).any(|(&p, _)| {
+        (p.clamp(lo, hi) - p).length_squared() <= tolerance * tolerance
+            && closest_on_triangle(p, second).0.distance(p) <= tolerance
+    })
 }
 
 /// True if the segment meets the triangle, its edges and its plane included: bodies that overlap by whole faces, or by corners that

@@ -5,16 +5,21 @@
 //! field after Barill, Dickson, Schmidt, Levin, Jacobson, "Fast winding numbers for soups and clouds", 2018 (its first term). Holes,
 //! overlaps and touching parts, as scans have them, leave the sign defined everywhere.
 
+use super::clusters::{Cluster, clusters};
+use super::edges::EdgeUses;
 use super::pseudonormal::{Feature, Pseudonormals};
+use super::repair::{MeshReport, examine_in};
+use super::turned::{Turned, turned};
 use super::{Shape, TriMesh};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// Triangles per leaf.
 const LEAF: usize = 4;
 
 /// Nodes with more triangles than this are worth a thread of their own.
-const ALONE: u32 = 4096;
+pub(super) const ALONE: u32 = 4096;
 
 /// A cluster farther away than this many of its radii counts as one dipole; its error of order 1/9 of the cluster's own share stays
 /// well away from the decision at ½ because clusters that near the point matter are opened.
@@ -27,28 +32,45 @@ pub struct MeshShape {
     corners: Vec<[DVec3; 3]>,
     numbers: Vec<u32>,
     tree: Vec<Node>,
+    /// Boxes of small nodes along the surface, about `origin`; empty of a mesh that is only asked for winding numbers.
+    turned: Vec<Turned>,
+    origin: DVec3,
+    /// What every node is from afar: made when a winding number is first asked for.
+    far: OnceLock<Vec<Cluster>>,
     normals: Option<Pseudonormals>,
 }
 
+/// A node of the tree, in a flat array: 64 bytes, one line of the cache.
 #[derive(Clone, Debug, Default)]
-struct Node {
+pub(super) struct Node {
     lo: DVec3,
     hi: DVec3,
     /// Range of triangles.
-    range: (u32, u32),
+    pub range: (u32, u32),
     /// Number of the second child, the first follows directly; 0 for a leaf.
-    second: u32,
-    /// Sum of area vectors, their centre, and the greatest distance of a corner from it.
-    dipole: DVec3,
-    center: DVec3,
-    radius: f64,
+    pub second: u32,
 }
 
 impl MeshShape {
     /// Prepares a mesh; an empty mesh has infinite distance everywhere.
     pub fn new(mesh: TriMesh) -> MeshShape {
+        MeshShape::examined(mesh).0
+    }
+
+    /// The same with what is wrong with the mesh: both need the same tree and the same edges.
+    pub fn examined(mesh: TriMesh) -> (MeshShape, MeshReport) {
         let mut shape = MeshShape::unsigned(mesh);
-        shape.normals = Pseudonormals::of(&shape.mesh, &shape);
+        let (report, normals) = examine_in(&shape.mesh, &shape);
+        shape.normals = normals;
+        shape.turned = turned(&shape.corners, &shape.tree, shape.origin);
+        (shape, report)
+    }
+
+    /// The shape elsewhere; what was found clean stays so.
+    pub fn placed(&self, pose: &DAffine3) -> MeshShape {
+        let mut shape = MeshShape::unsigned(self.mesh.transformed(pose));
+        shape.normals = self.normals.is_some().then(|| Pseudonormals::new(&shape.mesh, &EdgeUses::of(&shape.mesh)));
+        shape.turned = turned(&shape.corners, &shape.tree, shape.origin);
         shape
     }
 
@@ -69,12 +91,18 @@ impl MeshShape {
         if count > 0 {
             fill(&corners, 0, 0, &mut tree);
         }
-        MeshShape { mesh, corners, numbers, tree, normals: None }
+        let origin = tree.first().map_or(DVec3::ZERO, |n: &Node| 0.5 * (n.lo + n.hi));
+        MeshShape { mesh, corners, numbers, tree, turned: Vec::new(), origin, far: OnceLock::new(), normals: None }
     }
 
     /// The mesh.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
+    }
+
+    /// The mesh alone.
+    pub fn into_mesh(self) -> TriMesh {
+        self.mesh
     }
 
     /// Nearest point of the mesh [m] and its triangle; `None` only for an empty mesh.
@@ -88,6 +116,7 @@ impl MeshShape {
         if self.tree.is_empty() {
             return None;
         }
+        let from = p - self.origin;
         while let Some((bound, n)) = stack.pop() {
             if bound > best.0 {
                 continue;
@@ -104,6 +133,9 @@ impl MeshShape {
                 }
             } else {
                 let distance = |n: u32| {
+                    if let Some(b) = self.turned.get(n as usize).filter(|b| b.is_there()) {
+                        return b.gap(from);
+                    }
                     let b = &self.tree[n as usize];
                     p.clamp(b.lo, b.hi).distance_squared(p)
                 };
@@ -116,7 +148,13 @@ impl MeshShape {
         Some((best.1, best.2 as usize, best.3))
     }
 
-    /// Sum of what `look` says of every pair of triangles whose bounding boxes come within `margin` [m] of each other; each pair once.
+    /// A triangle by its place in the tree, neighbours next to each other: corners [m] and numbers of the vertices.
+    pub(super) fn triangle(&self, place: usize) -> ([DVec3; 3], [u32; 3]) {
+        (self.corners[place], self.mesh.triangles[self.numbers[place] as usize])
+    }
+
+    /// Sum of what `look` says of every pair of triangles, by their places in the tree, whose bounding boxes come within `margin` [m] of each
+    /// other; each pair once.
     pub(super) fn count_close(&self, margin: f64, look: &(impl Fn(usize, usize) -> usize + Sync)) -> usize {
         if self.tree.is_empty() { 0 } else { self.within(0, margin, look) }
     }
@@ -170,22 +208,24 @@ impl MeshShape {
         let ([a, b, c], [d, e, f]) = (self.corners[s as usize], self.corners[t as usize]);
         let apart =
             (a.min(b).min(c) - margin).cmpgt(d.max(e).max(f)).any() || (d.min(e).min(f) - margin).cmpgt(a.max(b).max(c)).any();
-        if apart { 0 } else { look(self.numbers[s as usize] as usize, self.numbers[t as usize] as usize) }
+        if apart { 0 } else { look(s as usize, t as usize) }
     }
 
     /// Generalized winding number: 1 inside a closed mesh, 0 outside, between them near holes.
     pub fn winding_number(&self, p: DVec3) -> f64 {
+        // Threads of a pool would wait for each other in here: it is made by one.
+        let far = self.far.get_or_init(|| clusters(&self.corners, &self.tree));
         let mut sum = 0.0;
         let mut stack = Vec::new();
         if !self.tree.is_empty() {
             stack.push(0u32);
         }
         while let Some(n) = stack.pop() {
-            let node = &self.tree[n as usize];
-            let d = node.center - p;
+            let (node, cluster) = (&self.tree[n as usize], &far[n as usize]);
+            let d = cluster.center - p;
             let r = d.length();
-            if r > FAR * node.radius {
-                sum += node.dipole.dot(d) / (r * r * r);
+            if r > FAR * cluster.radius {
+                sum += cluster.dipole.dot(d) / (r * r * r);
             } else if node.second == 0 {
                 sum += (node.range.0..node.range.1).map(|t| solid_angle(p, self.corners[t as usize])).sum::<f64>();
             } else {
@@ -232,43 +272,26 @@ fn arrange(items: &mut [(DVec3, u32)]) {
     }
 }
 
-/// Sums over the triangles of a node: area vectors, middles times area, area.
-type Sums = (DVec3, DVec3, f64);
-
 /// Fills in the nodes over a range of triangles, which begins at `first` of all; `number` is the place of the node among all.
-fn fill(corners: &[[DVec3; 3]], first: usize, number: usize, tree: &mut [Node]) -> Sums {
-    let (mut lo, mut hi, mut second) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0);
+fn fill(corners: &[[DVec3; 3]], first: usize, number: usize, tree: &mut [Node]) {
     let (here, below) = tree.split_first_mut().expect("every range has a node");
     here.range = (first as u32, (first + corners.len()) as u32);
-    let sums = if corners.len() <= LEAF {
-        let mut sums = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for c in corners {
-            let vector = 0.5 * (c[1] - c[0]).cross(c[2] - c[0]);
-            let area = vector.length();
-            sums = (sums.0 + vector, sums.1 + (c[0] + c[1] + c[2]) / 3.0 * area, sums.2 + area);
-            (lo, hi) = c.iter().fold((lo, hi), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
-        }
-        sums
-    } else {
-        let half = corners.len() / 2;
-        let of_first = node_counts(half).0;
-        second = number + 1 + of_first;
-        let (left, right) = below.split_at_mut(of_first);
-        let ((a, b), (one, other)) = (
-            both(
-                here,
-                || fill(&corners[..half], first, number + 1, left),
-                || fill(&corners[half..], first + half, number + 1 + of_first, right),
-            ),
-            (&below[0], &below[of_first]),
-        );
-        (lo, hi) = (one.lo.min(other.lo), one.hi.max(other.hi));
-        (a.0 + b.0, a.1 + b.1, a.2 + b.2)
-    };
-    let center = if sums.2 > 0.0 { sums.1 / sums.2 } else { 0.5 * (lo + hi) };
-    let radius = corners.iter().flatten().map(|p| p.distance_squared(center)).fold(0.0, f64::max).sqrt();
-    *here = Node { lo, hi, range: here.range, second: second as u32, dipole: sums.0, center, radius };
-    sums
+    if corners.len() <= LEAF {
+        let ends = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        (here.lo, here.hi) = corners.iter().flatten().fold(ends, |(lo, hi), p| (lo.min(*p), hi.max(*p)));
+        return;
+    }
+    let half = corners.len() / 2;
+    let of_first = node_counts(half).0;
+    here.second = (number + 1 + of_first) as u32;
+    let (left, right) = below.split_at_mut(of_first);
+    both(
+        here,
+        || fill(&corners[..half], first, number + 1, left),
+        || fill(&corners[half..], first + half, number + 1 + of_first, right),
+    );
+    let (one, other) = (&below[0], &below[of_first]);
+    (here.lo, here.hi) = (one.lo.min(other.lo), one.hi.max(other.hi));
 }
 
 /// Signed solid angle of a triangle seen from `p` (van Oosterom and Strackee 1983); positive if its back is seen.

@@ -5,10 +5,7 @@
 //! neither touches nor pierces itself.
 
 use super::TriMesh;
-use super::contacts::touches_itself;
 use super::edges::{EdgeUses, bucketed};
-use super::mesh::MeshShape;
-use super::repair::diagnose_in;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -32,16 +29,8 @@ pub struct Pseudonormals {
 }
 
 impl Pseudonormals {
-    /// The normals, or `None` if the mesh is not clean. `tree` holds the same mesh.
-    pub fn of(mesh: &TriMesh, tree: &MeshShape) -> Option<Pseudonormals> {
-        let report = diagnose_in(mesh, tree);
-        let clean = report.is_closed()
-            && report.signed_volume > 0.0
-            && (report.inconsistent_edges, report.intersecting_pairs, report.degenerate_triangles, report.components)
-                == (0, 0, 0, 1);
-        if !clean || touches_itself(mesh, tree, 1e-6 * report.size) || !single_fans(mesh) {
-            return None;
-        }
+    /// The normals of a mesh that is clean, with its edges.
+    pub(super) fn new(mesh: &TriMesh, uses: &EdgeUses) -> Pseudonormals {
         // Normal of every face and angles at its corners [rad].
         let (face, angles): (Vec<DVec3>, Vec<[f64; 3]>) = (0..mesh.triangles.len())
             .into_par_iter()
@@ -56,11 +45,11 @@ impl Pseudonormals {
             (0..3).for_each(|i| corner[v[i] as usize] += face[t] * angles[t][i]);
         }
         let mut edge = vec![[DVec3::ZERO; 3]; mesh.triangles.len()];
-        for (_, uses) in EdgeUses::of(mesh).groups() {
+        for (_, uses) in uses.groups() {
             let sum: DVec3 = uses.iter().map(|u| face[u.triangle as usize]).sum();
             uses.iter().for_each(|u| edge[u.triangle as usize][usize::from(u.side)] = sum);
         }
-        Some(Pseudonormals { corner, edge, face })
+        Pseudonormals { corner, edge, face }
     }
 
     /// Normal at a feature of triangle `t` with vertices `v`.
@@ -74,7 +63,7 @@ impl Pseudonormals {
 }
 
 /// True if the triangles around every vertex form one fan (two cones that touch in their tips form two).
-fn single_fans(mesh: &TriMesh) -> bool {
+pub(super) fn single_fans(mesh: &TriMesh) -> bool {
     // Around vertex v[i] the triangle leads from the next corner to the one after.
     let steps = mesh.triangles.iter().flat_map(|v| (0..3).map(|i| (v[i], [v[(i + 1) % 3], v[(i + 2) % 3]])));
     let (first, mut steps) = bucketed(mesh.vertices.len(), steps);

@@ -1,9 +1,10 @@
 //! What is wrong with a triangle mesh, and what of it can be put right without guessing.
 
 use super::components::components;
-use super::contacts::intersecting_pairs;
-use super::edges::{EdgeUses, Use, bucketed};
+use super::contacts::contacts;
+use super::edges::{EdgeUses, bucketed};
 use super::joining::join_vertices;
+use super::pseudonormal::{Pseudonormals, single_fans};
 use super::{MeshShape, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -44,28 +45,47 @@ impl MeshReport {
     }
 }
 
+/// Distance over the size within which a surface that touches itself has no sign by normals.
+const TOUCHING: f64 = 1e-6;
+
 /// Examines a mesh.
 pub fn diagnose(mesh: &TriMesh) -> MeshReport {
-    diagnose_in(mesh, &MeshShape::unsigned(mesh.clone()))
+    MeshShape::examined(mesh.clone()).1
 }
 
-/// The same, with a tree that holds the mesh.
-pub(super) fn diagnose_in(mesh: &TriMesh, tree: &MeshShape) -> MeshReport {
+/// The same with the normals of all features, where the mesh is so clean that they tell inside from outside. `tree` holds the mesh.
+pub(super) fn examine_in(mesh: &TriMesh, tree: &MeshShape) -> (MeshReport, Option<Pseudonormals>) {
     let uses = EdgeUses::of(mesh);
-    let count = |f: fn(&[Use]) -> bool| uses.groups().filter(|(_, u)| f(u)).count();
-    let mut holes: Vec<(usize, f64)> = rims(mesh, &uses).iter().map(|r| (r.len(), rim_length(mesh, r))).collect();
+    let (mut open_edges, mut non_manifold_edges, mut inconsistent_edges) = (0, 0, 0);
+    for (_, u) in uses.groups() {
+        match u {
+            [_] => open_edges += 1,
+            [a, b] => inconsistent_edges += usize::from(a.rising == b.rising),
+            _ => non_manifold_edges += 1,
+        }
+    }
+    let mut holes: Vec<(usize, f64)> = match open_edges {
+        0 => Vec::new(),
+        _ => rims(mesh, &uses).iter().map(|r| (r.len(), rim_length(mesh, r))).collect(),
+    };
     holes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    MeshReport {
-        open_edges: count(|u| u.len() == 1),
-        non_manifold_edges: count(|u| u.len() > 2),
-        inconsistent_edges: count(|u| u.len() == 2 && u[0].rising == u[1].rising),
+    let size = mesh.size();
+    let contacts = contacts(mesh, tree, TOUCHING * size);
+    let report = MeshReport {
+        open_edges,
+        non_manifold_edges,
+        inconsistent_edges,
         signed_volume: mesh.volume(),
-        intersecting_pairs: intersecting_pairs(mesh, tree),
+        intersecting_pairs: contacts.pairs,
         components: components(&mesh.triangles, mesh.vertices.len()).1,
         degenerate_triangles: (0..mesh.triangles.len()).into_par_iter().filter(|&t| is_degenerate(mesh, t)).count(),
-        size: mesh.size(),
+        size,
         holes,
-    }
+    };
+    let counts = (report.inconsistent_edges, report.intersecting_pairs, report.degenerate_triangles, report.components);
+    let clean = report.is_closed() && report.signed_volume > 0.0 && counts == (0, 0, 0, 1) && !contacts.touches;
+    let normals = (clean && single_fans(mesh)).then(|| Pseudonormals::new(mesh, &uses));
+    (report, normals)
 }
 
 fn is_degenerate(mesh: &TriMesh, t: usize) -> bool {

@@ -97,8 +97,12 @@ impl TriMesh {
         let mut mesh = self.clone();
         // Every pass halves the long edges; 24 passes shrink them 10⁷-fold.
         for _ in 0..24 {
-            let split: Vec<[u32; 2]> =
-                mesh.edges().into_iter().filter(|&[a, b]| long(mesh.vertices[a as usize], mesh.vertices[b as usize])).collect();
+            // Of a fine mesh few are long, and only these need be sorted.
+            let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| [a.min(b), a.max(b)]);
+            let mut split: Vec<[u32; 2]> =
+                sides.filter(|&[a, b]| long(mesh.vertices[a as usize], mesh.vertices[b as usize])).collect();
+            split.sort_unstable();
+            split.dedup();
             if split.is_empty() {
                 break;
             }

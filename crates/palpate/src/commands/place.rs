@@ -119,14 +119,7 @@ fn document(a: &Arguments, p: &Placement, seconds: f64) -> PlacementDocument {
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let folder = out_folder(&a.out, &a.scene, "-placed");
-    crate::folder::check(&folder)?;
-    let mut progress = console.progress(0, "placing");
-    progress.on(0, "reading");
-    let experiment = Experiment::open(&a.scene)?;
-    progress.aside(|| console.warn(experiment.warnings()));
-    let lock = crate::folder::take(&folder, console)?;
-    console.interrupt.serve();
-    console.interrupt = lock.guard(&console.interrupt);
+    let (experiment, mut progress, lock) = crate::folder::begin(&folder, "placing", console, || Experiment::open(&a.scene))?;
     let clock = Instant::now();
     let (backend, note) = a.backend.choose_for(experiment.plan(), &Demand::forward(1), &mut progress)?;
     progress.aside(|| note.iter().for_each(|n| console.note(n)));

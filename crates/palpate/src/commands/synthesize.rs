@@ -138,15 +138,10 @@ fn lines(d: &SearchDocument) -> Vec<String> {
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let folder = out_folder(&a.out, &a.scene, "-motion");
-    crate::folder::check(&folder)?;
-    let mut track = console.progress(0, "reading");
-    track.on(0, "the scene");
-    let base = open(a)?;
+    let (base, track, lock) = crate::folder::begin(&folder, "synthesizing", console, || open(a))?;
     track.finish();
-    console.warn(base.warnings());
-    let _lock = crate::folder::take(&folder, console)?;
-    console.interrupt.serve();
     let found = lead(a, &base, console)?;
+    lock.check()?;
     let model = folder.join("scene.toml");
     let text = settled(&base, found.as_ref(), &folder)?;
     write_file(&model, |w| w.write_all(text.as_bytes()))?;

@@ -134,14 +134,7 @@ fn write_frames(folder: &Path, experiment: &Experiment, t: &TrackedBody, formats
 
 pub fn run(a: &Arguments, console: &mut Console) -> Result<i32, Error> {
     let folder = out_folder(&a.out, &a.scene, "-tracked");
-    crate::folder::check(&folder)?;
-    let mut progress = console.progress(0, "tracking");
-    progress.on(0, "reading");
-    let experiment = Experiment::open(&a.scene)?;
-    progress.aside(|| console.warn(experiment.warnings()));
-    let lock = crate::folder::take(&folder, console)?;
-    console.interrupt.serve();
-    console.interrupt = lock.guard(&console.interrupt);
+    let (experiment, mut progress, lock) = crate::folder::begin(&folder, "tracking", console, || Experiment::open(&a.scene))?;
     let clock = Instant::now();
     progress.measure(experiment.plan().observation.frames.len() as u64);
     let interrupt = console.interrupt.clone();

@@ -79,7 +79,7 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::open`].
     pub fn of_other_frames(&self) -> Result<Option<Experiment>, Error> {
-        let Some(chosen) = self.scene.fit.as_ref().and_then(|f| f.frames).filter(|_| self.recording.is_some()) else {
+        let Some(chosen) = self.scene.fit.as_ref().and_then(|f| f.frames.clone()).filter(|_| self.recording.is_some()) else {
             return Ok(None);
         };
         let mut scene = self.scene.clone();

@@ -47,6 +47,15 @@ pub(super) fn doubts(e: &Experiment) -> Vec<String> {
     if steps > MANY_STEPS {
         out.push(format!("{name}: time: {steps} steps of {} s take long; is the step in seconds?", number(e.scene().time.step)));
     }
+    // States of a sequence may lie far apart.
+    if e.plan().clock.moves() {
+        let leaps = e.plan().jumps(e.scene().time.start, f64::INFINITY);
+        out.extend(
+            leaps
+                .iter()
+                .map(|leap| format!("{name}: {leap}; is its motion in metres and seconds, and relative to the rest place?")),
+        );
+    }
     if held_whole(e) {
         out.push(format!("{name}: clamp: clamps hold the whole surface; nothing of the body can move by itself"));
     }

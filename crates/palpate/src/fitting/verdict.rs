@@ -72,6 +72,14 @@ fn doubts(fitted: &Fitted, experiments: &[Experiment]) -> Vec<String> {
     let unmatched: usize = fitted.after.iter().map(|r| r.unmatched).sum();
     let held = experiments.iter().filter(|e| held_whole(e)).map(|e| e.scene().path.display());
     out.extend(held.map(|scene| format!("{scene}: clamps hold the whole body; nothing of it can move by itself")));
+    let best = &fitted.result.runs[fitted.result.best];
+    if best.status == Status::Blind {
+        // What else there is to say of such values follows from it.
+        let text = "from no start anything of the recording could be seen: readings lie beyond the band around the body, or what is free \
+                    changes nothing that is seen; begin elsewhere (`start`), or free something else";
+        out.push(text.into());
+        return out;
+    }
     if points == 0 {
         out.push("nothing of the recording met the simulated body".into());
     } else if unmatched > points {
@@ -80,7 +88,6 @@ fn doubts(fitted: &Fitted, experiments: &[Experiment]) -> Vec<String> {
             points + unmatched
         ));
     }
-    let best = &fitted.result.runs[fitted.result.best];
     let distance = fitted.result.distance;
     // A search whose end is within the noise has arrived, whatever ended it.
     if best.status != Status::Converged && (distance.is_nan() || distance > NEAR) {
@@ -90,7 +97,6 @@ fn doubts(fitted: &Fitted, experiments: &[Experiment]) -> Vec<String> {
         };
         out.push(match &best.status {
             Status::IterationLimit => format!("the search used up its {} iterations before it converged{away}", best.iterations),
-            Status::Blind => "from no start anything of the recording could be seen".into(),
             _ => format!("the search found no better point and did not converge{away}"),
         });
     }

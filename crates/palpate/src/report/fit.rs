@@ -103,6 +103,7 @@ pub fn fit_document(
         parameters: (0..fitted.free.len()).map(|i| parameter(fitted, i)).collect(),
         fields,
         curves,
+        normals: fitted.normals.clone(),
         correlation: r.correlation.iter().map(|row| row.iter().map(|c| finite(*c)).collect()).collect(),
         cost: Cost { initial: finite(r.initial_cost), last: finite(r.cost) },
         reduced_chi_square: finite(r.reduced_chi_square),
@@ -288,6 +289,7 @@ pub fn summary(fitted: &Fitted, fields: &[FieldReference]) -> String {
     };
     let mut text = format!("  {}\n", fitted.verdict);
     text.extend(fitted.free.iter().zip(&fitted.result.parameters).enumerate().map(row));
+    fitted.normals.iter().for_each(|n| text += &format!("  {}\n", n.line(fitted.after.len())));
     let lines = |f: &FieldReference| [vec![field_line(f)], posterior_lines(f)].concat();
     fields.iter().flat_map(lines).for_each(|line| text += &format!("  {line}\n"));
     fitted.notes.iter().for_each(|n| text += &format!("  {n}\n"));

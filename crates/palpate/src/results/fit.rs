@@ -1,6 +1,7 @@
 //! `result.json` of a fit.
 
 use super::Document;
+pub use super::found::{FoundCurve, FoundNormal};
 use palpate_fit::AtBound;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -33,6 +34,9 @@ pub struct FitDocument {
     /// Curves of stiffness of which factors were free.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub curves: Vec<FoundCurve>,
+    /// Normals of planes of which an angle was free.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub normals: Vec<FoundNormal>,
     /// Correlation matrix of the numbers' errors `[q][q]`, of the logarithms where these are fitted.
     pub correlation: Vec<Vec<Option<f64>>>,
     /// Cost per scalar residual at the first start and at the best point.
@@ -83,23 +87,6 @@ pub struct Tracked {
     pub standard_error: Option<f64>,
     /// How far it is from what was found at last, in standard errors of the difference.
     pub distance: Option<f64>,
-}
-
-/// A curve of stiffness.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FoundCurve {
-    /// Its path in the scene.
-    pub path: String,
-    /// Number of the scene.
-    pub scene: usize,
-    /// Stretches, or ratios of volumes, of the corners.
-    pub corners: Vec<f64>,
-    /// Factors there, over the stiffness at rest.
-    pub factors: Vec<f64>,
-    /// Their standard errors; `None` where there is none.
-    pub errors: Vec<Option<f64>>,
-    /// Smallest and largest that occurred in the motion: of corners far beyond it says nothing.
-    pub range: [f64; 2],
 }
 
 /// What a fit is worth.
@@ -382,6 +369,7 @@ mod tests {
                 errors: vec![Some(0.1), None],
                 range: [0.9, 1.1],
             }],
+            normals: vec![FoundNormal { path: "plane.0.normal".into(), scene: 1, normal: [0.0, 0.6, 0.8], standard_error: None }],
             correlation: vec![vec![Some(1.0), None], vec![None, Some(1.0)]],
             cost: Cost { initial: None, last: Some(0.5) },
             reduced_chi_square: Some(1.1),
@@ -429,6 +417,7 @@ mod tests {
             "frames",
             "from_tracks",
             "independent_readings",
+            "normals",
             "notes",
             "optimizer",
             "parameters",

@@ -14,6 +14,7 @@ pub mod diagnosis;
 pub mod effects;
 pub mod export;
 pub mod fit;
+pub mod found;
 pub mod frames;
 pub mod import;
 pub mod inspection;

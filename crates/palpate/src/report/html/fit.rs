@@ -120,6 +120,9 @@ fn parameters(fitted: &Fitted) -> Markup {
             @for (n, f) in fitted.free.iter().zip(&fitted.result.parameters).filter(|(_, f)| f.known.is_some()) {
                 p { code { (n.label()) } ": " (beforehand(f)) "." }
             }
+            @for n in &fitted.normals {
+                p { code { (n.line(fitted.after.len())) } }
+            }
             p.small { (grid_line(fitted)) "." }
         }
     }
