@@ -124,6 +124,15 @@ fn everywhere(check: impl Fn(&At)) {
             check_all(p, &check);
         }
     }
+    // Points of a cloud with their penalty: fields where the material has them, and a viscosity beside a law at points.
+    for (model, exponent) in materials::ALL.iter().zip([None, Some(0.6)].into_iter().cycle()) {
+        let mut drag = Effect::absent(find("air-drag").unwrap());
+        drag.values[0] = Some(5.0);
+        let fields = if model.is_linear { fields() } else { Vec::new() };
+        let viscosity = exponent.map(|exponent| Viscosity { coefficient: 40.0, exponent });
+        let made = Made { fields, viscosity, ..Made::of(cloud(3), vec![drag]) };
+        check_all(Plan { model, ..made.plan() }, &check);
+    }
     // Laws of cells, of the clamps and of the body on them.
     for (model, kind, count) in [(&materials::ALL[0], Tetrahedron::Quadratic, 1), (&materials::ALL[1], Tetrahedron::Linear, 2)] {
         let on_tets = |e: &Effect| !matches!(e.law().site, Site::Edges(_));

@@ -66,6 +66,10 @@ impl Effects {
             let what = "a shape that is given as the equilibrium (object.state = \"static\"), which the CPU backend has".into();
             return Err(GpuError::Plan { what });
         }
+        if plan.body.points.stars.is_some() {
+            let what = "a body of points (object.discretisation = \"points\"), which the CPU backend has".into();
+            return Err(GpuError::Plan { what });
+        }
         if plan.clock.scheme.still {
             return Err(GpuError::Plan { what: "a quasi-static sequence (time.mode), which the CPU backend has".into() });
         }
