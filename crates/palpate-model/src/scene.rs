@@ -118,6 +118,11 @@ impl Object {
         let made = matches!(self.resolution, Resolution::Edge(_) | Resolution::OpenEdge);
         made || matches!(self.source, BodySource::Tetrahedra { .. })
     }
+
+    /// True of a body of points with their stars.
+    pub fn is_of_points(&self) -> bool {
+        matches!(self.source, BodySource::Cloud(_))
+    }
 }
 
 /// Where the surface comes from.
