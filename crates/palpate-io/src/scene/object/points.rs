@@ -99,3 +99,7 @@ fn read_points(path: &Path) -> Result<Vec<DVec3>, InputError> {
         _ => Err(InputError::file(path, format!("has shape {}, expected (N, 3): x, y, z of every point [m]", array.shape_text()))),
     }
 }
+
+#[cfg(test)]
+#[path = "points_tests.rs"]
+mod tests;
