@@ -4,13 +4,13 @@ use crate::CpuBackend;
 use crate::local_bodies::{Made, cloud};
 use glam::DVec3;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
+use palpate_model::effects::Effect;
 use palpate_model::materials;
 use palpate_model::observation::{Channel, Frame, Observation, ObservedMarker, ReadingKind, TrackRest};
 use palpate_model::params::ParamKey;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
-use palpate_model::effects::Effect;
 use palpate_model::scene::{BodySource, Scene, Solver};
 
 /// Tracks of three places, two of them between points, moved somewhere.

@@ -152,7 +152,10 @@ pub fn beam(data: &Path, folder: &Path, changes: &[(&'static str, &'static str)]
     let file = folder.join("rest.ply");
     write_cloud(&file, &points).map_err(text)?;
     let cloud = format!("points = \"{}\"\ndiscretisation = \"points\"", file.display());
-    let mut all = vec![("cell_size = 0.01              # 3 cells through the thickness: the enhanced element bends without locking", cloud.as_str())];
+    let mut all = vec![(
+        "cell_size = 0.01              # 3 cells through the thickness: the enhanced element bends without locking",
+        cloud.as_str(),
+    )];
     all.extend(changes.iter().copied());
     let e = crate::real::open(data, "beam-quasi-static", &all).map_err(text)?;
     let fitted = fitted(&e)?;

@@ -13,7 +13,8 @@ fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |n: usize| 0.01 * DVec3::new((n % 5) as f64 + 0.5, (n / 5 % 4) as f64 + 0.5, (n / 20) as f64 + 0.5);
     let points: Vec<DVec3> = (0..60).map(at).collect();
-    let array = |points: &[DVec3]| Array { shape: vec![points.len(), 3], values: points.iter().flat_map(|p| p.to_array()).collect() };
+    let array =
+        |points: &[DVec3]| Array { shape: vec![points.len(), 3], values: points.iter().flat_map(|p| p.to_array()).collect() };
     let file = |name: &str| folder.path().join(name);
     write_cloud(file("a.ply"), &points).expect("it can be written");
     write_npz(file("a.npz"), &[("rest", &array(&points))]).expect("it can be written");
@@ -37,7 +38,8 @@ fn read(folder: &Path, object: &str) -> Result<Scene, String> {
 fn clouds_become_points_or_cells() {
     let folder = folder();
     let of = |object: &str| read(folder.path(), object).unwrap_or_else(|e| panic!("{e}")).object;
-    let stars = of("points = \"a.npz\"\ndiscretisation = \"points\"\nneighbours = 8\nweights = \"published\"\nresidual_penalty = 0.1");
+    let stars =
+        of("points = \"a.npz\"\ndiscretisation = \"points\"\nneighbours = 8\nweights = \"published\"\nresidual_penalty = 0.1");
     let BodySource::Cloud(cloud) = &stars.source else { panic!("{:?}", stars.source) };
     assert_eq!((cloud.points.len(), cloud.stars.neighbours, cloud.stars.weights), (60, 8, Weights::Published));
     assert_eq!((cloud.stars.residual_penalty, stars.resolution), (0.1, Resolution::Own));
@@ -46,7 +48,8 @@ fn clouds_become_points_or_cells() {
     let BodySource::Mesh { mesh, .. } = &cells.source else { panic!("{:?}", cells.source) };
     assert!((mesh.volume() / 6e-5 - 1.0).abs() < 1e-6, "{}", mesh.volume());
     assert_eq!(cells.resolution, Resolution::CellSize(0.01));
-    let stated = of("points = \"a.ply\"\ndiscretisation = \"points\"\nshape = { box = { min = [0, 0, 0], max = [0.05, 0.04, 0.03] } }");
+    let stated =
+        of("points = \"a.ply\"\ndiscretisation = \"points\"\nshape = { box = { min = [0, 0, 0], max = [0.05, 0.04, 0.03] } }");
     let BodySource::Cloud(cloud) = &stated.source else { panic!("{:?}", stated.source) };
     assert!(matches!(cloud.hull, BodySource::Analytic(_)) && cloud.stars.neighbours == 6);
 }
@@ -67,11 +70,17 @@ fn what_is_no_cloud_is_refused() {
         ("points = \"a.ply\"\ndiscretisation = \"points\"\nweights = \"publishd\"", "did you mean \"published\"?"),
         ("points = \"a.ply\"\ndiscretisation = \"points\"\nresidual_penalty = -1", "must lie in [0, 10]"),
         ("points = \"a.ply\"\nvolume = 60", "is not what these points fill"),
-        ("points = \"a.ply\"\nvolume = 6e-5\nshape = { ball = { radius = 1 } }", "is that of the mesh or shape beside the points"),
+        (
+            "points = \"a.ply\"\nvolume = 6e-5\nshape = { ball = { radius = 1 } }",
+            "is that of the mesh or shape beside the points",
+        ),
         ("shape = { ball = { radius = 1 } }\nvolume = 1", "object.volume: belongs to bodies of object.points"),
         ("shape = { ball = { radius = 1 } }\ndiscretisation = \"points\"", "\"points\" is that of a cloud"),
         ("points = \"a.ply\"\n[[field]]\npath = \"material.density\"\nbasis = \"points\"", "belongs to bodies of points"),
-        ("points = \"a.ply\"\ndiscretisation = \"points\"\n[solver]\nelement = \"tet4\"", "belongs to bodies of cells or tetrahedra"),
+        (
+            "points = \"a.ply\"\ndiscretisation = \"points\"\n[solver]\nelement = \"tet4\"",
+            "belongs to bodies of cells or tetrahedra",
+        ),
     ] {
         let e = read(folder.path(), object).err().unwrap_or_else(|| panic!("{object} is read"));
         assert!(e.contains(wanted), "{object}: {e}");
