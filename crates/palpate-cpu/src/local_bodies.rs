@@ -15,6 +15,7 @@ use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use palpate_model::space::points::TetMesh;
+use palpate_model::space::stars::StarSpec;
 use std::sync::Arc;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
@@ -73,6 +74,17 @@ pub fn tetrahedra(count: usize) -> BodySource {
     BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
 }
 
+/// Points in the box of the ball, moved off a lattice of so many along every edge, with more neighbours than tetrahedra have nodes.
+pub fn cloud(count: usize) -> BodySource {
+    let (low, edge) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / count as f64);
+    let moved = |n: usize| (DVec3::new(0.819, 0.671, 0.549) * (n as f64 + 1.0)).fract() * 0.4 + 0.3;
+    let at = |n: usize| DVec3::new((n % count) as f64, (n / count % count) as f64, (n / (count * count)) as f64);
+    let points = (0..count.pow(3)).map(|n| low + edge * (at(n) + moved(n))).collect();
+    let hull = BodySource::Analytic(Analytic::Box { min: low, max: low + 0.1 });
+    let stars = StarSpec { neighbours: 11, residual_penalty: 0.5, ..StarSpec::default() };
+    BodySource::Cloud(Box::new(Cloud { path: "in-code.npy".into(), points, hull, stars }))
+}
+
 /// The ball.
 pub fn ball() -> BodySource {
     BodySource::Analytic(Analytic::Ball { radius: 0.05, center: DVec3::new(0.003, 0.001, 0.045) })
@@ -102,7 +114,7 @@ impl Made {
         p
     }
 
-    fn scene(self) -> Scene {
+    pub fn scene(self) -> Scene {
         let motion = RigidMotion {
             times: vec![-1.0, 0.0, 1.0],
             translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],

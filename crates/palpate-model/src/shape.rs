@@ -1,11 +1,13 @@
 //! Rest shapes as signed distances: analytic bodies and triangle meshes.
 
 mod analytic;
+pub mod cloud;
 mod clusters;
 pub(crate) mod components;
 mod contacts;
 mod edges;
 mod joining;
+mod marching;
 mod mesh;
 mod pseudonormal;
 mod repair;
@@ -76,6 +78,7 @@ pub fn shape_of(object: &Object) -> Arc<dyn Shape> {
         BodySource::Mesh { shape, .. } if object.pose == DAffine3::IDENTITY => shape.clone(),
         BodySource::Mesh { shape, .. } => Arc::new(shape.placed(&object.pose)),
         BodySource::Tetrahedra { surface, .. } => Arc::new(MeshShape::new(surface.transformed(&object.pose))),
+        BodySource::Cloud(cloud) => shape_of(&Object { source: cloud.hull.clone(), ..object.clone() }),
         BodySource::Analytic(body) => Arc::new(Placed::new(body.clone(), object.pose)),
     }
 }

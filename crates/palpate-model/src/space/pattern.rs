@@ -71,6 +71,21 @@ impl BlockRows {
 impl Pattern {
     /// The pattern of a body (27 neighbours in the bulk, and the ends of ghost lines).
     pub fn new(body: &Body) -> Pattern {
+        Pattern::with(body, &[])
+    }
+
+    /// The pattern of a plan. Places of a body of points follow more of them than a star has: its surface, point masses and driven points.
+    pub fn of(plan: &Plan) -> Pattern {
+        let driven = plan.driven.iter().flatten().map(|d| &d.stencils);
+        let beyond: Vec<&Stencils> = match plan.body.points.stars {
+            Some(_) => [&plan.body.surface, &plan.masses].into_iter().chain(driven).collect(),
+            None => Vec::new(),
+        };
+        Pattern::with(&plan.body, &beyond)
+    }
+
+    /// `beyond`: stencils whose nodes touch each other though no element has them.
+    fn with(body: &Body, beyond: &[&Stencils]) -> Pattern {
         let n = body.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
         let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
@@ -86,6 +101,9 @@ impl Pattern {
                 neighbours[a as usize].extend_from_slice(nodes);
                 points[a as usize].push((e as u32, i as u8));
             }
+        }
+        for nodes in beyond.iter().flat_map(|all| all.iter()).map(|s| s.nodes) {
+            nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(nodes));
         }
         for ghost in body.ghosts() {
             for a in ghost.nodes {
