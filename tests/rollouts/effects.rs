@@ -2,17 +2,20 @@
 //! of the scene that laws depend on.
 
 use super::gradients::{ball, observed};
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::effects::driven::{Drive, Points};
 use palpate_model::effects::law::Asks;
+use palpate_model::effects::moving::Moving;
 use palpate_model::effects::{self, ALL, Family};
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::mechanics::path::Path;
 use palpate_model::mechanics::series::Series;
 use palpate_model::params::ParamKey::{self, *};
 use palpate_model::plan::Plan;
-use palpate_model::scene::{Clamp, InitialShape};
+use palpate_model::scene::{Analytic, Clamp, InitialShape};
+use palpate_model::shape::Placed;
 use std::sync::Arc;
 
 /// The ball with one effect, every amplitude at a size that matters.
@@ -38,6 +41,21 @@ pub(super) fn with(law: usize) -> palpate_model::scene::Scene {
         let vectors = times.iter().flat_map(|t| points.iter().map(|p| at(*t, p)).collect::<Vec<_>>()).collect();
         let series = Arc::new(Series { count: 2, times, vectors });
         effect.drive = Some(Arc::new(Drive { points: Points::Places(points, None), series, tracked: Vec::new() }));
+    }
+    if let Some(moving) = &mut effect.moving {
+        // Into the side of the ball, turning, and a jet from there.
+        let at = |t: f64| DVec3::new(0.074 - 0.1 * t, 0.004 * (30.0 * t).sin(), 0.055);
+        let times = vec![0.0, 0.03, 0.07];
+        let translations = times.iter().map(|t| at(*t)).collect();
+        let rotations = times.iter().map(|t| DQuat::from_rotation_y(2.0 * t)).collect();
+        let motion = RigidMotion { times, translations, rotations };
+        *moving = Arc::new(match ALL[law].site {
+            effects::Site::Obstacle => {
+                let shape = Analytic::Ball { radius: 0.03, center: DVec3::new(0.001, 0.002, 0.0) };
+                Moving::obstacle(&Placed::new(shape, DAffine3::IDENTITY), 0.002, motion)
+            }
+            _ => Moving::nozzle(-DVec3::X, motion),
+        });
     }
     scene.effects = vec![effect];
     if ALL[law].family == Family::Contact {

@@ -7,6 +7,7 @@ mod effects;
 mod fields;
 mod gradients;
 mod measurement;
+mod moving;
 mod quasi_static;
 mod rows;
 mod visibility;

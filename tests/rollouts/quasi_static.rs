@@ -21,7 +21,7 @@ const TIP: [DVec3; 2] = [DVec3::new(0.1, 0.004, 0.03), DVec3::new(0.1, 0.026, 0.
 const MIDDLE: [DVec3; 2] = [DVec3::new(0.05, 0.002, 0.002), DVec3::new(0.055, 0.028, 0.028)];
 
 /// A beam of 250 kPa that is held at x = 0, without a load.
-fn beam() -> Scene {
+pub(super) fn beam() -> Scene {
     let mut s = scenes::body(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.1, 0.03, 0.03) }, 0.0125);
     s.material = Material::undamped(2.5e5, 0.45);
     s.gravity = DVec3::new(0.0, 0.4, -9.81);
@@ -63,7 +63,7 @@ fn strings(times: &[f64], stiffness: f64) -> Effect {
 }
 
 /// What tracks of three points of the beam would be, at times [s].
-fn tracks(times: &[f64]) -> Observation {
+pub(super) fn tracks(times: &[f64]) -> Observation {
     let rest = vec![DVec3::new(0.1, 0.015, 0.015), DVec3::new(0.07, 0.0, 0.03), DVec3::new(0.04, 0.03, 0.0)];
     let moved = |p: &DVec3, t: f64| *p + p.x * p.x * DVec3::new(-0.1 * t, 0.2 * t, -1.1 * t);
     let markers = |t: f64| (0..).zip(&rest).map(|(site, p)| ObservedMarker { site, position: moved(p, t) }).collect();
@@ -75,7 +75,7 @@ fn tracks(times: &[f64]) -> Observation {
     }
 }
 
-fn planned(scene: &Scene, observation: Observation) -> Plan {
+pub(super) fn planned(scene: &Scene, observation: Observation) -> Plan {
     build_plan(scene, observation, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 

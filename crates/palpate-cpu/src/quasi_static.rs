@@ -9,7 +9,7 @@ use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
 use crate::newton::{self, Effort, Reason};
 use crate::simulate::{Start, check, equation, minus, with_matrix};
-use crate::terms::{Curvature, Equation};
+use crate::terms::{Curvature, Equation, jets};
 use crate::world::{Gradient, Member, MemberState, MemberTangent, Shared};
 use glam::DVec3;
 use palpate_engine::FailureKind;
@@ -19,22 +19,30 @@ use palpate_model::plan::scheme::Stage;
 /// Times that the way to a state is halved at most.
 const HALVINGS: u32 = 6;
 
-/// Finds the equilibrium of a static problem from the guess in `u`.
+/// Finds the equilibrium of a static problem from the guess in `u`: of a stage, or of the start (`None`).
 pub(crate) fn settle(
     shared: &Shared,
-    e: &mut Equation,
+    member: &Member,
+    stage: Option<&Stage>,
     matrix: &mut Matrix,
     u: &mut Nodes,
     effort: &mut Effort,
 ) -> Result<(), Reason> {
     let solver = shared.plan.solver;
     let iterations = solver.newton_iterations.max(STATIC_ITERATIONS);
-    newton::solve(e, &shared.solvers, matrix, Purpose::Static, u, solver.tolerance, iterations, effort).map_err(
-        |(kind, detail)| match kind {
-            FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
-            _ => (kind, detail),
-        },
-    )
+    let mut solve = |start: &Start, u: &mut Nodes| {
+        let mut e = equation(shared, member, stage, start);
+        newton::solve(&mut e, &shared.solvers, matrix, Purpose::Static, u, solver.tolerance, iterations, effort).map_err(
+            |(kind, detail)| match kind {
+                FailureKind::NewtonStalled | FailureKind::LinearSolve => (FailureKind::NoEquilibrium, detail),
+                _ => (kind, detail),
+            },
+        )
+    };
+    if !jets::blow(&shared.plan) {
+        return solve(&Start::still(u.len()), u);
+    }
+    jets::swept(shared, member, stage, u, solve)
 }
 
 /// Refuses an equilibrium that the smallest push would end.
@@ -72,9 +80,7 @@ pub(crate) fn step(
         let (mut waiting, mut reached) = (vec![(to, 0)], from);
         while let Some((time, halved)) = waiting.pop() {
             let mut u = next.u.clone();
-            let stage = at(time);
-            let mut e = equation(shared, member, Some(&stage), &still);
-            match settle(shared, &mut e, matrix, &mut u, &mut effort) {
+            match settle(shared, member, Some(&at(time)), matrix, &mut u, &mut effort) {
                 Ok(()) => (next.u, reached) = (u, time),
                 Err((FailureKind::NoEquilibrium | FailureKind::NotFinite, _)) if halved < HALVINGS => {
                     waiting.extend([(time, halved + 1), (0.5 * (reached + time), halved + 1)]);
@@ -114,12 +120,15 @@ pub(crate) fn pull(
     adj: &MemberState,
     gradient: &mut Gradient,
 ) -> Result<usize, Reason> {
-    let still = Start::still(at.u.len());
+    let start = jets::at(shared, &at.u);
     let mut z = [adj.u.clone()];
     with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, stage, &still);
+        let mut e = equation(shared, member, stage, &start);
         e.residual(&at.u);
-        let iterations = newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut z)?;
+        let iterations = match jets::Jets::new(e.context) {
+            None => newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut z)?,
+            Some(jets) => jets.solve_back(&e, &shared.solvers, &at.u, &mut z)?,
+        };
         gradient.take(&e, &at.u, &z[0]);
         Ok(iterations)
     })
@@ -145,11 +154,14 @@ pub(crate) fn along(
     at: &MemberState,
     t: &mut MemberTangent,
 ) -> Result<(), Reason> {
-    let still = Start::still(at.u.len());
+    let start = jets::at(shared, &at.u);
     with_matrix(member, |member, matrix| {
-        let mut e = equation(shared, member, stage, &still);
+        let mut e = equation(shared, member, stage, &start);
         e.residual(&at.u);
         t.du = t.rates.iter().map(|r| minus(e.by_coefficients(&at.u, r))).collect();
-        newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut t.du).map(|_| ())
+        match jets::Jets::new(e.context) {
+            None => newton::solve_exact(&e, &shared.solvers, matrix, Purpose::Static, &at.u, &mut t.du).map(|_| ()),
+            Some(jets) => jets.solve_along(&e, &shared.solvers, &at.u, &mut t.du),
+        }
     })
 }

@@ -6,6 +6,7 @@ use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, Effort, Reason};
 use crate::quasi_static;
 use crate::stress_free;
+use crate::terms::jets::Lag;
 use crate::terms::{Context, Curvature, Equation, Past, PastChange, Rates, Weights, zeros};
 use crate::world::{Gradient, Member, MemberState, MemberTangent, Rated, Shared};
 use glam::DVec3;
@@ -21,6 +22,8 @@ pub(crate) struct Start<'a> {
     u: Nodes,
     v: Nodes,
     each: Vec<(f64, &'a [DVec3])>,
+    /// State that jets are taken at; `None` = ũ.
+    lag: Option<Lag>,
 }
 
 impl<'a> Start<'a> {
@@ -28,12 +31,23 @@ impl<'a> Start<'a> {
     pub(crate) fn new(stage: &Stage, past: &[&'a MemberState]) -> Start<'a> {
         let sum = |pick: fn(&MemberState) -> &Nodes| combined(stage, past.iter().map(|s| pick(s)));
         let each = stage.from.iter().zip(past).map(|(f, s)| (f.1, s.u.as_slice())).collect();
-        Start { u: sum(|s| &s.u), v: sum(|s| &s.v), each }
+        Start { u: sum(|s| &s.u), v: sum(|s| &s.v), each, lag: None }
     }
 
     /// Of a static problem: nothing.
     pub(crate) fn still(n: usize) -> Start<'a> {
-        Start { u: zeros(n), v: zeros(n), each: Vec::new() }
+        Start { u: zeros(n), v: zeros(n), each: Vec::new(), lag: None }
+    }
+
+    /// The same with jets taken at a state.
+    pub(crate) fn swept(lag: Lag) -> Start<'a> {
+        let n = lag.u.len();
+        Start { lag: Some(lag), ..Start::still(n) }
+    }
+
+    /// What the nozzles of jets were found to see, where that was looked at.
+    pub(crate) fn into_seen(self) -> Option<Vec<Vec<bool>>> {
+        self.lag.and_then(|l| l.seen)
     }
 
     /// ũ and ṽ.
@@ -43,7 +57,7 @@ impl<'a> Start<'a> {
     }
 
     fn past(&'a self) -> Past<'a> {
-        Past { u: &self.u, v: &self.v, each: &self.each }
+        Past { u: &self.u, v: &self.v, each: &self.each, lag: self.lag.as_ref() }
     }
 }
 
@@ -177,8 +191,8 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
         }
         let still = Start::still(s.u.len());
         with_matrix(member, |member, matrix| {
+            quasi_static::settle(shared, member, None, matrix, &mut s.u, &mut Effort::default())?;
             let mut e = equation(shared, member, None, &still);
-            quasi_static::settle(shared, &mut e, matrix, &mut s.u, &mut Effort::default())?;
             if plan.times.is_empty() { Ok(()) } else { quasi_static::check_stable(shared, &mut e, &s.u, 0) }
         })?;
     }

@@ -36,6 +36,20 @@ pub(crate) fn suggest(name: &str, known: &[&str]) -> String {
     }
 }
 
+/// A shape in closed form.
+const SHAPE: (&str, Schema) = (
+    "shape",
+    Schema {
+        keys: &[],
+        tables: &[
+            ("ball", table(&["radius", "center"])),
+            ("torus", table(&["major", "minor", "center", "axis"])),
+            ("box", table(&["min", "max"])),
+            ("cylinder", table(&["radius", "height", "center", "axis"])),
+        ],
+    },
+);
+
 /// Format `scene/1`.
 pub(crate) const SCENE: Schema = Schema {
     // The keys of an effect depend on its kind: its own reader checks them.
@@ -59,18 +73,7 @@ pub(crate) const SCENE: Schema = Schema {
                     "residual_penalty",
                     "volume",
                 ],
-                tables: &[(
-                    "shape",
-                    Schema {
-                        keys: &[],
-                        tables: &[
-                            ("ball", table(&["radius", "center"])),
-                            ("torus", table(&["major", "minor", "center", "axis"])),
-                            ("box", table(&["min", "max"])),
-                            ("cylinder", table(&["radius", "height", "center", "axis"])),
-                        ],
-                    },
-                )],
+                tables: &[SHAPE],
             },
         ),
         (
@@ -97,7 +100,14 @@ pub(crate) const SCENE: Schema = Schema {
         ),
         ("initial", table(&["velocity", "angular_velocity", "pivot", "state"])),
         ("time", table(&["mode", "step", "duration", "steps", "start", "scheme", "theta"])),
-        ("load", table(&["kind", "forces", "total", "index", "places", "times", "rate", "start", "factor"])),
+        (
+            "load",
+            table(&[
+                "kind", "forces", "total", "index", "places", "times", "rate", "start", "factor", "motion", "axis", "offset",
+                "thrust", "spread",
+            ]),
+        ),
+        ("obstacle", Schema { keys: &["mesh", "pose", "motion", "stiffness", "offset", "cell_size"], tables: &[SHAPE] }),
         ("attach", table(&["points", "places", "track", "times", "rate", "start", "stiffness", "offset"])),
         ("solver", table(&["element", "linear", "tolerance", "newton_iterations", "ghost"])),
         (

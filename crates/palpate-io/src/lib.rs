@@ -11,6 +11,7 @@ mod keys;
 mod rigid;
 mod room;
 
+pub mod carried;
 pub mod cloud;
 pub mod lens;
 pub mod mesh;

@@ -41,6 +41,14 @@ pub(crate) fn fingerprint(plan: &Plan) -> String {
         let places = sites.rest.iter().chain(&sites.series.vectors).flat_map(|p| p.as_ref());
         sites.series.times.iter().chain(places).for_each(|x| eat(x.to_bits()));
     }
+    for moving in plan.moving.iter().flatten() {
+        let m = &moving.motion;
+        let places = m.translations.iter().chain([&moving.axis]).flat_map(|p| p.to_array());
+        let numbers = m.times.iter().copied().chain(places).chain(m.rotations.iter().flat_map(|q| q.to_array()));
+        numbers.for_each(|x| eat(x.to_bits()));
+        let surface = moving.shape.iter().flat_map(|s| &s.surface.vertices).flat_map(|p| p.to_array());
+        surface.for_each(|x| eat(x.to_bits()));
+    }
     plan.times.iter().for_each(|t| eat(t.to_bits()));
     for f in &o.frames {
         eat(f.time.to_bits());

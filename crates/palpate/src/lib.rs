@@ -69,6 +69,8 @@ pub mod report;
 mod residuals;
 pub mod results;
 mod scatter;
+mod skin;
+mod solids;
 mod stress;
 mod suited;
 mod synthesis;

@@ -198,6 +198,7 @@ pub(super) fn plan(body: Body, laws: &[usize]) -> Plan {
     Plan {
         fields: Vec::new(),
         followed: Vec::new(),
+        moving: Vec::new(),
         driven: Vec::new(),
         frames: Default::default(),
         model: &ALL[0],

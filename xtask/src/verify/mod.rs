@@ -8,7 +8,7 @@ mod friction;
 mod hertz;
 mod linear;
 pub mod report;
-mod scenes;
+pub(crate) mod scenes;
 mod space;
 mod sphere;
 mod spin;

@@ -4,13 +4,15 @@
 
 use super::report::{Requirement, Row};
 use super::scenes;
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Evaluate, ParamBatch, Request, Rollout, Wanted};
 use palpate_model::cutcells::build::SUBDIVISIONS;
 use palpate_model::effects::driven::{Drive, Points};
 use palpate_model::effects::law::Asks;
+use palpate_model::effects::moving::Moving;
 use palpate_model::effects::{ALL, Effect, Law, Site, Unstated};
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::mechanics::path::Path;
 use palpate_model::mechanics::series::Series;
 use palpate_model::observation::{Camera, Channel, Frame, MarkerRest, Observation, ObservedDisplacement, ObservedMarker};
@@ -20,6 +22,7 @@ use palpate_model::params::fields::{Basis, Blend, FieldSpec, Region, Scale, Vari
 use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::{Analytic, Clamp, PointMass, Scene};
+use palpate_model::shape::Placed;
 use std::sync::Arc;
 
 /// Sizes of ε over the parameter's own: each a quarter of the last, from a twentieth on.
@@ -206,6 +209,17 @@ fn at_work(number: usize, law: &Law) -> Effect {
         let vectors = [DVec3::ZERO, late].iter().flat_map(|d| points.iter().map(|p| *p + *d).collect::<Vec<_>>()).collect();
         let series = Arc::new(Series { count: 2, times: vec![0.0, 0.0703], vectors });
         effect.drive = Some(Arc::new(Drive { points: Points::Places(points, None), series, tracked: Vec::new() }));
+    }
+    if law.moves() {
+        // Into the side of the ball, and a jet from there.
+        let translations = vec![DVec3::new(0.076, 0.0, 0.055), DVec3::new(0.068, 0.004, 0.053)];
+        let rotations = vec![DQuat::IDENTITY, DQuat::from_rotation_y(0.1)];
+        let motion = RigidMotion { times: vec![0.0, 0.07], translations, rotations };
+        let ball = Placed::new(Analytic::Ball { radius: 0.03, center: DVec3::ZERO }, DAffine3::IDENTITY);
+        effect.moving = Some(Arc::new(match law.site {
+            Site::Obstacle => Moving::obstacle(&ball, 0.002, motion),
+            _ => Moving::nozzle(-DVec3::X, motion),
+        }));
     }
     effect
 }

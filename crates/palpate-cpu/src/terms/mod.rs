@@ -14,7 +14,10 @@ pub mod elastic_points;
 pub mod ghost;
 pub mod held_nodes;
 pub mod inertia;
+pub mod jets;
+pub mod obstacles;
 pub mod point_laws;
+mod seen;
 pub mod star_penalty;
 pub mod tet_laws;
 pub mod unstrained;
@@ -29,6 +32,8 @@ use ghost::Ghost;
 use glam::{DMat3, DVec3};
 use held_nodes::HeldNodes;
 use inertia::Inertia;
+use jets::{Jets, Lag};
+use obstacles::Obstacles;
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::materials::Solid;
 use palpate_model::mechanics::plane::PlaneNow;
@@ -88,6 +93,8 @@ pub struct Past<'a> {
     /// Weights and displacements of the past states that ũ is the sum of. Objective rates see each by itself: a turned body has no strain,
     /// but a weighted sum of turned bodies has.
     pub each: &'a [(f64, &'a [DVec3])],
+    /// State that jets are taken at; `None` = ũ.
+    pub lag: Option<&'a Lag>,
 }
 
 /// A change of the past.
@@ -334,6 +341,8 @@ impl<'a> Equation<'a> {
         terms.push(Box::new(Inertia { c: context }));
         if !context.effects.is_empty() {
             terms.push(Box::new(PointLaws { c: context }));
+            terms.extend(Obstacles::new(context).map(|o| Box::new(o) as Box<dyn Term>));
+            terms.extend(Jets::new(context).map(|j| Box::new(j) as Box<dyn Term>));
         }
         Equation { context, terms }
     }

@@ -273,6 +273,7 @@ fn unknown_path(path: &str, scene: &Scene, known: &[Target]) -> String {
         ("effect.", "[[effect]]"),
         ("load.", "[[load]]"),
         ("attach.", "[[attach]]"),
+        ("obstacle.", "[[obstacle]]"),
     ] {
         let index = path.strip_prefix(table).and_then(|r| r.split('.').next()).and_then(|i| i.parse::<usize>().ok());
         if let Some(i) = index

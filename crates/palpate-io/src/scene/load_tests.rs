@@ -97,7 +97,7 @@ fn what_does_not_go_together_is_refused() {
     let forces = |name: &str, more: &str| of_load(&format!("forces = \"a.npz:{name}\"\n{PLACES}{more}"));
     for (said, message) in [
         (error("[[load]]\nforces = \"a.npz:flat\"\n".into()), "load.0.kind: missing"),
-        (error("[[load]]\nkind = \"jet\"\n".into()), "\"jet\" is not known; allowed: \"file\""),
+        (error("[[load]]\nkind = \"fan\"\n".into()), "\"fan\" is not known; allowed: \"file\", \"jet\""),
         (of_load("forces = \"a.npz:flat\"\n"), "load.0.places: missing"),
         (of_load(PLACES), "load.0.forces: missing"),
         (of_load(&format!("forces = \"a.npz:flat\"\nindex = [0, 1]\n{PLACES}")), "exclude each other"),
@@ -153,6 +153,71 @@ fn a_sequence_has_no_step_of_its_own() {
         ),
     ] {
         let said = with(time, more).unwrap_err().to_string();
+        assert!(said.contains(message), "{message}: {said}");
+    }
+}
+
+const PATH: &str = "time,x,y,z,qx,qy,qz,qw\n0,0,0,0.2,0,0,0,1\n1,0,0,0.1,0,0,0.6,0.8\n";
+
+#[test]
+fn jets_and_obstacles_move_as_files_say() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("path.csv"), PATH).expect("it can be written");
+    let read = |more: &str| {
+        let read = parse_scene(&format!("{BASE}{more}"), folder.path().join("s.toml"));
+        read.unwrap_or_else(|e| panic!("{e}")).value
+    };
+    let jet = "[[load]]\nkind = \"jet\"\nmotion = \"path.csv\"\naxis = [0, 0, -2]\noffset = [0, 0.1, 0]\nthrust = 0.15\n";
+    let ball = "[[obstacle]]\nshape = { ball = { radius = 0.02 } }\nmotion = \"path.csv\"\nstiffness = 1e6\n";
+    let scene = read(&format!(
+        "{jet}{ball}[fit]\n[[fit.parameter]]\npath = \"load.0.spread\"\n[[fit.parameter]]\npath = \"obstacle.0.offset\"\n"
+    ));
+    let [jet, obstacle] = &scene.effects[..] else { panic!("two effects") };
+    assert_eq!((jet.law().kind, &jet.values[..]), ("jet", &[0.15, 0.1, 0.0, 0.1, 0.0].map(Some)[..]));
+    let nozzle = jet.moving.as_ref().expect("it moves");
+    assert_eq!((nozzle.axis, nozzle.motion.at(0.5).1.z), (-glam::DVec3::Z, 0.15));
+    let solid = obstacle.moving.as_ref().and_then(|m| m.shape.clone()).expect("it has a shape");
+    assert_eq!((obstacle.law().kind, obstacle.values[0], solid.distance.spacing()), ("obstacle", Some(1e6), 0.04 / 64.0));
+    assert!((solid.distance.at(glam::DVec3::new(0.03, 0.0, 0.0)).value - 0.01).abs() < 1e-6);
+    let fit = scene.fit.as_ref().expect("it has one");
+    assert_eq!(fit.parameters.iter().map(|p| p.path.as_str()).collect::<Vec<_>>()[..2], ["load.0.spread", "obstacle.0.offset.x"]);
+    // Fitted values go back into their tables.
+    let text = format!("{BASE}{ball}");
+    let values = [("obstacle.0.offset.y".to_string(), 1e-3), ("obstacle.0.stiffness".to_string(), 2e6)];
+    let written = super::scene_with_values(&text, &read(ball), &values).unwrap_or_else(|e| panic!("{e}"));
+    let again = parse_scene(&written, folder.path().join("t.toml")).unwrap_or_else(|e| panic!("{e}")).value;
+    assert_eq!(again.effects[0].values, [2e6, 0.0, 1e-3, 0.0].map(Some));
+}
+
+#[test]
+fn jets_and_obstacles_that_cannot_be_are_refused() {
+    let error = |more: &str| {
+        let read = parse_scene(&format!("{BASE}{more}"), "s.toml");
+        read.err().map_or_else(|| panic!("must be refused: {more}"), |e| e.to_string())
+    };
+    let jet = |rest: &str| error(&format!("[[load]]\nkind = \"jet\"\n{rest}"));
+    let ball = |rest: &str| error(&format!("[[obstacle]]\nshape = {{ ball = {{ radius = 0.02 }} }}\n{rest}"));
+    for (said, message) in [
+        (jet(""), "load.0.thrust: missing"),
+        (jet("thrust = -1\n"), "must lie in [0, 1e6] (N)"),
+        (jet("thrust = 1\nspread = 0\n"), "must lie in [0.001, 10]"),
+        (jet("thrust = 1\naxis = [0, 0, 0]\n"), "load.0.axis: has no length"),
+        (jet("thrust = 1\nfactor = 2\n"), "belongs to kind = \"file\""),
+        (jet("thrust = 1\nspred = 2\n"), "did you mean \"spread\"?"),
+        (error(&load("thrust = 1\n")), "belongs to kind = \"jet\""),
+        (jet("thrust = 1\nmotion = \"none.csv\"\n"), "none.csv"),
+        (ball(""), "obstacle.0.stiffness: missing"),
+        (ball("stiffness = -1\n"), "must lie in [0, 1e15] (Pa/m)"),
+        (ball("stiffness = 1\nmesh = \"a.obj\"\n"), "exclude each other"),
+        (ball("stiffness = 1\ncell_size = 1e-5\n"), "at most 4000000 are allowed"),
+        (error("[[obstacle]]\nstiffness = 1\n"), "obstacle.0.mesh: missing"),
+        (
+            error("[[obstacle]]\nshape = { box = { min = [0, 0, 0], max = [1, 1, 0.01] } }\nstiffness = 1\n"),
+            "which does not see it",
+        ),
+        (error("[[effect]]\nkind = \"jet\"\n"), "is written as a table [[load]]"),
+        (error("[fit]\n[[fit.parameter]]\npath = \"obstacle.0.offset\"\n"), "this scene has no [[obstacle]] number 0"),
+    ] {
         assert!(said.contains(message), "{message}: {said}");
     }
 }

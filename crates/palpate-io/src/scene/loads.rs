@@ -1,5 +1,6 @@
 //! `[[load]]` and `[[attach]]`: forces on points of the body, and places that points are drawn to, from files.
 
+use super::moving;
 use crate::document::{Source, Table};
 use crate::error::{InputError, number};
 use crate::npy::{Array, read_array, read_indices};
@@ -28,7 +29,14 @@ pub(super) fn loads(
     effects: &mut Vec<Effect>,
 ) -> Result<(), InputError> {
     for t in root.tables("load")? {
-        t.optional_choice("kind", &[("file", ())])?.ok_or_else(|| t.missing("kind", "\"file\""))?;
+        let jet = t.optional_choice("kind", &[("file", false), ("jet", true)])?;
+        if jet.ok_or_else(|| t.missing("kind", "\"file\" or \"jet\""))? {
+            effects.push(moving::jet(&t)?);
+            continue;
+        }
+        if let Some(key) = moving::JET_KEYS.into_iter().find(|k| t.has(k)) {
+            return Err(t.error(key, "belongs to kind = \"jet\""));
+        }
         let r = Reader { source, t, observation };
         effects.push(r.load()?);
     }

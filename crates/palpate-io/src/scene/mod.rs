@@ -11,6 +11,7 @@ mod load_tests;
 mod loads;
 mod material;
 mod motion;
+mod moving;
 mod normal;
 mod object;
 mod path;
@@ -104,6 +105,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
     let observation = observation(&root)?;
     loads::loads(source, &root, observation.as_ref(), &mut effects)?;
     loads::attachments(source, &root, observation.as_ref(), &mut effects)?;
+    moving::obstacles(&root, &mut effects, &mut warnings)?;
     let mut scene = Scene {
         path: source.path.clone(),
         title: root.optional_str("title")?.unwrap_or_default().to_string(),

@@ -26,22 +26,22 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
     if let Some(path) = t.optional_file("volume_mesh")? {
         return tetrahedra(&t, path, warnings);
     }
-    let Some((body, extent)) = closed(&t, warnings)? else {
+    let Some((body, extent)) = surface(&t, warnings)? else {
         return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }"));
     };
     Ok(Object { source: body, pose: pose(&t)?, resolution: resolution(&t, extent.max_element())? })
 }
 
 /// A rigid placement.
-fn pose(t: &Table) -> Result<DAffine3, InputError> {
+pub(super) fn pose(t: &Table) -> Result<DAffine3, InputError> {
     match t.optional_matrix4("pose")? {
         None => Ok(DAffine3::IDENTITY),
         Some(m) => rigid(m).map_err(|e| t.error("pose", e)),
     }
 }
 
-/// The closed surface that a table states, and the sides of a box around it.
-fn closed(t: &Table, warnings: &mut Vec<String>) -> Result<Option<(BodySource, DVec3)>, InputError> {
+/// The closed surface that a table states, a mesh or a shape, and the sides of a box around it [m].
+pub(super) fn surface(t: &Table, warnings: &mut Vec<String>) -> Result<Option<(BodySource, DVec3)>, InputError> {
     Ok(Some(match (t.optional_file("mesh")?, t.optional_table("shape")?) {
         (None, None) => return Ok(None),
         (Some(path), _) => {

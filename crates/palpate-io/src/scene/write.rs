@@ -71,11 +71,11 @@ fn put(doc: &mut DocumentMut, scene: &Scene, values: &[(String, f64)]) -> Result
             }
             // Values of cells and nodes go into a file, which `name_field_files` names.
             ["field", i] | ["field", i, _] if i.parse().is_ok_and(|i: usize| i < scene.fields.len()) => {}
-            [rows @ ("effect" | "load" | "attach"), i, key] => {
+            [rows @ ("effect" | "load" | "attach" | "obstacle"), i, key] => {
                 let i: usize = i.parse().map_err(|_| unknown())?;
                 set(row(doc, rows, i).ok_or_else(unknown)?, key, Value::from(*value));
             }
-            [rows @ ("effect" | "load" | "attach"), i, key, a] => {
+            [rows @ ("effect" | "load" | "attach" | "obstacle"), i, key, a] => {
                 let (i, a) = (i.parse::<usize>().map_err(|_| unknown())?, axis(a).ok_or_else(unknown)?);
                 let effect = scene.effects.iter().filter(|e| e.law().table() == rows).nth(i).ok_or_else(unknown)?;
                 let slot = effect.law().params.iter().position(|p| p.key == key && p.axis == Some(0)).ok_or_else(unknown)?;
@@ -362,7 +362,7 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
 }
 
 /// Keys of tables that name files; one in an archive is named `file.npz:array`.
-const FILES: [(&str, &str); 14] = [
+const FILES: [(&str, &str); 17] = [
     ("clamp", "motion"),
     ("field", "file"),
     ("target", "file"),
@@ -373,6 +373,9 @@ const FILES: [(&str, &str); 14] = [
     ("load", "index"),
     ("load", "places"),
     ("load", "times"),
+    ("load", "motion"),
+    ("obstacle", "mesh"),
+    ("obstacle", "motion"),
     ("attach", "points"),
     ("attach", "places"),
     ("attach", "track"),

@@ -11,7 +11,10 @@ pub mod field;
 pub mod file_load;
 pub mod handle;
 pub mod impulse;
+pub mod jet;
 pub mod law;
+pub mod moving;
+pub mod obstacle;
 pub mod reading;
 pub mod sensors;
 
@@ -58,6 +61,7 @@ use cell::Cell;
 use driven::Drive;
 use field::Field;
 use law::{Asks, Point};
+use moving::Moving;
 use reading::Reading;
 use std::sync::Arc;
 
@@ -175,6 +179,10 @@ pub enum Site {
     Contact(&'static dyn Point),
     /// Points of the body that a file says something about; `measure` is 1.
     Driven(&'static dyn Point),
+    /// Every surface patch that an obstacle may touch, which a file moves.
+    Obstacle,
+    /// Every surface patch that a jet may blow on, of which a file moves the nozzle.
+    Jet,
     /// Every reading of a depth camera.
     Readings(&'static dyn Reading),
     /// The times of frames: they are ahead by parameter 0.
@@ -214,6 +222,8 @@ pub static ALL: &[Law] = &[
     handle::LAW,
     file_load::LAW,
     attachment::LAW,
+    jet::LAW,
+    obstacle::LAW,
     stiffness_gradient::LAW,
     two_part_stiffness::LAW,
     inclusion::LAW,
@@ -318,8 +328,15 @@ impl Law {
         match self.kind {
             file_load::KIND => "load",
             attachment::KIND => "attach",
+            jet::KIND => "load",
+            obstacle::KIND => "obstacle",
             _ => "effect",
         }
+    }
+
+    /// True of laws of rigid things that a file moves.
+    pub fn moves(&self) -> bool {
+        matches!(self.site, Site::Obstacle | Site::Jet)
     }
 
     /// True where bodies of tetrahedra cannot have it: it moves the edge of what is held within a cell, and of them whole faces are held.
@@ -339,15 +356,18 @@ pub struct Effect {
     pub path: Option<Arc<Path>>,
     /// What drives its points, of laws that ask for a series.
     pub drive: Option<Arc<Drive>>,
+    /// What moves, of obstacles and jets.
+    pub moving: Option<Arc<Moving>>,
 }
 
 impl Effect {
-    /// An effect with every parameter at its default; what it follows stays at the origin, and what drives it is zero.
+    /// An effect with every parameter at its default; what it follows or moves stays at the origin, and what drives it is zero.
     pub fn absent(law: usize) -> Effect {
         let follows = ALL[law].asks() == Asks::Path;
         let path = follows.then(|| Arc::new(Path { times: vec![0.0], points: vec![glam::DVec3::ZERO] }));
         let drive = (ALL[law].asks() == Asks::Series).then(|| Arc::new(Drive::still()));
-        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect(), path, drive }
+        let moving = ALL[law].moves().then(|| Arc::new(Moving { axis: glam::DVec3::Z, ..Moving::default() }));
+        Effect { law, values: ALL[law].params.iter().map(|p| p.default.value()).collect(), path, drive, moving }
     }
 
     /// Its law.

@@ -17,12 +17,21 @@ pub struct RigidMotion {
 impl RigidMotion {
     /// Rotation matrix and translation [m] at a time: cubic (Catmull–Rom) between samples, held outside them.
     pub fn at(&self, t: f64) -> (DMat3, DVec3) {
+        let pose = self.pose(t);
+        (pose.rotation, pose.translation)
+    }
+
+    /// The same with its rates.
+    pub fn pose(&self, t: f64) -> Pose {
         if self.times.is_empty() {
-            return (DMat3::IDENTITY, DVec3::ZERO);
+            return Pose::STILL;
         }
-        let (first, f) = match Between::at(&self.times, t) {
-            Between::Held(m) => return (DMat3::from_quat(self.rotations[m].normalize()), self.translations[m]),
-            Between::Cubic { first, value, .. } => (first, value),
+        let (first, value, rate) = match Between::at(&self.times, t) {
+            Between::Held(m) => {
+                let rotation = DMat3::from_quat(self.rotations[m].normalize());
+                return Pose { rotation, translation: self.translations[m], ..Pose::STILL };
+            }
+            Between::Cubic { first, value, rate } => (first, value, rate),
         };
         // Neighbouring samples' quaternions are brought to the same hemisphere; q and −q are the same rotation.
         let q0 = self.rotations[first];
@@ -33,10 +42,34 @@ impl RigidMotion {
         };
         let next = first + 1;
         let ((vi, wi), (vj, wj)) = (slope(first), slope(next));
-        let b = self.translations[first] * f[0] + vi * f[1] + self.translations[next] * f[2] + vj * f[3];
-        let q = q0 * f[0] + wi * f[1] + near(next) * f[2] + wj * f[3];
-        (DMat3::from_quat(q.normalize()), b)
+        let [b, db] =
+            [value, rate].map(|f| self.translations[first] * f[0] + vi * f[1] + self.translations[next] * f[2] + vj * f[3]);
+        let [q, dq] = [value, rate].map(|f| q0 * f[0] + wi * f[1] + near(next) * f[2] + wj * f[3]);
+        let (rotation, length) = (DMat3::from_quat(q.normalize()), q.length());
+        // Ṙ = [ω]× R with the angular velocity ω, the vector part of 2 q̇ q̄ / |q|²: what q̇ has along q does not turn.
+        let spin = 2.0 / (length * length) * (dq * q.conjugate()).xyz();
+        let turned = DMat3::from_cols(spin.cross(rotation.x_axis), spin.cross(rotation.y_axis), spin.cross(rotation.z_axis));
+        Pose { rotation, translation: b, rotation_rate: turned, velocity: db }
     }
+}
+
+/// A rigid motion x ↦ R x + b at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Rotation R.
+    pub rotation: DMat3,
+    /// Translation b [m].
+    pub translation: DVec3,
+    /// Ṙ [1/s].
+    pub rotation_rate: DMat3,
+    /// ḃ [m/s].
+    pub velocity: DVec3,
+}
+
+impl Pose {
+    /// Where the world is, at rest.
+    pub const STILL: Pose =
+        Pose { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, rotation_rate: DMat3::ZERO, velocity: DVec3::ZERO };
 }
 
 #[cfg(test)]
@@ -57,5 +90,13 @@ mod tests {
         assert!((0..3).all(|c| (r.col(c) - exact.col(c)).length() < 1e-5), "{r}");
         assert!((m.at(0.3).1.x - 0.3).abs() < 1e-12);
         assert_eq!(m.at(9.0).1.x, 1.0);
+        for t in [0.03, 0.27, 0.45, 0.99] {
+            let (d, pose) = (1e-6, m.pose(t));
+            let ((r1, b1), (r0, b0)) = (m.at(t + d), m.at(t - d));
+            // A central difference: rounding of 1e-10.
+            assert!(((b1 - b0) / (2.0 * d) - pose.velocity).length() < 1e-9);
+            let turned = (r1 - r0) * (0.5 / d);
+            assert!((0..3).all(|c| (turned.col(c) - pose.rotation_rate.col(c)).length() < 1e-9), "{t}");
+        }
     }
 }

@@ -13,10 +13,32 @@ pub struct Turned {
     size: f64,
 }
 
+/// Area vector cof(F) N of a unit of surface with the vector N at rest.
+pub fn carried(rest: DVec3, f: DMat3) -> DVec3 {
+    rest.x * f.y_axis.cross(f.z_axis) + rest.y * f.z_axis.cross(f.x_axis) + rest.z * f.x_axis.cross(f.y_axis)
+}
+
+/// Change of [`carried`] for a change of F.
+pub fn carried_along(n: DVec3, f: DMat3, d: DMat3) -> DVec3 {
+    n.x * (d.y_axis.cross(f.z_axis) + f.y_axis.cross(d.z_axis))
+        + n.y * (d.z_axis.cross(f.x_axis) + f.z_axis.cross(d.x_axis))
+        + n.z * (d.x_axis.cross(f.y_axis) + f.x_axis.cross(d.y_axis))
+}
+
+/// Its transpose: derivative by F of what has the derivative `g` by the area vector.
+pub fn carried_pull(n: DVec3, f: DMat3, g: DVec3) -> DMat3 {
+    let (x, y, z) = (f.x_axis, f.y_axis, f.z_axis);
+    DMat3::from_cols(
+        n.y * g.cross(z) + n.z * y.cross(g),
+        n.z * g.cross(x) + n.x * z.cross(g),
+        n.x * g.cross(y) + n.y * x.cross(g),
+    )
+}
+
 impl Turned {
     /// The normal `rest` of a surface that deforms by F.
     pub fn new(rest: DVec3, f: DMat3) -> Turned {
-        let m = rest.x * f.y_axis.cross(f.z_axis) + rest.y * f.z_axis.cross(f.x_axis) + rest.z * f.x_axis.cross(f.y_axis);
+        let m = carried(rest, f);
         // A surface that has shrunk to nothing has no normal; the one at rest is as good as any.
         let size = m.length();
         let normal = if size > f64::MIN_POSITIVE { m / size } else { rest };
@@ -25,22 +47,13 @@ impl Turned {
 
     /// Change of the normal for a change of F.
     pub fn along(&self, d: DMat3) -> DVec3 {
-        let (f, n) = (&self.f, self.rest);
-        let m = n.x * (d.y_axis.cross(f.z_axis) + f.y_axis.cross(d.z_axis))
-            + n.y * (d.z_axis.cross(f.x_axis) + f.z_axis.cross(d.x_axis))
-            + n.z * (d.x_axis.cross(f.y_axis) + f.x_axis.cross(d.y_axis));
+        let m = carried_along(self.rest, self.f, d);
         (m - self.normal * self.normal.dot(m)) / self.size
     }
 
     /// The transpose of [`Turned::along`]: derivative by F of what has the derivative `w` by the normal.
     pub fn pull(&self, w: DVec3) -> DMat3 {
-        let g = (w - self.normal * self.normal.dot(w)) / self.size;
-        let (x, y, z, n) = (self.f.x_axis, self.f.y_axis, self.f.z_axis, self.rest);
-        DMat3::from_cols(
-            n.y * g.cross(z) + n.z * y.cross(g),
-            n.z * g.cross(x) + n.x * z.cross(g),
-            n.x * g.cross(y) + n.y * x.cross(g),
-        )
+        carried_pull(self.rest, self.f, (w - self.normal * self.normal.dot(w)) / self.size)
     }
 }
 

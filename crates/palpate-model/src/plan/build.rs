@@ -1,6 +1,7 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
 mod driven;
+mod obstacles;
 mod sites;
 mod stars;
 mod tets;
@@ -147,6 +148,7 @@ pub fn build_plan_of(
         driven::check_held(scene)?;
     }
     let times = driven::times(scene, &observation);
+    obstacles::check_apart(scene, times.first().copied().unwrap_or(scene.time.start), &body, shape.as_ref())?;
     let planes = scene
         .planes
         .iter()
@@ -176,7 +178,8 @@ pub fn build_plan_of(
         masses,
         followed: scene.effects.iter().map(|e| e.path.clone()).collect(),
         driven,
-        frames: Arc::new(sites::frames(scene.effects.iter().any(|e| e.law().asks() == Asks::Normal), &body)),
+        moving: scene.effects.iter().map(|e| e.moving.clone()).collect(),
+        frames: Arc::new(sites::frames(scene.effects.iter().any(turns), &body)),
         clock,
         times,
         initial: match scene.initial.state {
@@ -258,6 +261,11 @@ fn check_effects(scene: &Scene, body: &Body) -> Result<(), PlanError> {
         }
     }
     Ok(())
+}
+
+/// True of effects that ask for normals which turn with the surface.
+fn turns(effect: &Effect) -> bool {
+    effect.law().asks() == Asks::Normal || matches!(effect.law().site, Site::Jet)
 }
 
 /// How far a handle may be from the nearest node, in cells.

@@ -57,6 +57,7 @@ impl Plan {
             && (self.initial, self.pivot, self.band, self.solver) == (other.initial, other.pivot, other.band, other.solver)
             && (&self.curves, &self.layout, &self.planes) == (&other.curves, &other.layout, &other.planes)
             && (&self.masses, &self.fields, &self.followed) == (&other.masses, &other.fields, &other.followed)
+            && self.moving == other.moving
             && (&self.driven, &self.times) == (&other.driven, &other.times)
             && self.clamps.len() == other.clamps.len()
             && self.clamps.iter().zip(&other.clamps).all(|(a, b)| a.is_like(b))

@@ -9,6 +9,7 @@ pub mod scheme;
 pub use crate::cutcells::clamp_cell::ClampCell;
 use crate::cutcells::clamp_edge::Edge;
 use crate::effects::driven::DrivenSites;
+use crate::effects::moving::Moving;
 use crate::materials::Model;
 use crate::materials::curve::Curve;
 use crate::materials::principal_stretch::PrincipalStretch;
@@ -55,6 +56,8 @@ pub struct Plan {
     pub followed: Vec<Option<Arc<Path>>>,
     /// Where the points of every effect that a series drives sit.
     pub driven: Vec<Option<Arc<DrivenSites>>>,
+    /// What moves, of every effect that is a rigid thing beside the body.
+    pub moving: Vec<Option<Arc<Moving>>>,
     /// How the body deforms at every patch of the surface, where some effect asks for normals that turn with it; else empty.
     pub frames: Arc<Stencils>,
     /// Time steps.

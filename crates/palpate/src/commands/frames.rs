@@ -9,11 +9,14 @@ use crate::fields::{OnGrid, named};
 use crate::options::count;
 use crate::progress::Track;
 use crate::render::{Pinhole, shade};
+use crate::skin::Skin;
+use crate::solids::{intrusion, obstacles};
 use crate::stress::stressed;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::Snapshot;
+use palpate_io::npy::{Array, write_npz};
 use palpate_io::output::{make_folder, write_file};
 use palpate_io::vtk::{Elements, Values, write_vtu};
 use palpate_model::scene::InitialShape;
@@ -31,6 +34,10 @@ pub struct Output {
     /// Write every N-th state
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(1..=u64::MAX), allow_negative_numbers = true)]
     every: u64,
+    /// Files that the body carries along, in the coordinates of object.mesh: meshes (OBJ, PLY), points and Gaussian splats (PLY); each is
+    /// written anew for every frame
+    #[arg(long, value_name = "FILE", value_delimiter = ',')]
+    carry: Vec<PathBuf>,
 }
 
 /// A motion that was simulated and written.
@@ -53,6 +60,7 @@ enum Format {
     Ply,
     Vtu,
     Png,
+    Npz,
 }
 
 impl Format {
@@ -62,21 +70,36 @@ impl Format {
             Format::Ply => "ply",
             Format::Vtu => "vtu",
             Format::Png => "png",
+            Format::Npz => "npz",
         }
     }
 }
 
-fn frame_name(number: usize, format: Format) -> String {
-    format!("frame_{number:05}.{}", format.ending())
+/// Frames of one kind: `frame_00012.obj`, `toy_00012.ply`.
+#[derive(Clone, Debug, PartialEq)]
+struct Series {
+    stem: String,
+    ending: String,
+}
+
+impl Series {
+    fn of(format: Format) -> Series {
+        Series { stem: "frame".into(), ending: format.ending().into() }
+    }
+
+    fn name(&self, number: usize) -> String {
+        format!("{}_{number:05}.{}", self.stem, self.ending)
+    }
 }
 
 /// Removes the frames of an earlier simulation that this one, with its frames `numbers`, does not replace: whoever plays the folder would
 /// see both. Returns how many there were. Series without a frame 0, which every simulation writes, come from elsewhere and stay.
-fn remove_stale(folder: &Path, format: Format, numbers: &[usize]) -> Result<usize, Error> {
+fn remove_stale(folder: &Path, series: &Series, numbers: &[usize]) -> Result<usize, Error> {
     let list = std::fs::read_dir(folder).map_err(|e| Error::write(folder, e))?;
     let number = |name: &str| {
-        let n = name.strip_prefix("frame_")?.strip_suffix(format.ending())?.strip_suffix('.')?.parse().ok()?;
-        (frame_name(n, format) == name).then_some(n)
+        let n =
+            name.strip_prefix(&series.stem)?.strip_prefix('_')?.strip_suffix(&series.ending)?.strip_suffix('.')?.parse().ok()?;
+        (series.name(n) == name).then_some(n)
     };
     let there: Vec<usize> = list
         .filter_map(|e| e.ok().filter(|e| e.file_type().is_ok_and(|t| t.is_file()))?.file_name().to_str().and_then(number))
@@ -86,7 +109,7 @@ fn remove_stale(folder: &Path, format: Format, numbers: &[usize]) -> Result<usiz
     }
     let stale: Vec<usize> = there.into_iter().filter(|n| !numbers.contains(n)).collect();
     for n in &stale {
-        let path = folder.join(frame_name(*n, format));
+        let path = folder.join(series.name(*n));
         std::fs::remove_file(&path).map_err(|e| Error::Failed(format!("{}: cannot be removed: {e}", path.display())))?;
     }
     Ok(stale.len())
@@ -104,6 +127,7 @@ struct Writer<'a> {
     /// Displacement of the stress-free shape, where the shape given is the equilibrium [m].
     stress_free: Option<Vec<DVec3>>,
     camera: Pinhole,
+    carried: Vec<(Series, Skin)>,
     series: Vec<(f64, String)>,
     files: usize,
 }
@@ -113,7 +137,8 @@ impl Writer<'_> {
         let vertices = self.surface.deform(&state.displacement);
         let time = self.experiment.start_time() + state.time;
         for format in self.formats.clone() {
-            let file = self.folder.join(frame_name(number, format));
+            let name = Series::of(format).name(number);
+            let file = self.folder.join(&name);
             match format {
                 Format::Obj | Format::Ply => {
                     let mesh = TriMesh { vertices: vertices.clone(), triangles: self.triangles.clone() };
@@ -140,14 +165,34 @@ impl Writer<'_> {
                         of_elements.push(("fraction", Values::Numbers(&fractions)));
                     }
                     write_vtu(file, &points, &self.elements, &of_nodes, &of_elements)?;
-                    self.series.push((time, frame_name(number, format)));
+                    self.series.push((time, name));
                 }
                 Format::Png => {
-                    let blue = |_| DVec3::new(0.45, 0.62, 0.85);
-                    let picture = shade(&self.camera, &vertices, &self.triangles, self.experiment.up(), blue);
+                    let mut seen = TriMesh { vertices: vertices.clone(), triangles: self.triangles.clone() };
+                    for other in obstacles(self.experiment.plan(), time) {
+                        let first = seen.vertices.len() as u32;
+                        seen.vertices.extend(other.vertices);
+                        seen.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+                    }
+                    let own = vertices.len();
+                    let colour = |v: usize| if v < own { DVec3::new(0.45, 0.62, 0.85) } else { DVec3::splat(0.72) };
+                    let picture = shade(&self.camera, &seen.vertices, &seen.triangles, self.experiment.up(), colour);
                     write_file(file, |w| w.write_all(&picture.png()))?;
                 }
+                Format::Npz => {
+                    let rest = &self.experiment.plan().body.nodes;
+                    let rows = |v: Vec<f64>| Array { shape: vec![rest.len(), 3], values: v };
+                    let before = rows(rest.iter().flat_map(|x| x.to_array()).collect());
+                    let moved = rest.iter().zip(&state.displacement);
+                    let after = rows(moved.flat_map(|(x, u)| (*x + *u).to_array()).collect());
+                    let time = Array { shape: vec![1], values: vec![time] };
+                    write_npz(file, &[("X", &before), ("y", &after), ("time", &time)])?;
+                }
             }
+            self.files += 1;
+        }
+        for (series, skin) in &self.carried {
+            skin.write(&self.folder.join(series.name(number)), &state.displacement)?;
             self.files += 1;
         }
         Ok(())
@@ -158,6 +203,28 @@ impl Writer<'_> {
 fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
     let (lo, hi) = boxes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
     Pinhole::framing(lo, hi, experiment.up(), 640, 480)
+}
+
+/// What the body carries, and what its frames are called.
+fn carried(
+    experiment: &Experiment,
+    files: &[PathBuf],
+    track: &mut Track,
+    console: &mut Console,
+) -> Result<Vec<(Series, Skin)>, Error> {
+    let mut all: Vec<(Series, Skin)> = Vec::new();
+    for file in files {
+        let part = |p: Option<&std::ffi::OsStr>| p.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+        let series = Series { stem: part(file.file_stem()), ending: part(file.extension()).to_ascii_lowercase() };
+        if series.stem == "frame" || all.iter().any(|(other, _)| *other == series) {
+            let message = format!("its frames would be called {}, as others are; rename the file", series.name(0));
+            return Err(Error::Option { option: "carry", given: file.display().to_string(), message });
+        }
+        let (skin, doubt) = Skin::new(experiment, file)?;
+        track.aside(|| console.warn(doubt.as_slice()));
+        all.push((series, skin));
+    }
+    Ok(all)
 }
 
 /// Simulates an experiment with its own values and writes its motion into a folder.
@@ -173,8 +240,10 @@ pub fn write_motion(
     console: &mut Console,
 ) -> Result<Written, Error> {
     make_folder(folder)?;
-    let clock = Instant::now();
     let plan = experiment.plan();
+    // Whoever names a file that cannot be carried is told before anything is computed.
+    let carried = carried(experiment, &a.carry, &mut track, console)?;
+    let clock = Instant::now();
     let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
 
@@ -203,7 +272,8 @@ pub fn write_motion(
     let mut formats = a.format.clone();
     formats.dedup();
     let numbers: Vec<usize> = states.iter().map(|(k, _)| *k).collect();
-    let stale = formats.iter().map(|f| remove_stale(folder, *f, &numbers)).sum::<Result<usize, Error>>()?;
+    let series = formats.iter().map(|f| Series::of(*f)).chain(carried.iter().map(|c| c.0.clone()));
+    let stale = series.map(|s| remove_stale(folder, &s, &numbers)).sum::<Result<usize, Error>>()?;
     if stale > 0 {
         console.note(&format!("removed from {}: {stale} frames of an earlier simulation", folder.display()));
     }
@@ -219,9 +289,11 @@ pub fn write_motion(
         formats,
         surface,
         triangles,
+        carried,
         series: Vec::new(),
         files: 0,
     };
+    console.warn(intrusion(plan, experiment.start_time(), &states).as_slice());
     let mut track = console.progress(states.len() as u64, "writing");
     let mut written = 0;
     for (k, state) in &states {

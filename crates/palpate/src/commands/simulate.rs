@@ -15,9 +15,12 @@ Examples:
   palpate simulate beam.toml                           a surface mesh (OBJ) per frame in out/beam/
   palpate simulate beam.toml --format vtu,png --every 5
   palpate simulate found/model.toml --out frames       what a fit has found, simulated again
+  palpate simulate toy.toml --carry fine.obj,splats.ply   files that follow the body, written for every frame
 
 obj, ply: the deformed surface; vtu: the cells or tetrahedra with displacement, velocity and fields, strain (Green) and stress
-(Cauchy, and von Mises' of it; the material's alone), and a .pvd for the whole series; png: shaded pictures. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
+(Cauchy, and von Mises' of it; the material's alone), and a .pvd for the whole series; png: shaded pictures; npz: the warp, nodes at rest X
+and moved y [N, 3] and the time. What --carry names is in the coordinates of object.mesh. Splats (3DGS PLY) move with their covariance and turn with
+their harmonics. The scene's recording is not read. Frames of an earlier simulation in the same folder and of the same
 formats are replaced: those that this one has no frame for are removed.";
 
 /// Simulate a scene and write its motion

@@ -1,8 +1,10 @@
-//! Acceptance of what came with Chen et al., Virtual Elastic Objects (CVPR 2022): sequences of equilibria under known loads. `bench/veo.jsonl` holds a
-//! row a case and commit.
+//! Acceptance of what came with Chen et al., Virtual Elastic Objects (CVPR 2022): sequences of equilibria under known loads, jets, obstacles and what a body
+//! carries. `bench/veo.jsonl` holds a row a case and commit.
 
 mod bars;
+mod carried;
 mod clouds;
+mod interactions;
 mod states;
 
 use super::acceptance::Aim;
@@ -14,7 +16,7 @@ use crate::rows::Measured;
 /// The study.
 pub const SET: Set = Set { name: "veo", page: "docs/veo.md", cases: &CASES, aims: AIMS, more: &[], measured: Measured::Fits };
 
-const CASES: [(&str, Case); 12] = [
+const CASES: [(&str, Case); 16] = [
     ("states", |data, _| states::run(data, &[])),
     ("states-0", |data, _| states::run(data, states::LOADS[0])),
     ("states-52", |data, _| states::run(data, states::LOADS[1])),
@@ -27,6 +29,10 @@ const CASES: [(&str, Case); 12] = [
     ("both-bodies", |_, folder| clouds::both(folder)),
     ("two-parts", |_, folder| clouds::two_parts(folder)),
     ("cloud-states", |data, folder| clouds::beam(data, folder, &[])),
+    ("jet-plate", |_, _| interactions::plate()),
+    ("jet-sphere", |_, _| interactions::sphere()),
+    ("obstacle", |_, _| interactions::obstacle()),
+    ("carried", |_, folder| carried::run(folder)),
 ];
 
 const MODULUS: &str = "E [kPa]";
@@ -49,6 +55,58 @@ const UNMOVED: &str = "rms of the other frames, not moving [mm]";
 
 /// E within a tenth of fits of single states on hexahedra: 253 to 259, 246 to 248 and 253 to 261 kPa.
 const AIMS: &[Aim] = &[
+    ("A9", "jet on a plate: force over thrust", "jet-plate", Of("force on a plate over thrust"), "–", Between(0.99, 1.01)),
+    (
+        "A9",
+        "jet on a plate askew by 30°: error over thrust",
+        "jet-plate",
+        Of("plate askew: error of the force over thrust"),
+        "–",
+        AtMost(0.02),
+    ),
+    (
+        "A9",
+        "even stream on a sphere: drag coefficient",
+        "jet-sphere",
+        Of("drag coefficient of a sphere, 12 cells to its radius"),
+        "–",
+        Between(0.99, 1.01),
+    ),
+    (
+        "A10",
+        "ball between obstacles: force over that between planes",
+        "obstacle",
+        Of("force over that of a plane"),
+        "–",
+        Between(0.98, 1.02),
+    ),
+    ("A10", "both forces' sum over one", "obstacle", Of("what both forces leave over one"), "–", AtMost(0.02)),
+    (
+        "A10",
+        "largest difference of the displacement over the largest",
+        "obstacle",
+        Of("largest difference of the displacement over the largest"),
+        "–",
+        AtMost(0.02),
+    ),
+    ("A11", "turned mesh: error over size", "carried", Of("mesh: error over size"), "–", AtMost(1e-6)),
+    (
+        "A11",
+        "turned splats: error of places over size",
+        "carried",
+        Of("splats: error of the places over size"),
+        "–",
+        AtMost(1e-6),
+    ),
+    (
+        "A11",
+        "turned splats: error of covariances over their size",
+        "carried",
+        Of("splats: error of the covariance over its size"),
+        "–",
+        AtMost(2e-6),
+    ),
+    ("A11", "turned splats: error of the colour", "carried", Of("splats: error of the colour"), "–", AtMost(1e-6)),
     ("A13", "E of all six states [kPa]", "states", Of(MODULUS), "–", Between(221.4, 287.1)),
     ("A13", "own weight: E [kPa]", "states-0", Of(MODULUS), "–", Between(227.7, 284.9)),
     ("A13", "52 g: E [kPa]", "states-52", Of(MODULUS), "–", Between(221.4, 272.8)),

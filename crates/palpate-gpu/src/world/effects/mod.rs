@@ -70,6 +70,7 @@ impl Effects {
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let asks = match law.asks() {
+                _ if law.moves() => Some("moves as a file says"),
                 Asks::Nothing => None,
                 Asks::Path => Some("follows a path"),
                 Asks::Series => Some("is driven by a file"),
@@ -113,7 +114,7 @@ impl Effects {
                 }
                 Site::Cells(_) => Some(AT_CELLS),
                 // The observer's business.
-                Site::Clock | Site::Marker | Site::Readings(_) | Site::Driven(_) => None,
+                Site::Clock | Site::Marker | Site::Readings(_) | Site::Driven(_) | Site::Obstacle | Site::Jet => None,
             };
             e.first_rows.push(row);
             if let Some(site) = site.filter(|s| *s == AT_CELLS) {

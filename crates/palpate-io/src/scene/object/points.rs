@@ -1,6 +1,6 @@
 //! `[object] points`: a body from a cloud of points that fills it.
 
-use super::{closed, pose, resolution};
+use super::{pose, resolution, surface};
 use crate::cloud::{ENDINGS, ending, read_cloud};
 use crate::document::Table;
 use crate::error::{InputError, number};
@@ -8,10 +8,12 @@ use crate::mesh::{LARGEST_SIDE, bounds};
 use crate::npy::read_array;
 use glam::DVec3;
 use palpate_model::scene::{BodySource, Cloud, Object, Resolution};
+use palpate_model::shape::MeshShape;
 use palpate_model::shape::cloud::around;
 use palpate_model::space::stars::graph::MOST;
 use palpate_model::space::stars::{StarSpec, Weights, check};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Keys of stars alone.
 const STARS: [&str; 3] = ["neighbours", "weights", "residual_penalty"];
@@ -43,7 +45,7 @@ pub(super) fn object(t: &Table, warnings: &mut Vec<String>) -> Result<Object, In
         return Err(t.error("points", text));
     }
     let volume = t.f64_where("volume", |v| v > 0.0, "is not allowed: must be > 0 (m³)")?;
-    let stated = closed(t, warnings)?;
+    let stated = surface(t, warnings)?;
     let hull = match (stated, volume) {
         (Some(_), Some(_)) => {
             return Err(t.error("volume", "is that of the mesh or shape beside the points; leave it out".to_string()));
@@ -52,7 +54,7 @@ pub(super) fn object(t: &Table, warnings: &mut Vec<String>) -> Result<Object, In
         (None, volume) => {
             let key = if volume.is_some() { "volume" } else { "points" };
             let mesh = around(&points, volume).map_err(|message| t.error(key, format!("the points {message}")))?;
-            BodySource::Mesh { path: path.clone(), mesh, open_edges: 0 }
+            BodySource::Mesh { path: path.clone(), shape: Arc::new(MeshShape::new(mesh)), open_edges: 0 }
         }
     };
     if !own {

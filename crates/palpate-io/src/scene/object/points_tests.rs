@@ -45,8 +45,8 @@ fn clouds_become_points_or_cells() {
     assert_eq!((cloud.stars.residual_penalty, stars.resolution), (0.1, Resolution::Own));
     assert!((cloud.points[59] - DVec3::new(0.045, 0.035, 0.025)).length() < 1e-12);
     let cells = of("points = \"a.ply\"\nvolume = 6e-5\ncell_size = 0.01");
-    let BodySource::Mesh { mesh, .. } = &cells.source else { panic!("{:?}", cells.source) };
-    assert!((mesh.volume() / 6e-5 - 1.0).abs() < 1e-6, "{}", mesh.volume());
+    let BodySource::Mesh { shape, .. } = &cells.source else { panic!("{:?}", cells.source) };
+    assert!((shape.mesh().volume() / 6e-5 - 1.0).abs() < 1e-6, "{}", shape.mesh().volume());
     assert_eq!(cells.resolution, Resolution::CellSize(0.01));
     let stated =
         of("points = \"a.ply\"\ndiscretisation = \"points\"\nshape = { box = { min = [0, 0, 0], max = [0.05, 0.04, 0.03] } }");

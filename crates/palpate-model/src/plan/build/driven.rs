@@ -78,7 +78,7 @@ fn driven(drive: &Drive, body: &Body) -> Result<DrivenSites, (&'static str, Stri
 /// Times of the states of a quasi-static sequence on the recording's clock [s], rising; empty for a motion.
 ///
 /// Those of a uniform clock where the scene states one, and of the frames that it is compared with; with neither those of the series
-/// that drive it, and else the start alone.
+/// that drive it and of what moves beside it, and else the start alone.
 pub(super) fn times(scene: &Scene, observation: &Observation) -> Vec<f64> {
     let time = &scene.time;
     if !time.scheme.still {
@@ -91,6 +91,7 @@ pub(super) fn times(scene: &Scene, observation: &Observation) -> Vec<f64> {
     if all.is_empty() {
         let series = scene.effects.iter().filter_map(|e| e.drive.as_ref()).map(|d| &d.series);
         all = series.filter(|s| s.times.len() > 1).flat_map(|s| s.times.iter().copied()).collect();
+        all.extend(scene.effects.iter().filter_map(|e| e.moving.as_ref()).flat_map(|m| m.motion.times.iter().copied()));
     }
     if all.is_empty() {
         all.push(time.start);
