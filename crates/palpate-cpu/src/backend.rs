@@ -66,7 +66,7 @@ impl StressFree for CpuBackend {
 
 impl World {
     fn failed_at_start(&self, member: usize) -> impl Fn(newton::Reason) -> Failure {
-        move |reason| newton::at(0.0)(reason).with_values(&self.shared.plan.layout, &self.members[member].theta)
+        move |reason| newton::at(0.0)(reason).in_plan(&self.shared.plan, &self.members[member].theta)
     }
 }
 

@@ -25,7 +25,7 @@ pub struct Carried {
 #[derive(Debug)]
 enum Content {
     Obj(obj::Lines),
-    Ply(ply::Vertices),
+    Ply(Box<ply::Vertices>),
 }
 
 impl Carried {
@@ -38,7 +38,7 @@ impl Carried {
         let wrong = |text: String| InputError::file(path, text);
         let (places, content) = match ending(path).as_str() {
             "obj" => obj::read(&bytes).map(|(p, l)| (p, Content::Obj(l))).map_err(wrong)?,
-            "ply" => ply::read(bytes).map(|(p, v)| (p, Content::Ply(v))).map_err(wrong)?,
+            "ply" => ply::read(bytes).map(|(p, v)| (p, Content::Ply(Box::new(v)))).map_err(wrong)?,
             other => {
                 let text = format!(
                     "\".{other}\" is no format that a motion carries; allowed: .obj (meshes), .ply (meshes, points, splats)"
