@@ -15,6 +15,7 @@ use palpate_model::plan::Plan;
 use palpate_model::plan::build::build_plan;
 use palpate_model::scene::*;
 use palpate_model::space::points::TetMesh;
+use palpate_model::space::stars::StarSpec;
 use std::sync::Arc;
 
 /// Every effect that changes the body, its material or its clamps, at a size that matters.
@@ -71,6 +72,17 @@ pub fn tetrahedra(count: usize) -> BodySource {
     }
     let mesh = mesh.checked().unwrap();
     BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
+}
+
+/// Points in the box of the ball, moved off a lattice of so many along every edge, with more neighbours than tetrahedra have nodes.
+pub fn cloud(count: usize) -> BodySource {
+    let (low, edge) = (DVec3::new(-0.047, -0.049, -0.005), 0.1 / count as f64);
+    let moved = |n: usize| (DVec3::new(0.819, 0.671, 0.549) * (n as f64 + 1.0)).fract() * 0.4 + 0.3;
+    let at = |n: usize| DVec3::new((n % count) as f64, (n / count % count) as f64, (n / (count * count)) as f64);
+    let points = (0..count.pow(3)).map(|n| low + edge * (at(n) + moved(n))).collect();
+    let hull = BodySource::Analytic(Analytic::Box { min: low, max: low + 0.1 });
+    let stars = StarSpec { neighbours: 11, residual_penalty: 0.5, ..StarSpec::default() };
+    BodySource::Cloud(Box::new(Cloud { path: "in-code.npy".into(), points, hull, stars }))
 }
 
 /// The ball.

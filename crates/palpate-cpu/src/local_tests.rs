@@ -2,7 +2,7 @@
 //! products.
 
 use crate::linear::matrix::{Operator, Packed};
-use crate::local_bodies::{Made, altering, ball, curved, fields, flowing, leading, plan, tetrahedra};
+use crate::local_bodies::{Made, altering, ball, cloud, curved, fields, flowing, leading, plan, tetrahedra};
 use crate::simulate::{self, Start};
 use crate::terms::elastic_cells::corners;
 use crate::terms::{Curvature, PastChange, zeros};
@@ -14,6 +14,7 @@ use palpate_model::effects::{Effect, Site, find};
 use palpate_model::materials;
 use palpate_model::materials::viscosity::Viscosity;
 use palpate_model::params::ParamKey;
+use palpate_model::params::fields::{Basis, FieldSpec};
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::{self, Stage};
 use palpate_model::scene::*;
@@ -123,6 +124,16 @@ fn everywhere(check: impl Fn(&At)) {
             values.enumerate().for_each(|(i, (v, _))| *v = 1.0 + 0.3 * (i as f64).sin());
             check_all(p, &check);
         }
+    }
+    // Points of a cloud with their penalty: fields where the material has them, and a viscosity beside a law at points.
+    for (model, exponent) in materials::ALL.iter().zip([None, Some(0.6)].into_iter().cycle()) {
+        let mut drag = Effect::absent(find("air-drag").unwrap());
+        drag.values[0] = Some(5.0);
+        let by_points = |f: FieldSpec| FieldSpec { basis: Basis::Points, ..f };
+        let fields = if model.is_linear { fields().into_iter().map(by_points).collect() } else { Vec::new() };
+        let viscosity = exponent.map(|exponent| Viscosity { coefficient: 40.0, exponent });
+        let made = Made { fields, viscosity, ..Made::of(cloud(3), vec![drag]) };
+        check_all(Plan { model, ..made.plan() }, &check);
     }
     // Laws of cells, of the clamps and of the body on them.
     for (model, kind, count) in [(&materials::ALL[0], Tetrahedron::Quadratic, 1), (&materials::ALL[1], Tetrahedron::Linear, 2)] {

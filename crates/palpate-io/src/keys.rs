@@ -44,7 +44,21 @@ pub(crate) const SCENE: Schema = Schema {
         (
             "object",
             Schema {
-                keys: &["mesh", "volume_mesh", "state", "pose", "discretisation", "cell_size", "cells", "edge_length"],
+                keys: &[
+                    "mesh",
+                    "volume_mesh",
+                    "points",
+                    "state",
+                    "pose",
+                    "discretisation",
+                    "cell_size",
+                    "cells",
+                    "edge_length",
+                    "neighbours",
+                    "weights",
+                    "residual_penalty",
+                    "volume",
+                ],
                 tables: &[(
                     "shape",
                     Schema {

@@ -26,13 +26,16 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// The elements of a body: its cells as hexahedra (VTK's type 12), or its tetrahedra (type 10, or 24 where they are quadratic), in
-    /// the body's order.
+    /// The elements of a body: its cells as hexahedra (VTK's type 12), or its tetrahedra (type 10, or 24 where they are quadratic), or
+    /// its points (type 1), in the body's order.
     pub fn of(body: &Body) -> Elements {
         let mut all = Elements::default();
         body.cells().iter().for_each(|c| all.push(CellType::Hexahedron, VTK_ORDER.map(|i| c.nodes[i])));
         // Tetrahedra count their nodes as VTK does: the fourth corner lies on the side that the first three turn around, and nodes of edges
         // follow as `palpate_model::space::tets::EDGES` has them.
+        if body.points.stars.is_some() {
+            return Elements::vertices(body.nodes.len());
+        }
         for s in body.points.means() {
             let kind = if s.nodes.len() == 4 { CellType::Tetra } else { CellType::QuadraticTetra };
             all.push(kind, s.nodes.iter().copied());

@@ -20,6 +20,7 @@ use crate::params::fields::FieldSpec;
 use crate::plan::scheme::{self, Scheme};
 use crate::shape::TriMesh;
 use crate::space::points::TetMesh;
+use crate::space::stars::StarSpec;
 pub use crate::space::tets::Tetrahedron;
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
@@ -117,6 +118,11 @@ impl Object {
         let made = matches!(self.resolution, Resolution::Edge(_) | Resolution::OpenEdge);
         made || matches!(self.source, BodySource::Tetrahedra { .. })
     }
+
+    /// True of a body of points with their stars.
+    pub fn is_of_points(&self) -> bool {
+        matches!(self.source, BodySource::Cloud(_))
+    }
 }
 
 /// Where the surface comes from.
@@ -142,6 +148,21 @@ pub enum BodySource {
         /// Its surface.
         surface: TriMesh,
     },
+    /// Points, each of which is simulated with its neighbours.
+    Cloud(Box<Cloud>),
+}
+
+/// A cloud of points that fills a body, checked by `palpate-io`.
+#[derive(Clone, Debug)]
+pub struct Cloud {
+    /// The file they were read from.
+    pub path: PathBuf,
+    /// The points, before `pose` [m].
+    pub points: Vec<DVec3>,
+    /// The surface around them, a mesh or a closed form.
+    pub hull: BodySource,
+    /// What is made of them.
+    pub stars: StarSpec,
 }
 
 /// Analytic bodies, lengths in metres.

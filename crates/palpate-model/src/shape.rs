@@ -1,10 +1,12 @@
 //! Rest shapes as signed distances: analytic bodies and triangle meshes.
 
 mod analytic;
+pub mod cloud;
 pub(crate) mod components;
 mod contacts;
 mod edges;
 mod joining;
+mod marching;
 mod mesh;
 mod pseudonormal;
 mod repair;
@@ -71,6 +73,7 @@ pub fn shape_of(object: &Object) -> Arc<dyn Shape> {
     match &object.source {
         BodySource::Mesh { mesh, .. } => Arc::new(MeshShape::new(mesh.transformed(&object.pose))),
         BodySource::Tetrahedra { surface, .. } => Arc::new(MeshShape::new(surface.transformed(&object.pose))),
+        BodySource::Cloud(cloud) => shape_of(&Object { source: cloud.hull.clone(), ..object.clone() }),
         BodySource::Analytic(body) => Arc::new(Placed::new(body.clone(), object.pose)),
     }
 }

@@ -126,7 +126,11 @@ pub fn coarsen(fine: &Experiment, folder: &Path, options: CoarsenOptions) -> Res
 /// What a body is made of, in words.
 fn mesh(e: &Experiment) -> String {
     let body = &e.plan.body;
-    let kind = if body.cut.is_some() { "cells" } else { "tetrahedra" };
+    let kind = match (&body.cut, &body.points.stars) {
+        (Some(_), _) => "cells",
+        (None, Some(_)) => "points",
+        (None, None) => "tetrahedra",
+    };
     format!("{} {kind} of {:.4} mm", body.elements(), 1e3 * body.length)
 }
 

@@ -170,7 +170,7 @@ impl Found<'_> {
     fn errors_by_place(&self) -> Option<&[f64]> {
         let own = matches!(
             (&self.experiment.scene().fields[self.field].basis, self.varied()),
-            (Basis::Cells, Varied::Modulus | Varied::Damping) | (Basis::Nodes, Varied::Density)
+            (Basis::Points, _) | (Basis::Cells, Varied::Modulus | Varied::Damping) | (Basis::Nodes, Varied::Density)
         );
         self.errors.as_deref().filter(|_| own)
     }

@@ -56,6 +56,14 @@ pub(crate) fn suited(e: &Experiment) -> Suited {
         let reason = format!("a mesh is given that follows the surface; of cells, {bend} and take about {cells} nodes");
         return Suited { discretisation: "tetrahedra", reason };
     }
+    if let BodySource::Cloud(cloud) = &e.scene().object.source {
+        let reason = format!(
+            "its modulus is that of the material whatever the spacing, and {bend} with about {cells} nodes; the {} points given serve where they are \
+             what is asked for",
+            cloud.points.len()
+        );
+        return Suited { discretisation: "cells", reason };
+    }
     match needed.cells_suit() {
         true => Suited {
             discretisation: "cells",

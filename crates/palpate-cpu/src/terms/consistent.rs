@@ -1,4 +1,4 @@
-//! The mass matrix of a body of tetrahedra: ∫ ρ N_i N_j, exactly, with one density an element.
+//! The mass matrix of a body of tetrahedra: ∫ ρ N_i N_j, exactly, with one density an element. Points of a cloud have their own mass alone.
 //!
 //! The density around a node is a coefficient of the model; an element's is the mean over its nodes, weighed as `space::tets::lumped` has them. So
 //! the whole mass is the sum of the nodes' densities times their volumes, and every entry is linear in each node's density.
@@ -66,13 +66,13 @@ impl<'a> Consistent<'a> {
 
     /// Nodes of an element.
     fn nodes(&self) -> usize {
-        self.plan.body.points.means().next().map_or(0, |s| s.nodes.len())
+        if self.plan.body.points.is_empty() { 0 } else { self.plan.body.points.bearers(0).nodes.len() }
     }
 
-    /// Number, nodes and volume [m³] of every element.
+    /// Number, nodes that bear the mass and volume [m³] of every element.
     fn elements(&self) -> impl Iterator<Item = (usize, Stencil<'a>, f64)> + use<'a> {
         let points = &self.plan.body.points;
-        points.means().enumerate().map(|(e, s)| (e, s, points.element_volume(e)))
+        (0..points.elements()).map(|e| (e, points.bearers(e), points.element_volume(e)))
     }
 
     /// Rows of an element's matrix over its mass, times a vector per node.
@@ -96,7 +96,8 @@ impl<'a> Consistent<'a> {
         for (e, s, _) in self.elements() {
             let n = s.nodes.len();
             let places = places.points.of(self.plan.body.points.mean_point(e));
-            for (k, place) in places.iter().enumerate() {
+            // A star's first block is its own point's.
+            for (k, place) in places.iter().enumerate().take(n * n) {
                 put(*place as usize, self.masses[e] * self.unit[k / n][k % n]);
             }
         }

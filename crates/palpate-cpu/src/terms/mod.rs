@@ -15,6 +15,7 @@ pub mod ghost;
 pub mod held_nodes;
 pub mod inertia;
 pub mod point_laws;
+pub mod star_penalty;
 pub mod tet_laws;
 pub mod unstrained;
 
@@ -36,6 +37,7 @@ use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::space::pattern::{Pattern, Places};
 use point_laws::PointLaws;
+use star_penalty::StarPenalty;
 use tet_laws::TetLaws;
 
 pub use elastic_cells::laws::{CellActing, cell_laws};
@@ -314,6 +316,9 @@ impl<'a> Equation<'a> {
             Some(_) => vec![Box::new(ElasticCells::new(context))],
             None => vec![Box::new(ElasticPoints::new(context)), Box::new(HeldNodes::new(context))],
         };
+        if let Some(penalty) = context.plan.body.points.stars.as_ref().filter(|p| p.factor != 0.0) {
+            terms.push(Box::new(StarPenalty::new(context, penalty)));
+        }
         if context.plan.body.cut.is_none() && !context.altered.laws.is_empty() {
             terms.push(Box::new(TetLaws::new(context)));
         }

@@ -7,30 +7,36 @@ use crate::vtk::read_vtu_array;
 use palpate_model::params::fields::{Basis, Blend, FieldSpec, Prior, PriorKind, Region, Scale, Varied};
 use std::path::Path;
 
-/// Every field of a scene, in the order of the file.
-pub(super) fn fields(root: &Table) -> Result<Vec<FieldSpec>, InputError> {
-    root.tables("field")?.iter().map(field).collect()
+/// Every field of a scene, in the order of the file. `of_points`: of a body of points.
+pub(super) fn fields(root: &Table, of_points: bool) -> Result<Vec<FieldSpec>, InputError> {
+    root.tables("field")?.iter().map(|t| field(t, of_points)).collect()
 }
 
-/// The three bases by name.
+/// The bases by name.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Cells,
     Nodes,
+    Points,
     Regions,
 }
 
-fn field(t: &Table) -> Result<FieldSpec, InputError> {
+fn field(t: &Table, of_points: bool) -> Result<FieldSpec, InputError> {
     let paths = Varied::ALL.map(|v| (v.0, v.1));
     let allowed = || paths.map(|p| format!("\"{}\"", p.0)).join(" or ");
     let varied = t.optional_choice("path", &paths)?.ok_or_else(|| t.missing("path", &allowed()))?;
-    let kinds = [("cells", Kind::Cells), ("nodes", Kind::Nodes), ("regions", Kind::Regions)];
-    let kind = t.optional_choice("basis", &kinds)?.ok_or_else(|| t.missing("basis", "\"cells\", \"nodes\" or \"regions\""))?;
+    let kinds = [("cells", Kind::Cells), ("nodes", Kind::Nodes), ("points", Kind::Points), ("regions", Kind::Regions)];
+    let kind = t.optional_choice("basis", &kinds)?.ok_or_else(|| t.missing("basis", "\"cells\", \"nodes\", \"points\" or \"regions\""))?;
+    match (kind, of_points) {
+        (Kind::Points, false) => return Err(t.error("basis", "\"points\" belongs to bodies of points (object.discretisation); give \"cells\" or \"nodes\"")),
+        (Kind::Cells | Kind::Nodes, true) => return Err(t.error("basis", "must be \"points\" or \"regions\" on a body of points")),
+        _ => {}
+    }
     let scales = [("log", Scale::Log), ("linear", Scale::Linear)];
     let scale = t.optional_choice("scale", &scales)?.unwrap_or(Scale::Log);
     let (with_regions, without): (&[&str], &[&str]) = (&["regions", "blend"], &["file", "array"]);
     let (foreign, belongs) = match kind {
-        Kind::Regions => (without, "basis = \"cells\" or \"nodes\"; regions state their own value"),
+        Kind::Regions => (without, "basis = \"cells\", \"nodes\" or \"points\"; regions state their own value"),
         _ => (with_regions, "basis = \"regions\""),
     };
     if let Some(key) = foreign.iter().find(|k| t.has(k)) {
@@ -39,6 +45,7 @@ fn field(t: &Table) -> Result<FieldSpec, InputError> {
     let basis = match kind {
         Kind::Cells => Basis::Cells,
         Kind::Nodes => Basis::Nodes,
+        Kind::Points => Basis::Points,
         Kind::Regions => {
             let blend = t.optional_choice("blend", &Blend::ALL)?.unwrap_or(Blend::Harmonic);
             Basis::Regions(regions(t, blend)?, blend)
@@ -53,7 +60,7 @@ fn field(t: &Table) -> Result<FieldSpec, InputError> {
 fn prior(t: &Table, kind: Kind) -> Result<Option<Prior>, InputError> {
     let Some(p) = t.optional_table("prior")? else { return Ok(None) };
     if kind == Kind::Regions {
-        let message = "belongs to basis = \"cells\" or \"nodes\"; what is known of a region is said by known = [value, sd] in its [[fit.parameter]]";
+        let message = "belongs to basis = \"cells\", \"nodes\" or \"points\"; what is known of a region is said by known = [value, sd] in its [[fit.parameter]]";
         return Err(t.error("prior", message));
     }
     let names = PriorKind::ALL.map(|(name, _)| format!("\"{name}\"")).join(" or ");

@@ -91,7 +91,7 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
 
     let mut warnings = Vec::new();
     let object = object::object(&root, &mut warnings)?;
-    let of_tets = object.is_of_tetrahedra();
+    let (of_tets, of_points) = (object.is_of_tetrahedra(), object.is_of_points());
     let (material, curves) = material::material(&root, &mut warnings)?;
     let gravity = match root.optional_table("world")? {
         Some(w) => w.optional_vec3("gravity")?,
@@ -114,10 +114,10 @@ fn scene(source: &Source) -> Result<Loaded<Scene>, InputError> {
         planes: planes(&root)?,
         masses: masses(&root)?,
         effects,
-        fields: fields::fields(&root)?,
+        fields: fields::fields(&root, of_points)?,
         time,
         initial,
-        solver: solver(&root, of_tets)?,
+        solver: solver(&root, of_tets, of_points)?,
         observation,
         targets: target::targets(&root)?,
         synthesis,
@@ -226,9 +226,12 @@ fn initial(root: &Table, given: bool) -> Result<Initial, InputError> {
     Ok(initial)
 }
 
-fn solver(root: &Table, of_tets: bool) -> Result<Solver, InputError> {
+fn solver(root: &Table, of_tets: bool, of_points: bool) -> Result<Solver, InputError> {
     let mut s = Solver::default();
     let Some(t) = root.optional_table("solver")? else { return Ok(s) };
+    if of_points && t.has("element") {
+        return Err(t.error("element", "belongs to bodies of cells or tetrahedra; points have stars (object.neighbours)"));
+    }
     element(&t, of_tets, &mut s)?;
     let linear = [("auto", LinearSolver::Auto), ("cholesky", LinearSolver::Cholesky), ("cg", LinearSolver::ConjugateGradient)];
     s.linear = t.optional_choice("linear", &linear)?.unwrap_or(s.linear);

@@ -1,5 +1,7 @@
 //! `[object]`: the shape.
 
+mod points;
+
 use super::corners;
 use crate::document::Table;
 use crate::error::{InputError, number};
@@ -13,6 +15,10 @@ use std::path::PathBuf;
 
 pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object, InputError> {
     let t = root.optional_table("object")?.ok_or_else(|| root.missing("object", "a table [object] with mesh or shape"))?;
+    if t.has("points") {
+        return points::object(&t, warnings);
+    }
+    points::refuse_keys(&t)?;
     let sources = ["mesh", "shape", "volume_mesh"];
     if let [first, second, ..] = sources.into_iter().filter(|k| t.has(k)).collect::<Vec<_>>()[..] {
         return Err(t.error(second, format!("{first} and {second} exclude each other; give one")));
@@ -20,8 +26,24 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
     if let Some(path) = t.optional_file("volume_mesh")? {
         return tetrahedra(&t, path, warnings);
     }
-    let (body, extent) = match (t.optional_file("mesh")?, t.optional_table("shape")?) {
-        (None, None) => return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }")),
+    let Some((body, extent)) = closed(&t, warnings)? else {
+        return Err(t.missing("mesh", "mesh = \"FILE\" or shape = { … }"));
+    };
+    Ok(Object { source: body, pose: pose(&t)?, resolution: resolution(&t, extent.max_element())? })
+}
+
+/// A rigid placement.
+fn pose(t: &Table) -> Result<DAffine3, InputError> {
+    match t.optional_matrix4("pose")? {
+        None => Ok(DAffine3::IDENTITY),
+        Some(m) => rigid(m).map_err(|e| t.error("pose", e)),
+    }
+}
+
+/// The closed surface that a table states, and the sides of a box around it.
+fn closed(t: &Table, warnings: &mut Vec<String>) -> Result<Option<(BodySource, DVec3)>, InputError> {
+    Ok(Some(match (t.optional_file("mesh")?, t.optional_table("shape")?) {
+        (None, None) => return Ok(None),
         (Some(path), _) => {
             let loaded = read_repaired(&path)?;
             warnings.extend(loaded.warnings);
@@ -43,12 +65,7 @@ pub(super) fn object(root: &Table, warnings: &mut Vec<String>) -> Result<Object,
             }
             (BodySource::Analytic(analytic), extent)
         }
-    };
-    let pose = match t.optional_matrix4("pose")? {
-        None => DAffine3::IDENTITY,
-        Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
-    };
-    Ok(Object { source: body, pose, resolution: resolution(&t, extent.max_element())? })
+    }))
 }
 
 /// True where the shape is the equilibrium that the motion starts from; else it is free of stress.
@@ -59,6 +76,10 @@ pub(super) fn is_given(root: &Table) -> Result<bool, InputError> {
 
 /// Cells or tetrahedra, and how fine.
 fn resolution(t: &Table, longest: f64) -> Result<Resolution, InputError> {
+    let own = "points";
+    if t.optional_str("discretisation")? == Some(own) && !t.has("points") {
+        return Err(t.error("discretisation", "\"points\" is that of a cloud: give points = \"FILE\""));
+    }
     let made = t.optional_choice("discretisation", &[("cells", false), ("tetrahedra", true)])?.unwrap_or(false);
     let (length, others) = if made { ("edge_length", &["cell_size", "cells"][..]) } else { ("cell_size", &["edge_length"][..]) };
     if let Some(key) = others.iter().find(|k| t.has(k)) {
@@ -96,7 +117,7 @@ fn tetrahedra(t: &Table, path: PathBuf, warnings: &mut Vec<String>) -> Result<Ob
     for (key, of) in [
         ("cell_size", "bodies that are cut out of a lattice"),
         ("cells", "bodies that are cut out of a lattice"),
-        ("discretisation", "bodies of a mesh or shape"),
+        ("discretisation", "bodies of a mesh, shape or points"),
         ("edge_length", "bodies whose tetrahedra are made here"),
     ] {
         if t.has(key) {
@@ -107,11 +128,7 @@ fn tetrahedra(t: &Table, path: PathBuf, warnings: &mut Vec<String>) -> Result<Ob
     warnings.extend(loaded.warnings);
     let mesh = loaded.value;
     let surface = mesh.surface();
-    let pose = match t.optional_matrix4("pose")? {
-        None => DAffine3::IDENTITY,
-        Some(m) => rigid(m).map_err(|e| t.error("pose", e))?,
-    };
-    Ok(Object { source: BodySource::Tetrahedra { path, mesh, surface }, pose, resolution: Resolution::Own })
+    Ok(Object { source: BodySource::Tetrahedra { path, mesh, surface }, pose: pose(t)?, resolution: Resolution::Own })
 }
 
 fn analytic(shape: &Table) -> Result<Analytic, InputError> {

@@ -24,6 +24,10 @@ pub(super) fn check(source: &Source, scene: &Scene, warnings: &mut Vec<String>) 
             let (min, max) = bounds(&surface.vertices);
             ("object.volume_mesh", max - min)
         }
+        BodySource::Cloud(cloud) => {
+            let (min, max) = bounds(&cloud.points);
+            ("object.points", max - min)
+        }
         BodySource::Analytic(shape) => ("object.shape", extent(shape)),
     };
     let longest = own.max_element();

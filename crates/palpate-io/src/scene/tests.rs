@@ -119,7 +119,7 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
     assert!(
         error_with("cell_size", "zzz")
-            .contains("known: mesh, volume_mesh, state, pose, discretisation, cell_size, cells, edge_length, shape")
+            .contains("known: mesh, volume_mesh, points, state, pose, discretisation, cell_size, cells, edge_length, neighbours, weights,")
     );
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));

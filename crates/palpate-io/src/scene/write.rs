@@ -346,6 +346,7 @@ pub(super) fn rebase(doc: &mut DocumentMut, from: &Path, to: &Path) {
     if let Some(t) = doc.get_mut("object").and_then(Item::as_table_like_mut) {
         fix(t, "mesh");
         fix(t, "volume_mesh");
+        fix(t, "points");
     }
     if let Some(t) = doc.get_mut("observation").and_then(Item::as_table_like_mut) {
         fix(t, "recording");

@@ -42,7 +42,7 @@ impl NodeLookup {
 }
 
 /// The nodes that a fit may use.
-pub(super) trait Nearby: Sync {
+pub(crate) trait Nearby: Sync {
     /// Distance of neighbouring nodes [m].
     fn spacing(&self) -> f64;
     /// A radius that holds all nodes from anywhere near the body [m].
@@ -84,8 +84,8 @@ impl Nearby for OnLattice<'_> {
 }
 
 /// A weighted least-squares fit of affine fields: value and gradient anywhere are linear in the nodes' values.
-pub(super) struct AffineFit {
-    pub(super) nodes: Vec<u32>,
+pub(crate) struct AffineFit {
+    pub(crate) nodes: Vec<u32>,
     offsets: Vec<DVec3>,
     kernel: Vec<f64>,
     total: f64,
@@ -95,7 +95,7 @@ pub(super) struct AffineFit {
 
 impl AffineFit {
     /// Fits around `center` [m] with a kernel of the given radius [m], grown until the nodes span all directions.
-    pub(super) fn new(body: &Body, near: &dyn Nearby, center: DVec3, radius: f64) -> AffineFit {
+    pub(crate) fn new(body: &Body, near: &dyn Nearby, center: DVec3, radius: f64) -> AffineFit {
         let h = near.spacing();
         let reach = near.reach() + radius;
         let mut r = radius.max(h);
@@ -152,13 +152,13 @@ impl AffineFit {
     }
 
     /// Weights of the nodes for the value at `p`; they sum to one.
-    pub(super) fn value(&self, p: DVec3) -> Vec<f64> {
+    pub(crate) fn value(&self, p: DVec3) -> Vec<f64> {
         let a = self.inverse * (p - self.mean);
         self.offsets.iter().zip(&self.kernel).map(|(d, k)| k * (1.0 / self.total + a.dot(*d))).collect()
     }
 
     /// Weights of the nodes for the gradient [1/m]; they sum to zero.
-    fn gradient(&self) -> Vec<DVec3> {
+    pub(crate) fn gradient(&self) -> Vec<DVec3> {
         self.offsets.iter().zip(&self.kernel).map(|(d, k)| self.inverse * *d * *k).collect()
     }
 }

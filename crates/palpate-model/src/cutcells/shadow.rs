@@ -9,7 +9,6 @@ use crate::cutcells::domain::Band;
 use crate::cutcells::extension::{AffineFit, Nearby, band_of};
 use crate::shape::Shape;
 use crate::space::body::Body;
-use crate::space::tets::TetLookup;
 use glam::DVec3;
 use std::collections::HashMap;
 
@@ -17,14 +16,15 @@ use std::collections::HashMap;
 const RADIUS: f64 = 2.5;
 
 /// Nodes in cubes of their mean distance.
-struct InCubes<'a> {
+pub(crate) struct InCubes<'a> {
     body: &'a Body,
     edge: f64,
     cubes: HashMap<[i64; 3], Vec<u32>>,
 }
 
 impl InCubes<'_> {
-    fn new(body: &Body) -> InCubes<'_> {
+    /// Sorts the nodes.
+    pub(crate) fn new(body: &Body) -> InCubes<'_> {
         let edge = (body.volume / body.nodes.len() as f64).cbrt();
         let mut all = InCubes { body, edge, cubes: HashMap::new() };
         for (n, x) in (0u32..).zip(&body.nodes) {
@@ -71,9 +71,9 @@ impl Nearby for InCubes<'_> {
 /// The lattice would be too large.
 pub fn shadow(body: &Body, shape: &dyn Shape, h: f64, width: f64) -> Result<Band, BodyError> {
     let (grid, _) = lattice_for(shape, h, width)?;
-    let (tets, near) = (TetLookup::new(body), InCubes::new(body));
+    let (carrier, near) = (body.carrier(), InCubes::new(body));
     let row = |p: DVec3| {
-        let (inside, away) = tets.carry(p);
+        let (inside, away) = carrier.carry(p);
         if away == 0.0 {
             return (inside.nodes, inside.value);
         }

@@ -37,7 +37,7 @@ struct Frame {
 }
 
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi's rotations.
-fn eigen(mut a: Gradient<f64>) -> ([f64; 3], Gradient<f64>) {
+pub(crate) fn eigen(mut a: Gradient<f64>) -> ([f64; 3], Gradient<f64>) {
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     // Quadratic from the third sweep on; six leave nothing.
     for _ in 0..6 {

@@ -93,6 +93,8 @@ pub enum Basis {
     Cells,
     /// One value a node.
     Nodes,
+    /// One value a point, of bodies of points.
+    Points,
     /// One value a region.
     Regions(Vec<Region>, Blend),
 }
@@ -148,7 +150,7 @@ impl FieldSpec {
     pub fn count(&self, body: &Body) -> usize {
         match &self.basis {
             Basis::Cells => body.elements(),
-            Basis::Nodes => body.nodes.len(),
+            Basis::Nodes | Basis::Points => body.nodes.len(),
             Basis::Regions(regions, _) => regions.len(),
         }
     }
@@ -158,6 +160,7 @@ impl FieldSpec {
         match self.basis {
             Basis::Cells => Some(Neighbours::of_elements(body)),
             Basis::Nodes => Some(Neighbours::of_nodes(body)),
+            Basis::Points => Some(Neighbours::of_elements(body)),
             Basis::Regions(..) => None,
         }
     }
@@ -185,6 +188,7 @@ impl Basis {
         match self {
             Basis::Cells => "cells",
             Basis::Nodes => "nodes",
+            Basis::Points => "points",
             Basis::Regions(..) => "regions",
         }
     }
@@ -218,7 +222,8 @@ impl Field {
                 let share = |nodes: &[u32]| nodes.iter().map(|n| (*n, 1.0 / nodes.len() as f64)).collect();
                 body.element_nodes().map(share).collect()
             }
-            Basis::Cells | Basis::Nodes => (0..places.len() as u32).map(|own| vec![(own, 1.0)]).collect(),
+            // Point k of a cloud is node k and element k.
+            Basis::Cells | Basis::Nodes | Basis::Points => (0..places.len() as u32).map(|own| vec![(own, 1.0)]).collect(),
             Basis::Regions(regions, Blend::Nearest) => places.iter().map(|x| vec![(nearest(regions, *x), 1.0)]).collect(),
             Basis::Regions(regions, Blend::Axis) => places.iter().map(|x| along_axis(regions, *x)).collect(),
             Basis::Regions(regions, Blend::Harmonic) => {

@@ -2,6 +2,7 @@
 
 mod driven;
 mod sites;
+mod stars;
 mod tets;
 
 pub use sites::marker_sites;
@@ -49,6 +50,9 @@ pub fn build_body(scene: &Scene) -> Result<(Arc<Body>, Arc<dyn Shape>), PlanErro
 
 /// `seen`: observed points are to be looked up; bodies of cells are always ready for them.
 fn build_parts(scene: &Scene, shape: &Arc<dyn Shape>, seen: bool) -> Result<Parts, PlanError> {
+    if let BodySource::Cloud(cloud) = &scene.object.source {
+        return stars::parts(scene, cloud, shape.as_ref(), seen);
+    }
     let mesh = match (&scene.object.source, scene.object.resolution) {
         (BodySource::Tetrahedra { mesh, .. }, _) => Some(mesh.transformed(&scene.object.pose)),
         (_, Resolution::Edge(_)) => Some(tets::made(&scene.object)?.0),

@@ -3,6 +3,7 @@
 use crate::cutcells::places::CellLookup;
 use crate::space::body::Body;
 use crate::space::stencil::StencilBuf;
+use crate::space::stars::lookup::StarLookup;
 use crate::space::tets::TetLookup;
 use glam::DVec3;
 
@@ -12,6 +13,8 @@ pub enum Carrier<'a> {
     Cells(CellLookup<'a>),
     /// A tetrahedron.
     Tets(Box<TetLookup<'a>>),
+    /// Points of a cloud.
+    Stars(Box<StarLookup<'a>>),
 }
 
 impl Body {
@@ -19,6 +22,7 @@ impl Body {
     pub fn carrier(&self) -> Carrier<'_> {
         match &self.cut {
             Some(cut) => Carrier::Cells(CellLookup::new(cut)),
+            None if self.points.stars.is_some() => Carrier::Stars(Box::new(StarLookup::new(self))),
             None => Carrier::Tets(Box::new(TetLookup::new(self))),
         }
     }
@@ -30,6 +34,7 @@ impl Carrier<'_> {
         match self {
             Carrier::Cells(cells) => cells.carry(place),
             Carrier::Tets(tets) => tets.carry(place),
+            Carrier::Stars(stars) => stars.carry(place),
         }
     }
 }

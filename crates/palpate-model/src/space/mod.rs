@@ -7,6 +7,7 @@ pub mod kept_volume;
 pub mod neighbours;
 pub mod pattern;
 pub mod points;
+pub mod stars;
 pub mod stencil;
 pub mod stuffing;
 pub mod tet_checks;

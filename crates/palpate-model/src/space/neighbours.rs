@@ -33,17 +33,24 @@ pub struct Link {
 const CLOSE: f64 = 0.1;
 
 impl Neighbours {
-    /// Elements that share a face: cells of a lattice, or elastic points whose stencils share three of their first four nodes.
+    /// Elements that share a face: cells of a lattice, or elastic points whose stencils share three of their first four nodes; or points of a cloud with
+    /// their stars.
     pub fn of_elements(body: &Body) -> Neighbours {
         let mut n = Neighbours::default();
         n.add_cells(body);
-        n.add_points(body);
+        match body.points.stars {
+            Some(_) => n.add_stars(body),
+            None => n.add_points(body),
+        }
         n.settle()
     }
 
     /// Nodes that share an element. A pair at distance d gets an equal part of 3 V/d² of every element of volume V that holds it, so that a
     /// constant gradient has the right norm wherever pairs point in all directions alike.
     pub fn of_nodes(body: &Body) -> Neighbours {
+        if body.points.stars.is_some() {
+            return Neighbours::of_elements(body);
+        }
         let volumes = body.cells().iter().map(|c| c.fraction * body.cut().grid.h.powi(3)).chain(volumes(body));
         let mut areas: BTreeMap<(u32, u32), (f64, f64)> = BTreeMap::new();
         for (nodes, volume) in body.element_nodes().zip(volumes) {
@@ -86,6 +93,19 @@ impl Neighbours {
                 self.links.push(Link { a: e as u32, b: other, area: full * h * h, distance });
             }
         }
+    }
+
+    /// Points of a cloud. A pair at distance d gets an equal part of 3 V/d² of the star of each that has it, as nodes that share an element do.
+    fn add_stars(&mut self, body: &Body) {
+        for (s, volume) in body.points.means().zip(&body.points.volume) {
+            let others = &s.nodes[1..];
+            for other in others {
+                let distance = (body.nodes[*other as usize] - body.nodes[s.nodes[0] as usize]).length();
+                let area = 3.0 * volume / (others.len() as f64 * distance);
+                self.links.push(Link { a: s.nodes[0], b: *other, area, distance });
+            }
+        }
+        self.volume.extend(volumes(body));
     }
 
     /// Tetrahedra.

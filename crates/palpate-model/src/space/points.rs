@@ -2,6 +2,7 @@
 //! tetrahedron is one point with four nodes, a quadratic one five with ten ([`super::tets`]).
 
 use crate::shape::TriMesh;
+use crate::space::stars::penalty::Penalty;
 use crate::space::stencil::{Stencil, Stencils};
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -15,6 +16,8 @@ pub struct Points {
     pub volume: Vec<f64>,
     /// Points of an element, the last of which has its mean; zero without any.
     pub per_element: usize,
+    /// Of a cloud's stars, each a node's own, what keeps them from moving otherwise than affinely.
+    pub stars: Option<Penalty>,
 }
 
 /// What part of the material acts at a point.
@@ -100,6 +103,13 @@ impl Points {
     /// Place and deformation gradient of an element's mean: of a point of its own, or of its only one.
     pub fn mean(&self, element: usize) -> Stencil<'_> {
         self.stencils.get(self.mean_point(element))
+    }
+
+    /// The nodes that bear an element's mass: all of a tetrahedron's, and of a star the point itself.
+    pub fn bearers(&self, element: usize) -> Stencil<'_> {
+        let s = self.mean(element);
+        let n = if self.stars.is_some() { 1 } else { s.nodes.len() };
+        Stencil { nodes: &s.nodes[..n], value: &s.value[..n], gradient: &s.gradient[..n] }
     }
 
     /// The same of all elements.

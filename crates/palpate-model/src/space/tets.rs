@@ -189,7 +189,11 @@ pub fn lumped(nodes: usize) -> &'static [f64] {
     const CORNER: f64 = 1.0 / 36.0;
     const EDGE: f64 = 4.0 / 27.0;
     const QUADRATIC: [f64; 10] = [CORNER, CORNER, CORNER, CORNER, EDGE, EDGE, EDGE, EDGE, EDGE, EDGE];
-    if nodes == 4 { &[0.25; 4] } else { &QUADRATIC }
+    match nodes {
+        1 => &[1.0],
+        4 => &[0.25; 4],
+        _ => &QUADRATIC,
+    }
 }
 
 /// Mean over an element of a number per node, with these shares.
@@ -197,10 +201,12 @@ pub fn lumped_mean(element: &Stencil, of_nodes: &[f64]) -> f64 {
     element.nodes.iter().zip(lumped(element.nodes.len())).map(|(n, w)| w * of_nodes[*n as usize]).sum()
 }
 
-/// ∫ N_i N_j over a tetrahedron of so many nodes, over its volume: exact, and positive definite.
+/// ∫ N_i N_j over a tetrahedron of so many nodes, over its volume: exact, and positive definite. A single node has all.
 pub fn mass(nodes: usize, i: usize, j: usize) -> f64 {
-    if nodes == 4 {
-        return if i == j { 0.1 } else { 0.05 };
+    match nodes {
+        1 => return 1.0,
+        4 => return if i == j { 0.1 } else { 0.05 },
+        _ => {}
     }
     let ends = |k: usize| if k < 4 { [k, k] } else { EDGES[k - 4] };
     let [[a, b], [c, d]] = [ends(i), ends(j)];

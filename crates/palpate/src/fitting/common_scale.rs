@@ -19,14 +19,17 @@ pub(crate) fn warnings(experiments: &[Experiment], theta: &[Vec<f64>], backend: 
     for (e, theta) in experiments.iter().zip(theta) {
         let plan = e.plan();
         // Motions have inertia, which is a force.
-        if plan.clock.moves() || !frees_a_stiffness(e) {
+        if plan.clock.moves() || !frees(e, |path| path == "material.youngs_modulus" || path.starts_with("field.")) {
             continue;
         }
         if is_silent(plan, theta, backend) == Some(true) {
+            let advice = match frees(e, |path| path.starts_with("field.")) {
+                false => "leave the modulus as it is stated and free ratios alone (a field)",
+                true => "read the field as ratios: its mean is what the scene or the field's prior states, not what was measured",
+            };
             out.push(format!(
                 "{}: no known force acts, so that only ratios of stiffnesses are determined and Young's modulus is not: twice as stiff a body with \
-                 supports twice as stiff gives the same states. Give a [[load]] or the weight (gravity and density), or leave the modulus as it \
-                 is stated and free ratios alone (a field)",
+                 supports twice as stiff gives the same states. Give a [[load]] or the weight (gravity and density), or {advice}",
                 e.scene().path.display()
             ));
         }
@@ -34,9 +37,8 @@ pub(crate) fn warnings(experiments: &[Experiment], theta: &[Vec<f64>], backend: 
     out
 }
 
-fn frees_a_stiffness(e: &Experiment) -> bool {
-    let free = e.scene().fit.iter().flat_map(|f| &f.parameters);
-    free.into_iter().any(|p| p.path == "material.youngs_modulus" || p.path.starts_with("field."))
+fn frees(e: &Experiment, which: impl Fn(&str) -> bool) -> bool {
+    e.scene().fit.iter().flat_map(|f| &f.parameters).any(|p| which(&p.path))
 }
 
 /// Whether the derivative along the common scale vanishes beside the gradient; `None` where that cannot be computed.

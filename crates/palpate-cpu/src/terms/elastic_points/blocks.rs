@@ -5,9 +5,6 @@ use crate::terms::Curvature;
 use crate::terms::assembly::Elements;
 use glam::{DMat3, DVec3};
 
-/// Most nodes of an element.
-const MOST: usize = 10;
-
 /// Points with what their tangents are taken at.
 pub(super) struct Tangents<'a, 'b> {
     pub(super) term: &'b ElasticPoints<'a>,
@@ -52,7 +49,7 @@ impl Tangents<'_, '_> {
 }
 
 impl Elements for Tangents<'_, '_> {
-    type Scratch = [[DMat3; MOST]; MOST];
+    type Scratch = Vec<DMat3>;
 
     fn count(&self) -> usize {
         self.term.c.plan.body.points.elements()
@@ -67,14 +64,15 @@ impl Elements for Tangents<'_, '_> {
     }
 
     fn scratch(&self) -> Self::Scratch {
-        [[DMat3::ZERO; MOST]; MOST]
+        Vec::new()
     }
 
     /// The tangent is symmetric: blocks below the diagonal are those above it, transposed.
     fn blocks(&self, e: usize, sum: &mut Self::Scratch, mut put: impl FnMut(usize, usize, DMat3)) {
         let points = &self.term.c.plan.body.points;
         let (last, n) = (points.mean_point(e), points.mean(e).nodes.len());
-        sum.iter_mut().flatten().for_each(|block| *block = DMat3::ZERO);
+        sum.clear();
+        sum.resize(n * n, DMat3::ZERO);
         for k in last + 1 - points.per_element..=last {
             let point = self.term.point(k);
             let tangent = self.tangent(&point);
@@ -86,16 +84,16 @@ impl Elements for Tangents<'_, '_> {
                 });
                 for (i, ga) in point.s.gradient.iter().enumerate().take(j + 1) {
                     let column = |c: usize| DVec3::new(half[0][c].dot(*ga), half[1][c].dot(*ga), half[2][c].dot(*ga));
-                    sum[i][j] += DMat3::from_cols(column(0), column(1), column(2));
+                    sum[n * i + j] += DMat3::from_cols(column(0), column(1), column(2));
                 }
             }
         }
         for j in 0..n {
             for i in 0..j {
-                put(i, j, sum[i][j]);
-                put(j, i, sum[i][j].transpose());
+                put(i, j, sum[n * i + j]);
+                put(j, i, sum[n * i + j].transpose());
             }
-            put(j, j, sum[j][j]);
+            put(j, j, sum[n * j + j]);
         }
     }
 }

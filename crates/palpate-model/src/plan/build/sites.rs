@@ -6,8 +6,8 @@ use crate::cutcells::places::{beside, in_cell, material_point};
 use crate::observation::{MarkerRest, MarkerSite, Observation, ReadingKind, TrackRest};
 use crate::shape::Shape;
 use crate::space::body::Body;
+use crate::space::carrier::Carrier;
 use crate::space::stencil::{StencilBuf, Stencils};
-use crate::space::tets::TetLookup;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -31,14 +31,15 @@ pub fn marker_sites(rest: &[MarkerRest], body: &Body, shape: &dyn Shape) -> Resu
 enum Lookup<'a> {
     /// Nodes by their place on the lattice.
     Cells(NodeLookup),
-    Tets(Box<TetLookup<'a>>),
+    /// Elements or points.
+    Elements(Carrier<'a>),
 }
 
 impl Lookup<'_> {
     fn new(body: &Body) -> Lookup<'_> {
         match &body.cut {
             Some(_) => Lookup::Cells(NodeLookup::new(body)),
-            None => Lookup::Tets(Box::new(TetLookup::new(body))),
+            None => Lookup::Elements(body.carrier()),
         }
     }
 }
@@ -72,7 +73,7 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &Lookup, shape: &dyn Shape) 
         kind: ReadingKind::Marker,
         stencil: match lookup {
             Lookup::Cells(nodes) => affine_weights(body, nodes, surface, MARKER_RADIUS * h),
-            Lookup::Tets(tets) => tets.carry(surface).0,
+            Lookup::Elements(carrier) => carrier.carry(surface).0,
         },
         stalk: m.position - surface,
     })
@@ -107,7 +108,7 @@ pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) ->
         kind: ReadingKind::Track,
         stencil: match &lookup {
             Lookup::Cells(nodes) => material_point(body, nodes, *place, MARKER_RADIUS * body.length),
-            Lookup::Tets(tets) => tets.carry(*place).0,
+            Lookup::Elements(carrier) => carrier.carry(*place).0,
         },
         stalk: DVec3::ZERO,
     };
@@ -122,7 +123,7 @@ pub(super) fn frames(asked: bool, body: &Body) -> Stencils {
         for p in &body.patches {
             let stencil = match &lookup {
                 Lookup::Cells(_) => in_cell(body, p.cell, p.point),
-                Lookup::Tets(tets) => tets.carry(p.point).0,
+                Lookup::Elements(carrier) => carrier.carry(p.point).0,
             };
             frames.push_with_gradient(&stencil.nodes, &stencil.value, &stencil.gradient);
         }
@@ -134,7 +135,7 @@ pub(super) fn frames(asked: bool, body: &Body) -> Stencils {
 pub(super) fn mass_site(key: &str, point: DVec3, body: &Body) -> Result<StencilBuf, PlanError> {
     let (place, away) = match &body.cut {
         Some(_) => beside(body, point),
-        None => TetLookup::new(body).carry(point),
+        None => body.carrier().carry(point),
     };
     if away > body.length {
         let message = format!(

@@ -49,7 +49,7 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
 pub(super) fn refuse_what_needs_cells(scene: &Scene) -> Result<(), PlanError> {
     let Some(i) = scene.effects.iter().position(|e| e.law().needs_cells()) else { return Ok(()) };
     let message = format!(
-        "\"{}\" moves the edge of what is held within cells, and of a body of tetrahedra whole nodes are held: change the clamp's box",
+        "\"{}\" moves the edge of what is held within cells, and of tetrahedra and points whole nodes are held: change the clamp's box",
         scene.effects[i].law().kind
     );
     Err(error(format!("effect.{i}.kind"), message))
@@ -142,7 +142,7 @@ fn hold_middles(held: &mut Vec<u32>, body: &Body) {
 /// The corners of a named group of the body's volume mesh, or why there are none.
 fn group(name: &str, scene: &Scene) -> Result<Vec<u32>, String> {
     let BodySource::Tetrahedra { path, mesh, .. } = &scene.object.source else {
-        return Err("names a group of a volume mesh, and the tetrahedra of this body are made here: give a box".into());
+        return Err("names a group of a volume mesh, and this body comes from no such file: give a box".into());
     };
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     match mesh.groups.get(name) {

@@ -6,10 +6,23 @@ use crate::results::inspection::{Group, MadeHere, SceneInspection, Tetrahedra};
 use palpate_model::plan::build::made;
 use palpate_model::scene::{BodySource, Resolution};
 use palpate_model::space::points::TetMesh;
+use palpate_model::space::stars::Weights;
 
 /// Adds the mesh of a body of tetrahedra to what is said.
 pub(super) fn tetrahedra(e: &Experiment, content: &mut SceneInspection, lines: &mut Lines) {
     let object = &e.scene().object;
+    if let BodySource::Cloud(cloud) = &object.source {
+        let stars = &e.plan().body.points.stencils;
+        let members = stars.iter().map(|s| s.nodes.len() - 1);
+        let (least, most) = members.fold((usize::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
+        let weights = match cloud.stars.weights {
+            Weights::Compatible => "compatible",
+            Weights::Published => "published",
+        };
+        lines.push(("points", format!("{} of about {:.5} m", cloud.points.len(), content.cell_size)));
+        lines.push(("stars", format!("{least} to {most} neighbours, {weights} weights, residual penalty {}", cloud.stars.residual_penalty)));
+        return;
+    }
     let (mesh, here): (TetMesh, _) = match (&object.source, object.resolution) {
         (BodySource::Tetrahedra { mesh, .. }, _) => (mesh.clone(), None),
         // The plan was made of it a moment ago, so it can be made again.
