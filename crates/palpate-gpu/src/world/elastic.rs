@@ -38,6 +38,9 @@ pub(super) struct ElasticTables {
     /// Clamps that hold a node.
     pub(super) holders: Lists<Holder>,
     volumes: Vec<f32>,
+    /// Of stars, entries of γ A of the residual penalty [m], and where each star's begin.
+    braces: Vec<f32>,
+    brace_rows: Vec<u32>,
 }
 
 impl ElasticTables {
@@ -64,7 +67,16 @@ impl ElasticTables {
                 holders[*node as usize].push(Holder { by, stiffness: *stiffness as f32, area: *area as f32 });
             }
         }
+        let (mut braces, mut brace_rows) = (Vec::new(), Vec::new());
+        if let Some(penalty) = &plan.body.points.stars {
+            for star in 0..plan.body.points.len() {
+                brace_rows.push(braces.len() as u32);
+                braces.extend(penalty.of(star).iter().map(|a| (penalty.factor * a) as f32));
+            }
+        }
         ElasticTables {
+            braces,
+            brace_rows,
             of_node: Lists::new(&of_node),
             of_block: Lists::new(&of_block),
             holders: Lists::new(&holders),
@@ -80,6 +92,8 @@ impl ElasticTables {
     /// Adds them to an arena.
     pub(super) fn put(&self, tables: &mut Arena) {
         tables.put("elastic_volumes", &self.volumes);
+        tables.put("braces", &self.braces);
+        tables.put("brace_rows", &self.brace_rows);
         tables.put("elastic_rows", &self.of_node.rows);
         tables.put("elastic_list", &self.of_node.all);
         tables.put("pair_rows", &self.of_block.rows);

@@ -5,7 +5,7 @@ use super::effects::Effects;
 use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
 use super::mass::MassTable;
-use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
+use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES, FIELD_STARS};
 use crate::device::{Arena, GpuError, Maker};
 use crate::layout::{Cell, Shape};
 use crate::stencils::StencilTable;
@@ -177,7 +177,10 @@ impl Geometry {
             most: MOST_ITERATIONS as u32,
             quantum: (0.25 * body.length).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts().is_empty() && plan.solver.ghost != 0.0),
-            fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
+            fields: effects.bits
+                | if coupled { FIELD_COUPLED } else { 0 }
+                | if mixes { FIELD_MIXES } else { 0 }
+                | if body.points.stars.is_some() { FIELD_STARS } else { 0 },
             time: plan.clock.step as f32,
             aging_rows: effects.aging_rows,
             point_items: n.max(if touched { patches.len() } else { 0 }) as u32,

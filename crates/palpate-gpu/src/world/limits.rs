@@ -83,7 +83,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 27] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 30] {
         [
             ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
             (
@@ -118,6 +118,9 @@ impl Most {
             ("gather_elastic", 10 * self.pairs + 12),
             // Nine derivatives by hyper-dual numbers, or a rotation by Jacobi's method.
             ("tangent_elastic", 9 * 800 + 20 * self.stencil),
+            ("brace_stars", self.valence * (self.stencil + 1)),
+            ("push_stars", self.valence * (self.stencil + 1)),
+            ("pull_stars", self.stencil * (self.stencil + 1) + self.aging),
             ("place_held", self.holders * (1 + self.holders)),
             ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
             // Laws of cells at up to three states of an element, by every number.

@@ -26,10 +26,18 @@ fn field(t: &Table, of_points: bool) -> Result<FieldSpec, InputError> {
     let allowed = || paths.map(|p| format!("\"{}\"", p.0)).join(" or ");
     let varied = t.optional_choice("path", &paths)?.ok_or_else(|| t.missing("path", &allowed()))?;
     let kinds = [("cells", Kind::Cells), ("nodes", Kind::Nodes), ("points", Kind::Points), ("regions", Kind::Regions)];
-    let kind = t.optional_choice("basis", &kinds)?.ok_or_else(|| t.missing("basis", "\"cells\", \"nodes\", \"points\" or \"regions\""))?;
+    let kind = t
+        .optional_choice("basis", &kinds)?
+        .ok_or_else(|| t.missing("basis", "\"cells\", \"nodes\", \"points\" or \"regions\""))?;
     match (kind, of_points) {
-        (Kind::Points, false) => return Err(t.error("basis", "\"points\" belongs to bodies of points (object.discretisation); give \"cells\" or \"nodes\"")),
-        (Kind::Cells | Kind::Nodes, true) => return Err(t.error("basis", "must be \"points\" or \"regions\" on a body of points")),
+        (Kind::Points, false) => {
+            return Err(
+                t.error("basis", "\"points\" belongs to bodies of points (object.discretisation); give \"cells\" or \"nodes\"")
+            );
+        }
+        (Kind::Cells | Kind::Nodes, true) => {
+            return Err(t.error("basis", "must be \"points\" or \"regions\" on a body of points"));
+        }
         _ => {}
     }
     let scales = [("log", Scale::Log), ("linear", Scale::Linear)];

@@ -117,10 +117,9 @@ fn an_unknown_key_names_the_nearest_and_its_line() {
     assert!(error_with("radius = 0.05", "radius = 0.05, centre = [0, 0, 0]").contains("did you mean \"center\"?"));
     assert!(error_with("mass = 0.05", "mas = 0.05").starts_with("scene.toml:14: mass.0.mas: unknown key"));
     assert!(error_with("[time]", "[tiem]").contains("did you mean \"time\"?"));
-    assert!(
-        error_with("cell_size", "zzz")
-            .contains("known: mesh, volume_mesh, points, state, pose, discretisation, cell_size, cells, edge_length, neighbours, weights,")
-    );
+    assert!(error_with("cell_size", "zzz").contains(
+        "known: mesh, volume_mesh, points, state, pose, discretisation, cell_size, cells, edge_length, neighbours, weights,"
+    ));
     assert!(error("format = \"scene/9\"\n").contains("reads \"scene/1\""));
     assert!(error("[object]\n").contains("format = \"scene/1\""));
 }

@@ -2,8 +2,8 @@
 
 use crate::cutcells::places::CellLookup;
 use crate::space::body::Body;
-use crate::space::stencil::StencilBuf;
 use crate::space::stars::lookup::StarLookup;
+use crate::space::stencil::StencilBuf;
 use crate::space::tets::TetLookup;
 use glam::DVec3;
 

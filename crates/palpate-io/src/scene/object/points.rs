@@ -59,7 +59,8 @@ pub(super) fn object(t: &Table, warnings: &mut Vec<String>) -> Result<Object, In
         return Ok(Object { source: hull, pose: pose(t)?, resolution: resolution(t, longest)? });
     }
     if let Some(key) = ["cell_size", "cells", "edge_length"].iter().find(|k| t.has(k)) {
-        let text = "belongs to bodies of cells or tetrahedra; with discretisation = \"points\" the points say how fine the body is";
+        let text =
+            "belongs to bodies of cells or tetrahedra; with discretisation = \"points\" the points say how fine the body is";
         return Err(t.error(key, text.to_string()));
     }
     let stars = stars(t, points.len())?;
@@ -96,6 +97,8 @@ fn read_points(path: &Path) -> Result<Vec<DVec3>, InputError> {
     let array = read_array(path, None)?;
     match array.shape[..] {
         [_, 3] => Ok(array.values.chunks_exact(3).map(DVec3::from_slice).collect()),
-        _ => Err(InputError::file(path, format!("has shape {}, expected (N, 3): x, y, z of every point [m]", array.shape_text()))),
+        _ => {
+            Err(InputError::file(path, format!("has shape {}, expected (N, 3): x, y, z of every point [m]", array.shape_text())))
+        }
     }
 }

@@ -32,7 +32,9 @@ fn refuse(scene: &Scene) -> Result<(), PlanError> {
         None => Ok(()),
         Some(i) => {
             let kind = scene.effects[i].law().kind;
-            let text = format!("\"{kind}\" changes the stress-free shape, which stars are not turned to; use discretisation = \"cells\"");
+            let text = format!(
+                "\"{kind}\" changes the stress-free shape, which stars are not turned to; use discretisation = \"cells\""
+            );
             Err(error(format!("effect.{i}.kind"), text))
         }
     }

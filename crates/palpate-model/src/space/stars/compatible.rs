@@ -67,7 +67,9 @@ pub fn make_compatible(stars: &mut [Star], points: &[DVec3], volume: &[f64], are
         }
     }
     entries.extend((0..n).map(|i| Triplet::new(i, i, SHIFT * trace / n as f64)));
-    let fault = |e: &dyn std::fmt::Debug| format!("compatible weights of the points cannot be found ({e:?}); try weights = \"published\"");
+    let fault = |e: &dyn std::fmt::Debug| {
+        format!("compatible weights of the points cannot be found ({e:?}); try weights = \"published\"")
+    };
     let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &entries).map_err(|e| fault(&e))?;
     let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, SymmetricOrdering::Amd, Default::default())
         .map_err(|e| fault(&e))?;

@@ -2,9 +2,9 @@
 
 use super::graph::{MOST, stars};
 use super::*;
+use crate::scene::Analytic;
 use crate::shape::cloud::around;
 use crate::shape::{MeshShape, Placed};
-use crate::scene::Analytic;
 use glam::{DAffine3, DMat3};
 
 /// A number from −½ to ½ (Weyl's sequence of three dimensions).

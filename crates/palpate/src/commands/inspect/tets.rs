@@ -20,7 +20,10 @@ pub(super) fn tetrahedra(e: &Experiment, content: &mut SceneInspection, lines: &
             Weights::Published => "published",
         };
         lines.push(("points", format!("{} of about {:.5} m", cloud.points.len(), content.cell_size)));
-        lines.push(("stars", format!("{least} to {most} neighbours, {weights} weights, residual penalty {}", cloud.stars.residual_penalty)));
+        lines.push((
+            "stars",
+            format!("{least} to {most} neighbours, {weights} weights, residual penalty {}", cloud.stars.residual_penalty),
+        ));
         return;
     }
     let (mesh, here): (TetMesh, _) = match (&object.source, object.resolution) {
