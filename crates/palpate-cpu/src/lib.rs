@@ -20,6 +20,8 @@ mod quasi_static;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;
+#[cfg(test)]
+mod star_tests;
 mod stress_free;
 #[cfg(test)]
 mod stress_free_tests;

@@ -114,7 +114,7 @@ impl Made {
         p
     }
 
-    fn scene(self) -> Scene {
+    pub fn scene(self) -> Scene {
         let motion = RigidMotion {
             times: vec![-1.0, 0.0, 1.0],
             translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, 0.0), DVec3::new(0.01, 0.0, 0.02)],

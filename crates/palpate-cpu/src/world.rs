@@ -121,7 +121,7 @@ impl World {
 
     pub(crate) fn new(plan: &Plan) -> World {
         let plan = plan.clone();
-        let pattern = Pattern::new(&plan.body);
+        let pattern = Pattern::of(&plan);
         let places = Places::new(&plan, &pattern);
         let classes = Classes::new(&plan);
         let strains = plan.layout.is_viscous().then(|| Elements::new(&plan, &classes, 0.0));

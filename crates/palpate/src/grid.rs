@@ -154,7 +154,9 @@ pub fn grid_check(
         (true, true) => "cells and step",
         (true, false) => "cells",
         (false, true) => "step",
-        (false, false) => return Err(Error::Failed("tetrahedra at rest have neither cells nor step to refine".into())),
+        (false, false) => {
+            return Err(Error::Failed("tetrahedra and points at rest have neither cells nor step to refine".into()));
+        }
     };
     let Level { steps: finer, z, charts } = level(experiments, fitted, FINER, backend, interrupt)?;
     let found = &fitted.result.parameters;

@@ -64,7 +64,7 @@ impl Geometry {
         let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();
-        let pattern = Pattern::new(body);
+        let pattern = Pattern::of(plan);
         let places = Places::new(plan, &pattern);
         let classes = Classes::new(plan);
         let blocks = pattern.blocks.columns.len();

@@ -134,6 +134,8 @@ fn read(t: &Table, file: &Path, array: Option<&str>, kind: Kind) -> Result<Vec<f
                 _ => Err(t.error("file", format!("{}: has shape {}; expected one axis", file.display(), found.shape_text()))),
             }
         }
+        // Points are cells of a grid of vertices as well.
+        Some("vtu") if kind == Kind::Points => read_vtu_array(file, array, true).or_else(|_| read_vtu_array(file, array, false)),
         Some("vtu") => read_vtu_array(file, array, kind == Kind::Cells),
         _ => Err(t.error("file", format!("{}: is not an .npy, .npz or .vtu file", file.display()))),
     }

@@ -93,7 +93,7 @@ pub enum Basis {
     Cells,
     /// One value a node.
     Nodes,
-    /// One value a point, of bodies of points.
+    /// One value a point, of bodies of points: point k is node k and element k.
     Points,
     /// One value a region.
     Regions(Vec<Region>, Blend),
@@ -158,9 +158,8 @@ impl FieldSpec {
     /// Which of its values lie beside each other on a body; `None` of regions.
     pub fn neighbours(&self, body: &Body) -> Option<Neighbours> {
         match self.basis {
-            Basis::Cells => Some(Neighbours::of_elements(body)),
+            Basis::Cells | Basis::Points => Some(Neighbours::of_elements(body)),
             Basis::Nodes => Some(Neighbours::of_nodes(body)),
-            Basis::Points => Some(Neighbours::of_elements(body)),
             Basis::Regions(..) => None,
         }
     }
@@ -222,7 +221,6 @@ impl Field {
                 let share = |nodes: &[u32]| nodes.iter().map(|n| (*n, 1.0 / nodes.len() as f64)).collect();
                 body.element_nodes().map(share).collect()
             }
-            // Point k of a cloud is node k and element k.
             Basis::Cells | Basis::Nodes | Basis::Points => (0..places.len() as u32).map(|own| vec![(own, 1.0)]).collect(),
             Basis::Regions(regions, Blend::Nearest) => places.iter().map(|x| vec![(nearest(regions, *x), 1.0)]).collect(),
             Basis::Regions(regions, Blend::Axis) => places.iter().map(|x| along_axis(regions, *x)).collect(),
@@ -382,12 +380,8 @@ mod tests {
     use crate::shape::shape_of;
 
     fn bar() -> Body {
-        let shape = Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.2, 0.04, 0.04) };
-        let object = Object {
-            source: BodySource::Analytic(shape),
-            pose: glam::DAffine3::IDENTITY,
-            resolution: Resolution::CellSize(0.02),
-        };
+        let source = BodySource::Analytic(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(0.2, 0.04, 0.04) });
+        let object = Object { source, pose: glam::DAffine3::IDENTITY, resolution: Resolution::CellSize(0.02) };
         Body::build(shape_of(&object).as_ref(), 0.02, 0.02, SUBDIVISIONS).unwrap()
     }
 

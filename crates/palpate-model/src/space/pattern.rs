@@ -71,6 +71,17 @@ impl BlockRows {
 impl Pattern {
     /// The pattern of a body (27 neighbours in the bulk, and the ends of ghost lines).
     pub fn new(body: &Body) -> Pattern {
+        Pattern::with(body, [])
+    }
+
+    /// The pattern of a plan: its body's, and the nodes of each place at which something acts. Those of an element are in the body's already; stars
+    /// carry a place by nodes that need not be one star's.
+    pub fn of(plan: &Plan) -> Pattern {
+        let places = plan.driven.iter().flatten().map(|d| &d.stencils).chain([&plan.masses]);
+        Pattern::with(&plan.body, places)
+    }
+
+    fn with<'a>(body: &Body, places: impl IntoIterator<Item = &'a Stencils>) -> Pattern {
         let n = body.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
         let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
@@ -90,6 +101,11 @@ impl Pattern {
         for ghost in body.ghosts() {
             for a in ghost.nodes {
                 neighbours[a as usize].extend_from_slice(&ghost.nodes);
+            }
+        }
+        if body.points.stars.is_some() {
+            for s in places.into_iter().chain([&body.surface]).flat_map(Stencils::iter) {
+                s.nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(s.nodes));
             }
         }
         let blocks = BlockRows::new(neighbours);

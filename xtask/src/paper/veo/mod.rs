@@ -1,10 +1,12 @@
 //! Acceptance of what came with Chen et al., Virtual Elastic Objects (CVPR 2022): sequences of equilibria under known loads. `bench/veo.jsonl` holds a
 //! row a case and commit.
 
+mod bars;
+mod clouds;
 mod states;
 
 use super::acceptance::Aim;
-use super::acceptance::Bound::{AtMost, Below, Between};
+use super::acceptance::Bound::{AtLeast, AtMost, Below, Between};
 use super::acceptance::Figure::{Of, Over};
 use super::cases::{Case, Figures, Set};
 use crate::rows::Measured;
@@ -12,17 +14,37 @@ use crate::rows::Measured;
 /// The study.
 pub const SET: Set = Set { name: "veo", page: "docs/veo.md", cases: &CASES, aims: AIMS, more: &[], measured: Measured::Fits };
 
-const CASES: [(&str, Case); 5] = [
+const CASES: [(&str, Case); 12] = [
     ("states", |data, _| states::run(data, &[])),
     ("states-0", |data, _| states::run(data, states::LOADS[0])),
     ("states-52", |data, _| states::run(data, states::LOADS[1])),
     ("states-102", |data, _| states::run(data, states::LOADS[2])),
     ("held-out", |data, _| states::run(data, states::HALF)),
+    ("bars-4", |_, _| bars::thick(4)),
+    ("bars-6", |_, _| bars::thick(6)),
+    ("bars-modes", |_, _| bars::modes()),
+    ("bars-finer", |_, _| bars::finer()),
+    ("both-bodies", |_, folder| clouds::both(folder)),
+    ("two-parts", |_, folder| clouds::two_parts(folder)),
+    ("cloud-states", |data, folder| clouds::beam(data, folder, &[])),
 ];
 
 const MODULUS: &str = "E [kPa]";
 const RMS: &str = "rms [mm]";
 const TEST: &str = "rms of the other frames [mm]";
+const ROWS: &str = "rows and completeness, largest error";
+const COLUMNS: &str = "columns, largest error over h²";
+const PULLED: &str = "E in tension, largest error [%]";
+const NARROWED: &str = "Poisson's ratio, largest error [%]";
+const BENT: &str = "EI, mean";
+const PUBLISHED: &str = "E by published weights, mean";
+const FEWEST: &str = "fewest zero modes";
+const ZEROS: &str = "zero modes";
+const NEXT: &str = "next mode over the shear modulus";
+const HELD: &str = "rms of the other states, per point over one modulus";
+const RATIO: &str = "outer half over inner half";
+const TIPS: &str = "tip of points over tip of cells";
+const LN: &str = "ln of the moduli's ratio";
 const UNMOVED: &str = "rms of the other frames, not moving [mm]";
 
 /// E within a tenth of fits of single states on hexahedra: 253 to 259, 246 to 248 and 253 to 261 kPa.
@@ -40,6 +62,26 @@ const AIMS: &[Aim] = &[
         "–",
         Below(0.5),
     ),
+    ("A1", "4 points thick: row sums and completeness", "bars-4", Of(ROWS), "–", AtMost(1e-12)),
+    ("A1", "column sums over h²", "bars-4", Of(COLUMNS), "–", AtMost(1e-10)),
+    ("A1", "6 points thick: row sums and completeness", "bars-6", Of(ROWS), "–", AtMost(1e-12)),
+    ("A1", "column sums over h²", "bars-6", Of(COLUMNS), "–", AtMost(1e-10)),
+    ("A2", "4 points thick, 5 draws: largest error of E [%]", "bars-4", Of(PULLED), "–", AtMost(0.1)),
+    ("A2", "of Poisson's ratio [%]", "bars-4", Of(NARROWED), "–", AtMost(0.1)),
+    ("A2", "6 points thick: of E [%]", "bars-6", Of(PULLED), "–", AtMost(0.1)),
+    ("A2", "of Poisson's ratio [%]", "bars-6", Of(NARROWED), "–", AtMost(0.1)),
+    ("A2", "published weights, 4 points thick: E, mean", "bars-4", Of(PUBLISHED), "–", Between(0.5, 0.7)),
+    ("A2", "6 points thick", "bars-6", Of(PUBLISHED), "–", Between(0.5, 0.7)),
+    ("A3", "4 points thick: EI, mean of 5 draws", "bars-4", Of(BENT), "–", AtLeast(0.92)),
+    ("A3", "6 points thick", "bars-6", Of(BENT), "–", AtLeast(0.95)),
+    ("A3", "zero modes of 5³ points, most of 5 draws", "bars-modes", Of(ZEROS), "–", Between(6.0, 6.0)),
+    ("A3", "the next one over μ, least", "bars-modes", Of(NEXT), "–", AtLeast(0.2)),
+    ("A4", "EI of 16k points over that of 4k", "bars-finer", Over("EI, 16k points", "EI, 4k points"), "–", Between(0.97, 1.03)),
+    ("A8", "bar of two parts: per point over one modulus, states not fitted", "two-parts", Of(HELD), "–", AtMost(0.1)),
+    ("A8", "stiffness of the outer half over the inner one", "two-parts", Of(RATIO), "–", Between(0.2, 0.3)),
+    ("A12", "tip of points over that of cells, one cloud", "both-bodies", Of(TIPS), "–", Between(0.95, 1.05)),
+    ("A12", "ln of the moduli's ratio", "both-bodies", Of(LN), "–", Between(-0.1, 0.1)),
+    ("A13", "points: E of all six states [kPa]", "cloud-states", Of(MODULUS), "–", Between(221.4, 287.1)),
 ];
 
 #[cfg(test)]

@@ -102,3 +102,7 @@ fn read_points(path: &Path) -> Result<Vec<DVec3>, InputError> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "points_tests.rs"]
+mod tests;

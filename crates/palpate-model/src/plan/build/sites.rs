@@ -85,7 +85,9 @@ fn marker_site(m: &MarkerRest, body: &Body, lookup: &Lookup, shape: &dyn Shape) 
 /// Points farther from the rest surface than allowed: how many, and the farthest.
 pub(super) fn track_sites(tracks: &TrackRest, body: &Body, shape: &dyn Shape) -> Result<Vec<MarkerSite>, PlanError> {
     let allowed = tracks.tolerance.unwrap_or(TRACK_REACH * body.length);
-    let away: Vec<f64> = tracks.places.par_iter().map(|p| shape.signed_distance(*p).abs()).collect();
+    // Points of a cloud lie within the body as well.
+    let away = |d: f64| if body.points.stars.is_some() { d.max(0.0) } else { d.abs() };
+    let away: Vec<f64> = tracks.places.par_iter().map(|p| away(shape.signed_distance(*p))).collect();
     // What is no number is away as well.
     let far: Vec<usize> = (0..away.len()).filter(|k| away[*k] > allowed || away[*k].is_nan()).collect();
     if let Some(&first) = far.first() {

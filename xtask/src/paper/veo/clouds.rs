@@ -1,0 +1,167 @@
+//! Bodies of points in scenes: against cells made of the same points (A12), a bar of two parts (A8), and the measured beam (A13).
+
+use super::Figures;
+use glam::DVec3;
+use palpate::render::Sensor;
+use palpate::synthetic::{Observers, observe};
+use palpate::{Backend, Experiment, FitOptions, Fitted};
+use palpate_io::cloud::write_cloud;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Points with a layer on the plane x = 0, by which the body is held: in the middles of cubes of edge `h` [m], moved by up to a quarter of it.
+fn held(count: [usize; 3], h: f64) -> Vec<DVec3> {
+    let layer = super::bars::points([1, count[1], count[2]], 11).into_iter().map(|x| x * DVec3::new(0.0, 1.0, 1.0));
+    super::bars::points(count, 12).into_iter().chain(layer).map(|x| h * x).collect()
+}
+
+fn text(e: impl std::fmt::Display) -> String {
+    e.to_string()
+}
+
+fn fitted(e: &Experiment) -> Result<Fitted, String> {
+    e.fit(FitOptions { backend: Backend::Cpu, ..FitOptions::default() }).map_err(text)
+}
+
+/// Writes what is seen of a scene's points at the times of its states.
+fn record(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Path) -> Result<(), String> {
+    let e = Experiment::from_toml(truth, folder.join("truth.toml")).map_err(text)?;
+    let observers = Observers {
+        cameras: Vec::new(),
+        markers: Vec::new(),
+        points: points.to_vec(),
+        displacements: false,
+        times: times.to_vec(),
+        sensor: Sensor { noise, dropout: 0.0, depth_scale: 0.001, seed: 2 },
+    };
+    let mut seen = observe(&e, Backend::Cpu, &observers, |_| ControlFlow::Continue(())).map_err(text)?;
+    if let Some(points) = &mut seen.points {
+        // Points lie deep within cells of half their spacing.
+        points.tolerance = Some(1.0);
+    }
+    palpate_io::write_recording(folder.join("seen"), &seen).map_err(text)
+}
+
+/// Spacing of the bars' points [m].
+const H: f64 = 0.01;
+const MODULUS: f64 = 2e5;
+
+fn bar(object: &str, more: &str) -> String {
+    format!(
+        "format = \"scene/1\"\n[object]\n{object}\n[material]\nmodel = \"neo-hookean\"\ndensity = 1000\nyoungs_modulus = {MODULUS}\npoisson_ratio = 0.3\n\
+         [[clamp]]\nbox = {{ min = [-1, -1, -1], max = [1e-4, 1, 1] }}\n{more}"
+    )
+}
+
+/// A12: one cloud as points and as cells within a surface around it, and the modulus that the points' motion in a body of finer cells gives back.
+pub fn both(folder: &Path) -> Result<Figures, String> {
+    let points = held([16, 4, 4], H);
+    write_cloud(folder.join("rest.ply"), &points).map_err(text)?;
+    let cloud = |kind: &str| format!("points = \"rest.ply\"\nvolume = 2.64e-4\n{kind}");
+    let still = "[initial]\nstate = \"static-equilibrium\"\n[time]\nduration = 0\n";
+    let kinds = [cloud("discretisation = \"points\""), cloud("cell_size = 0.01"), cloud("cell_size = 0.005")];
+    let tip = |object: &String| -> Result<f64, String> {
+        let e = Experiment::from_toml(&bar(object, still), folder.join("s.toml")).map_err(text)?;
+        let s = e.simulate(Backend::Cpu).map_err(text)?;
+        let rest = e.surface(0.5 * H).0;
+        let places = rest.deform(&vec![DVec3::ZERO; e.plan().body.nodes.len()]);
+        let moved = rest.deform(&s.snapshots[0].displacement);
+        let end = places.iter().zip(&moved).filter(|(x, _)| x.x > 15.0 * H).map(|(x, y)| (*y - *x).z);
+        let all: Vec<f64> = end.collect();
+        Ok(all.iter().sum::<f64>() / all.len() as f64)
+    };
+    let tips = kinds.iter().map(tip).collect::<Result<Vec<f64>, _>>()?;
+    record(&bar(&kinds[2], still), &points, &[0.0], 1e-4, folder)?;
+    let fit = "[observation]\nrecording = \"seen\"\ncost = \"points\"\n[fit]\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1e5\n";
+    let found = |object: &String| -> Result<f64, String> {
+        let e = Experiment::from_toml(&bar(object, &format!("{still}{fit}")), folder.join("f.toml")).map_err(text)?;
+        Ok(crate::real::found(&fitted(&e)?, "material.youngs_modulus"))
+    };
+    let [of_points, of_cells] = [found(&kinds[0])?, found(&kinds[1])?];
+    let mut out = Figures::new();
+    for (name, x) in [
+        ("tip of points [mm]", 1e3 * tips[0]),
+        ("tip of cells [mm]", 1e3 * tips[1]),
+        ("tip of finer cells [mm]", 1e3 * tips[2]),
+        (super::TIPS, tips[0] / tips[1]),
+        (super::LN, (of_points / of_cells).ln()),
+    ] {
+        out.insert(name.into(), x);
+    }
+    Ok(out)
+}
+
+/// Force on the end of the bar at every state [N]; the last two are what fits are tried on.
+const LOADS: [[f64; 3]; 6] =
+    [[0.0, 0.0, -0.25], [0.0, 0.25, 0.0], [4.0, 0.0, 0.0], [0.0, -0.2, 0.2], [0.0, 0.15, -0.2], [2.0, 0.0, 0.2]];
+
+/// A8: a bar of two parts, the outer half four times softer, seen on hexahedra twice as fine as the points are apart.
+pub fn two_parts(folder: &Path) -> Result<Figures, String> {
+    let points = held([16, 4, 4], H);
+    write_cloud(folder.join("rest.ply"), &points).map_err(text)?;
+    let places: Vec<String> =
+        (0..16).map(|k| format!("[0.16, {}, {}]", 0.01 * (k % 4) as f64 + 0.005, 0.01 * (k / 4) as f64 + 0.005)).collect();
+    let total: Vec<String> = LOADS.iter().map(|f| format!("{f:?}")).collect();
+    let loads = format!(
+        "[world]\ngravity = [0, 0, 0]\n[time]\nmode = \"quasi-static\"\n[[load]]\nkind = \"file\"\nplaces = [{}]\ntotal = [{}]\ntimes = [0, 1, 2, 3, 4, 5]\n",
+        places.join(", "),
+        total.join(", ")
+    );
+    let hull = "shape = { box = { min = [0, 0, 0], max = [0.16, 0.04, 0.04] } }\n";
+    let halves = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"regions\"\nblend = \"nearest\"\n\
+                  regions = [{ center = [0.04, 0.02, 0.02], radius = 0.01 }, { center = [0.12, 0.02, 0.02], radius = 0.01, value = 0.25 }]\n";
+    let times: Vec<f64> = (0..LOADS.len()).map(|k| k as f64).collect();
+    record(&bar(&format!("{hull}cell_size = 0.005"), &format!("{loads}{halves}")), &points, &times, 0.02 * H, folder)?;
+    let seen = "[observation]\nrecording = \"seen\"\ncost = \"points\"\n[fit]\nframes = { train = { every = 1, count = 4 } }\n";
+    let object = format!("points = \"rest.ply\"\ndiscretisation = \"points\"\n{hull}");
+    let one = "[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1e5\n";
+    let field = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"points\"\n[field.prior]\nkind = \"matern\"\nlength = 0.08\ndeviation = 1.0\n";
+    let free = "[[fit.parameter]]\npath = \"field.0\"\n";
+    let run = |more: &str| -> Result<(Fitted, Vec<f64>), String> {
+        let e = Experiment::from_toml(&bar(&object, &format!("{loads}{seen}{more}")), folder.join("f.toml")).map_err(text)?;
+        let fitted = fitted(&e)?;
+        let values = fitted.result.theta[0][e.plan().layout.resolve("field.0")].to_vec();
+        Ok((fitted, values))
+    };
+    let ((one, _), (many, values)) = (run(one)?, run(&format!("{free}{field}"))?);
+    let held_out = |f: &Fitted| f.held_out.as_ref().map_or(f64::NAN, |h| 1e3 * h.test.rms);
+    let mean_ln = |outer: bool| {
+        let (own, other) = if outer { (0.09, 0.15) } else { (0.01, 0.07) };
+        let of = points.iter().zip(&values).filter(|(x, _)| (own..other).contains(&x.x)).map(|(_, v)| v.ln());
+        let all: Vec<f64> = of.collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    };
+    let mut out = Figures::new();
+    for (name, x) in [
+        ("one modulus: rms of the other states [mm]", held_out(&one)),
+        ("per point: rms of the other states [mm]", held_out(&many)),
+        (super::HELD, held_out(&many) / held_out(&one)),
+        (super::RATIO, (mean_ln(true) - mean_ln(false)).exp()),
+        ("one modulus [kPa]", 1e-3 * crate::real::found(&one, "material.youngs_modulus")),
+        ("evaluations", many.result.evaluations as f64),
+        ("seconds of the fit", many.result.seconds),
+    ] {
+        out.insert(name.into(), x);
+    }
+    Ok(out)
+}
+
+/// A13: the measured beam as a cloud, 6 points thick, within its own surface.
+pub fn beam(data: &Path, folder: &Path, changes: &[(&'static str, &'static str)]) -> Result<Figures, String> {
+    let points: Vec<DVec3> = held([20, 6, 6], 0.005);
+    let file = folder.join("rest.ply");
+    write_cloud(&file, &points).map_err(text)?;
+    let cloud = format!("points = \"{}\"\ndiscretisation = \"points\"", file.display());
+    let mut all = vec![(
+        "cell_size = 0.01              # 3 cells through the thickness: the enhanced element bends without locking",
+        cloud.as_str(),
+    )];
+    all.extend(changes.iter().copied());
+    let e = crate::real::open(data, "beam-quasi-static", &all).map_err(text)?;
+    let fitted = fitted(&e)?;
+    let mut out = Figures::new();
+    out.insert(super::MODULUS.into(), 1e-3 * crate::real::found(&fitted, "material.youngs_modulus"));
+    out.insert(super::RMS.into(), 1e3 * fitted.residual().0);
+    out.insert("seconds of the fit".into(), fitted.result.seconds);
+    Ok(out)
+}
