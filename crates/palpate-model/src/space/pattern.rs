@@ -81,7 +81,7 @@ impl Pattern {
         Pattern::with(&plan.body, places)
     }
 
-    fn with<'a>(body: &Body, places: impl IntoIterator<Item = &'a Stencils>) -> Pattern {
+    fn with<'a>(body: &'a Body, places: impl IntoIterator<Item = &'a Stencils>) -> Pattern {
         let n = body.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::with_capacity(33); n];
         let mut cells: Vec<Vec<(u32, u8)>> = vec![Vec::with_capacity(8); n];
