@@ -3,9 +3,10 @@
 // use shared/brace_asks
 // use shared/grid
 
-// Elastic points, then patches, that have the node: stencil and entry.
+// Elastic points, then patches, that have the node: stencil and entry; and where the points end.
 var<body> elastic_rows: array<u32>;
 var<body> elastic_list: array<vec2<u32>>;
+var<body> star_ends: array<u32>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read> probe: array<vec4<f32>>;
@@ -39,19 +40,17 @@ fn brace_stars(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let share = select(mix.old, mix.fresh, (call.extra & BRACE_OF) == BRACE_NEW);
     var force = vec3(0.0);
     var energy = 0.0;
-    for (var k = elastic_rows[p.item]; k < elastic_rows[p.item + 1u]; k++) {
+    for (var k = elastic_rows[p.item]; k < star_ends[p.item]; k++) {
         let at = elastic_list[k];
-        if at.x < shape.elastic {
-            var sum = vec3(0.0);
-            for (var c = stencil_rows[at.x]; c < stencil_rows[at.x + 1u]; c++) {
-                sum += brace_at(at.x, at.y, c) * apart(at_node(p.member, stencil_entries[c].node), a);
-            }
-            let star = at_node(p.member, stencil_entries[stencil_rows[at.x]].node);
-            let scale = share * young_at(m, p.member, at.x) * m.lame.y;
-            force += scale * sum;
-            // Σ_a u_a · (A u)_a, counted from the star's own node.
-            energy += 0.5 * scale * dot(apart(a, star), sum);
+        var sum = vec3(0.0);
+        for (var c = stencil_rows[at.x]; c < end_of_star(at.x); c++) {
+            sum += brace_at(at.x, at.y, c) * apart(at_node(p.member, stencil_entries[c].node), a);
         }
+        let star = at_node(p.member, stencil_entries[stencil_rows[at.x]].node);
+        let scale = share * young_at(m, p.member, at.x) * m.lame.y;
+        force += scale * sum;
+        // Σ_a u_a · (A u)_a, counted from the star's own node.
+        energy += 0.5 * scale * dot(apart(a, star), sum);
     }
     if (call.extra & BRACE_RESIDUAL) == 0u {
         forces[a] += vec4(select(1.0, -1.0, (call.extra & BRACE_MINUS) != 0u) * force, 0.0);

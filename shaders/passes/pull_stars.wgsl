@@ -21,12 +21,12 @@ fn pull_stars(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let mix = mix_of(m);
     let o = at_node(p.member, stencil_entries[stencil_rows[p.item]].node);
     var form = 0.0;
-    for (var c = stencil_rows[p.item]; c < stencil_rows[p.item + 1u]; c++) {
+    for (var c = stencil_rows[p.item]; c < end_of_star(p.item); c++) {
         let b = at_node(p.member, stencil_entries[c].node);
         let fresh = (next[b].xyz - next[o].xyz) + (next[part(1u) + b].xyz - next[part(1u) + o].xyz);
         let old = (now[b].xyz - now[o].xyz) + (now[part(1u) + b].xyz - now[part(1u) + o].xyz);
         let moved = mix.fresh * fresh + mix.old * old;
-        for (var r = stencil_rows[p.item]; r < stencil_rows[p.item + 1u]; r++) {
+        for (var r = stencil_rows[p.item]; r < end_of_star(p.item); r++) {
             let z = probe[at_node(p.member, stencil_entries[r].node)].xyz - probe[o].xyz;
             form += brace_at(p.item, r, c) * dot(z, moved);
         }

@@ -3,9 +3,10 @@
 // use shared/rates
 // use shared/grid
 
-// Elastic points, then patches, that have the node: stencil and entry.
+// Elastic points, then patches, that have the node: stencil and entry; and where the points end.
 var<body> elastic_rows: array<u32>;
 var<body> elastic_list: array<vec2<u32>>;
+var<body> star_ends: array<u32>;
 var<storage, read> now: array<vec4<f32>>;
 var<storage, read> next: array<vec4<f32>>;
 var<storage, read_write> forces: array<vec4<f32>>;
@@ -28,19 +29,17 @@ fn push_stars(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
     let mix = mix_of(m);
     let a = at_node(p.member, p.item);
     var force = vec3(0.0);
-    for (var k = elastic_rows[p.item]; k < elastic_rows[p.item + 1u]; k++) {
+    for (var k = elastic_rows[p.item]; k < star_ends[p.item]; k++) {
         let at = elastic_list[k];
-        if at.x < shape.elastic {
-            var sum = vec3(0.0);
-            for (var c = stencil_rows[at.x]; c < stencil_rows[at.x + 1u]; c++) {
-                sum += brace_at(at.x, at.y, c) * apart(mix, at_node(p.member, stencil_entries[c].node), a);
-            }
-            var scale = young_rate(m, p.member, at.x) * m.lame.y;
-            if with_rate(WITH_POISSON) {
-                scale += young_at(m, p.member, at.x) * m.lame.w * rates[p.member].poisson;
-            }
-            force += scale * sum;
+        var sum = vec3(0.0);
+        for (var c = stencil_rows[at.x]; c < end_of_star(at.x); c++) {
+            sum += brace_at(at.x, at.y, c) * apart(mix, at_node(p.member, stencil_entries[c].node), a);
         }
+        var scale = young_rate(m, p.member, at.x) * m.lame.y;
+        if with_rate(WITH_POISSON) {
+            scale += young_at(m, p.member, at.x) * m.lame.w * rates[p.member].poisson;
+        }
+        force += scale * sum;
     }
     forces[a] += vec4(force, 0.0);
 }

@@ -13,6 +13,10 @@ fn has_stars() -> bool {
     return (shape.fields & FIELD_STARS) != 0u;
 }
 
+fn end_of_star(star: u32) -> u32 {
+    return stencil_rows[star + 1u];
+}
+
 // Entry of γ A of a star at two entries of its stencil.
 fn brace_at(star: u32, row: u32, column: u32) -> f32 {
     let first = stencil_rows[star];

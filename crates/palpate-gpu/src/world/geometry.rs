@@ -139,6 +139,8 @@ impl Geometry {
             masses: plan.masses.len() as u64,
             stencil: stencils.longest() as u64,
             valence: elastic.of_node.longest(),
+            stars: elastic.most_stars(),
+            star: body.points.stencils.iter().map(|s| s.nodes.len()).max().unwrap_or(0) as u64,
             pairs: elastic.of_block.longest(),
             holders: elastic.holders.longest(),
             grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
