@@ -78,8 +78,9 @@ fn main() {
 }
 
 /// Shared files whose whole numbers Rust uses as well.
-const NUMBERED: [&str; 12] = [
+const NUMBERED: [&str; 13] = [
     "asks",
+    "brace_asks",
     "directions",
     "efforts",
     "elastic_asks",

@@ -3,6 +3,7 @@
 // use shared/inertia
 // use shared/elastic_asks
 // use shared/unstrained
+// use shared/braces
 
 struct Pair { // mirrored
     // Both entries of a stencil that make the block.
@@ -43,11 +44,17 @@ fn gather_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if !p.live {
         return;
     }
+    let m = members[p.member];
+    let mix = mix_of(m);
     var sum = mat3x3<f32>();
+    var braced = 0.0;
     for (var k = pair_rows[p.item]; k < pair_rows[p.item + 1u]; k++) {
         let pair = pairs[k];
         if pair.stencil < shape.elastic {
             sum += elastic_block(p.member, pair);
+            if has_stars() {
+                braced += young_at(m, p.member, pair.stencil) * m.lame.y * brace_at(pair.stencil, pair.row, pair.column);
+            }
         } else {
             let w = stencil_entries[pair.row].weight * stencil_entries[pair.column].weight;
             let s = 3u * (p.member * shape.patches + pair.stencil - shape.first_patch);
@@ -56,12 +63,11 @@ fn gather_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             sum += mat3x3(vec3(d.x, o.x, o.y), vec3(o.x, d.y, o.z), vec3(o.y, o.z, d.z));
         }
     }
-    let m = members[p.member];
-    let damped = mix_of(m).drag * block_mass(m, p.member, p.item);
+    let diagonal = mix.drag * block_mass(m, p.member, p.item) + mix.fresh * braced;
     let at = (p.member * shape.blocks + p.item) * 9u;
     for (var row = 0u; row < 3u; row++) {
         for (var column = 0u; column < 3u; column++) {
-            values[at + 3u * row + column] += sum[column][row] + select(0.0, damped, row == column);
+            values[at + 3u * row + column] += sum[column][row] + select(0.0, diagonal, row == column);
         }
     }
 }

@@ -1,7 +1,8 @@
-//! Derivatives by the density of every tetrahedron: z · M a over the density, M its mass matrix. The point that has the element's mean knows its nodes.
+//! Derivatives by the density of every tetrahedron or star: z · M a over the density, M its mass matrix. The point that has the element's mean knows its nodes.
 // use shared/mix
 // use shared/stencil
 // use shared/motion
+// use shared/braces
 
 // [m³]
 var<body> elastic_volumes: array<f32>;
@@ -20,15 +21,22 @@ fn pull_densities(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     }
     let m = members[p.member];
     let first = stencil_rows[p.item];
-    let count = stencil_rows[p.item + 1u] - first;
+    // A star's own node, which is its first, has all of its mass.
+    let count = select(stencil_rows[p.item + 1u] - first, 1u, has_stars());
     var by = 0.0;
     for (var j = stencil_rows[p.item]; j < stencil_rows[p.item + 1u]; j++) {
+        if j - first >= count {
+            break;
+        }
         let node = stencil_entries[j].node;
         var pull = acceleration(p.member, node, m);
         if call.mode != 0u {
             pull += m.mass_damping * speed(p.member, node);
         }
         for (var i = stencil_rows[p.item]; i < stencil_rows[p.item + 1u]; i++) {
+            if i - first >= count {
+                break;
+            }
             let z = probe[at_node(p.member, stencil_entries[i].node)].xyz;
             by += mass_shares[(i - first) * count + j - first] * dot(z, pull);
         }

@@ -10,13 +10,14 @@ var<storage, read_write> health: array<Health>;
 const ACCEPTABLE = 1e-3;
 
 // `of_rhs`: rᵀ M⁻¹ r of the right-hand side; `along_rhs`: xᵀ times it, which is Σ α rᵀ M⁻¹ r over the iterations. `exact`: the solve is for a
-// derivative; then a negative curvature is an error, and no line search follows.
+// derivative; then a negative curvature is an error where much is left, and no line search follows.
 fn leave_cg(local: u32, member: u32, found: Newton, of_rhs: f32, along_rhs: f32, bent: bool, over: bool, exact: bool) {
     var n = found;
     var broken = 0u;
     // Of nothing nothing is left.
     let relative = sqrt(max(n.rz, 0.0) / max(of_rhs, 1e-37));
-    let cut = bent && !exact && n.cg > 1u;
+    // Of a derivative whose load stiff springs bear but for rounding, that rounding is all that bends.
+    let cut = bent && select(n.cg > 1u, relative <= ACCEPTABLE, exact);
     let negative = bent && !cut;
     let ended = over || cut;
     if negative {

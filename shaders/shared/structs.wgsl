@@ -126,6 +126,8 @@ const MOST_COUNT = 255u;
 // From this bit on the number of the material, 0 where it is linear.
 const MATERIAL_AT = 20u;
 const MOST_MATERIALS = 255u;
+// A body of stars, which have a residual penalty and bear their own mass alone.
+const FIELD_STARS = 0x10000000u;
 // Some stages start from several states; this one does: `now` is their weighted sum.
 const FIELD_MIXES = 0x40000000u;
 const FIELD_SEVERAL = 0x80000000u;

@@ -56,7 +56,7 @@ impl<'a> Sizes<'a> {
     /// Of a plan.
     pub fn new(plan: &'a Plan) -> Sizes<'a> {
         let (body, band) = (&plan.body, &plan.body.band);
-        let pattern = Pattern::new(body);
+        let pattern = Pattern::of(plan);
         let blocks = pattern.blocks.columns.len();
         let held: usize = plan.clamps.iter().map(|c| c.cells.len()).sum();
         let points_of = |r: usize| plan.recording(r).observation.frames.iter().map(|f| f.points.len()).sum::<usize>();

@@ -10,6 +10,7 @@ mod elastic_points;
 mod held_nodes;
 mod nodes;
 mod point_laws;
+mod star_penalty;
 mod start;
 
 use crate::device::pipelines::pass;
@@ -22,13 +23,14 @@ use crate::world::{Rates, SOLVING, Sums, Tally, World};
 use palpate_model::effects::Site;
 use palpate_model::params::coefficients::Sought;
 
-const TERMS: [&dyn Term; 8] = [
+const TERMS: [&dyn Term; 9] = [
     &contact::Contact,
     &point_laws::SurfaceLaws,
     &clamps::Clamps,
     &elastic_cells::ElasticCells,
     &nodes::Nodes,
     &point_laws::NodeLaws,
+    &star_penalty::StarPenalty,
     &elastic_points::ElasticPoints,
     &held_nodes::HeldNodes,
 ];

@@ -183,7 +183,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
     let coefficients = Coefficients::new(plan, &plan.theta);
     let physics = &coefficients.physics;
     let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
-    let pattern = Pattern::new(&plan.body);
+    let pattern = Pattern::of(plan);
     let places = Places::new(plan, &pattern);
     let altered = Altered::new(plan, &coefficients, &elements);
     let masses = mass_matrix(plan, &pattern, &places, &coefficients);
@@ -261,7 +261,7 @@ impl Exact {
         whole.tangent(u1, Curvature::Exact, &mut matrix);
         // Rows of blocks, as the device keeps them.
         let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
-        let mut exact = Exact { given, pattern: Pattern::new(&plan.body), matrix, parts: Vec::new() };
+        let mut exact = Exact { given, pattern: Pattern::of(plan), matrix, parts: Vec::new() };
         let load = exact.scaled(&load(plan));
         exact.parts = vec![
             ("place_next", flat(u1)),

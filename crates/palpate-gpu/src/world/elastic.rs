@@ -38,6 +38,11 @@ pub(super) struct ElasticTables {
     /// Clamps that hold a node.
     pub(super) holders: Lists<Holder>,
     volumes: Vec<f32>,
+    /// Of stars, entries of γ A of the residual penalty [m], and where each star's begin.
+    braces: Vec<f32>,
+    brace_rows: Vec<u32>,
+    /// Where the points end in each node's list of `of_node`.
+    star_ends: Vec<u32>,
 }
 
 impl ElasticTables {
@@ -64,12 +69,36 @@ impl ElasticTables {
                 holders[*node as usize].push(Holder { by, stiffness: *stiffness as f32, area: *area as f32 });
             }
         }
+        let (mut braces, mut brace_rows) = (Vec::new(), Vec::new());
+        if let Some(penalty) = &plan.body.points.stars {
+            for star in 0..plan.body.points.len() {
+                brace_rows.push(braces.len() as u32);
+                braces.extend(penalty.of(star).iter().map(|a| (penalty.factor * a) as f32));
+            }
+        }
+        let of_node = Lists::new(&of_node);
+        let mut star_ends = Vec::new();
+        if plan.body.points.stars.is_some() {
+            let count = plan.body.points.len() as u32;
+            let end = |rows: &[u32]| {
+                rows[0] + of_node.all[rows[0] as usize..rows[1] as usize].partition_point(|at| at[0] < count) as u32
+            };
+            star_ends.extend(of_node.rows.windows(2).map(end));
+        }
         ElasticTables {
-            of_node: Lists::new(&of_node),
+            star_ends,
+            braces,
+            brace_rows,
+            of_node,
             of_block: Lists::new(&of_block),
             holders: Lists::new(&holders),
             volumes: plan.body.points.volume.iter().map(|v| *v as f32).collect(),
         }
+    }
+
+    /// Most stars that have a node.
+    pub(super) fn most_stars(&self) -> u64 {
+        self.star_ends.iter().zip(&self.of_node.rows).map(|(end, first)| u64::from(end - first)).max().unwrap_or(0)
     }
 
     /// True where clamps hold nodes.
@@ -80,6 +109,9 @@ impl ElasticTables {
     /// Adds them to an arena.
     pub(super) fn put(&self, tables: &mut Arena) {
         tables.put("elastic_volumes", &self.volumes);
+        tables.put("braces", &self.braces);
+        tables.put("brace_rows", &self.brace_rows);
+        tables.put("star_ends", &self.star_ends);
         tables.put("elastic_rows", &self.of_node.rows);
         tables.put("elastic_list", &self.of_node.all);
         tables.put("pair_rows", &self.of_block.rows);

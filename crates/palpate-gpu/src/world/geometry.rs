@@ -5,7 +5,7 @@ use super::effects::Effects;
 use super::elastic::ElasticTables;
 use super::limits::{LOOPS, Most, check_loops};
 use super::mass::MassTable;
-use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES};
+use crate::device::pipelines::shared::structs::{FIELD_COUPLED, FIELD_MIXES, FIELD_STARS};
 use crate::device::{Arena, GpuError, Maker};
 use crate::layout::{Cell, Shape};
 use crate::stencils::StencilTable;
@@ -64,7 +64,7 @@ impl Geometry {
         let coupled = along || effects.on_patches();
         let body = &plan.body;
         let n = body.nodes.len();
-        let pattern = Pattern::new(body);
+        let pattern = Pattern::of(plan);
         let places = Places::new(plan, &pattern);
         let classes = Classes::new(plan);
         let blocks = pattern.blocks.columns.len();
@@ -139,6 +139,8 @@ impl Geometry {
             masses: plan.masses.len() as u64,
             stencil: stencils.longest() as u64,
             valence: elastic.of_node.longest(),
+            stars: elastic.most_stars(),
+            star: body.points.stencils.iter().map(|s| s.nodes.len()).max().unwrap_or(0) as u64,
             pairs: elastic.of_block.longest(),
             holders: elastic.holders.longest(),
             grips: effects.hold_numbers().iter().map(|n| u64::from(*n)).sum(),
@@ -177,7 +179,10 @@ impl Geometry {
             most: MOST_ITERATIONS as u32,
             quantum: (0.25 * body.length).log2().floor().exp2() as f32,
             ghosts: u32::from(!body.ghosts().is_empty() && plan.solver.ghost != 0.0),
-            fields: effects.bits | if coupled { FIELD_COUPLED } else { 0 } | if mixes { FIELD_MIXES } else { 0 },
+            fields: effects.bits
+                | if coupled { FIELD_COUPLED } else { 0 }
+                | if mixes { FIELD_MIXES } else { 0 }
+                | if body.points.stars.is_some() { FIELD_STARS } else { 0 },
             time: plan.clock.step as f32,
             aging_rows: effects.aging_rows,
             point_items: n.max(if touched { patches.len() } else { 0 }) as u32,

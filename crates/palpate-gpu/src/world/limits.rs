@@ -35,6 +35,9 @@ pub(crate) struct Most {
     /// Elastic points and patches that have a node, and that make a block.
     pub(crate) valence: u64,
     pub(crate) pairs: u64,
+    /// Stars that have a node, and nodes of an elastic point.
+    pub(crate) stars: u64,
+    pub(crate) star: u64,
     /// Clamps that hold a node.
     pub(crate) holders: u64,
     /// Numbers of effects on clamps, those that change matrices twice.
@@ -83,7 +86,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 27] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 30] {
         [
             ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
             (
@@ -118,6 +121,9 @@ impl Most {
             ("gather_elastic", 10 * self.pairs + 12),
             // Nine derivatives by hyper-dual numbers, or a rotation by Jacobi's method.
             ("tangent_elastic", 9 * 800 + 20 * self.stencil),
+            ("brace_stars", self.stars * (self.star + 1)),
+            ("push_stars", self.stars * (self.star + 1)),
+            ("pull_stars", self.star * (self.star + 1) + self.aging),
             ("place_held", self.holders * (1 + self.holders)),
             ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),
             // Laws of cells at up to three states of an element, by every number.

@@ -1,4 +1,5 @@
-//! The mass matrix of a body of tetrahedra, entry by entry of the pattern of blocks; densities may vary over the body from member to member.
+//! The mass matrix of a body of tetrahedra or of stars, which bear their own mass alone, entry by entry of the pattern of blocks; densities may vary
+//! over the body from member to member.
 
 use crate::device::Arena;
 use palpate_model::plan::Plan;
@@ -8,7 +9,7 @@ use palpate_model::space::tets::{lumped_mean, mass};
 /// Where elements add to the matrix.
 #[derive(Debug)]
 pub(crate) struct MassTable {
-    /// Nodes of an element; zero for a body of cells.
+    /// Nodes that bear an element's mass; zero for a body of cells.
     nodes: usize,
     /// Entries of an element's matrix over its mass, row by row.
     shares: Vec<f64>,
@@ -20,9 +21,11 @@ pub(crate) struct MassTable {
 impl MassTable {
     pub(super) fn new(plan: &Plan, places: &Places, blocks: usize) -> MassTable {
         let points = &plan.body.points;
-        let nodes = points.means().next().map_or(0, |s| s.nodes.len());
+        let nodes = if points.is_empty() { 0 } else { points.bearers(0).nodes.len() };
         let shares = (0..nodes * nodes).map(|k| mass(nodes, k / nodes, k % nodes)).collect();
-        let places = (0..points.elements()).flat_map(|e| places.points.of(points.mean_point(e)).iter().copied()).collect();
+        // A star's first block is its own point's.
+        let own = |e| places.points.of(points.mean_point(e)).iter().copied().take(nodes * nodes);
+        let places = (0..points.elements()).flat_map(own).collect();
         MassTable { nodes, shares, places, blocks }
     }
 
@@ -35,7 +38,7 @@ impl MassTable {
     pub(super) fn matrix(&self, plan: &Plan, factors: Option<&[f64]>) -> Vec<f64> {
         let (points, mut out) = (&plan.body.points, vec![0.0; self.entries()]);
         for (e, places) in self.places.chunks_exact(self.shares.len().max(1)).enumerate() {
-            let volume = points.element_volume(e) * factors.map_or(1.0, |f| lumped_mean(&points.mean(e), f));
+            let volume = points.element_volume(e) * factors.map_or(1.0, |f| lumped_mean(&points.bearers(e), f));
             places.iter().zip(&self.shares).for_each(|(place, share)| out[*place as usize] += volume * share);
         }
         out

@@ -218,7 +218,8 @@ impl Member<'_> {
     fn densities_of_nodes(&self, plan: &Plan, density: f64) -> Vec<f64> {
         let (points, mut out) = (&plan.body.points, vec![0.0; plan.body.nodes.len()]);
         let pulls = self.items("density_pulls", self.shape.elastic, 1);
-        for (e, s) in points.means().enumerate() {
+        for e in 0..points.elements() {
+            let s = points.bearers(e);
             let by = density * pulls[points.mean_point(e)];
             s.nodes.iter().zip(lumped(s.nodes.len())).for_each(|(n, w)| out[*n as usize] += w * by);
         }
