@@ -163,7 +163,7 @@ impl<'a> Machine<'a> {
     }
 
     /// Values down to the last mark, in order.
-    fn to_mark(&mut self) -> Result<Vec<At>, String> {
+    fn up_to_mark(&mut self) -> Result<Vec<At>, String> {
         let begin = self.stack.iter().rposition(|at| self.values[*at] == Value::Mark).ok_or("the pickle lacks a mark")?;
         let all = self.stack.split_off(begin + 1);
         self.stack.pop();
@@ -186,7 +186,7 @@ impl<'a> Machine<'a> {
     }
 
     fn set(&mut self, more: Vec<At>) -> Result<(), String> {
-        if more.len() % 2 != 0 {
+        if !more.len().is_multiple_of(2) {
             return Err("the pickle has a key without a value".into());
         }
         let at = self.last()?;
@@ -230,7 +230,7 @@ impl<'a> Machine<'a> {
                 b'.' => return self.pop(),
                 b'(' => self.push(Value::Mark)?,
                 b'0' => drop(self.pop()?),
-                b'1' => drop(self.to_mark()?),
+                b'1' => drop(self.up_to_mark()?),
                 b'N' => self.push(Value::None)?,
                 0x88 => self.push(Value::Bool(true))?,
                 0x89 => self.push(Value::Bool(false))?,
@@ -268,7 +268,7 @@ impl<'a> Machine<'a> {
                 b'}' => self.push(Value::Dict(Vec::new()))?,
                 0x85..=0x87 => self.tuple(usize::from(code) - 0x84)?,
                 b't' | b'l' => {
-                    let all = self.to_mark()?;
+                    let all = self.up_to_mark()?;
                     self.push(Value::List(all))?;
                 }
                 b'a' => {
@@ -276,7 +276,7 @@ impl<'a> Machine<'a> {
                     self.append(vec![one])?;
                 }
                 b'e' => {
-                    let all = self.to_mark()?;
+                    let all = self.up_to_mark()?;
                     self.append(all)?;
                 }
                 b's' => {
@@ -284,7 +284,7 @@ impl<'a> Machine<'a> {
                     self.set(vec![key, value])?;
                 }
                 b'u' => {
-                    let all = self.to_mark()?;
+                    let all = self.up_to_mark()?;
                     self.set(all)?;
                 }
                 b'q' => {

@@ -205,7 +205,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
         inertia: Some(Rates { displacement: 1.0 / (theta * dt * dt), velocity: 1.0 / (theta * dt), rate: 1.0 / dt }),
         weights: Weights { new: theta, old: 1.0 - theta, rate: physics.stiffness_damping / dt },
         time: physics.start + dt,
-        past: Past { u: &u0, v: &v0, each: &[(1.0, &u0)] },
+        past: Past { u: &u0, v: &v0, each: &[(1.0, &u0)], lag: None },
     };
     let u1 = placed(&context, given, 1.0);
     work(context, &u1)

@@ -78,7 +78,8 @@ fn star(points: &[DVec3], i: u32, neighbours: &[u32]) -> Option<Star> {
     }
     let values = eigen(std::array::from_fn(|r| std::array::from_fn(|c| moment.col(c)[r]))).0;
     let (least, most) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), v| (a.min(*v), b.max(*v)));
-    if neighbours.len() < 3 || !(least * WORST > most) {
+    let spread = least * WORST > most;
+    if neighbours.len() < 3 || !spread {
         return None;
     }
     let inverse = moment.inverse();
