@@ -4,16 +4,11 @@ use crate::costs::{Along, Instant, blend};
 use crate::linear::vector::{self, Nodes};
 use crate::newton;
 use crate::simulate;
-use crate::stress_free;
 use crate::terms::zeros;
 use crate::world::{Adjoint, Gradient, Member, MemberState, MemberTally, MemberTangent, State, Tally, Tangent, World};
 use glam::{DMat3, DVec3};
-use palpate_engine::{
-    Backend, BuildError, Curvature, Direction, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rows, StressFree,
-    StressFreeShapes,
-};
+use palpate_engine::{Backend, BuildError, Curvature, Direction, Evaluation, Failure, FrameResiduals, ParamBatch, Request, Rows};
 use palpate_model::params::ParamKey;
-use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use rayon::prelude::*;
@@ -54,42 +49,6 @@ impl CpuBackend {
         let (shared, member) = (&world.shared, &mut world.members[0]);
         simulate::start(shared, member, &mut first.members[0]).map_err(|reason| newton::at(0.0)(reason).in_plan(plan, theta))?;
         Ok(world.members.remove(0).coefficients.changes.rest.unwrap_or_default())
-    }
-}
-
-impl StressFree for CpuBackend {
-    fn open(&self, plan: &Plan) -> Box<dyn StressFreeShapes> {
-        faer::set_global_parallelism(faer::Par::Seq);
-        Box::new(World::new(plan))
-    }
-}
-
-impl World {
-    fn failed_at_start(&self, member: usize) -> impl Fn(newton::Reason) -> Failure {
-        move |reason| newton::at(0.0)(reason).in_plan(&self.shared.plan, &self.members[member].theta)
-    }
-}
-
-impl StressFreeShapes for World {
-    fn find(&mut self, theta: &ParamBatch) -> Vec<Result<Nodes, Failure>> {
-        self.set_params(theta);
-        let shared = &self.shared;
-        let found: Vec<_> = self.members.par_iter_mut().map(|m| simulate::make_stress_free(shared, m)).collect();
-        let w = |(b, found): (usize, Result<(), newton::Reason>)| {
-            found.map(|()| self.members[b].coefficients.changes.rest.clone().unwrap_or_default()).map_err(self.failed_at_start(b))
-        };
-        found.into_iter().enumerate().map(w).collect()
-    }
-
-    fn along(&self, member: usize, rates: &mut [Coefficients]) -> Result<(), Failure> {
-        stress_free::along(&self.shared, &self.members[member], rates).map_err(self.failed_at_start(member))
-    }
-
-    fn pull(&self, member: usize, sought: &Sought, gradient: &mut Coefficients) -> Result<(), Failure> {
-        let mut own = Gradient { coefficients: gradient.clone(), sought: sought.clone(), wanted: Vec::new() };
-        stress_free::pull(&self.shared, &self.members[member], &mut own).map_err(self.failed_at_start(member))?;
-        *gradient = own.coefficients;
-        Ok(())
     }
 }
 

@@ -11,19 +11,21 @@
 //!
 //! J is not symmetric, and close to minus the tangent stiffness, whose factor preconditions it.
 
+use crate::CpuBackend;
 use crate::linear::gmres;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
 use crate::newton::{self, EVER_TAMER, Reason};
-use crate::simulate::{Start, context};
+use crate::simulate::{Start, context, make_stress_free};
 use crate::terms::altered::Altered;
 use crate::terms::{Equation, zeros};
-use crate::world::{Balanced, Gradient, Member, Shared};
+use crate::world::{Balanced, Gradient, Member, Shared, World};
 use glam::DVec3;
-use palpate_engine::{FailureKind, number};
+use palpate_engine::{Failure, FailureKind, ParamBatch, StressFree, StressFreeShapes, number};
 use palpate_model::params::changes;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
 use palpate_model::scene::InitialShape;
+use rayon::prelude::*;
 
 /// Newton iterations at a share of the load. From the share before they converge quadratically, or not at all.
 const ITERATIONS: usize = 12;
@@ -258,4 +260,40 @@ pub(crate) fn pull(shared: &Shared, member: &Member, gradient: &mut Gradient) ->
         gradient.coefficients.changes.rest = Some(by_rest);
     }
     Ok(())
+}
+
+impl StressFree for CpuBackend {
+    fn open(&self, plan: &Plan) -> Box<dyn StressFreeShapes> {
+        faer::set_global_parallelism(faer::Par::Seq);
+        Box::new(World::new(plan))
+    }
+}
+
+impl World {
+    fn failed_at_start(&self, member: usize) -> impl Fn(Reason) -> Failure {
+        move |reason| newton::at(0.0)(reason).in_plan(&self.shared.plan, &self.members[member].theta)
+    }
+}
+
+impl StressFreeShapes for World {
+    fn find(&mut self, theta: &ParamBatch) -> Vec<Result<Nodes, Failure>> {
+        self.set_params(theta);
+        let shared = &self.shared;
+        let found: Vec<_> = self.members.par_iter_mut().map(|m| make_stress_free(shared, m)).collect();
+        let w = |(b, found): (usize, Result<(), Reason>)| {
+            found.map(|()| self.members[b].coefficients.changes.rest.clone().unwrap_or_default()).map_err(self.failed_at_start(b))
+        };
+        found.into_iter().enumerate().map(w).collect()
+    }
+
+    fn along(&self, member: usize, rates: &mut [Coefficients]) -> Result<(), Failure> {
+        along(&self.shared, &self.members[member], rates).map_err(self.failed_at_start(member))
+    }
+
+    fn pull(&self, member: usize, sought: &Sought, gradient: &mut Coefficients) -> Result<(), Failure> {
+        let mut own = Gradient { coefficients: gradient.clone(), sought: sought.clone(), wanted: Vec::new() };
+        pull(&self.shared, &self.members[member], &mut own).map_err(self.failed_at_start(member))?;
+        *gradient = own.coefficients;
+        Ok(())
+    }
 }
