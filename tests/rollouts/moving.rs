@@ -78,7 +78,9 @@ fn derivatives_by_a_jet_in_motion_are_exact() {
 fn derivatives_of_an_equilibrium_under_a_jet_are_exact() {
     let mut s = beam();
     // It bends the beam by a fifth of its length, so that the force depends on the shape.
-    s.effects = vec![jet(DVec3::new(0.09, 0.015, 0.2), DVec3::new(0.08, 0.02, 0.19), -DVec3::Z, 0.6)];
+    // Askew, so that no face lies along it: there the force begins with its square, which spoils differences.
+    let axis = DVec3::new(-0.2, -0.35, -1.0).normalize();
+    s.effects = vec![jet(DVec3::new(0.12, 0.075, 0.2), DVec3::new(0.11, 0.08, 0.19), axis, 0.6)];
     let plan = planned(&s, tracks(&[0.3, 1.0]));
     let some = |key| matches!(key, ParamKey::Effect { .. } | ParamKey::YoungsModulus | ParamKey::PoissonRatio);
     check_some(&plan, "jet on a sequence", some);

@@ -328,7 +328,7 @@ fn impossible_fields_are_refused_with_what_is_allowed() {
         ("basis = \"cells\"", "field.0.path: missing; expected"),
         ("path = \"material.poisson_ratio\"", "allowed: \"material.youngs_modulus\", \"material.density\""),
         ("path = \"material.density\"", "field.0.basis: missing; expected"),
-        ("path = \"material.density\"\nbasis = \"modes\"", "allowed: \"cells\", \"nodes\", \"regions\""),
+        ("path = \"material.density\"\nbasis = \"modes\"", "allowed: \"cells\", \"nodes\", \"points\", \"regions\""),
         ("path = \"material.density\"\nbasis = \"regions\"", "field.0.regions: missing; expected"),
         ("path = \"material.density\"\nbasis = \"cells\"\nblend = \"axis\"", "field.0.blend: belongs to basis = \"regions\""),
         ("path = \"material.density\"\nbasis = \"cells\"\nfile = \"none.npy\"", "field.0.file: there is no file"),
