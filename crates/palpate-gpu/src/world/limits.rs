@@ -122,7 +122,7 @@ impl Most {
             // Nine derivatives by hyper-dual numbers, or a rotation by Jacobi's method.
             ("tangent_elastic", 9 * 800 + 20 * self.stencil),
             ("brace_stars", self.stars * (self.star + 1)),
-            ("push_stars", self.stars * (self.star + 1)),
+            ("push_stars", self.stars * (self.star + 1 + self.aging)),
             ("pull_stars", self.star * (self.star + 1) + self.aging),
             ("place_held", self.holders * (1 + self.holders)),
             ("pull_elastic", 2 * (800 + self.stencil) + self.stencil + self.aging + 40),

@@ -307,7 +307,7 @@ fn a_shape_that_is_filled_keeps_its_volume_and_turns_with_its_pose() {
     scene.clamps = vec![Clamp::group("base")];
     let e = build_plan(&scene, Observation::default(), &[]).unwrap_err();
     assert_eq!(e.key, "clamp.0.group");
-    assert!(e.message.contains("this body comes from no such file: give a box"), "{e}");
+    assert!(e.message.contains("the tetrahedra of this body are made here: give a box"), "{e}");
     scene.object.resolution = Resolution::CellSize(0.02);
     let e = build_plan(&scene, Observation::default(), &[]).unwrap_err();
     assert!(e.key == "clamp.0.group" && e.message.contains("this body is cut out of a lattice: give a box"), "{e}");

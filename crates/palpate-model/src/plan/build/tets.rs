@@ -142,7 +142,9 @@ fn hold_middles(held: &mut Vec<u32>, body: &Body) {
 /// The corners of a named group of the body's volume mesh, or why there are none.
 fn group(name: &str, scene: &Scene) -> Result<Vec<u32>, String> {
     let BodySource::Tetrahedra { path, mesh, .. } = &scene.object.source else {
-        return Err("names a group of a volume mesh, and this body comes from no such file: give a box".into());
+        let of =
+            if scene.object.is_of_points() { "this body is one of points" } else { "the tetrahedra of this body are made here" };
+        return Err(format!("names a group of a volume mesh, and {of}: give a box"));
     };
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     match mesh.groups.get(name) {
