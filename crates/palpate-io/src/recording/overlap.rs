@@ -6,8 +6,8 @@ use glam::DVec3;
 use palpate_model::observation::{Frame, Observation};
 use palpate_model::shape::LARGE;
 
-/// What a recording in another unit spans at least of the object, whose every motion and surface is a larger part of it.
-const SPANS: f64 = 0.02;
+/// What a recording in another unit spans at least of the object: markers may hardly move, and what a camera sees is a part of the surface.
+const SPANS: [f64; 2] = [0.02, 0.1];
 
 fn positions(frame: &Frame) -> impl Iterator<Item = DVec3> {
     frame.points.iter().map(|p| p.position).chain(frame.markers.iter().map(|m| m.position))
@@ -61,7 +61,8 @@ pub fn check_overlap(observation: &Observation, min: DVec3, max: DVec3) -> Resul
     // About the origin a small multiple of anything lies at the object: it must span a part of it as well.
     let (low, high) = bounds(&observation.frames.iter().flat_map(positions).collect::<Vec<_>>());
     let spread = (high - low).length();
-    let fits = |factor: f64| factor * spread > SPANS * size && meets(observation, factor, distance, 0.5 * size);
+    let spans = SPANS[usize::from(observation.frames.iter().any(|f| !f.points.is_empty()))];
+    let fits = |factor: f64| factor * spread > spans * size && meets(observation, factor, distance, 0.5 * size);
     let units = [(0.001, "millimetres"), (0.01, "centimetres")];
     let unit = match units.into_iter().find(|u| fits(u.0)) {
         Some((factor, name)) => {
