@@ -333,7 +333,7 @@ fn impossible_fields_are_refused_with_what_is_allowed() {
         ("path = \"material.density\"\nbasis = \"cells\"\nblend = \"axis\"", "field.0.blend: belongs to basis = \"regions\""),
         ("path = \"material.density\"\nbasis = \"cells\"\nfile = \"none.npy\"", "field.0.file: there is no file"),
         ("path = \"material.density\"\nbasis = \"cells\"\narray = \"a\"", "names an array of file, which is missing"),
-        (&format!("{REGIONS}file = \"a.npy\""), "field.0.file: belongs to basis = \"cells\" or \"nodes\""),
+        (&format!("{REGIONS}file = \"a.npy\""), "field.0.file: belongs to basis = \"cells\", \"nodes\" or \"points\""),
         (&REGIONS.replace("value = 2", "value = 0"), "a factor must be > 0"),
         (&REGIONS.replace("radius = 0.02", "radius = -1"), "field.0.regions.1.radius"),
         (
@@ -352,7 +352,10 @@ fn impossible_fields_are_refused_with_what_is_allowed() {
             "path = \"material.density\"\nbasis = \"cells\"\nprior = { kind = \"edge-preserving\", length = 0.1 }",
             "field.0.prior.length: belongs to kind = \"matern\"",
         ),
-        (&format!("{REGIONS}prior = {{ kind = \"matern\" }}"), "field.0.prior: belongs to basis = \"cells\" or \"nodes\""),
+        (
+            &format!("{REGIONS}prior = {{ kind = \"matern\" }}"),
+            "field.0.prior: belongs to basis = \"cells\", \"nodes\" or \"points\"",
+        ),
         (&REGIONS.replace("0.1", "0").replace("regions = [", "blend = \"axis\"\nregions = ["), "is that of the region before"),
         (&format!("{REGIONS}bases = 1"), "did you mean \"basis\"?"),
     ] {
