@@ -56,7 +56,8 @@ pub fn seen(body: &Body, places: &[DVec3], areas: &[DVec3], axis: DVec3, spread:
     }
     let looks = |(area, d): (&DVec3, &Option<([f64; 2], f64)>)| {
         let facing = -axis.dot(*area) / area.length();
-        let slope = (1.0 / facing.max(STEEPEST).powi(2) - 1.0).sqrt();
+        // Rounding takes the cosine of a patch right across the jet beyond one.
+        let slope = (1.0 / facing.clamp(STEEPEST, 1.0).powi(2) - 1.0).sqrt();
         let allowed = size(*area) * (1.0 + 1.5 * slope);
         facing > 0.0 && d.is_some_and(|(p, s)| s <= depths[of(1, p[1]) * side + of(0, p[0])] + allowed)
     };
@@ -69,6 +70,23 @@ mod tests {
     use glam::DAffine3;
     use palpate_model::plan::build::build_body;
     use palpate_model::scene::{Analytic, BodySource, Material, Object, Resolution, Scene};
+
+    #[test]
+    fn a_turned_nozzle_sees_a_face_right_across_it() {
+        let shape = Analytic::Box { min: DVec3::ZERO, max: DVec3::splat(0.05) };
+        let (source, pose) = (BodySource::Analytic(shape), DAffine3::IDENTITY);
+        let object = Object { source, pose, resolution: Resolution::CellSize(0.01) };
+        let (body, _) = build_body(&Scene::at_rest("in-code.toml", object, Material::undamped(5000.0, 0.4))).unwrap();
+        let places: Vec<DVec3> = body.patches.iter().map(|p| p.point - DVec3::new(0.025, -0.1, 0.025)).collect();
+        let areas: Vec<DVec3> = body.patches.iter().map(|p| p.area * p.normal).collect();
+        let face: Vec<usize> = (0..places.len()).filter(|n| body.patches[*n].normal.y < -0.99).collect();
+        // Unit vectors along y but for rounding, some of them longer than one by a unit in the last place.
+        for (short, turn) in (1..40).map(|k| f64::from(k) * 0.04).map(|a| (DVec3::new(a.sin(), a.cos(), 0.0), a)) {
+            let axis = glam::DMat3::from_quat(glam::DQuat::from_rotation_z(turn)) * short;
+            let found = seen(&body, &places, &areas, axis, 0.3);
+            assert!(face.iter().all(|n| found[*n]), "{axis} of length 1 + {:e}", axis.length() - 1.0);
+        }
+    }
 
     #[test]
     fn it_is_what_lines_of_sight_meet() {
