@@ -175,15 +175,11 @@ impl Rates {
         let members: Vec<Coefficients> = theta.iter().map(|row| Coefficients::new(plan, row)).collect();
         let along = |b: usize, direction: &Direction| members[b].along(plan, &direction.of(b).dense(plan.layout.len()));
         // Where the stress-free shape follows from the other numbers, all directions of a member at once.
-        let mut shaped: Vec<Vec<Coefficients>> = match &world.shapes {
-            None => Vec::new(),
-            Some(shapes) => {
-                (0..members.len()).map(|b| shaped(world, shapes.as_ref(), b, directions.iter().map(|d| along(b, d)))).collect()
-            }
-        };
-        shaped.iter_mut().for_each(|s| s.reverse());
+        let of = |shapes: &dyn StressFreeShapes, b| shaped(world, shapes, b, directions.iter().map(|d| along(b, d))).into_iter();
+        let mut shaped: Vec<std::vec::IntoIter<Coefficients>> =
+            world.shapes.iter().flat_map(|shapes| (0..members.len()).map(|b| of(shapes.as_ref(), b))).collect();
         let mut one = |direction: &Direction| {
-            let own = |b: usize| shaped.get_mut(b).and_then(Vec::pop).unwrap_or_else(|| along(b, direction));
+            let own = |b: usize| shaped.get_mut(b).and_then(Iterator::next).unwrap_or_else(|| along(b, direction));
             let mut rates: Vec<Coefficients> = (0..members.len()).map(own).collect();
             fill(&mut rates, |r| &mut r.changes.modulus);
             fill(&mut rates, |r| &mut r.changes.density);
