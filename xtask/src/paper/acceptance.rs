@@ -21,6 +21,11 @@ impl Figure {
     }
 }
 
+/// A limit, by its power of ten where it is small.
+fn bound(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-3 { format!("{x:e}") } else { x.to_string() }
+}
+
 /// What is aimed at.
 pub enum Bound {
     /// Less than this.
@@ -48,8 +53,8 @@ impl Bound {
 
     fn text(&self) -> String {
         match self {
-            Below(most) => format!("< {most}"),
-            AtMost(most) => format!("≤ {most}"),
+            Below(most) => format!("< {}", bound(*most)),
+            AtMost(most) => format!("≤ {}", bound(*most)),
             AtLeast(least) => format!("≥ {least}"),
             Around(middle, by) => format!("{middle} ± {by}"),
             Between(low, high) => format!("{low} to {high}"),
@@ -60,6 +65,11 @@ impl Bound {
 /// Acceptance, what is looked at, case, figure, the paper's own number, and what is aimed at.
 pub type Aim = (&'static str, &'static str, &'static str, Figure, &'static str, Bound);
 
+/// A figure with three decimals, or by its power of ten where these would not tell it from nothing.
+fn number(x: f64) -> String {
+    if x != 0.0 && x.abs() < 0.01 { format!("{x:.1e}") } else { format!("{x:.3}") }
+}
+
 /// The table in Markdown; cases without a row stand with a dash.
 pub fn markdown(aims: &[Aim], rows: &[Row]) -> String {
     let mut out = String::from("| | | paper | aim | here | | measured |\n|---|---|---|---|---|---|---|\n");
@@ -68,7 +78,7 @@ pub fn markdown(aims: &[Aim], rows: &[Row]) -> String {
         let (here, met, measured) = match row.and_then(|r| Some((r, figure.of(&r.figures)?))) {
             Some((r, x)) => {
                 let word = if bound.holds(x) { "met" } else { "missed" };
-                (format!("{x:.3}"), word, format!("{}, {}, {:.0} s", r.made.date, r.made.commit, r.seconds))
+                (number(x), word, format!("{}, {}, {:.0} s", r.made.date, r.made.commit, r.seconds))
             }
             None => ("–".into(), "–", "–".into()),
         };
