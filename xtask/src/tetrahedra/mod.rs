@@ -12,7 +12,7 @@ mod integrator;
 mod loads;
 mod material;
 mod matrix;
-mod mesh;
+pub mod mesh;
 pub mod motion;
 pub mod outside;
 mod solid;

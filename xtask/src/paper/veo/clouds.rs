@@ -6,25 +6,26 @@ use palpate::render::Sensor;
 use palpate::synthetic::{Observers, observe};
 use palpate::{Backend, Experiment, FitOptions, Fitted};
 use palpate_io::cloud::write_cloud;
+use palpate_io::recording::Recording;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Points with a layer on the plane x = 0, by which the body is held: in the middles of cubes of edge `h` [m], moved by up to a quarter of it.
-fn held(count: [usize; 3], h: f64) -> Vec<DVec3> {
+pub(super) fn held(count: [usize; 3], h: f64) -> Vec<DVec3> {
     let layer = super::bars::points([1, count[1], count[2]], 11).into_iter().map(|x| x * DVec3::new(0.0, 1.0, 1.0));
     super::bars::points(count, 12).into_iter().chain(layer).map(|x| h * x).collect()
 }
 
-fn text(e: impl std::fmt::Display) -> String {
+pub(super) fn text(e: impl std::fmt::Display) -> String {
     e.to_string()
 }
 
-fn fitted(e: &Experiment) -> Result<Fitted, String> {
+pub(super) fn fitted(e: &Experiment) -> Result<Fitted, String> {
     e.fit(FitOptions { backend: Backend::Cpu, ..FitOptions::default() }).map_err(text)
 }
 
-/// Writes what is seen of a scene's points at the times of its states.
-fn record(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Path) -> Result<(), String> {
+/// What is seen of a scene's points at the times of its states.
+fn watched(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Path) -> Result<Recording, String> {
     let e = Experiment::from_toml(truth, folder.join("truth.toml")).map_err(text)?;
     let observers = Observers {
         cameras: Vec::new(),
@@ -34,7 +35,12 @@ fn record(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Pat
         times: times.to_vec(),
         sensor: Sensor { noise, dropout: 0.0, depth_scale: 0.001, seed: 2 },
     };
-    let mut seen = observe(&e, Backend::Cpu, &observers, |_| ControlFlow::Continue(())).map_err(text)?;
+    observe(&e, Backend::Cpu, &observers, |_| ControlFlow::Continue(())).map_err(text)
+}
+
+/// Writes it.
+pub(super) fn record(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Path) -> Result<(), String> {
+    let mut seen = watched(truth, points, times, noise, folder)?;
     if let Some(points) = &mut seen.points {
         // Points lie deep within cells of half their spacing.
         points.tolerance = Some(1.0);
@@ -42,11 +48,17 @@ fn record(truth: &str, points: &[DVec3], times: &[f64], noise: f64, folder: &Pat
     palpate_io::write_recording(folder.join("seen"), &seen).map_err(text)
 }
 
-/// Spacing of the bars' points [m].
-const H: f64 = 0.01;
-const MODULUS: f64 = 2e5;
+/// Where the points of a scene lie at the times of its states [m] `[T][N]`.
+pub(super) fn seen(truth: &str, points: &[DVec3], times: &[f64], folder: &Path) -> Result<Vec<Vec<DVec3>>, String> {
+    let seen = watched(truth, points, times, 0.0, folder)?.points.ok_or("no points are seen")?;
+    Ok(seen.track.vectors.chunks_exact(points.len()).map(<[DVec3]>::to_vec).collect())
+}
 
-fn bar(object: &str, more: &str) -> String {
+/// Spacing of the bars' points [m].
+pub(super) const SPACING: f64 = 0.01;
+pub(super) const MODULUS: f64 = 2e5;
+
+pub(super) fn bar(object: &str, more: &str) -> String {
     format!(
         "format = \"scene/1\"\n[object]\n{object}\n[material]\nmodel = \"neo-hookean\"\ndensity = 1000\nyoungs_modulus = {MODULUS}\npoisson_ratio = 0.3\n\
          [[clamp]]\nbox = {{ min = [-1, -1, -1], max = [1e-4, 1, 1] }}\n{more}"
@@ -55,7 +67,7 @@ fn bar(object: &str, more: &str) -> String {
 
 /// A12: one cloud as points and as cells within a surface around it, and the modulus that the points' motion in a body of finer cells gives back.
 pub fn both(folder: &Path) -> Result<Figures, String> {
-    let points = held([16, 4, 4], H);
+    let points = held([16, 4, 4], SPACING);
     write_cloud(folder.join("rest.ply"), &points).map_err(text)?;
     let cloud = |kind: &str| format!("points = \"rest.ply\"\nvolume = 2.64e-4\n{kind}");
     let still = "[initial]\nstate = \"static-equilibrium\"\n[time]\nduration = 0\n";
@@ -63,10 +75,10 @@ pub fn both(folder: &Path) -> Result<Figures, String> {
     let tip = |object: &String| -> Result<f64, String> {
         let e = Experiment::from_toml(&bar(object, still), folder.join("s.toml")).map_err(text)?;
         let s = e.simulate(Backend::Cpu).map_err(text)?;
-        let rest = e.surface(0.5 * H).0;
+        let rest = e.surface(0.5 * SPACING).0;
         let places = rest.deform(&vec![DVec3::ZERO; e.plan().body.nodes.len()]);
         let moved = rest.deform(&s.snapshots[0].displacement);
-        let end = places.iter().zip(&moved).filter(|(x, _)| x.x > 15.0 * H).map(|(x, y)| (*y - *x).z);
+        let end = places.iter().zip(&moved).filter(|(x, _)| x.x > 15.0 * SPACING).map(|(x, y)| (*y - *x).z);
         let all: Vec<f64> = end.collect();
         Ok(all.iter().sum::<f64>() / all.len() as f64)
     };
@@ -97,7 +109,7 @@ const LOADS: [[f64; 3]; 6] =
 
 /// A8: a bar of two parts, the outer half four times softer, seen on hexahedra twice as fine as the points are apart.
 pub fn two_parts(folder: &Path) -> Result<Figures, String> {
-    let points = held([16, 4, 4], H);
+    let points = held([16, 4, 4], SPACING);
     write_cloud(folder.join("rest.ply"), &points).map_err(text)?;
     let places: Vec<String> =
         (0..16).map(|k| format!("[0.16, {}, {}]", 0.01 * (k % 4) as f64 + 0.005, 0.01 * (k / 4) as f64 + 0.005)).collect();
@@ -111,7 +123,7 @@ pub fn two_parts(folder: &Path) -> Result<Figures, String> {
     let halves = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"regions\"\nblend = \"nearest\"\n\
                   regions = [{ center = [0.04, 0.02, 0.02], radius = 0.01 }, { center = [0.12, 0.02, 0.02], radius = 0.01, value = 0.25 }]\n";
     let times: Vec<f64> = (0..LOADS.len()).map(|k| k as f64).collect();
-    record(&bar(&format!("{hull}cell_size = 0.005"), &format!("{loads}{halves}")), &points, &times, 0.02 * H, folder)?;
+    record(&bar(&format!("{hull}cell_size = 0.005"), &format!("{loads}{halves}")), &points, &times, 0.02 * SPACING, folder)?;
     let seen = "[observation]\nrecording = \"seen\"\ncost = \"points\"\n[fit]\nframes = { train = { every = 1, count = 4 } }\n";
     let object = format!("points = \"rest.ply\"\ndiscretisation = \"points\"\n{hull}");
     let one = "[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1e5\n";

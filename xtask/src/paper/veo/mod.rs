@@ -6,6 +6,7 @@ mod carried;
 mod clouds;
 mod interactions;
 mod states;
+mod toy;
 
 use super::acceptance::Aim;
 use super::acceptance::Bound::{AtLeast, AtMost, Below, Between};
@@ -14,9 +15,16 @@ use super::cases::{Case, Figures, Set};
 use crate::rows::Measured;
 
 /// The study.
-pub const SET: Set = Set { name: "veo", page: "docs/veo.md", cases: &CASES, aims: AIMS, more: &[], measured: Measured::Fits };
+pub const SET: Set = Set {
+    name: "veo",
+    page: "docs/veo.md",
+    cases: &CASES,
+    aims: AIMS,
+    more: &[("veo-toy", toy::table)],
+    measured: Measured::Fits,
+};
 
-const CASES: [(&str, Case); 16] = [
+const CASES: [(&str, Case); 18] = [
     ("states", |data, _| states::run(data, &[])),
     ("states-0", |data, _| states::run(data, states::LOADS[0])),
     ("states-52", |data, _| states::run(data, states::LOADS[1])),
@@ -29,6 +37,8 @@ const CASES: [(&str, Case); 16] = [
     ("both-bodies", |_, folder| clouds::both(folder)),
     ("two-parts", |_, folder| clouds::two_parts(folder)),
     ("cloud-states", |data, folder| clouds::beam(data, folder, &[])),
+    ("toy", |_, folder| toy::run(folder, false)),
+    ("toy-tet", |_, folder| toy::run(folder, true)),
     ("jet-plate", |_, _| interactions::plate()),
     ("jet-sphere", |_, _| interactions::sphere()),
     ("obstacle", |_, _| interactions::obstacle()),
@@ -137,6 +147,22 @@ const AIMS: &[Aim] = &[
     ("A4", "EI of 16k points over that of 4k", "bars-finer", Over("EI, 16k points", "EI, 4k points"), "–", Between(0.97, 1.03)),
     ("A8", "bar of two parts: per point over one modulus, states not fitted", "two-parts", Of(HELD), "–", AtMost(0.1)),
     ("A8", "stiffness of the outer half over the inner one", "two-parts", Of(RATIO), "–", Between(0.2, 0.3)),
+    (
+        "A8",
+        "toy under an obstacle: mean error per point over that of one modulus",
+        "toy",
+        Over("per point: mean [mm]", "one modulus: mean [mm]"),
+        "–",
+        AtMost(0.1),
+    ),
+    (
+        "A8",
+        "the same with a truth of tetrahedra",
+        "toy-tet",
+        Over("per point: mean [mm]", "one modulus: mean [mm]"),
+        "–",
+        AtMost(0.1),
+    ),
     ("A12", "tip of points over that of cells, one cloud", "both-bodies", Of(TIPS), "–", Between(0.95, 1.05)),
     ("A12", "ln of the moduli's ratio", "both-bodies", Of(LN), "–", Between(-0.1, 0.1)),
     ("A13", "points: E of all six states [kPa]", "cloud-states", Of(MODULUS), "–", Between(221.4, 287.1)),
