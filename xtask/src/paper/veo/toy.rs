@@ -2,12 +2,11 @@
 //! felt. The truth is made of other elements: hexahedra twice as fine as the points lie, or quadratic tetrahedra.
 
 use super::super::cases::{Figures, Row};
-use super::clouds::{MODULUS, SPACING, bar, fitted, held, record, seen, text};
+use super::clouds::{FIELD, FOUND, MODULUS, PRIOR, SPACING, bar, fitted, held, record, seen, text, write_field};
 use crate::tetrahedra::mesh::Mesh;
 use glam::DVec3;
 use palpate::Experiment;
 use palpate_io::cloud::write_cloud;
-use palpate_io::npy::{Array, write_npz};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -131,11 +130,8 @@ pub fn run(folder: &Path, quadratic: bool) -> Result<Figures, String> {
         Ok((fitted(&e)?, e))
     };
     let (one, _) = fit("[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1e5\n")?;
-    let prior = "[field.prior]\nkind = \"matern\"\nlength = 0.08\ndeviation = 1.0\n";
-    let field = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"points\"\n";
-    let (many, e) = fit(&format!("[[fit.parameter]]\npath = \"field.0\"\n{field}{prior}"))?;
-    let values = many.result.theta[0][e.plan().layout.resolve("field.0")].to_vec();
-    write_npz(folder.join("found.npz"), &[("E", &Array { shape: vec![values.len()], values })]).map_err(text)?;
+    let (many, e) = fit(&format!("[[fit.parameter]]\npath = \"field.0\"\n{FIELD}{PRIOR}"))?;
+    write_field(folder, &many.result.theta[0][e.plan().layout.resolve("field.0")])?;
 
     let found = crate::real::found(&one, "material.youngs_modulus");
     let states = |object: &str, modulus: f64, more: &str| {
@@ -145,7 +141,7 @@ pub fn run(folder: &Path, quadratic: bool) -> Result<Figures, String> {
     };
     let right = states(&truth, MODULUS, HALVES)?;
     let of_one = states(&object, found, "")?;
-    let of_points = states(&object, MODULUS, &format!("{field}file = \"found.npz\"\n"))?;
+    let of_points = states(&object, MODULUS, &format!("{FIELD}{FOUND}"))?;
     let still = vec![points.clone(); PRESSED.len()];
 
     let mut out = Figures::new();
