@@ -420,6 +420,8 @@ impl Unstated {
 }
 
 #[cfg(test)]
+mod force_tests;
+#[cfg(test)]
 mod sensor_tests;
 #[cfg(test)]
 mod tests;
