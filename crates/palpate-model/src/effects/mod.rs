@@ -420,6 +420,8 @@ impl Unstated {
 }
 
 #[cfg(test)]
+mod field_tests;
+#[cfg(test)]
 mod force_tests;
 #[cfg(test)]
 mod sensor_tests;
