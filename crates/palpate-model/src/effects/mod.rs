@@ -426,4 +426,6 @@ mod force_tests;
 #[cfg(test)]
 mod sensor_tests;
 #[cfg(test)]
+mod table_tests;
+#[cfg(test)]
 mod tests;
