@@ -3,7 +3,7 @@
 use super::sensors::{MOST, Sensors};
 use super::{ALL, Law, Site, Unstated};
 use crate::mechanics::rotation::tests::Noise;
-use crate::observation::{Camera, ObservedPoint};
+use crate::observation::{Camera, MarkerSite, Observation, ObservedPoint, ReadingKind};
 use crate::params::{Layout, ParamKey};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -141,6 +141,11 @@ fn readings_are_the_truth_and_the_effect() {
     assert!((read(&part) - 1.02).abs() < 1e-9);
     assert!((part.read(&camera, 0, DVec3::new(-0.3, 0.0, 1.0)) - 1.0).abs() < 1e-9);
     assert!((part.read(&camera, 0, DVec3::new(0.0, 0.0, 1.0)) - 1.01).abs() < 1e-9);
+    // Of the plane's direction the length does not count: half a width before it the bias has its tanh.
+    let part = alone("depth-bias-part", &[(0, 0.02), (1, 2.0), (4, 0.0), (7, 0.6)]);
+    let seen = ObservedPoint { position: point, camera: 0 };
+    let bias = 0.01 * (1.0 + 0.5f64.tanh());
+    assert!((part.truth(&camera, &seen).position() - point * (1.0 - bias)).length() < 1e-15);
     // A scanner errs along its rays, and nobody knows the rays of points that were seen from nowhere.
     let bias = alone("depth-bias", &[(0, 0.02)]);
     let seen = ObservedPoint { position: point, camera: 0 };
@@ -158,9 +163,62 @@ fn readings_are_the_truth_and_the_effect() {
     // Turned by a quarter about the axis, to the left: the true point lies to the right.
     let turned = alone("camera-pose", &[(6, std::f64::consts::FRAC_PI_2)]);
     assert!((turned.truth(&camera, &seen(0)).position() - DVec3::new(0.0, -0.3, 1.0)).length() < 1e-15);
+    // Turned by half, where the cosine is not zero.
+    let turned = alone("camera-pose", &[(6, std::f64::consts::PI)]);
+    assert!((turned.truth(&camera, &seen(0)).position() - DVec3::new(-0.3, 0.0, 1.0)).length() < 1e-15);
     assert_eq!(alone("time-offset", &[(0, 0.25)]).ahead(), 0.25);
     let marker = alone("marker-offset", &[(0, 2.0), (1, 1.0), (3, 3.0)]);
     assert_eq!((marker.marker_offset(2), marker.marker_offset(0)), (DVec3::new(1.0, 0.0, 3.0), DVec3::ZERO));
+}
+
+#[test]
+fn slopes_that_nobody_wants_are_left_out() {
+    let (layout, theta) = effects(&reading_laws(), &mut Noise(5));
+    let sensors = Sensors::new(&layout, &theta);
+    let seen = ObservedPoint { position: DVec3::new(0.05, 0.02, -0.04), camera: 0 };
+    let of = |wanted: &dyn Fn(usize) -> bool| {
+        let mut found = Vec::new();
+        sensors.point_slopes(&camera(), &seen, wanted, |at, by| found.push((at, by)));
+        found
+    };
+    let all = of(&|_| true);
+    assert!(all.len() > 10);
+    for (at, by) in &all {
+        assert_eq!(of(&|place| place == *at), [(*at, *by)]);
+    }
+    assert!(of(&|_| false).is_empty());
+}
+
+#[test]
+fn points_clocks_and_sites_are_those_of_the_effects() {
+    let point = DVec3::new(0.3, 0.0, 1.0);
+    let cameras = [Camera::Pinhole { center: DVec3::ZERO, axis: DVec3::Z }];
+    let seen = [ObservedPoint { position: point, camera: 0 }];
+    // A bias of 2 cm is taken off a depth of 1 m; without laws of readings the recording's points are the true ones.
+    let bias = alone("depth-bias", &[(0, 0.02)]);
+    let moved = bias.points(&cameras, &seen).expect("they move");
+    assert!(!bias.exact_points() && moved.len() == 1 && (moved[0].position - 0.98 * point).length() < 1e-15);
+    let clock = alone("time-offset", &[(0, 0.25)]);
+    assert!(clock.exact_points() && clock.points(&cameras, &seen).is_none());
+    let (layout, theta) = effects(&[super::find("time-offset").unwrap(), super::find("time-offset").unwrap()], &mut Noise(6));
+    let two = Sensors::new(&layout, &theta);
+    assert_eq!(two.clocks().iter().map(|p| theta[*p]).sum::<f64>(), two.ahead());
+    assert_eq!(two.clocks(), [layout.len() - 2, layout.len() - 1]);
+    let site = |name: &str| MarkerSite {
+        name: name.into(),
+        kind: ReadingKind::Marker,
+        stencil: Default::default(),
+        stalk: DVec3::new(0.1, 0.2, 0.3),
+    };
+    let observation = Observation { markers: vec![site("a"), site("b")], ..Default::default() };
+    let offset = alone("marker-offset", &[(0, 1.0), (1, 1.0), (3, 3.0)]);
+    assert_eq!(offset.site(&observation, 0).stalk, DVec3::new(0.1, 0.2, 0.3));
+    assert_eq!(
+        (offset.site(&observation, 1).stalk, offset.site(&observation, 1).name.as_str()),
+        (DVec3::new(1.1, 0.2, 3.3), "b")
+    );
+    assert_eq!(offset.marker_places(0).count(), 0);
+    assert_eq!(offset.marker_places(1).count(), 1);
 }
 
 #[test]
