@@ -226,7 +226,9 @@ mod tests {
                     assert!((tangent[k][l] - tangent[l][k]).abs() < 1e-12);
                 }
             }
-            for (n, by) in law.by_curves(&h, lambda, mu).iter().enumerate() {
+            let by_factors = law.by_curves(&h, lambda, mu);
+            assert_eq!(by_factors.len(), 6);
+            for (n, by) in by_factors.iter().enumerate() {
                 let at = |by: f64| {
                     let mut law = law.clone();
                     let first = law.stretch.factors.len();
@@ -249,6 +251,20 @@ mod tests {
             assert!((plain.value(&h, lambda, mu) - NeoHookean.value(&h, lambda, mu)).abs() < 1e-14);
             let ((a, t), (b, r)) = (plain.stress(&h, lambda, mu), NeoHookean.stress(&h, lambda, mu));
             assert!((0..9).all(|k| (a[k] - b[k]).abs() < 1e-14 && (0..9).all(|l| (t[k][l] - r[k][l]).abs() < 1e-13)), "{h:?}");
+        }
+    }
+
+    #[test]
+    fn stretches_are_those_of_the_turned_and_stretched_body() {
+        let turn = glam::DMat3::from_axis_angle(glam::DVec3::new(0.3, -0.5, 0.8).normalize(), 1.1);
+        let f = turn * glam::DMat3::from_diagonal(glam::DVec3::new(0.7, 1.2, 1.6)) * turn;
+        let h = std::array::from_fn(|i| std::array::from_fn(|j| f.col(j)[i] - f64::from(u8::from(i == j))));
+        let mut found = stretches(&h).unwrap();
+        found.sort_by(f64::total_cmp);
+        assert!(found.iter().zip([0.7, 1.2, 1.6]).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?}");
+        // Inside out, and flat.
+        for by in [-1.5, -1.0] {
+            assert_eq!(stretches(&[[by, 0.0, 0.0], [0.0; 3], [0.0; 3]]), None);
         }
     }
 }

@@ -84,6 +84,9 @@ mod tests {
             for c in 0..6 {
                 assert!(((a.value[c] - b.value[c]) / (2.0 * d) - at.slopes[c][k]).abs() < 1e-9);
             }
+            let mut entry = [0.0; 9];
+            entry[k] = 2.0;
+            assert_eq!(at.along(&entry), at.slopes.map(|row| 2.0 * row[k]));
             let (a, b) = (a.back(&g), b.back(&g));
             assert!((0..9).all(|l| ((a[l] - b[l]) / (2.0 * d) - bend[k][l]).abs() < 1e-8));
         }

@@ -63,7 +63,9 @@ fn stress_and_tangent_are_derivatives_of_the_energy() {
 fn formulas_give_what_dual_numbers_give() {
     fn check<L: Hyperelastic>(law: &L) {
         let (lambda, mu) = lame(1.0, NU);
-        for h in gradients(0.3) {
+        // Stretched along one axis alone: an iteration for the rotation that looks at the others thinks that it is done.
+        let along = (0..3).map(|k| moved(&[[0.0; 3]; 3], 4 * k, 0.6));
+        for h in gradients(0.3).into_iter().chain(along) {
             let (p, t) = law.stress_by_formula(&h, lambda, mu).expect("the material has a formula");
             let (p2, t2) = by_dual_numbers(law, &h, lambda, mu);
             assert!(p.iter().zip(p2).all(|(a, b)| (a - b).abs() < 1e-12));
@@ -74,6 +76,23 @@ fn formulas_give_what_dual_numbers_give() {
     check(&neo_hookean::NeoHookean);
     check(&neo_hookean_log::NeoHookeanLog);
     check(&stable_neo_hookean::StableNeoHookean);
+}
+
+#[test]
+fn names_find_materials_and_tell_them_apart() {
+    for (i, a) in ALL.iter().enumerate() {
+        assert_eq!(find(a.name), Some(a));
+        assert!(ALL.iter().enumerate().all(|(j, b)| (a == b) == (i == j)) && format!("{a:?}") == a.name);
+        assert_eq!((a.has_twin(), a.has_curves), (a.name != "principal-stretch", a.name == "principal-stretch"));
+    }
+    assert_eq!(find("neo-hooke"), None);
+}
+
+#[test]
+fn only_a_material_of_curves_has_factors() {
+    for m in ALL {
+        assert!(m.law.by_curves(&gradients(0.3)[0], 1.0, 1.0).is_empty(), "{}: none are stated", m.name);
+    }
 }
 
 #[test]
@@ -125,4 +144,46 @@ fn materials_with_a_barrier_do_not_exist_inside_out_and_the_stable_one_does() {
     let stable = find("stable-neo-hookean").unwrap().law;
     let (stress, _) = stable.stress(&squeezed(-1.5), lambda, mu);
     assert!(stress[0] < 0.0, "what is inside out is pushed back: {}", stress[0]);
+}
+
+/// A material of a formula for its energy alone, which is not linear in its moduli.
+struct Plain;
+
+impl Hyperelastic for Plain {
+    fn energy<D: Number>(&self, h: &Gradient<D>, lambda: D, mu: D) -> D {
+        squares(h) * mu * lambda * lambda
+    }
+}
+
+/// A law of no energy, of which the stress is all that is stated.
+struct Stated;
+
+impl Solid for Stated {
+    fn value(&self, _: &Gradient<f64>, _: f64, _: f64) -> f64 {
+        0.0
+    }
+
+    fn stress(&self, h: &Gradient<f64>, _: f64, mu: f64) -> Stress {
+        (std::array::from_fn(|k| mu * h[k / 3][k % 3]), [[0.0; 9]; 9])
+    }
+
+    fn by_moduli(&self, _: &Gradient<f64>, _: f64, _: f64) -> [[f64; 9]; 2] {
+        [[0.0; 9]; 2]
+    }
+}
+
+#[test]
+fn what_a_law_leaves_out_follows_from_what_it_states() {
+    let (h, lambda, mu) = (gradients(0.3)[0], 3.0, 2.0);
+    let (stress, tangent) = Plain.stress(&h, lambda, mu);
+    let by = Plain.by_moduli(&h, lambda, mu);
+    for k in 0..9 {
+        let entry = h[k / 3][k % 3];
+        // 2 μ λ² H, and its derivatives by λ and μ.
+        assert!((stress[k] - 36.0 * entry).abs() < 1e-13 && (Plain.first(&h, lambda, mu)[k] - stress[k]).abs() < 1e-13);
+        assert!((by[0][k] - 24.0 * entry).abs() < 1e-13 && (by[1][k] - 18.0 * entry).abs() < 1e-13);
+        assert!((0..9).all(|l| (tangent[k][l] - if k == l { 36.0 } else { 0.0 }).abs() < 1e-13));
+    }
+    assert_eq!(Stated.first(&h, lambda, mu), Stated.stress(&h, lambda, mu).0);
+    assert!(Stated.by_curves(&h, lambda, mu).is_empty());
 }
