@@ -281,7 +281,7 @@ impl EffectParam {
 
 /// One coordinate of a place; the body's centre of mass unless stated.
 const fn place(key: &'static str, axis: u8, doc: &'static str) -> EffectParam {
-    EffectParam { default: Unstated::OnBody, typical: 0.02, ..component(key, axis, "m", 0.02, doc) }
+    EffectParam { default: Unstated::OnBody, ..component(key, axis, "m", 0.02, doc) }
 }
 
 /// One component of a vector of any sign that is zero when absent.
