@@ -8,6 +8,9 @@ use std::collections::HashMap;
 /// Values more than this are no table of a data set.
 const MOST: usize = 1 << 24;
 
+/// Longest name of a class or function [B]: a text that is kept once could be made a name at every opcode.
+const NAME: usize = 1 << 10;
+
 /// Place of a value among all values of a pickle: what is in several places is one value.
 pub type At = usize;
 
@@ -313,6 +316,9 @@ impl<'a> Machine<'a> {
                     let (Value::Text(module), Value::Text(name)) = (&self.values[module], &self.values[name]) else {
                         return Err("the pickle names something by what is no text".into());
                     };
+                    if module.len().saturating_add(name.len()) > NAME {
+                        return Err(format!("the pickle has a name of more than {NAME} bytes"));
+                    }
                     let name = format!("{module}.{name}");
                     self.push(Value::Name(name))?;
                 }
@@ -398,6 +404,13 @@ mod tests {
             }
             let _ = Pickle::read(&b[..b.len() - k % 3]);
         }
+    }
+
+    #[test]
+    fn a_text_that_is_kept_does_not_become_long_names() {
+        let text = [&b"X"[..], &600u32.to_le_bytes(), &[b'a'; 600]].concat();
+        let bytes = [b"\x80\x02", &text[..], b"q\x00h\x00\x93."].concat();
+        assert_eq!(Pickle::read(&bytes).unwrap_err(), "the pickle has a name of more than 1024 bytes");
     }
 
     #[test]

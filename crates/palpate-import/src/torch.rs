@@ -13,6 +13,9 @@ use zip::{CompressionMethod, ZipArchive};
 /// Longest pickle that is read [B]: it describes tensors and does not hold them.
 const PICKLE: u64 = 256 << 20;
 
+/// Numbers and letters of all entries together, over bytes of the file and beside them: what many entries share would fill any memory.
+const SHARED: (usize, usize) = (4, 1 << 20);
+
 /// The entries of a dictionary by their names: tensors, numbers and lists of numbers as arrays; of others, what they are.
 pub type Entries = Vec<(String, Result<Array, String>)>;
 
@@ -26,6 +29,7 @@ pub fn read_torch(path: &Path) -> Result<Entries, ImportError> {
         let what = if old { "is of PyTorch before 1.6; load it and save it again" } else { "is no file of torch.save" };
         return refuse(path, what);
     }
+    let mut left = bytes.len().saturating_mul(SHARED.0).saturating_add(SHARED.1);
     let wrong = |e: String| refuse(path, e);
     let mut archive = match ZipArchive::new(Cursor::new(bytes)) {
         Ok(a) => a,
@@ -52,6 +56,11 @@ pub fn read_torch(path: &Path) -> Result<Entries, ImportError> {
     for (key, value) in all {
         if let Value::Text(name) = pickle.at(*key) {
             let array = reader.array(*value).map(|(shape, numbers)| Array { name: name.clone(), shape, numbers });
+            let size = array.as_ref().map_or_else(String::len, |a| a.shape.iter().product());
+            let Some(rest) = left.checked_sub(name.len().saturating_add(size)) else {
+                return refuse(path, "has entries that share so much that they fill the memory");
+            };
+            left = rest;
             out.push((name.clone(), array));
         }
     }
@@ -187,5 +196,42 @@ impl Reader<'_> {
             Numbers::Counts(all) => Numbers::Counts((0..len).map(|k| all[place(k)]).collect()),
         };
         Ok((size, numbers))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    /// A storage of half a million truth values, and so many entries with all of it.
+    fn shared(entries: usize) -> Result<Entries, ImportError> {
+        const COUNT: usize = 500_000;
+        let mut pickle = b"\x80\x02}(X\x01\x00\x00\x00actorch._utils\n_rebuild_tensor_v2\n((".to_vec();
+        pickle.extend(b"X\x01\x00\x00\x00sctorch\nBoolStorage\nX\x01\x00\x00\x000X\x03\x00\x00\x00cpuJ");
+        pickle.extend((COUNT as u32).to_le_bytes());
+        pickle.extend(b"tQK\x00J");
+        pickle.extend((COUNT as u32).to_le_bytes());
+        pickle.extend(b"\x85K\x01\x85\x89NtRq\x00");
+        (1..entries).for_each(|_| pickle.extend(b"X\x01\x00\x00\x00bh\x00"));
+        pickle.extend(b"u.");
+        let path = std::env::temp_dir().join(format!("palpate-torch-{entries}-{}", std::process::id()));
+        let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+        for (name, content) in [("a/data.pkl", pickle), ("a/data/0", vec![1; COUNT])] {
+            let stored = zip::write::SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+            archive.start_file(name, stored).unwrap();
+            archive.write_all(&content).unwrap();
+        }
+        archive.finish().unwrap();
+        let found = read_torch(&path);
+        std::fs::remove_file(&path).unwrap();
+        found
+    }
+
+    #[test]
+    fn entries_share_numbers_until_they_would_fill_the_memory() {
+        let few = shared(3).unwrap();
+        assert!(few.len() == 3 && few.iter().all(|e| e.1.as_ref().is_ok_and(|a| a.shape == [500_000])));
+        assert!(shared(20).unwrap_err().to_string().contains("share so much"));
     }
 }
