@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use studies::{bench, coverage, dawn, fuzz, paper, real, same, suite, table, test, tidy, verify};
+use studies::{bench, coverage, dawn, fuzz, mutants, paper, real, same, suite, table, test, tidy, verify};
 
 /// Counts what the benchmarks allocate.
 #[global_allocator]
@@ -187,6 +187,18 @@ enum Verb {
         #[arg(long, default_value_t = 5.0)]
         minutes: f64,
     },
+    /// Change effects and materials in one place at a time and see whether a test notices (docs/mutants.md)
+    ///
+    /// Needs cargo-mutants, which builds the crate once for every change: many hours for all of them. What was caught before is left out, so that it can
+    /// be stopped and goes on. Fails where a change is alive that the page does not explain.
+    Mutants {
+        /// Only a part of the changes, spread over all files, e.g. 0/20
+        #[arg(long, value_name = "K/N")]
+        shard: Option<String>,
+        /// Instead: write the tables of docs/mutants.md from bench/mutants.json
+        #[arg(long, conflicts_with = "shard")]
+        report: bool,
+    },
     /// Check rooms, imports, sizes of files
     Tidy,
 }
@@ -256,6 +268,8 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Dawn { compile } => dawn::run(dawn::Options { compile })?,
         Verb::Fuzz { minutes } => fuzz::run(&table::root(), minutes)?,
+        Verb::Mutants { report: true, .. } => mutants::report(&table::root())?,
+        Verb::Mutants { shard, .. } => mutants::run(&table::root(), shard.as_deref())?,
         Verb::Tidy => {
             let found = tidy::check(&table::root());
             found.iter().for_each(|f| println!("{f}"));

@@ -3,6 +3,7 @@
 use crate::bench::{counts, page};
 use crate::coverage;
 use crate::figures;
+use crate::mutants;
 use crate::pages;
 use crate::paper;
 use crate::real::report::Report;
@@ -132,6 +133,10 @@ fn generated(root: &Path, found: &mut Vec<String>) {
             Err(e) => found.push(e),
         }
     };
+    for (number, name) in ["mutants", "alive"].into_iter().enumerate() {
+        let table = mutants::stored(root).map(|r| mutants::markdown(&r)[number].clone());
+        check("docs/mutants.md", name, table, "mutants --report");
+    }
     check("docs/suite.md", "suite", suite, "suite --report");
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
