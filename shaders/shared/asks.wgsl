@@ -4,6 +4,10 @@
 const TOUCH_FORCE = 0u;
 const NO_TOUCH = 1u;
 const TOUCH_OLD = 2u;
+// Of passes of things that move besides: the transpose of that; change along a direction of the coefficients; stiffness.
+const TOUCH_BACK = 3u;
+const TOUCH_ALONG = 4u;
+const TOUCH_STIFFNESS = 5u;
 
 // Of hold_cells: force of the new state, weighted with θ, and of the old one, weighted with 1 − θ; the old state's matrix times `probe`; nothing.
 const HOLD_NEW = 0u;

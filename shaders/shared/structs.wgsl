@@ -55,6 +55,12 @@ struct Shape { // mirrored
     slices: u32,
     // Workgroups that a system's solve is given for a whole dispatch; 0: none stays.
     crew: u32,
+    // Things beside the body that a file moves, and the edge of a mean patch [m].
+    obstacles: u32,
+    jets: u32,
+    patch_size: f32,
+    // Rows of sums of their numbers.
+    moving_rows: u32,
 }
 
 struct Member { // mirrored

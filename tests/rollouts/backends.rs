@@ -1,11 +1,13 @@
 //! The GPU against the CPU through whole rollouts: every scheme with the last material of the table, and every material with the last scheme.
 
 use super::combinations::{Kind, beam, seen};
-use glam::{DAffine3, DVec3};
+use super::moving::{jet, pressed};
+use glam::{DAffine3, DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
 use palpate_gpu::{Choice, Gpu, GpuBackend};
 use palpate_model::materials;
+use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme;
@@ -148,4 +150,93 @@ fn bodies_of_stars_agree() {
         }
         compare(&gpu, &scene, &format!("stars, {name}"));
     }
+}
+
+/// Bodies of every kind, with schemes that take contact along the way of a step, at its end, and in turn, and with two past states.
+fn bodies() -> Vec<(String, Scene)> {
+    let neo_hookean = materials::find("neo-hookean").expect("it is in the table");
+    let kinds = [
+        ("cells", "theta", Kind::CutCells),
+        ("cells", "tr-bdf2", Kind::CutCells),
+        ("tetrahedra", "bdf2", Kind::Tetrahedra(Tetrahedron::Quadratic)),
+        ("stars", "theta", Kind::Tetrahedra(Tetrahedron::Linear)),
+    ];
+    let made = kinds.map(|(body, name, kind)| {
+        let model = if body == "cells" { &materials::ALL[0] } else { neo_hookean };
+        let mut scene = beam(kind, scheme::find(name).expect("it is in the table"), model);
+        if body == "stars" {
+            scene.object = stars();
+        }
+        scene.solver.tolerance = 1e-10;
+        (format!("{body}, {name}"), scene)
+    });
+    made.into()
+}
+
+/// Highest y and z of the bodies of [`bodies`].
+fn ends(name: &str) -> [f64; 2] {
+    if name.starts_with("cells") { [0.014, 0.0215] } else { [0.0164, 0.0169] }
+}
+
+/// A ball that turns as it comes down on the beam, and a box beside it that moves away.
+#[test]
+fn obstacles_agree() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    for (name, mut scene) in bodies() {
+        let [side, top] = ends(&name);
+        let above = DVec3::new(0.07, 0.002, top + 0.03);
+        let motion = RigidMotion {
+            times: vec![0.0, 0.02, 0.04],
+            translations: vec![above, above - DVec3::new(0.001, 0.0, 0.0015), above - DVec3::new(0.002, 0.001, 0.004)],
+            rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_y(0.1), DQuat::from_rotation_y(0.3)],
+        };
+        let ball = Analytic::Ball { radius: 0.03, center: DVec3::new(0.001, 0.0, 0.0) };
+        let away = RigidMotion {
+            times: vec![0.0, 0.04],
+            translations: vec![DVec3::ZERO, DVec3::new(0.0, 0.001, 0.0)],
+            rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_z(0.02)],
+        };
+        let wall = Analytic::Box { min: DVec3::new(0.05, side + 7e-4, -0.01), max: DVec3::new(0.09, 0.03, 0.02) };
+        scene.effects = vec![pressed(ball, motion, [5e7, 1e-4, -2e-4, 3e-4]), pressed(wall, away, [2e7, 0.0, -5e-4, 0.0])];
+        compare(&gpu, &scene, &format!("obstacles, {name}"));
+    }
+}
+
+/// Two nozzles that move and turn.
+#[test]
+fn jets_agree() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    for (name, mut scene) in bodies() {
+        let above = DVec3::new(0.08, 0.02, ends(&name)[1] + 0.12);
+        let beside = DVec3::new(0.09, -0.15, 0.01);
+        scene.effects = vec![
+            jet(above, above + DVec3::new(-0.02, 0.0, 0.01), DVec3::new(-0.1, -0.2, -1.0).normalize(), 1.5),
+            jet(beside, beside + DVec3::new(-0.01, 0.0, 0.02), DVec3::new(-0.1, 1.0, 0.05).normalize(), 0.8),
+        ];
+        compare(&gpu, &scene, &format!("jets, {name}"));
+    }
+}
+
+/// A ring in a jet along its plane: half of what faces the nozzle lies behind the other half.
+#[test]
+fn what_a_nozzle_sees_agrees() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let mut scene = beam(Kind::CutCells, scheme::find("theta").expect("it is in the table"), &materials::ALL[0]);
+    let ring = Analytic::Torus { major: 0.05, minor: 0.02, center: DVec3::new(0.05, 0.0, 0.005), axis: DVec3::Z };
+    scene.object =
+        Object { source: BodySource::Analytic(ring), pose: DAffine3::IDENTITY, resolution: Resolution::CellSize(0.0125) };
+    scene.planes.clear();
+    scene.solver.tolerance = 1e-10;
+    let before = DVec3::new(0.3, 0.004, 0.01);
+    scene.effects = vec![jet(before, before + DVec3::new(0.0, 0.01, 0.01), DVec3::new(-1.0, 0.02, -0.03).normalize(), 3.0)];
+    compare(&gpu, &scene, "a ring");
 }

@@ -11,7 +11,8 @@ use palpate_model::scene::*;
 use palpate_model::shape::{Placed, Shape};
 use std::sync::Arc;
 
-fn pressed(shape: Analytic, motion: RigidMotion, values: [f64; 4]) -> Effect {
+/// An obstacle of a shape, with its stiffness and offset.
+pub(super) fn pressed(shape: Analytic, motion: RigidMotion, values: [f64; 4]) -> Effect {
     let shape = Placed::new(shape, DAffine3::IDENTITY);
     let (low, high) = shape.bounds();
     let spacing = (high - low).max_element() / 40.0;
@@ -51,7 +52,7 @@ fn derivatives_by_an_obstacle_in_motion_are_exact() {
 }
 
 /// A jet from a nozzle that moves and turns.
-fn jet(from: DVec3, to: DVec3, axis: DVec3, thrust: f64) -> Effect {
+pub(super) fn jet(from: DVec3, to: DVec3, axis: DVec3, thrust: f64) -> Effect {
     let motion = RigidMotion {
         times: vec![0.0, 0.05, 2.0],
         translations: vec![from, from.lerp(to, 0.4), to],

@@ -2,10 +2,12 @@
 
 mod crowd;
 mod looks;
+mod moving;
 
 use bytemuck::{Pod, Zeroable};
 pub use crowd::{Crowd, Eye};
 pub use looks::{BandCell, Carried, Found, Look, Mark, Shot, Sight, Site};
+pub use moving::{Jet, MovingPose, Obstacle};
 
 /// Arguments of one dispatch.
 #[repr(C)]
@@ -109,6 +111,14 @@ pub struct Shape {
     pub slices: u32,
     /// Workgroups that stay for all iterations of a system's solve; 0: none stays.
     pub crew: u32,
+    /// Obstacles that a file moves.
+    pub obstacles: u32,
+    /// Nozzles that a file moves.
+    pub jets: u32,
+    /// Edge of a mean patch [m].
+    pub patch_size: f32,
+    /// Rows of sums of the numbers of obstacles and jets.
+    pub moving_rows: u32,
 }
 
 /// Parameters of one member.

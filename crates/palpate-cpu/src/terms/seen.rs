@@ -4,14 +4,8 @@
 //! no deeper than its pixel, give or take what its own slope makes over its size.
 
 use glam::DVec3;
+use palpate_model::effects::jet::{REACH, SIDE, STEEPEST};
 use palpate_model::space::body::Body;
-
-/// Radii b of the jet out to which it blows: e⁻³² of its pressure is left there, so that no gradient sees the edge.
-const REACH: f64 = 4.0;
-/// Most pixels along a side of the picture.
-const SIDE: usize = 1024;
-/// Least cosine between a patch and the jet by which its slope is reckoned: what is steeper feels a hundredth of the pressure.
-const STEEPEST: f64 = 0.1;
 
 /// Patches that face the jet, lie within its cone, and are hidden by nothing; `places` [m] are those of the patches from the jet's origin,
 /// `areas` [m²] their area vectors.

@@ -8,7 +8,9 @@ mod contact;
 mod elastic_cells;
 mod elastic_points;
 mod held_nodes;
+mod jets;
 mod nodes;
+mod obstacles;
 mod point_laws;
 mod star_penalty;
 mod start;
@@ -23,13 +25,16 @@ use crate::world::{Rates, SOLVING, Sums, Tally, World};
 use palpate_model::effects::Site;
 use palpate_model::params::coefficients::Sought;
 
-const TERMS: [&dyn Term; 9] = [
+const TERMS: [&dyn Term; 12] = [
     &contact::Contact,
     &point_laws::SurfaceLaws,
+    &obstacles::Obstacles,
+    &jets::Jets,
     &clamps::Clamps,
     &elastic_cells::ElasticCells,
     &nodes::Nodes,
     &point_laws::NodeLaws,
+    &jets::JetTurns,
     &star_penalty::StarPenalty,
     &elastic_points::ElasticPoints,
     &held_nodes::HeldNodes,
@@ -108,6 +113,10 @@ struct Along<'a> {
     laws: bool,
     /// Laws of points.
     points: bool,
+    /// Obstacles.
+    obstacles: bool,
+    /// Jets.
+    jets: bool,
     /// Something at patches.
     patches: bool,
     /// Something of what the node term gathers.
@@ -124,9 +133,24 @@ impl<'a> Along<'a> {
         let clamps = body || grips || moved.start;
         let laws = on(|s| matches!(s, Site::Cells(_)));
         let points = point_laws::change(world, moved);
-        let patches = moved.planes || moved.modulus || (points && effects.on_patches());
+        let obstacles = effects.moving()[0] != 0 && (moved.start || on(|s| matches!(s, Site::Obstacle)));
+        let jets = effects.moving()[1] != 0 && (moved.start || on(|s| matches!(s, Site::Jet)));
+        let patches = moved.planes || moved.modulus || obstacles || jets || (points && effects.on_patches());
         let gathered = body || moved.damping[1] || moved.viscosity || clamps || patches || laws;
-        Along { moved, flags: rates.flags, named: rates.named(), body, grips, clamps, laws, points, patches, gathered }
+        Along {
+            moved,
+            flags: rates.flags,
+            named: rates.named(),
+            body,
+            grips,
+            clamps,
+            laws,
+            points,
+            obstacles,
+            jets,
+            patches,
+            gathered,
+        }
     }
 }
 

@@ -7,19 +7,25 @@ use palpate_model::plan::Plan;
 use palpate_model::space::pattern::Pattern;
 
 /// Lists in compressed rows.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Lists<T> {
     rows: Vec<u32>,
     all: Vec<T>,
 }
 
-impl<T: Copy> Lists<T> {
-    fn new(lists: &[Vec<T>]) -> Lists<T> {
+impl<T: Copy + bytemuck::NoUninit> Lists<T> {
+    pub(super) fn new(lists: &[Vec<T>]) -> Lists<T> {
         let mut rows = vec![0];
         for list in lists {
             rows.push(rows[rows.len() - 1] + list.len() as u32);
         }
         Lists { rows, all: lists.concat() }
+    }
+
+    /// Adds rows and lists to an arena, by the names of their tables.
+    pub(super) fn put(&self, [rows, all]: [&str; 2], tables: &mut Arena) {
+        tables.put(rows, &self.rows);
+        tables.put(all, &self.all);
     }
 
     /// Length of the longest.
@@ -112,11 +118,8 @@ impl ElasticTables {
         tables.put("braces", &self.braces);
         tables.put("brace_rows", &self.brace_rows);
         tables.put("star_ends", &self.star_ends);
-        tables.put("elastic_rows", &self.of_node.rows);
-        tables.put("elastic_list", &self.of_node.all);
-        tables.put("pair_rows", &self.of_block.rows);
-        tables.put("pairs", &self.of_block.all);
-        tables.put("held_rows", &self.holders.rows);
-        tables.put("holders", &self.holders.all);
+        self.of_node.put(["elastic_rows", "elastic_list"], tables);
+        self.of_block.put(["pair_rows", "pairs"], tables);
+        self.holders.put(["held_rows", "holders"], tables);
     }
 }

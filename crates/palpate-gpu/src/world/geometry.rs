@@ -124,6 +124,7 @@ impl Geometry {
         let to_u32 = |v: &[usize]| -> Vec<u32> { v.iter().map(|x| *x as u32).collect() };
         let hold_sites: Vec<[u32; 2]> = holds.iter().map(|(i, cell)| [*cell, *i as u32]).collect();
 
+        let frames = effects.frames(plan);
         let most = Most {
             members: members as u64,
             nodes: n as u64,
@@ -135,6 +136,11 @@ impl Geometry {
                 .unwrap_or(0)
                 .into(),
             planes: plan.planes.len() as u64,
+            obstacles: effects.moving()[0].into(),
+            jets: effects.moving()[1].into(),
+            patches: if effects.moving()[1] == 0 { 0 } else { patches.len() as u64 },
+            frame: frames.most()[0],
+            framed: frames.most()[1],
             pressed: if effects.on_contact() { plan.planes.len() as u64 } else { 0 },
             masses: plan.masses.len() as u64,
             stencil: stencils.longest() as u64,
@@ -155,6 +161,7 @@ impl Geometry {
         let chunk = (LOOPS / most.of_iteration()).clamp(1, LONGEST_CHUNK);
         let stay = 2 * (LOOPS / most.of_staying() / 2).min(LONGEST_CHUNK) as u32;
         let [rate_effects, rate_numbers] = effects.rate_places(plan);
+        let [obstacles, jets] = effects.moving();
         let shape = Shape {
             members: 0,
             nodes: n as u32,
@@ -200,6 +207,10 @@ impl Geometry {
             group_size: groups.size as f32,
             slices: slices[0].len() as u32 - 1,
             crew: 0,
+            obstacles,
+            jets,
+            patch_size: (body.area / body.patches.len().max(1) as f64).sqrt() as f32,
+            moving_rows: effects.most_moving_rows(plan),
             contact_width: palpate_model::mechanics::contact::WIDTH as f32 * body.length as f32,
         };
         let mut tables = Arena::new("body_tables");
@@ -223,6 +234,7 @@ impl Geometry {
         tables.put("effects", &effects.sites());
         tables.put("cell_effects", &effects.cell_sites());
         tables.put("holds", &hold_sites);
+        effects.put_moving(plan, &mut tables);
         tables.upload(gpu, buffers)?;
         Ok(Geometry { shape, stay, classes, holds, effects, mass, groups, blocks: pattern.blocks })
     }

@@ -27,6 +27,12 @@ pub(crate) struct Most {
     /// Patches and clamp cells of a cell.
     pub(crate) supports: u64,
     pub(crate) planes: u64,
+    pub(crate) obstacles: u64,
+    pub(crate) jets: u64,
+    /// Patches that jets may blow on, entries of the deformation at one, and those that have a node.
+    pub(crate) patches: u64,
+    pub(crate) frame: u64,
+    pub(crate) framed: u64,
     /// Planes at which effects on contact are asked.
     pub(crate) pressed: u64,
     pub(crate) masses: u64,
@@ -86,7 +92,7 @@ impl Most {
     }
 
     /// Upper bounds of the loop iterations of one invocation, by kernel; `tests/loops.rs` compares them with the shaders.
-    pub(crate) fn loops(&self) -> [(&'static str, u64); 30] {
+    pub(crate) fn loops(&self) -> [(&'static str, u64); 38] {
         [
             ("list_members", (columns(self.members) * self.members).div_ceil(64) * LISTING[0] + LISTING[1]),
             (
@@ -110,6 +116,16 @@ impl Most {
             // An effect is asked up to six times for derivatives by all its inputs, and some laws several times in a step.
             ("press_patches", 410 * self.pressed.max(1) + 2 * self.stencil + 84),
             ("touch_patches", (1 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 2 * self.stencil + 4),
+            // Twice a spline of 4 × 4 × 4 samples, and the instants of a step.
+            ("press_obstacles", 60 * self.obstacles + 2 * self.stencil + 4),
+            ("pull_obstacles", 60 * self.obstacles + 2 * self.stencil + 4),
+            ("aim_jets", self.frame + self.jets * (1 + self.stencil)),
+            ("frame_jets", self.jets * (self.patches.div_ceil(64) + 9)),
+            // A patch looks for the one before it among all.
+            ("see_jets", self.frame + self.jets * (1 + self.stencil + self.patches)),
+            ("press_jets", 2 * self.frame + self.stencil + self.jets * (1 + self.stencil) + 3),
+            ("pull_jets", self.frame + self.stencil + self.jets * (1 + self.stencil)),
+            ("turn_jets", self.framed),
             // Once for each input, all planes together, and once for each of a plane's own numbers.
             ("pull_patch_laws", 1000 * self.pressed.max(1) + 2 * self.stencil + 684),
             ("pull_patches", (9 + palpate_model::mechanics::contact::INSTANTS as u64) * self.planes + 2 * self.stencil + 24),

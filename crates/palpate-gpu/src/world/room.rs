@@ -11,7 +11,7 @@ pub(crate) const VECTOR: u64 = 16;
 type Work = (&'static str, fn(&Shape) -> u32, u64);
 
 /// Work space per member.
-const WORK: [Work; 22] = [
+const WORK: [Work; 27] = [
     ("increment", |s| s.nodes, VECTOR),
     ("solving", |s| SOLVING_VECTORS as u32 * s.nodes, VECTOR),
     ("trial", |s| s.nodes, VECTOR),
@@ -33,6 +33,11 @@ const WORK: [Work; 22] = [
     ("past_stretches", |s| if s.elastic == 0 || laws(s.fields) == 0 { 0 } else { 2 * s.elements }, VECTOR),
     ("reactions", |s| if s.held == 0 || s.fields & structs::FIELD_GRIPS == 0 { 0 } else { s.nodes }, VECTOR),
     ("shape_stress", |s| if s.fields & structs::FIELD_REST == 0 { 0 } else { 3 * s.elastic }, VECTOR),
+    ("jet_sights", |s| s.jets * s.patches, VECTOR),
+    ("jet_pictures", |s| s.jets, VECTOR),
+    ("jet_seen", |s| s.jets * s.patches, 4),
+    ("jet_forces", |s| s.jets.min(1) * s.patches, VECTOR),
+    ("jet_turns", |s| s.jets.min(1) * 3 * s.patches, VECTOR),
     ("elastic_tangents", |s| elastic_asks::TANGENT_NUMBERS * s.elastic, 4),
 ];
 

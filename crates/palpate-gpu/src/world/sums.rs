@@ -71,6 +71,7 @@ impl Sums {
             ("mass_pulls", u64::from(shape.masses)),
             ("patch_sums", 4 * u64::from(shape.planes) * each(shape.patches, 64)),
             ("point_sums", u64::from(self.point_rows) * u64::from(shape.point_items)),
+            ("moving_sums", u64::from(shape.moving_rows) * u64::from(shape.patches)),
             ("velocity_sums", 8 * each(shape.nodes, 64)),
         ];
         floats.into_iter().map(|(name, count)| (name, 4 * count * members)).collect()
@@ -121,6 +122,12 @@ impl Sums {
                     _ => 0.0,
                 };
             }
+        }
+        for (number, first) in effects.moving_rows(plan) {
+            let row = |k: usize| at.sum("moving_sums", first + k as u32, shape.patches, 1)[0];
+            let numbers = &mut g.physics.effects[number];
+            numbers.iter_mut().enumerate().for_each(|(slot, out)| *out += row(slot));
+            g.physics.start += row(numbers.len());
         }
         for ((number, site), first) in effects.points.iter().zip(&self.points) {
             let row = |k: u32| at.sum("point_sums", first + k, shape.point_items, 1)[0];

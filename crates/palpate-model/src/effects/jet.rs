@@ -18,6 +18,12 @@ pub const THRUST: usize = 0;
 pub const SPREAD: usize = 1;
 /// First slot of the offset.
 pub const OFFSET: usize = 2;
+/// Radii b of the jet out to which it blows: e⁻³² of its pressure is left there, so that no gradient sees the edge.
+pub const REACH: f64 = 4.0;
+/// Most pixels along a side of the picture that a nozzle has of the body.
+pub const SIDE: usize = 1024;
+/// Least cosine between a patch and the jet by which its slope is reckoned: what is steeper feels a hundredth of the pressure.
+pub const STEEPEST: f64 = 0.1;
 /// Numbers of the law.
 pub const COUNT: usize = 5;
 

@@ -74,6 +74,11 @@ impl DistanceGrid {
         self.spacing
     }
 
+    /// Place of the first sample [m], samples along every axis, and the spline's coefficients [m] `[z, y, x]`, x fastest.
+    pub fn lattice(&self) -> (DVec3, [usize; 3], &[f64]) {
+        (self.origin, self.counts, &self.coefficients)
+    }
+
     /// Lowest and highest place where the spline is defined [m].
     pub fn domain(&self) -> (DVec3, DVec3) {
         let last = DVec3::from_array(self.counts.map(|n| (n - 2) as f64));

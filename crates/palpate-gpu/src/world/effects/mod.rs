@@ -3,6 +3,7 @@
 //! stress-free shapes (`rests`) and what effects make of clamps (`grips`).
 
 mod grips;
+mod moving;
 mod rests;
 
 use crate::device::pipelines::shared::laws;
@@ -43,6 +44,8 @@ pub(crate) struct Effects {
     pub(crate) aging_rows: u32,
     /// Parameters of how clamps are held: effect and number of each.
     grip_rows: Vec<[usize; 2]>,
+    /// What a file moves.
+    things: moving::Things,
     /// Those among them that change the clamps' matrices, by their row.
     matrix_rows: Vec<usize>,
     /// The material has a viscosity.
@@ -70,7 +73,9 @@ impl Effects {
         for (number, (law, places)) in plan.layout.effects().enumerate() {
             let count = places.len() as u32;
             let asks = match law.asks() {
-                _ if law.moves() => Some("moves as a file says"),
+                _ if matches!(law.site, Site::Jet) && plan.initial == InitialShape::StaticEquilibrium => {
+                    Some("initial.state = \"static-equilibrium\" brings to rest with the body")
+                }
                 Asks::Nothing => None,
                 Asks::Path => Some("follows a path"),
                 Asks::Series => Some("is driven by a file"),
@@ -113,8 +118,13 @@ impl Effects {
                     return Err(GpuError::Plan { what: format!("more than {MOST_LAWS} laws of cells") });
                 }
                 Site::Cells(_) => Some(AT_CELLS),
+                Site::Obstacle | Site::Jet => {
+                    e.bits |= FIELD_PATCHES;
+                    e.things.add(plan, number, &law.site, e.stride);
+                    None
+                }
                 // The observer's business.
-                Site::Clock | Site::Marker | Site::Readings(_) | Site::Driven(_) | Site::Obstacle | Site::Jet => None,
+                Site::Clock | Site::Marker | Site::Readings(_) | Site::Driven(_) => None,
             };
             e.first_rows.push(row);
             if let Some(site) = site.filter(|s| *s == AT_CELLS) {
@@ -216,6 +226,7 @@ impl Effects {
         all.extend(self.rest_sizes(members, body));
         all.push(("hold_slopes", grips::FLOATS * self.grip_rows.len() * members * (self.steps + 1) * clamps));
         all.push(("layers", of(FIELD_GRIPS, 1 + self.matrix_rows.len())));
+        all.push(("moving_poses", self.moving_size(members)));
         all
     }
 
@@ -253,6 +264,7 @@ impl Effects {
         }
         data[7] = self.hold_slopes(plan, batch);
         data[8] = self.layers(plan, batch);
+        data[9] = self.moving_poses(plan, batch);
         for ((name, size), values) in sizes.iter().zip(&data) {
             debug_assert_eq!(*size, values.len(), "{name}");
             tables.put(name, values);
