@@ -1,6 +1,7 @@
 //! The command line as its users meet it: arguments in, exit code, text and files out.
 
 mod batch;
+mod carrying;
 mod effects;
 mod export;
 mod fields;

@@ -1,6 +1,7 @@
 //! [`Backend`] on the device: every call puts dispatches on its list; only `read` waits. Calls that wait are those of `asynchronous.rs`, driven here.
 
 use crate::device::{Choice, Gpu, GpuError};
+use crate::skinning::Skinning;
 use crate::solve::{backward, forward};
 use crate::tracking::Correspondence;
 use crate::world::{Adjoint, LEVELS, Level, State, Tally, Tangent, Tuning, World};
@@ -10,6 +11,7 @@ use palpate_engine::{Backend, BuildError, Direction, Evaluation, FrameResiduals,
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::scene::InitialShape;
+use palpate_model::space::stencil::Stencils;
 use std::sync::Arc;
 
 /// The GPU backend.
@@ -113,6 +115,14 @@ impl GpuBackend {
     /// Who says, on its device, which readings of a frame belong to which part of a surface.
     pub fn correspondence(&self) -> Correspondence {
         Correspondence::on(self.gpu.clone())
+    }
+
+    /// Who moves, on its device, places that follow `nodes` nodes.
+    ///
+    /// # Errors
+    /// More than the device has.
+    pub fn skinning(&self, stencils: &Stencils, nodes: usize) -> Result<Skinning, GpuError> {
+        Skinning::on(self.gpu.clone(), stencils, nodes)
     }
 }
 

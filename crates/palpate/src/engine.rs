@@ -8,9 +8,10 @@ use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::tracking::Correspond;
 use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop};
-use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError};
+use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError, Skinning};
 use palpate_model::plan::Plan;
 use palpate_model::plan::join::{Joint, join};
+use palpate_model::space::stencil::Stencils;
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -119,6 +120,17 @@ impl Backend {
             Backend::Gpu => Box::new(gpu().map_err(Error::Device)?.correspondence()),
             Backend::Cpu | Backend::Auto => Box::new(palpate_cpu::Correspondence),
         })
+    }
+
+    /// Who moves places that follow a body of `nodes` nodes, where that is the device.
+    ///
+    /// # Errors
+    /// There is no usable adapter, or it has too little room.
+    pub(crate) fn skinning(self, stencils: &Stencils, nodes: usize) -> Result<Option<Skinning>, Error> {
+        match self {
+            Backend::Gpu => gpu().and_then(|device| device.skinning(stencils, nodes)).map(Some).map_err(Error::Device),
+            Backend::Cpu | Backend::Auto => Ok(None),
+        }
     }
 
     /// How many simulations of a fit run at once, with so many threads (0 = one per core).

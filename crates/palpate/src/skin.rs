@@ -2,10 +2,13 @@
 //!
 //! A place in an element moves as that does. One beyond the cells follows the affine motion that fits the nodes around it best, so that a rigid
 //! motion carries everything exactly; weighing nodes by their distance does not (at a turn of 45° a tenth of their spacing is lost).
+//! The backend that simulates adds up for every frame.
 
+use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use glam::{DAffine3, DMat3, DVec3};
+use palpate_gpu::Skinning;
 use palpate_io::carried::Carried;
 use palpate_model::space::carrier::Followers;
 use std::path::Path;
@@ -21,14 +24,16 @@ pub struct Skin {
     rest: Vec<DVec3>,
     /// From the file's coordinates into the world.
     pose: DAffine3,
+    /// The device that moves places; `None` = the CPU.
+    device: Option<Skinning>,
 }
 
 impl Skin {
     /// Reads a file and finds what its places follow; with a sentence where some lie far from the body.
     ///
     /// # Errors
-    /// The file cannot be read, or none of its places is near the body.
-    pub fn new(experiment: &Experiment, path: &Path) -> Result<(Skin, Option<String>), Error> {
+    /// The file cannot be read, or none of its places is near the body; or a device was asked for that cannot be had.
+    pub fn new(experiment: &Experiment, path: &Path, backend: Backend) -> Result<(Skin, Option<String>), Error> {
         let file = Carried::read(path)?;
         let (pose, body) = (experiment.scene().object.pose, &experiment.plan().body);
         let rest: Vec<DVec3> = file.places().iter().map(|p| pose.transform_point3(*p)).collect();
@@ -48,15 +53,20 @@ impl Skin {
             let doubt = doubt.unwrap_or_default();
             return Err(Error::Input(format!("{doubt} (are they in metres, and in the coordinates of object.mesh?)")));
         }
-        Ok((Skin { file, followers, rest, pose }, doubt))
+        let device = backend.skinning(&followers.stencils, body.nodes.len())?;
+        Ok((Skin { file, followers, rest, pose, device }, doubt))
     }
 
     /// Writes the file as it is at node displacements `[N]` [m].
-    pub fn write(&self, path: &Path, displacement: &[DVec3]) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// The file cannot be written, or the device fails.
+    pub fn write(&mut self, path: &Path, displacement: &[DVec3]) -> Result<(), Error> {
+        let known = self.device.as_mut().map(|d| d.moved(displacement)).transpose().map_err(Error::Device)?;
         let moved = |i: usize| {
             let s = self.followers.stencils.get(i);
-            let f = DMat3::IDENTITY + s.gradient_of(displacement);
-            (self.rest[i] + s.at(displacement), f * self.pose.matrix3)
+            let (u, h) = known.as_ref().map_or_else(|| (s.at(displacement), s.gradient_of(displacement)), |all| all[i]);
+            (self.rest[i] + u, (DMat3::IDENTITY + h) * self.pose.matrix3)
         };
         Ok(self.file.write(path, moved)?)
     }

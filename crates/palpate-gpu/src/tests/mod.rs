@@ -21,6 +21,7 @@ mod loops;
 mod material_passes;
 mod materials;
 mod memory;
+mod moving;
 mod mutations;
 mod passes;
 mod products;

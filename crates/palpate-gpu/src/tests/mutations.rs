@@ -6,6 +6,7 @@ use super::collapse::{measured, pressed};
 use super::effects::with;
 use super::elastic::{of_tets, seen as marked};
 use super::faults::busy;
+use super::moving::beset;
 use super::scenes::{ball, held, own_device};
 use super::tet_effects::{slipping, spinning};
 use super::{cell_laws::lawful, products};
@@ -28,7 +29,8 @@ use std::sync::{Arc, OnceLock};
 const PART: usize = 16;
 
 /// Kernels whose work changes no result, and what watches over them instead.
-const WATCHED: [(&str, &str); 3] = [
+const WATCHED: [(&str, &str); 4] = [
+    ("carry_places", "skinning::tests::places_go_where_their_stencils_say"),
     ("turn_groups", "coarse::groups_turn_as_the_body_does"),
     ("list_members", "limits::listings_give_every_kind_of_items_the_workgroups_that_its_passes_work_through"),
     ("close_cg", "limits::conjugate_gradients_at_the_bound_of_their_loops_run_all_iterations"),
@@ -167,6 +169,7 @@ fn subjects() -> Vec<Subject> {
         // What is lost depends on differences of strains, which in a slow step leave three digits.
         loose(Subject::new(marked(&slipping_tets), MANY), 1e-3),
         Subject::new(seen(&spinning_cells), MANY),
+        Subject::new(seen(&short(beset())), MANY),
         loose(Subject::new(marked(&short(spinning())), MANY), 5e-4),
         Subject::new(crushed.clone(), MANY),
         Subject::new(crushed, FREE),

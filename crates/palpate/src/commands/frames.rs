@@ -191,7 +191,7 @@ impl Writer<'_> {
             }
             self.files += 1;
         }
-        for (series, skin) in &self.carried {
+        for (series, skin) in &mut self.carried {
             skin.write(&self.folder.join(series.name(number)), &state.displacement)?;
             self.files += 1;
         }
@@ -209,6 +209,7 @@ fn camera(experiment: &Experiment, boxes: &[(DVec3, DVec3)]) -> Pinhole {
 fn carried(
     experiment: &Experiment,
     files: &[PathBuf],
+    backend: Backend,
     track: &mut Track,
     console: &mut Console,
 ) -> Result<Vec<(Series, Skin)>, Error> {
@@ -220,7 +221,7 @@ fn carried(
             let message = format!("its frames would be called {}, as others are; rename the file", series.name(0));
             return Err(Error::Option { option: "carry", given: file.display().to_string(), message });
         }
-        let (skin, doubt) = Skin::new(experiment, file)?;
+        let (skin, doubt) = Skin::new(experiment, file, backend)?;
         track.aside(|| console.warn(doubt.as_slice()));
         all.push((series, skin));
     }
@@ -242,7 +243,7 @@ pub fn write_motion(
     make_folder(folder)?;
     let plan = experiment.plan();
     // Whoever names a file that cannot be carried is told before anything is computed.
-    let carried = carried(experiment, &a.carry, &mut track, console)?;
+    let carried = carried(experiment, &a.carry, backend, &mut track, console)?;
     let clock = Instant::now();
     let (surface, triangles) = experiment.surface(0.5 * plan.body.length);
     let keep = |k: usize| (k as u64).is_multiple_of(a.every) || k == plan.clock.steps;
