@@ -10,7 +10,7 @@ use palpate_model::effects::moving::Moving;
 use palpate_model::effects::{Effect, find};
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::params::ParamKey;
-use palpate_model::scene::{Analytic, Scene};
+use palpate_model::scene::{Analytic, BodySource, Scene};
 use palpate_model::shape::Placed;
 use std::sync::Arc;
 
@@ -42,9 +42,13 @@ fn nozzle_beside(scene: &mut Scene) {
     scene.effects.push(effect("jet", &[3.0, 0.25, 0.001, -0.002, 0.0005], Moving::nozzle(DVec3::X, motion)));
 }
 
-/// The ball between both, in steps along whose way contact acts.
+/// A ring between both, in steps along whose way contact acts: half of what faces the nozzle lies behind the other half.
 pub(super) fn beset() -> Scene {
-    let mut s = ball(0.03);
+    let mut s = ball(0.015);
+    let ring = Analytic::Torus { major: 0.033, minor: 0.017, center: DVec3::new(0.003, 0.001, 0.051), axis: DVec3::Z };
+    s.object.source = BodySource::Analytic(ring);
+    s.masses[0].point = DVec3::new(0.0, 0.035, 0.06);
+    s.planes[0].point.z = 0.026;
     s.time.steps = 3;
     s.time.theta = 0.55;
     s.observation = watched();
