@@ -42,13 +42,14 @@ fn nozzle_beside(scene: &mut Scene) {
     scene.effects.push(effect("jet", &[3.0, 0.25, 0.001, -0.002, 0.0005], Moving::nozzle(DVec3::X, motion)));
 }
 
-/// A ring between both, in steps along whose way contact acts: half of what faces the nozzle lies behind the other half.
+/// A ring between both, in steps along whose way contact acts. It is tilted: of what lies behind, the nozzle sees the upper part.
 pub(super) fn beset() -> Scene {
     let mut s = ball(0.015);
-    let ring = Analytic::Torus { major: 0.033, minor: 0.017, center: DVec3::new(0.003, 0.001, 0.051), axis: DVec3::Z };
+    let axis = DVec3::new(-0.25, 0.0, 1.0).normalize();
+    let ring = Analytic::Torus { major: 0.033, minor: 0.017, center: DVec3::new(0.003, 0.001, 0.051), axis };
     s.object.source = BodySource::Analytic(ring);
     s.masses[0].point = DVec3::new(0.0, 0.035, 0.06);
-    s.planes[0].point.z = 0.026;
+    s.planes[0].point.z = 0.02;
     s.time.steps = 3;
     s.time.theta = 0.55;
     s.observation = watched();
