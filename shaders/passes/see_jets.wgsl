@@ -39,7 +39,8 @@ fn see_jets(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
                 }
             }
             let facing = -blown.through / length(blown.at.area);
-            let cosine = max(facing, jet_steepest);
+            // Rounding takes the cosine of a patch right across the jet beyond one.
+            let cosine = clamp(facing, jet_steepest, 1.0);
             let slope = sqrt(1.0 / (cosine * cosine) - 1.0);
             seen = u32(own.z <= nearest + own.w * (1.0 + 1.5 * slope));
         }
