@@ -111,6 +111,11 @@ const LOADS: [[f64; 3]; 6] =
 /// Of those the fits see the first ones.
 const TRAINED: usize = 4;
 
+/// A bar around the cloud, and its outer half four times softer.
+pub(super) const HULL: &str = "shape = { box = { min = [0, 0, 0], max = [0.16, 0.04, 0.04] } }\n";
+pub(super) const HALVES: &str = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"regions\"\nblend = \"nearest\"\n\
+                                 regions = [{ center = [0.04, 0.02, 0.02], radius = 0.01 }, { center = [0.12, 0.02, 0.02], radius = 0.01, value = 0.25 }]\n";
+
 /// A stiffness for every point, what is expected of it, and a fit's.
 pub(super) const FIELD: &str = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"points\"\n";
 pub(super) const PRIOR: &str = "[field.prior]\nkind = \"matern\"\nlength = 0.08\ndeviation = 1.0\n";
@@ -134,9 +139,7 @@ pub fn two_parts(folder: &Path) -> Result<Figures, String> {
         places.join(", "),
         total.join(", ")
     );
-    let hull = "shape = { box = { min = [0, 0, 0], max = [0.16, 0.04, 0.04] } }\n";
-    let halves = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"regions\"\nblend = \"nearest\"\n\
-                  regions = [{ center = [0.04, 0.02, 0.02], radius = 0.01 }, { center = [0.12, 0.02, 0.02], radius = 0.01, value = 0.25 }]\n";
+    let (hull, halves) = (HULL, HALVES);
     let times: Vec<f64> = (0..LOADS.len()).map(|k| k as f64).collect();
     let truth = format!("{hull}cell_size = 0.005");
     record(&bar(&truth, &format!("{loads}{halves}")), &points, &times, 0.02 * SPACING, folder)?;

@@ -2,7 +2,7 @@
 //! felt. The truth is made of other elements: hexahedra twice as fine as the points lie, or quadratic tetrahedra.
 
 use super::super::cases::{Figures, Row};
-use super::clouds::{FIELD, FOUND, MODULUS, PRIOR, SPACING, bar, fitted, held, record, seen, text, write_field};
+use super::clouds::{FIELD, FOUND, HALVES, HULL, MODULUS, PRIOR, SPACING, bar, fitted, held, record, seen, text, write_field};
 use crate::tetrahedra::mesh::Mesh;
 use glam::DVec3;
 use palpate::Experiment;
@@ -11,10 +11,6 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// A bar whose outer half is four times softer, around the cloud.
-const HULL: &str = "shape = { box = { min = [0, 0, 0], max = [0.16, 0.04, 0.04] } }\n";
-const HALVES: &str = "[[field]]\npath = \"material.youngs_modulus\"\nbasis = \"regions\"\nblend = \"nearest\"\n\
-                      regions = [{ center = [0.04, 0.02, 0.02], radius = 0.01 }, { center = [0.12, 0.02, 0.02], radius = 0.01, value = 0.25 }]\n";
 /// Where along the bar the jet blows [m], and whether from the side instead of from above, state by state. The fit sees the first ones.
 const SWEEP: [(f64, bool); 6] = [(0.15, false), (0.15, true), (0.09, false), (0.09, true), (0.12, false), (0.13, true)];
 const TRAINED: usize = 4;
@@ -43,7 +39,7 @@ fn press(folder: &Path) -> Result<(), String> {
     fs::write(folder.join("press.csv"), csv).map_err(text)
 }
 
-/// Writes the bar as tetrahedra, two bricks of six to a side of the points' spacing squared: `brick` long [m].
+/// Writes the bar as quadratic tetrahedra, six to a cube of edge `brick` [m].
 fn tetrahedra(folder: &Path, brick: f64) -> Result<(), String> {
     let planes = |n: usize| (0..=n).map(|k| brick * k as f64).collect::<Vec<f64>>();
     let (long, wide) = ((0.16 / brick).round() as usize, (0.04 / brick).round() as usize);
