@@ -1,22 +1,129 @@
 //! `cargo xtask fuzz`: the readers against damaged files for as long as asked, on a stable compiler. The targets are those of `fuzz/`, which
 //! `cargo +nightly fuzz run NAME` runs with coverage.
+//!
+//! A run goes on where the runs before it ended: `bench/fuzz.jsonl` counts them, and each has a seed of its own.
 
+use crate::{rows, table};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
-/// Runs all targets for so many minutes together.
+/// Files of one target in one go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the target.
+    pub target: String,
+    /// What its damages were drawn with.
+    pub seed: u64,
+    /// How long it ran [min].
+    pub minutes: f64,
+    /// Damaged files that it read.
+    pub files: u64,
+    /// Day of the run.
+    pub date: String,
+    /// Commit whose readers they were.
+    pub commit: String,
+}
+
+/// Runs targets for so many minutes together, all of them or those that are named.
 ///
 /// # Errors
 /// A reader panics or takes too long; the file is named in what the test prints.
-pub fn run(root: &Path, minutes: f64) -> Result<(), String> {
+pub fn run(root: &Path, minutes: f64, only: &[String]) -> Result<(), String> {
     if !(minutes > 0.0 && minutes < 1e5) {
         return Err(format!("--minutes {minutes}: must be > 0 and below 100000"));
     }
-    let status = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
+    let targets = targets(root)?;
+    if let Some(other) = only.iter().find(|o| !targets.contains(o)) {
+        return Err(format!("--only {other}: no target; there are {}", targets.join(", ")));
+    }
+    let chosen: Vec<&String> = targets.iter().filter(|t| only.is_empty() || only.contains(t)).collect();
+    let path = rows::path("fuzz");
+    for target in &chosen {
+        let seed = rows::load::<Row>(&path)?.iter().filter(|r| r.target == **target).count() as u64;
+        let share = minutes / chosen.len() as f64;
+        let files = one(root, target, seed, share)?;
+        let commit = table::git(&["log", "-1", "--format=%h"])?;
+        println!("{target}: {files} files in {share:.1} minutes");
+        let row = Row { target: (*target).clone(), seed, minutes: share, files, date: table::today(), commit };
+        rows::append(&path, &row)?;
+    }
+    Ok(())
+}
+
+/// Files that one target read in so many minutes.
+fn one(root: &Path, target: &str, seed: u64, minutes: f64) -> Result<u64, String> {
+    let done = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
         .args(["test", "--release", "-p", "palpate", "--test", "fuzz", "no_reader", "--", "--nocapture"])
         .env("PALPATE_FUZZ_MINUTES", minutes.to_string())
+        .env("PALPATE_FUZZ_ONLY", target)
+        .env("PALPATE_FUZZ_SEED", seed.to_string())
+        .stderr(Stdio::inherit())
         .current_dir(root)
-        .status()
+        .output()
         .map_err(|e| format!("cargo: {e}"))?;
-    if status.success() { Ok(()) } else { Err("a reader panics or takes too long".into()) }
+    let told = String::from_utf8_lossy(&done.stdout);
+    if !done.status.success() {
+        return Err(format!("a reader panics or takes too long:\n{told}"));
+    }
+    let line = told.lines().find_map(|l| l.split_once(&format!("{target}: ")));
+    let files = line.and_then(|(_, rest)| rest.split_whitespace().next()?.parse().ok());
+    files.ok_or_else(|| format!("{target}: the test does not say how many files it read:\n{told}"))
+}
+
+/// Names of the targets, a folder of files to begin with each.
+fn targets(root: &Path) -> Result<Vec<String>, String> {
+    let corpus = root.join("fuzz/corpus");
+    let entries = std::fs::read_dir(&corpus).map_err(|e| format!("{}: {e}", corpus.display()))?;
+    let mut names: Vec<String> = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    Ok(names)
+}
+
+/// Table of what was run, a line a target.
+///
+/// # Errors
+/// The rows cannot be read.
+pub fn markdown(root: &Path) -> Result<String, String> {
+    let rows: Vec<Row> = rows::load(&root.join("bench/fuzz.jsonl"))?;
+    let mut out = String::from("| target | files | minutes | last run |\n| --- | --- | --- | --- |\n");
+    let mut line = |name: &str, of: &[&Row]| {
+        let files: u64 = of.iter().map(|r| r.files).sum();
+        let minutes: f64 = of.iter().map(|r| r.minutes).sum();
+        let last = of.iter().map(|r| &r.date).max().map_or("never", |d| d);
+        out += &format!("| {name} | {files} | {minutes:.0} | {last} |\n");
+    };
+    for target in targets(root)? {
+        line(&target, &rows.iter().filter(|r| r.target == target).collect::<Vec<_>>());
+    }
+    line("all", &rows.iter().collect::<Vec<_>>());
+    Ok(out)
+}
+
+/// Writes the table of the page from what is stored.
+///
+/// # Errors
+/// A file cannot be read or written.
+pub fn report(root: &Path) -> Result<(), String> {
+    table::replace("docs/fuzzing.md", "fuzz", &markdown(root)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_a_target_are_counted_together_and_have_different_seeds() {
+        let root = table::root();
+        let rows: Vec<Row> = rows::load(&rows::path("fuzz")).unwrap();
+        let known = targets(&root).unwrap();
+        for (i, row) in rows.iter().enumerate() {
+            assert!(known.contains(&row.target) && row.minutes > 0.0, "{row:?}");
+            assert!(rows[..i].iter().all(|r| (&r.target, r.seed) != (&row.target, row.seed)), "{row:?}");
+        }
+        let all: u64 = rows.iter().map(|r| r.files).sum();
+        assert!(markdown(&root).unwrap().contains(&format!("| all | {all} |")));
+        assert!(run(&root, 0.0, &[]).unwrap_err().contains("--minutes 0"));
+        assert!(run(&root, 1.0, &["plyy".into()]).unwrap_err().contains("no target; there are c3d"));
+    }
 }

@@ -181,11 +181,19 @@ enum Verb {
         #[arg(long)]
         compile: bool,
     },
-    /// Damaged files against every reader
+    /// Damaged files against every reader (docs/fuzzing.md)
+    ///
+    /// A run draws other damages than the runs before it, and is counted in bench/fuzz.jsonl when a target has had its time.
     Fuzz {
         /// How long, all targets together
         #[arg(long, default_value_t = 5.0)]
         minutes: f64,
+        /// Targets to run, by name; all of them without
+        #[arg(long, value_delimiter = ',')]
+        only: Vec<String>,
+        /// Write the table of the page from what is stored, and run nothing
+        #[arg(long)]
+        report: bool,
     },
     /// Change effects and materials in one place at a time and see whether a test notices (docs/mutants.md)
     ///
@@ -267,7 +275,8 @@ fn run(verb: Verb) -> Result<(), String> {
         }
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Dawn { compile } => dawn::run(dawn::Options { compile })?,
-        Verb::Fuzz { minutes } => fuzz::run(&table::root(), minutes)?,
+        Verb::Fuzz { report: true, .. } => fuzz::report(&table::root())?,
+        Verb::Fuzz { minutes, only, .. } => fuzz::run(&table::root(), minutes, &only)?,
         Verb::Mutants { report: true, .. } => mutants::report(&table::root())?,
         Verb::Mutants { shard, .. } => mutants::run(&table::root(), shard.as_deref())?,
         Verb::Tidy => {

@@ -3,6 +3,7 @@
 use crate::bench::{counts, page};
 use crate::coverage;
 use crate::figures;
+use crate::fuzz;
 use crate::mutants;
 use crate::pages;
 use crate::paper;
@@ -137,6 +138,7 @@ fn generated(root: &Path, found: &mut Vec<String>) {
         let table = mutants::stored(root).map(|r| mutants::markdown(&r)[number].clone());
         check("docs/mutants.md", name, table, "mutants --report");
     }
+    check("docs/fuzzing.md", "fuzz", fuzz::markdown(root), "fuzz --report");
     check("docs/suite.md", "suite", suite, "suite --report");
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");

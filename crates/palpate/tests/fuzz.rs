@@ -10,7 +10,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use targets::TARGETS;
 
-/// Mutated files for every file of the corpus; `PALPATE_FUZZ_MINUTES` goes on for so long instead.
+/// Mutated files for every file of the corpus; `PALPATE_FUZZ_MINUTES` goes on for so long instead. `PALPATE_FUZZ_ONLY` names one target, and
+/// `PALPATE_FUZZ_SEED` draws other damages.
 const EXECUTIONS: usize = 150;
 
 /// Longest time that one small file may take: it announces something, and somebody believes it.
@@ -81,12 +82,17 @@ fn corpus(name: &str) -> Vec<Vec<u8>> {
 
 #[test]
 fn no_reader_panics_or_hangs_on_a_damaged_file() {
-    let minutes = std::env::var("PALPATE_FUZZ_MINUTES").ok().and_then(|m| m.parse::<f64>().ok());
-    let all = minutes.map(|m| Duration::from_secs_f64(60.0 * m));
-    for (number, (name, target)) in TARGETS.into_iter().enumerate() {
+    let number = |name| std::env::var(name).ok().map(|n| n.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {n} is no number")));
+    let all = number("PALPATE_FUZZ_MINUTES").map(|m| Duration::from_secs_f64(60.0 * m));
+    let seed = number("PALPATE_FUZZ_SEED").map_or(0, |s| s as u64);
+    let only = std::env::var("PALPATE_FUZZ_ONLY").ok();
+    let chosen = |name: &str| only.as_ref().is_none_or(|o| o == name);
+    let count = TARGETS.iter().filter(|(name, _)| chosen(name)).count();
+    assert!(count > 0, "no target is {only:?}");
+    for (number, (name, target)) in TARGETS.into_iter().enumerate().filter(|(_, (name, _))| chosen(name)) {
         let dir = tempfile::tempdir().expect("a folder");
         let files = corpus(name);
-        let mut random = ChaCha8Rng::seed_from_u64(number as u64);
+        let mut random = ChaCha8Rng::seed_from_u64(seed * TARGETS.len() as u64 + number as u64);
         let run = |data: &[u8]| {
             let begun = Instant::now();
             let kept = dir.path().join("last");
@@ -101,7 +107,7 @@ fn no_reader_panics_or_hangs_on_a_damaged_file() {
         };
         files.iter().for_each(|f| run(f));
         let (begun, mut done) = (Instant::now(), 0);
-        let share = all.map(|a| a / TARGETS.len() as u32);
+        let share = all.map(|a| a / count as u32);
         while share.map_or(done < EXECUTIONS * files.len(), |s| begun.elapsed() < s) {
             let (of, with) = (random.random_range(0..files.len()), random.random_range(0..files.len()));
             let data = mutated(&mut random, files[of].clone(), &files[with]);
