@@ -47,17 +47,15 @@ impl Settings {
 pub struct Walk {
     /// Longest step that it would try next; infinite before the first.
     pub reach: f64,
-    /// Damping; `None` before the first step.
+    /// Damping: relative to each number's curvature, but absolute where that is known by products; `None` before the first step.
     pub damping: Option<f64>,
-    /// Factor of the damping at the next rejected step.
-    pub growth: f64,
     /// Rejected steps in a row that changed nothing.
     pub level: u32,
 }
 
 impl Default for Walk {
     fn default() -> Walk {
-        Walk { reach: f64::INFINITY, damping: None, growth: 2.0, level: 0 }
+        Walk { reach: f64::INFINITY, damping: None, level: 0 }
     }
 }
 

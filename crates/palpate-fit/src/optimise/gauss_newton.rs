@@ -1,7 +1,8 @@
 //! Gauss–Newton with Levenberg–Marquardt damping in a box.
 //!
-//! Damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed. 2004,
-//! eq. 2.21 and algorithm 3.16). A step may also not exceed a length in z: parameters far from their optimum otherwise jump
+//! After a step that is taken, damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed.
+//! 2004, eq. 2.21); after one that is refused, it makes the next half as long. It counts in each number's own curvature (Marquardt, J. SIAM 11, 1963, § 4), so that a number that the
+//! data say a thousandth as much of moves as early as the others. A step may also not exceed a length in z: parameters far from their optimum otherwise jump
 //! into regions where a simulation fails.
 //!
 //! It ends where a free step promises less than a hundredth of a standard error ([`crate::Tolerance::decrement`]): what is left to gain
@@ -15,10 +16,14 @@ use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 use crate::settings::Walk;
 
-/// Damping relative to the largest diagonal entry at the start.
+/// Damping at the start, in the curvature's unit.
 const FIRST_DAMPING: f64 = 1e-3;
 /// Added to the diagonal, relative to its largest entry, so that undetermined directions stay put.
 const FLOOR: f64 = 1e-12;
+/// With more damping than this nothing moves.
+const MOST_DAMPING: f64 = 1e20;
+/// Damping of a step that counts as free.
+const FREE: f64 = 1e-9;
 /// If an undamped step promises less than this share of the cost, rejections come from the accuracy of the cost itself.
 const COST_NOISE: f64 = 1e-5;
 /// Two costs that differ by less of themselves are the same in single precision.
@@ -33,6 +38,16 @@ enum Curvature {
     /// By products; its size along the first gradient stands for the largest diagonal entry.
     /// With priors of fields it is measured in their precision, of size one.
     Products { size: f64, steepest: f64, numbers: Vec<(usize, f64)> },
+}
+
+impl Curvature {
+    /// What damping counts in: each number's own curvature where all are known, and the size of one that is not.
+    fn unit(&self) -> f64 {
+        match self {
+            Curvature::Matrix => 1.0,
+            Curvature::Products { size, .. } => *size,
+        }
+    }
 }
 
 /// With the curvature of forward sensitivities.
@@ -56,8 +71,12 @@ pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Res
 fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
     let q = z.len();
     let tolerance = search.settings.tolerance.clone();
-    let Walk { reach, mut damping, mut growth, mut level } = search.settings.walk;
-    let mut longest = search.settings.max_step.min(reach);
+    let Walk { reach, mut damping, mut level } = search.settings.walk;
+    let unit = curvature.unit();
+    // The largest finite number stands for no limit in files.
+    let mut longest = if reach < f64::MAX { reach } else { search.settings.max_step };
+    // Where λ counts in each number's curvature h, a step g / (h (1 + λ)) becomes half as long.
+    let halved = |lambda: f64| 2.0 * lambda + unit;
     loop {
         if matches!(curvature, Curvature::Matrix) && at.curvature.len() != q * q {
             return Ok(Status::Failed("no sensitivities were computed".into()));
@@ -75,16 +94,16 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
         if scale <= 0.0 {
             return Ok(Status::Stalled);
         }
-        let lambda = *damping.get_or_insert(FIRST_DAMPING * scale);
-        let Some((p, promised)) = step(search, &z, &at, curvature, lambda + FLOOR * scale, longest)? else {
-            damping = Some(lambda.max(FLOOR * scale) * growth);
-            growth *= 2.0;
-            if growth > 1e30 {
+        let lambda = *damping.get_or_insert(FIRST_DAMPING * unit);
+        let Some((p, promised)) = step(search, &z, &at, curvature, lambda, scale, longest)? else {
+            if lambda > MOST_DAMPING * unit {
                 return Ok(Status::Stalled);
             }
+            damping = Some(halved(lambda));
             continue;
         };
         let length = max_abs(&p);
+        let limited = length >= longest * (1.0 - 1e-12);
         if length <= tolerance.step || promised <= tolerance.cost * at.cost {
             return Ok(if settled(search, &z, &at, curvature, scale)? { Status::Converged } else { Status::Stalled });
         }
@@ -100,9 +119,8 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
         if trial.cost < at.cost {
             let ratio = (at.cost - trial.cost) / promised;
             damping = Some(lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0));
-            growth = 2.0;
-            if ratio > 0.75 {
-                longest = (2.0 * longest).min(search.settings.max_step);
+            if ratio > 0.75 && limited {
+                longest *= 2.0;
             }
             z = trial_z;
             at = trial;
@@ -112,34 +130,39 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
             if level == LEVEL && settled(search, &z, &at, curvature, scale)? {
                 return Ok(Status::Converged);
             }
-            damping = Some(lambda * growth);
-            growth *= 2.0;
             // A failure says nothing about the curvature, only that the step was too long.
-            longest = length * if trial.failure.is_some() { 0.25 } else { 0.5 };
+            if trial.failure.is_some() {
+                longest = 0.25 * length;
+            } else {
+                damping = Some(halved(lambda));
+                longest *= if limited { 0.5 } else { 1.0 };
+            }
         }
-        search.walk = Walk { reach: longest, damping, growth, level };
+        search.walk = Walk { reach: longest, damping, level };
         search.iterated(at.cost, &z);
     }
 }
 
 /// Minimiser of the damped model within the box and the longest step, and the decrease that the undamped model promises for it; `None`
-/// where the model is not positive definite.
+/// where the model is not positive definite. Damping counts in [`Curvature::unit`].
 fn step(
     search: &mut Search,
     z: &[f64],
     at: &Sample,
     curvature: &Curvature,
     damping: f64,
+    scale: f64,
     longest: f64,
 ) -> Result<Option<(Vec<f64>, f64)>, Stop> {
     let q = z.len();
     if let Curvature::Products { steepest, numbers, .. } = curvature {
         let metric = Metric::new(search, z, at, numbers)?;
+        let damping = damping + FLOOR * scale;
         let model = Model { z, gradient: &at.gradient, damping, longest, steepest: *steepest, metric: &metric };
         return conjugate::step(search, &model).map(Some);
     }
     let mut h = at.curvature.clone();
-    (0..q).for_each(|i| h[i * q + i] += damping);
+    (0..q).for_each(|i| h[i * q + i] += damping * at.curvature[i * q + i] + FLOOR * scale);
     let lower: Vec<f64> = (0..q).map(|i| (search.lower[i] - z[i]).clamp(-longest, 0.0)).collect();
     let upper: Vec<f64> = (0..q).map(|i| (search.upper[i] - z[i]).clamp(0.0, longest)).collect();
     let promise = |p: Vec<f64>| {
@@ -158,7 +181,7 @@ fn free_step(
     curvature: &Curvature,
     scale: f64,
 ) -> Result<Option<(Vec<f64>, f64)>, Stop> {
-    step(search, z, at, curvature, 1e-9 * scale, search.settings.max_step)
+    step(search, z, at, curvature, FREE * curvature.unit(), scale, search.settings.max_step)
 }
 
 /// The decrease of the cost that a free step from a sample promises; 0 where it has no curvature that leads down.

@@ -82,7 +82,8 @@ fn errors_are_those_of_the_closed_form_where_residuals_are_as_noisy_as_stated() 
     let s = result.reduced_chi_square.max(1.0);
     for k in 0..2 {
         let p = &result.parameters[k];
-        assert!((p.value - mean[k]).abs() < 1e-6 * sd[k], "{p:?} {mean:?}");
+        // The search ends where a step promises less than 1e-9 of the cost, √(41 · 1e-9) standard errors from the end.
+        assert!((p.value - mean[k]).abs() < 2.1e-4 * sd[k], "{p:?} {mean:?}");
         assert!((p.standard_error.unwrap() / sd[k] - 1.0).abs() <= s - 1.0 + 1e-6, "{p:?} {sd:?} {s}");
     }
     assert!((result.correlation[0][1] - correlation).abs() <= s - 1.0 + 1e-6);

@@ -24,13 +24,13 @@ pub(super) struct Lap {
 impl Lap {
     /// For the checkpoint, which keeps the reach beside it.
     pub fn to_document(&self) -> CheckpointLap {
-        let Walk { damping, growth, level, .. } = self.walk;
-        CheckpointLap { damping, growth, level, typical: self.typical.clone() }
+        let Walk { damping, level, .. } = self.walk;
+        CheckpointLap { damping, level, typical: self.typical.clone() }
     }
 
     /// As the checkpoint has it.
     pub fn from_document(lap: &CheckpointLap, reach: f64) -> Lap {
-        let walk = Walk { reach, damping: lap.damping, growth: lap.growth.max(2.0), level: lap.level };
+        let walk = Walk { reach, damping: lap.damping, level: lap.level };
         Lap { walk, typical: lap.typical.clone() }
     }
 }

@@ -38,8 +38,6 @@ pub struct CheckpointFit {
 pub struct CheckpointLap {
     /// Damping; `None` before the first step.
     pub damping: Option<f64>,
-    /// Factor of the damping at the next rejected step.
-    pub growth: f64,
     /// Rejected steps in a row that changed nothing.
     pub level: u32,
     /// Sizes that steps count in, of every number.
@@ -62,7 +60,7 @@ mod tests {
             promised: 0.0,
             reach: f64::MAX,
             settled: true,
-            lap: CheckpointLap { damping: Some(0.1), growth: 2.0, level: 1, typical: vec![1.0 / 3.0, 1.0] },
+            lap: CheckpointLap { damping: Some(0.1), level: 1, typical: vec![1.0 / 3.0, 1.0] },
         };
         let text = serde_json::to_string(&fit).expect("it can be written");
         assert_eq!(serde_json::from_str::<CheckpointFit>(&text).expect("it can be read"), fit);
