@@ -16,8 +16,6 @@ use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 use crate::settings::Walk;
 
-/// Damping at the start, in the curvature's unit.
-const FIRST_DAMPING: f64 = 1e-3;
 /// Added to the diagonal, relative to its largest entry, so that undetermined directions stay put.
 const FLOOR: f64 = 1e-12;
 /// With more damping than this nothing moves.
@@ -46,6 +44,15 @@ impl Curvature {
         match self {
             Curvature::Matrix => 1.0,
             Curvature::Products { size, .. } => *size,
+        }
+    }
+
+    /// Damping at the start. A start value is a guess, from which half the step of the linear model is taken. One size for all directions
+    /// has to let those of far less curvature move.
+    fn first(&self) -> f64 {
+        match self {
+            Curvature::Matrix => 1.0,
+            Curvature::Products { size, .. } => 1e-3 * size,
         }
     }
 }
@@ -94,7 +101,7 @@ fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvat
         if scale <= 0.0 {
             return Ok(Status::Stalled);
         }
-        let lambda = *damping.get_or_insert(FIRST_DAMPING * unit);
+        let lambda = *damping.get_or_insert(curvature.first());
         let Some((p, promised)) = step(search, &z, &at, curvature, lambda, scale, longest)? else {
             if lambda > MOST_DAMPING * unit {
                 return Ok(Status::Stalled);

@@ -57,16 +57,17 @@ fn optimisers_cross_rosenbrocks_valley() {
 }
 
 #[test]
-fn a_number_seen_a_thousandth_as_well_moves_at_once() {
+fn a_number_that_is_hardly_seen_moves_as_early_as_the_others() {
     // Both are linear in the chart: a step from the start is nearly right, whatever the curvatures, unless damping holds the second.
-    let model = LeastSquares::new(2, |t| Some(vec![1e3 * (t[0] / 5.0).ln(), (t[1] / 0.05).ln(), 0.01]));
+    let model = LeastSquares::new(2, |t| Some(vec![1e4 * (t[0] / 5.0).ln(), (t[1] / 0.05).ln(), 0.01]));
     let batches = model.batches.clone();
     let free = (0..2).map(|p| parameter(p, Transform::Log, (1e-3, 1e3), (0.01, 10.0))).collect();
     let mut problem = Problem::new(vec![scene(&[2.0, 0.2], model)], free).expect("the problem is valid");
     let v = values(&solve(&mut problem, &settings(Optimizer::GaussNewton)));
     assert!((v[0] / 5.0 - 1.0).abs() < FOUND && (v[1] / 0.05 - 1.0).abs() < FOUND, "{v:?}");
     let evaluations: usize = batches.lock().expect("no test panics while it holds the lock").iter().sum();
-    assert!(evaluations <= 8, "{evaluations} evaluations");
+    // Damping that is one to three, a third, a ninth… leaves 1e-5 after seven steps.
+    assert!(evaluations <= 12, "{evaluations} evaluations");
 }
 
 /// A bowl with its minimum outside the box: (2, 0.2) with p0 ≤ 1, coupled so that p1 must move too.
