@@ -39,7 +39,7 @@ fn begin_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         solving[solving_part(REST) + a] = vec4(r, 0.0);
         // The way before the first, which is even.
         solving[solving_part(ODD_WAY) + a] = vec4(0.0);
-        let w = wrench_of(turn, arms[node].xyz, r);
+        let w = wrench_of(turn, arms[node], r);
         force += vec4(w.force, 0.0);
         torque += vec4(w.torque, 0.0);
     }

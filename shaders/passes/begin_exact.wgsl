@@ -3,12 +3,10 @@
 // use shared/grid
 // use shared/finite
 // use shared/sum_nodes
+// use shared/accuracy
 
 var<storage, read_write> newton: array<Newton>;
 var<storage, read_write> health: array<Health>;
-
-// Relative accuracy that a solve in single precision can reach with any certainty.
-const FINEST = 2e-7;
 
 // Stiffness of a held node's springs over that of its share of the body.
 override held_stiffness: f32;

@@ -27,19 +27,19 @@ fn close_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         return;
     }
     let update = scalars_of(local, scalars_at(p.member) + 3u);
-    let rz = sum_rests(local, p.member);
+    let rests = sum_rests(local, p.member);
     let negative = s.z == 2.0 || (s.z == 0.0 && update.x != 0.0);
-    var ended = !negative && (s.z == 1.0 || is_small(rz, s.w, n) || s.y >= f32(shape.most));
+    var ended = !negative && (s.z == 1.0 || is_small(rests, s.w, n) || s.y >= f32(shape.most));
     // A solve that had ended before the last iteration left its sum with the update before.
     let along_rhs = max(update.y, scalars_of(local, scalars_at(p.member) + 2u).y);
-    n.rz = rz;
+    n.rz = rests.x;
     n.cg = u32(s.y);
-    if ended && exact && !is_true(rz, s.w, n) {
+    if ended && exact && !is_true(rests, s.w, n) {
         ended = false;
         n.trial += 1u;
         if local == 0u {
             cg_sums[scalars_at(p.member) + 1u] = vec4(ANEW, s.y, 0.0, s.w);
         }
     }
-    leave_cg(local, p.member, n, s.w, along_rhs, negative, ended, exact);
+    leave_cg(local, p.member, n, rests, s.w, along_rhs, negative, ended, exact);
 }

@@ -20,18 +20,20 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let exact = call.extra == FOR_DERIVATIVE;
-    // Between chunks: rᵀ M⁻¹ r of the right-hand side and of the iteration before, and xᵀ times the right-hand side.
+    // Between chunks: rᵀ M⁻¹ r of the right-hand side and of the iteration before and xᵀ times the right-hand side; then the sums of the residual.
     let kept = scalars_of(local, scalars_at(p.member));
     var of_rhs = kept.x;
     var before = kept.y;
     var along_rhs = kept.z;
+    var rests = scalars_of(local, scalars_at(p.member) + 1u).xyz;
     if n.cg == 0u {
-        n.rz = precondition_alone(local, p.member, p.home);
+        rests = precondition_alone(local, p.member, p.home);
+        n.rz = rests.x;
         of_rhs = n.rz;
         before = 0.0;
         along_rhs = 0.0;
     }
-    var small = is_small(n.rz, of_rhs, n) || n.cg >= shape.most;
+    var small = is_small(rests, of_rhs, n) || n.cg >= shape.most;
     var negative = false;
     for (var iteration = 0u; iteration < shape.chunk; iteration++) {
         if small {
@@ -55,11 +57,13 @@ fn iterate_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) 
         }
         restrict_alone(local, p.member, p.home);
         before = n.rz;
-        n.rz = precondition_alone(local, p.member, p.home);
-        small = is_small(n.rz, of_rhs, n) || n.cg >= shape.most;
+        rests = precondition_alone(local, p.member, p.home);
+        n.rz = rests.x;
+        small = is_small(rests, of_rhs, n) || n.cg >= shape.most;
     }
     if local == 0u {
         cg_sums[scalars_at(p.member)] = vec4(of_rhs, before, along_rhs, 0.0);
+        cg_sums[scalars_at(p.member) + 1u] = vec4(rests, 0.0);
     }
-    leave_cg(local, p.member, n, of_rhs, along_rhs, negative, small && !exact, exact);
+    leave_cg(local, p.member, n, rests, of_rhs, along_rhs, negative, small && !exact, exact);
 }

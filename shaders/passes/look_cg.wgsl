@@ -17,7 +17,8 @@ fn look_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     var n = newton_of(local, p.member);
     // What iterate_cg has left there.
     let kept = scalars_of(local, scalars_at(p.member));
-    if n.stage != WANTS_SOLVE || !(is_small(n.rz, kept.x, n) || n.cg >= shape.most) {
+    let said = scalars_of(local, scalars_at(p.member) + 1u).xyz;
+    if n.stage != WANTS_SOLVE || !(is_small(said, kept.x, n) || n.cg >= shape.most) {
         return;
     }
     set_solution();
@@ -27,13 +28,15 @@ fn look_cg(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
         solving[solving_part(REST) + a] = solving[solving_part(RIGHT) + a] - solving[solving_part(IMAGE) + a];
     }
     restrict_alone(local, p.member, p.home);
-    n.rz = precondition_alone(local, p.member, p.home);
-    let ended = is_true(n.rz, kept.x, n);
+    let rests = precondition_alone(local, p.member, p.home);
+    n.rz = rests.x;
+    let ended = is_true(rests, kept.x, n);
     if !ended {
         n.trial += 1u;
         if local == 0u {
             cg_sums[scalars_at(p.member)].y = ANEW;
+            cg_sums[scalars_at(p.member) + 1u] = vec4(rests, 0.0);
         }
     }
-    leave_cg(local, p.member, n, kept.x, kept.z, false, ended, true);
+    leave_cg(local, p.member, n, rests, kept.x, kept.z, false, ended, true);
 }

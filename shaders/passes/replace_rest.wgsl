@@ -29,7 +29,7 @@ fn replace_rest(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let a = at_node(share.member, node);
         let r = solving[solving_part(RIGHT) + a].xyz - solving[solving_part(IMAGE) + a].xyz;
         solving[solving_part(REST) + a] = vec4(r, 0.0);
-        let w = wrench_of(turn, arms[node].xyz, r);
+        let w = wrench_of(turn, arms[node], r);
         force += vec4(w.force, 0.0);
         torque += vec4(w.torque, 0.0);
     }

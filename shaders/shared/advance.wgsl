@@ -3,6 +3,7 @@
 // use shared/precondition
 // use shared/iteration
 // use shared/correction
+// use shared/held
 
 // First slice of each group.
 var<body> group_slices: array<u32>;
@@ -61,6 +62,7 @@ fn advance_group(local: u32, system: u32, home: u32, own: u32, alpha: f32, begin
     let way = solving_part(select(EVEN_WAY, ODD_WAY, parity() == 1u));
     var force = vec4(0.0);
     var torque = vec4(0.0);
+    var borne = 0.0;
     for (var k = group_rows[own] + local; k < group_rows[own + 1u]; k += TEAM) {
         let node = group_nodes[k];
         let a = at_node(system, node);
@@ -69,18 +71,26 @@ fn advance_group(local: u32, system: u32, home: u32, own: u32, alpha: f32, begin
             solving[a] += alpha * solving[way + a];
             r -= alpha * solving[solving_part(IMAGE) + a].xyz;
             solving[solving_part(REST) + a] = vec4(r, 0.0);
-            let w = wrench_of(turn, arms[node].xyz, r);
+            let w = wrench_of(turn, arms[node], r);
             force += vec4(w.force, 0.0);
             torque += vec4(w.torque, 0.0);
         }
-        let z = scaled(at_node(home, node), r) + carried(turn, arms[node].xyz, motion);
+        let first = scaled(at_node(home, node), r);
+        let z = first + carried(turn, arms[node], motion);
         solving[solving_part(SCALED) + a] = vec4(z, 0.0);
         force.w += dot(r, z);
+        torque.w += dot(r, first);
+        if shape.held != 0u && is_held(home, node) {
+            borne += dot(r, first);
+        }
     }
     let whole_force = total(local, force);
     let whole_torque = total(local, torque);
+    if shape.held != 0u {
+        borne = total(local, vec4(borne, 0.0, 0.0, 0.0)).x;
+    }
     if local == 0u {
-        cg_sums[rests_at(system) + own] = vec4(whole_force.w, 0.0, 0.0, 0.0);
+        cg_sums[rests_at(system) + own] = vec4(whole_force.w, whole_torque.w, borne, 0.0);
         // Of the residual itself: what is added up iteration by iteration would drift from it.
         if !begins {
             let at = wrenches_at(system, parity()) + 2u * own;

@@ -5,8 +5,13 @@
 // Nodes of each group.
 var<body> group_rows: array<u32>;
 var<body> group_nodes: array<u32>;
-// Arm of each node from its group's centre at rest, over the size of groups; and the group.
+// Arm of each node from its group's centre at rest, over the size of groups; and the group's number. That is below zero, counted from -1 on, at a node
+// that springs hold: it does not move with its group, Q has no rows there.
 var<body> arms: array<vec4<f32>>;
+
+fn group_of(arm: vec4<f32>) -> u32 {
+    return u32(select(arm.w, -1.0 - arm.w, arm.w < 0.0));
+}
 
 fn turned(q: vec4<f32>, v: vec3<f32>) -> vec3<f32> {
     return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v);
@@ -23,14 +28,20 @@ struct Wrench {
 }
 
 // What a force on a node is to its group.
-fn wrench_of(turn: vec4<f32>, arm: vec3<f32>, force: vec3<f32>) -> Wrench {
+fn wrench_of(turn: vec4<f32>, arm: vec4<f32>, force: vec3<f32>) -> Wrench {
+    if arm.w < 0.0 {
+        return Wrench(vec3(0.0), vec3(0.0));
+    }
     let own = turned_back(turn, force);
-    return Wrench(own, cross(arm, own));
+    return Wrench(own, cross(arm.xyz, own));
 }
 
 // How a node moves with its group.
-fn carried(turn: vec4<f32>, arm: vec3<f32>, motion: Wrench) -> vec3<f32> {
-    return turned(turn, motion.force + cross(motion.torque, arm));
+fn carried(turn: vec4<f32>, arm: vec4<f32>, motion: Wrench) -> vec3<f32> {
+    if arm.w < 0.0 {
+        return vec3(0.0);
+    }
+    return turned(turn, motion.force + cross(motion.torque, arm.xyz));
 }
 
 // The motion of a group that forces on one of them make, summed over calls.

@@ -30,7 +30,7 @@ fn restrict_alone(local: u32, system: u32, home: u32) {
             let turn = turn_of_group(home, g);
             for (var k = group_rows[g] + local % 4u; k < group_rows[g + 1u]; k += 4u) {
                 let node = group_nodes[k];
-                let w = wrench_of(turn, arms[node].xyz, solving[solving_part(REST) + at_node(system, node)].xyz);
+                let w = wrench_of(turn, arms[node], solving[solving_part(REST) + at_node(system, node)].xyz);
                 force += vec4(w.force, 0.0);
                 torque += vec4(w.torque, 0.0);
             }

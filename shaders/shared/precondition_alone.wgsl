@@ -1,9 +1,10 @@
 //! z = M⁻¹ r by one workgroup of 256.
 // use shared/coarse_alone
 // use shared/correction
+// use shared/held
 
-// Puts z in its part, from the residual and what restrict_alone left, and returns rᵀ z.
-fn precondition_alone(local: u32, system: u32, home: u32) -> f32 {
+// Puts z in its part, from the residual and what restrict_alone left, and returns the sums of the residual (`shared/iteration`).
+fn precondition_alone(local: u32, system: u32, home: u32) -> vec3<f32> {
     let choice = coarse_choice(home);
     let wrenches = wrenches_at(system, 1u);
     for (var first = 0u; first < shape.groups; first += 64u) {
@@ -28,12 +29,16 @@ fn precondition_alone(local: u32, system: u32, home: u32) -> f32 {
     for (var i = local; i < shape.nodes; i += 256u) {
         let a = at_node(system, i);
         let arm = arms[i];
-        let g = u32(arm.w);
+        let g = group_of(arm);
         let motion = Wrench(cg_sums[motions_at(system) + 2u * g].xyz, cg_sums[motions_at(system) + 2u * g + 1u].xyz);
         let r = solving[solving_part(REST) + a].xyz;
-        let z = scaled(at_node(home, i), r) + carried(turn_of_group(home, g), arm.xyz, motion);
+        let first = scaled(at_node(home, i), r);
+        let z = first + carried(turn_of_group(home, g), arm, motion);
         solving[solving_part(SCALED) + a] = vec4(z, 0.0);
-        left.x += dot(r, z);
+        left += vec4(dot(r, z), dot(r, first), 0.0, 0.0);
+        if shape.held != 0u && is_held(home, i) {
+            left.z += dot(r, first);
+        }
     }
-    return total(local, left).x;
+    return total(local, left).xyz;
 }

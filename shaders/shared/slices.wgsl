@@ -32,7 +32,7 @@ fn keep_product(local: u32, share: Share, p: Place, own: vec3<f32>, parts: vec3<
             solving[way_at + a] = vec4(x, 0.0);
         }
         let arm = arms[p.item];
-        let w = wrench_of(turn_of_group(p.home, u32(arm.w)), arm.xyz, row);
+        let w = wrench_of(turn_of_group(p.home, group_of(arm)), arm, row);
         force = vec4(w.force, dot(x, row));
         torque = vec4(w.torque, 0.0);
     }

@@ -10,6 +10,6 @@ const NEAR = 10.0;
 const ANEW = -1.0;
 
 // Whether a solve that claims to have ended has; `n.trial` counts the claims, for no trial follows a derivative.
-fn is_true(rz: f32, of_rhs: f32, n: Newton) -> bool {
-    return is_within(NEAR, rz, of_rhs, n) || n.trial >= MOST_CLAIMS || n.cg >= shape.most;
+fn is_true(rests: vec3<f32>, of_rhs: f32, n: Newton) -> bool {
+    return is_within(NEAR, rests, of_rhs, n) || n.trial >= MOST_CLAIMS || n.cg >= shape.most;
 }

@@ -5,7 +5,8 @@ var<storage, read> newton: array<Newton>;
 
 // Scalars of the iteration, the same in all workgroups of a system; one of them `speaks` for all and keeps them. Sets the way.
 fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
-    let rz = sum_rests(local, system);
+    let rests = sum_rests(local, system);
+    let rz = rests.x;
     let before = scalars_of(local, scalars_at(system) + 1u - parity());
     let bad = scalars_of(local, scalars_at(system) + 3u - parity()).x;
     let of_rhs = select(before.w, rz, before.y == 0.0);
@@ -13,7 +14,7 @@ fn turn_cg(local: u32, system: u32, speaks: bool) -> vec4<f32> {
     if state == 0.0 {
         if bad != 0.0 {
             state = 2.0;
-        } else if is_small(rz, of_rhs, newton[system]) || before.y >= f32(shape.most) {
+        } else if is_small(rests, of_rhs, newton[system]) || before.y >= f32(shape.most) {
             state = 1.0;
         }
     }

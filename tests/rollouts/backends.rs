@@ -245,3 +245,17 @@ fn what_a_nozzle_sees_agrees() {
     scene.effects = vec![jet(before, before + DVec3::new(0.0, 0.01, 0.01), DVec3::new(-1.0, 0.02, -0.03).normalize(), 3.0)];
     compare(&gpu, &scene, "a ring");
 }
+
+/// A bar of so few linear tetrahedra that a group of the second level is a plate which hinges on two held nodes.
+#[test]
+fn short_bars_of_linear_tetrahedra_agree() {
+    if !support::gpu::there_is_one() {
+        return;
+    }
+    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    for scheme in scheme::ALL {
+        let mut scene = beam(Kind::Tetrahedra(Tetrahedron::Linear), scheme, &materials::ALL[0]);
+        scene.solver.tolerance = 1e-10;
+        compare(&gpu, &scene, &format!("a short bar, {}", scheme.name));
+    }
+}

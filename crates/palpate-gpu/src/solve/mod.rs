@@ -215,8 +215,9 @@ impl<'a> Passes<'a, '_> {
     pub(crate) fn solve_columns(&mut self, count: usize) {
         self.columns = count as u32;
         self.list();
-        let most = self.world.geometry.shape.most;
-        // A look that finds too much left comes at the end of a block, and the next block begins anew.
+        // A look that finds too much left comes at the end of a block, and the next block begins anew: a solve may take all its iterations and that
+        // often some more, and must have come to an end then.
+        let most = self.world.geometry.shape.most + asks::MOST_CLAIMS * EXACT_BLOCK;
         let given = self.effort().derivative.saturating_add(EXACT_BLOCK).min(most);
         self.conjugate_gradients(asks::FOR_DERIVATIVE, given);
         self.columns = 1;

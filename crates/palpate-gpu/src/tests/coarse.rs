@@ -1,5 +1,6 @@
 //! The second level of the preconditioner: what it computes, what it knows, how groups turn, and what it is good for.
 
+use super::elastic::bar;
 use super::passes::Exact;
 use super::products::crowded;
 use super::scenes::{ball, device, plan, solving_part, spread};
@@ -7,12 +8,15 @@ use crate::device::pipelines::shared::asks;
 use crate::device::pipelines::shared::solving::{REST, SCALED};
 use crate::layout::Newton;
 use crate::passes::{ALL, Passes};
+use crate::world::carried;
 use crate::world::{State, Tally, World};
 use crate::{GpuBackend, Tuning};
 use glam::{DQuat, DVec3};
-use palpate_engine::{Backend, ParamBatch, Request};
+use palpate_engine::{Backend, Direction, ParamBatch, Request};
+use palpate_model::mechanics::motion::RigidMotion;
+use palpate_model::params::ParamKey;
 use palpate_model::plan::Plan;
-use palpate_model::scene::{Analytic, BodySource, Clamp, Scene};
+use palpate_model::scene::{Analytic, BodySource, Clamp, Resolution, Scene, Tetrahedron};
 
 fn backend(gpu: std::sync::Arc<crate::Gpu>, many: bool) -> GpuBackend {
     GpuBackend::on(gpu).tuned(Tuning {
@@ -67,7 +71,8 @@ fn right(world: &World, member: usize, r: &[DVec3]) -> Vec<DVec3> {
     let [number, factor] = coarse.choices(&world.batch.physics)[kind * world.members() + member];
     let c = coarse.dense(number as usize);
     let mut loads = vec![0.0; 6 * groups.len()];
-    for i in 0..n {
+    let carried = carried(&world.plan);
+    for i in (0..n).filter(|i| carried[*i]) {
         let own = turn(i).inverse() * r[i];
         for (row, value) in rows(arms[i]).iter().zip(own.to_array()) {
             (0..6).for_each(|k| loads[6 * groups.of_node[i] as usize + k] += row[k] * value);
@@ -80,12 +85,30 @@ fn right(world: &World, member: usize, r: &[DVec3]) -> Vec<DVec3> {
             let own = glam::DMat3::from_cols_array(&[a[0], a[1], a[2], a[1], a[3], b[0], a[2], b[0], b[1]]);
             let motion = &motions[6 * groups.of_node[i] as usize..][..6];
             let moved = rows(arms[i]).map(|row| row.iter().zip(motion).map(|(q, m)| q * m).sum::<f64>());
-            own * r[i] + turn(i) * DVec3::from_array(moved)
+            own * r[i] + if carried[i] { turn(i) * DVec3::from_array(moved) } else { DVec3::ZERO }
         })
         .collect()
 }
 
-/// Both ways to apply it, on a body that has turned, for members of different stiffness.
+/// A short bar of tetrahedra that a clamp holds and turns at one end. Each of its two groups is a plate that hinges on two nodes that are held.
+fn hinged() -> Scene {
+    let mut scene = ball(0.03);
+    scene.solver.tetrahedron = Tetrahedron::Linear;
+    scene.object.source = bar(DVec3::new(0.0, -0.017, -0.0165), 0.0334, [3, 1, 1]);
+    scene.object.resolution = Resolution::Own;
+    scene.material.youngs_modulus = 2e5;
+    scene.planes.clear();
+    scene.masses.clear();
+    let motion = RigidMotion {
+        times: vec![0.0, 0.1],
+        translations: vec![DVec3::ZERO, DVec3::new(0.003, 0.001, -0.002)],
+        rotations: vec![DQuat::IDENTITY, DQuat::from_rotation_y(0.1)],
+    };
+    scene.clamps = vec![Clamp::still(DVec3::splat(-1.0), DVec3::new(0.021, 1.0, 1.0)).moved(Some(motion))];
+    scene
+}
+
+/// Both ways to apply it, on a body that has turned, for members of different stiffness; and on one that has nodes which take no part.
 #[test]
 fn many_and_one_workgroup_apply_what_the_formula_says() {
     let Some(gpu) = device(None) else { return };
@@ -93,9 +116,9 @@ fn many_and_one_workgroup_apply_what_the_formula_says() {
     scene.initial.state = palpate_model::scene::InitialShape::Rest;
     scene.initial.angular_velocity = DVec3::new(9.0, 4.0, -7.0);
     scene.clamps.clear();
-    let plan = plan(&scene);
-    let theta = spread(&plan, 3);
-    for many in [true, false] {
+    for (scene, many) in [(&scene, true), (&scene, false), (&hinged(), true), (&hinged(), false)] {
+        let plan = plan(scene);
+        let theta = spread(&plan, 3);
         let backend = backend(gpu.clone(), many);
         let (mut world, [now, next], tally) = stepped(&backend, &plan, &theta);
         assert!(world.geometry.groups.len() > 1);
@@ -255,4 +278,82 @@ fn a_beam_takes_less_than_half_of_the_iterations() {
         println!("many {many}: {with} iterations, {without} with block-Jacobi alone");
         assert!(2 * with < without, "{with} against {without}");
     }
+}
+
+/// Spoils C, of so many groups.
+type Spoil = fn(&mut [[f32; 4]], usize);
+
+/// What nobody must be left with: a solve that ended far from its solution, and no failure. C is made wrong before a step, or before its derivatives.
+#[test]
+fn a_second_level_that_is_none_does_no_harm_or_fails() {
+    let Some(gpu) = device(None) else { return };
+    let plan = plan(&hinged());
+    // C is no longer symmetric, and iterations stand still. Of the derivative by a spin, nearly all of whose load a clamp's springs bear, what is
+    // left then is little beside that load, and a tenth of the derivative.
+    let skew: Spoil = |c, groups| {
+        for (row, c) in c.chunks_mut(groups).enumerate() {
+            c.iter_mut().flatten().enumerate().for_each(|(k, x)| *x *= 1.0 + 0.45 * ((7 * row + 3 * k) as f32).sin());
+        }
+    };
+    let negative: Spoil = |c, _| c.iter_mut().flatten().for_each(|x| *x *= -9.0);
+    for many in [true, false] {
+        let backend = backend(gpu.clone(), many);
+        let (right, failure) = derived(&backend, &plan, [None, None]);
+        assert_eq!(failure, None);
+        for (name, spoil) in [("skew", skew), ("negative", negative)] {
+            for [first, second] in [[Some(spoil), None], [None, Some(spoil)]] {
+                let (found, failure) = derived(&backend, &plan, [first, second]);
+                let off = right.iter().zip(&found).map(|(a, b)| apart(a, b)).fold(0.0, f64::max);
+                println!("many {many}, {name}, before the step: {}: off by {off:.1e}, {failure:?}", first.is_some());
+                // Derivatives are promised to a thousandth.
+                assert!(failure.is_some() || off < 1e-3, "{name}: {off:.1e} and no failure");
+                assert!(second.is_none() || failure.is_some_and(|f| f.contains("conjugate gradient iterations left")), "{name}");
+            }
+        }
+    }
+}
+
+/// Difference of two vectors over the size of the first.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut a.iter().copied()).max(1e-30)
+}
+
+/// State after a step, its derivatives by the modulus and by the first spin, and the derivative of a wave of it by the old state; and what failed. C is
+/// spoilt before the step, and before its derivatives.
+fn derived(backend: &GpuBackend, plan: &Plan, spoils: [Option<Spoil>; 2]) -> (Vec<Vec<f64>>, Option<String>) {
+    let mut world = backend.build(plan, 1).unwrap_or_else(|e| panic!("{e}"));
+    backend.set_params(&mut world, &ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
+    let coarse = world.buffers["coarse"].clone();
+    let right: Vec<[f32; 4]> = world.gpu.download(&coarse, coarse.size() as usize / 16).unwrap_or_else(|e| panic!("{e}"));
+    let spoil = |world: &World, how: Option<Spoil>| {
+        let mut c = right.clone();
+        how.into_iter().for_each(|how| how(&mut c, world.geometry.groups.len()));
+        world.gpu.queue.write_buffer(&coarse, 0, bytemuck::cast_slice(&c));
+    };
+    let asked = |p: &usize| matches!(plan.layout.keys[*p], ParamKey::YoungsModulus | ParamKey::AngularVelocity(0));
+    let directions: Vec<usize> = (0..plan.theta.len()).filter(asked).collect();
+    let mut tally = backend.new_tally(&world, &Request::default());
+    let [mut now, mut next] = [0; 2].map(|_| backend.new_state(&world));
+    let [mut old, mut new] = [0; 2].map(|_| backend.new_tangent(&world, &Direction::parameters(&directions)));
+    let (adj, mut adj_past) = (backend.new_adjoint(&world), [backend.new_adjoint(&world)]);
+    let stage = &plan.clock.stages()[0];
+    backend.start(&mut world, &mut now, &mut tally);
+    backend.start_tangent(&mut world, &now, &mut old, &mut tally);
+    spoil(&world, spoils[0]);
+    backend.step(&mut world, stage, &[&now], &mut next, &mut tally);
+    spoil(&world, spoils[1]);
+    backend.step_tangent(&mut world, stage, &[&now], &next, &[&old], &mut new, &mut tally);
+    let n = plan.body.nodes.len();
+    let wave: Vec<[f32; 4]> = (0..2 * n).map(|i| [(i as f32).sin(), (2.0 * i as f32).cos(), 0.1, 0.0]).collect();
+    world.gpu.queue.write_buffer(&adj.0.buffer, 0, bytemuck::cast_slice(&wave));
+    backend.step_adjoint(&mut world, stage, &[&now], &next, &adj, &mut adj_past, &mut tally);
+    let of = |buffer: &wgpu::Buffer, vectors: usize| -> Vec<f64> {
+        let all: Vec<[f32; 4]> = world.gpu.download(buffer, vectors).unwrap_or_else(|e| panic!("{e}"));
+        all.iter().flat_map(|v| [v[0], v[1], v[2]]).map(f64::from).collect()
+    };
+    let tangents = new.parts.iter().map(|part| of(&part.buffer, 2 * n));
+    let ends = [of(&next.0.buffer, 2 * n), of(&adj_past[0].0.buffer, 2 * n)];
+    let found = tangents.chain(ends).collect();
+    (found, backend.read(&world, &tally)[0].failure.as_ref().map(|f| f.message()))
 }

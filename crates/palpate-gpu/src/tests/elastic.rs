@@ -25,17 +25,16 @@ use std::ops::ControlFlow;
 
 use Tetrahedron::{Linear, Quadratic};
 
-/// The box of the ball as cubes of six tetrahedra each, so many along every edge.
-fn tetrahedra(count: usize) -> BodySource {
-    let (low, edge) = (DVec3::new(-0.047, -0.049, 0.001), 0.1 / count as f64);
-    let n = count + 1;
-    let at = |i: usize, j: usize, k: usize| (i + n * (j + n * k)) as u32;
+/// A box of cubes of six tetrahedra each, so many along its edges.
+pub(super) fn bar(low: DVec3, edge: f64, count: [usize; 3]) -> BodySource {
+    let [a, b, c] = count.map(|n| n + 1);
+    let at = |i: usize, j: usize, k: usize| (i + a * (j + b * k)) as u32;
     let mut mesh = TetMesh::default();
-    for m in 0..n * n * n {
-        mesh.nodes.push(low + edge * DVec3::new((m % n) as f64, (m / n % n) as f64, (m / (n * n)) as f64));
+    for m in 0..a * b * c {
+        mesh.nodes.push(low + edge * DVec3::new((m % a) as f64, (m / a % b) as f64, (m / (a * b)) as f64));
     }
-    for m in 0..count * count * count {
-        let (i, j, k) = (m % count, m / count % count, m / (count * count));
+    for m in 0..count.iter().product() {
+        let (i, j, k) = (m % count[0], m / count[0] % count[1], m / (count[0] * count[1]));
         let c = |bits: usize| at(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2));
         for way in [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]] {
             mesh.tets.push([c(0), c(way[0]), c(way[1]), c(7)]);
@@ -43,6 +42,11 @@ fn tetrahedra(count: usize) -> BodySource {
     }
     let mesh = mesh.checked().unwrap_or_else(|e| panic!("{e}"));
     BodySource::Tetrahedra { path: "in-code.msh".into(), surface: mesh.surface(), mesh }
+}
+
+/// The box of the ball, so many cubes along every edge.
+fn tetrahedra(count: usize) -> BodySource {
+    bar(DVec3::new(-0.047, -0.049, 0.001), 0.1 / count as f64, [count; 3])
 }
 
 /// A scene with tetrahedra in place of its ball.

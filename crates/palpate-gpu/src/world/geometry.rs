@@ -230,7 +230,7 @@ impl Geometry {
         tables.put("place_rows", &place_rows);
         tables.put("places", &contributions.concat());
         tables.put("ghosts", &ghosts.iter().map(|g| *g as f32).collect::<Vec<_>>());
-        coarse::put(&groups, &slices, body, &mut tables);
+        coarse::put(&groups, &slices, plan, &mut tables);
         tables.put("effects", &effects.sites());
         tables.put("cell_effects", &effects.cell_sites());
         tables.put("holds", &hold_sites);

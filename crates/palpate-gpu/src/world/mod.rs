@@ -17,6 +17,8 @@ mod tuning;
 
 #[cfg(test)]
 pub(crate) use coarse::MOST_GROUPS;
+#[cfg(test)]
+pub(crate) use coarse::carried;
 pub(crate) use coarse::{Coarse, vectors as coarse_vectors};
 pub(crate) use effort::{Effort, LEVELS, Level};
 pub(crate) use geometry::Geometry;
