@@ -5,7 +5,7 @@ use super::moving::{jet, pressed};
 use glam::{DAffine3, DQuat, DVec3};
 use palpate_cpu::CpuBackend;
 use palpate_engine::{Backend, Evaluate, Evaluation, ParamBatch, Request, Rollout, Wanted};
-use palpate_gpu::{Choice, Gpu, GpuBackend};
+use palpate_gpu::{Gpu, GpuBackend};
 use palpate_model::materials;
 use palpate_model::mechanics::motion::RigidMotion;
 use palpate_model::params::fields::{Basis, FieldSpec, Scale, Varied};
@@ -63,10 +63,7 @@ fn compare(gpu: &Arc<Gpu>, scene: &Scene, name: &str) {
 
 #[test]
 fn every_scheme_and_every_material_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     let known: Vec<_> = materials::ALL.iter().filter(|m| m.has_twin()).collect();
     let (scheme, model) = (scheme::ALL.last().expect("there is one"), *known.last().expect("there is one"));
     let schemes = scheme::ALL.iter().map(|s| (s, model));
@@ -91,10 +88,7 @@ fn every_scheme_and_every_material_agree() {
 /// The stress-free shape is found on the host; derivatives through it are the host's and the device's together.
 #[test]
 fn shapes_that_are_given_as_the_equilibrium_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     let neo_hookean = materials::find("neo-hookean").expect("it is in the table");
     let kinds = [(Kind::CutCells, &materials::ALL[0]), (Kind::Tetrahedra(Tetrahedron::Quadratic), neo_hookean)];
     for (kind, model) in kinds {
@@ -135,10 +129,7 @@ fn stars() -> Object {
 /// A scheme that weighs the old state's forces and one with two past states; moduli and densities that vary from point to point.
 #[test]
 fn bodies_of_stars_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     let neo_hookean = materials::find("neo-hookean").expect("it is in the table");
     for name in ["theta", "bdf2"] {
         let mut scene = beam(Kind::Tetrahedra(Tetrahedron::Linear), scheme::find(name).expect("it is in the table"), neo_hookean);
@@ -181,10 +172,7 @@ fn ends(name: &str) -> [f64; 2] {
 /// A ball that turns as it comes down on the beam, and a box beside it that moves away.
 #[test]
 fn obstacles_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     for (name, mut scene) in bodies() {
         let [side, top] = ends(&name);
         let above = DVec3::new(0.07, 0.002, top + 0.03);
@@ -208,10 +196,7 @@ fn obstacles_agree() {
 /// Two nozzles that move and turn.
 #[test]
 fn jets_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     for (name, mut scene) in bodies() {
         let above = DVec3::new(0.08, 0.02, ends(&name)[1] + 0.12);
         let beside = DVec3::new(0.09, -0.15, 0.01);
@@ -231,10 +216,7 @@ fn jets_agree() {
 /// A ring in a jet along its plane: half of what faces the nozzle lies behind the other half.
 #[test]
 fn what_a_nozzle_sees_agrees() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     let mut scene = beam(Kind::CutCells, scheme::find("theta").expect("it is in the table"), &materials::ALL[0]);
     let ring = Analytic::Torus { major: 0.05, minor: 0.02, center: DVec3::new(0.05, 0.0, 0.005), axis: DVec3::Z };
     scene.object =
@@ -249,10 +231,7 @@ fn what_a_nozzle_sees_agrees() {
 /// A bar of so few linear tetrahedra that a group of the second level is a plate which hinges on two held nodes.
 #[test]
 fn short_bars_of_linear_tetrahedra_agree() {
-    if !support::gpu::there_is_one() {
-        return;
-    }
-    let gpu = Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}"));
+    let Some(gpu) = support::gpu::device() else { return };
     for scheme in scheme::ALL {
         let mut scene = beam(Kind::Tetrahedra(Tetrahedron::Linear), scheme, &materials::ALL[0]);
         scene.solver.tolerance = 1e-10;

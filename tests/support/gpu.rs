@@ -1,4 +1,12 @@
-//! Whether tests of the GPU backend can run.
+//! Whether tests of the GPU backend can run, and the device that they run on.
+
+use palpate_gpu::{Choice, Gpu};
+use std::sync::Arc;
+
+/// The adapter that the environment chooses, opened; none where [`there_is_one`] says that a test is skipped.
+pub fn device() -> Option<Arc<Gpu>> {
+    there_is_one().then(|| Gpu::open(&Choice::from_env()).unwrap_or_else(|e| panic!("{e}")))
+}
 
 /// True when there is a usable adapter. Without one the test says that it is skipped, or fails where `PALPATE_GPU=require`.
 pub fn there_is_one() -> bool {
