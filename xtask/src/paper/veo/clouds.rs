@@ -4,12 +4,13 @@ use super::Figures;
 use glam::DVec3;
 use palpate::render::Sensor;
 use palpate::synthetic::{Observers, observe};
-use palpate::{Backend, Experiment, FitOptions, Fitted};
+use palpate::{Backend, Coordinates, Experiment, FitOptions, Fitted, Objective};
 use palpate_io::cloud::write_cloud;
 use palpate_io::npy::{Array, write_npz};
 use palpate_io::recording::Recording;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Instant;
 
 /// Points with a layer on the plane x = 0, by which the body is held: in the middles of cubes of edge `h` [m], moved by up to a quarter of it.
 pub(super) fn held(count: [usize; 3], h: f64) -> Vec<DVec3> {
@@ -185,6 +186,43 @@ pub fn two_parts(folder: &Path) -> Result<Figures, String> {
         ("one modulus [kPa]", 1e-3 * modulus),
         ("evaluations", many.result.evaluations as f64),
         ("seconds of the fit", many.result.seconds),
+    ] {
+        out.insert(name.into(), x);
+    }
+    Ok(out)
+}
+
+/// A sequence of a hundred equilibria of 3000 points: how long the cost and its gradient by every point's stiffness take.
+pub fn frames(folder: &Path) -> Result<Figures, String> {
+    const FRAMES: usize = 100;
+    let points = held([30, 10, 10], SPACING);
+    write_cloud(folder.join("rest.ply"), &points).map_err(text)?;
+    let turned = |k: usize| std::f64::consts::TAU * k as f64 / FRAMES as f64;
+    let total: Vec<String> =
+        (0..FRAMES).map(|k| format!("[0, {}, {}]", 2.0 * turned(k).sin(), 2.0 * turned(k).cos() - 2.0)).collect();
+    let times: Vec<f64> = (0..FRAMES).map(|k| k as f64).collect();
+    let loads = format!(
+        "[world]\ngravity = [0, 0, 0]\n[time]\nmode = \"quasi-static\"\n[[load]]\nkind = \"file\"\n\
+         places = [[0.295, 0.02, 0.02], [0.295, 0.08, 0.02], [0.295, 0.02, 0.08], [0.295, 0.08, 0.08]]\ntotal = [{}]\ntimes = {times:?}\n",
+        total.join(", ")
+    );
+    let object =
+        "points = \"rest.ply\"\ndiscretisation = \"points\"\nshape = { box = { min = [0, 0, 0], max = [0.3, 0.1, 0.1] } }\n";
+    record(&bar(object, &loads), &points, &times, 1e-4, folder)?;
+    let fit = format!(
+        "{loads}[observation]\nrecording = \"seen\"\ncost = \"points\"\n[fit]\n[[fit.parameter]]\npath = \"field.0\"\n{FIELD}{PRIOR}"
+    );
+    let e = Experiment::from_toml(&bar(object, &fit), folder.join("f.toml")).map_err(text)?;
+    let mut objective = Objective::new(std::slice::from_ref(&e), Backend::Cpu, Coordinates::default()).map_err(text)?;
+    let start = objective.start();
+    let clock = Instant::now();
+    let (value, gradient) = objective.value_and_gradient(&start).map_err(text)?;
+    let mut out = Figures::new();
+    for (name, x) in [
+        (super::HUNDRED, clock.elapsed().as_secs_f64()),
+        ("points", points.len() as f64),
+        ("numbers", gradient.len() as f64),
+        ("cost", value),
     ] {
         out.insert(name.into(), x);
     }

@@ -24,7 +24,7 @@ pub const SET: Set = Set {
     measured: Measured::Fits,
 };
 
-const CASES: [(&str, Case); 18] = [
+const CASES: [(&str, Case); 19] = [
     ("states", |data, _| states::run(data, &[])),
     ("states-0", |data, _| states::run(data, states::LOADS[0])),
     ("states-52", |data, _| states::run(data, states::LOADS[1])),
@@ -39,6 +39,7 @@ const CASES: [(&str, Case); 18] = [
     ("cloud-states", |data, folder| clouds::beam(data, folder, &[])),
     ("toy", |_, folder| toy::run(folder, false)),
     ("toy-tet", |_, folder| toy::run(folder, true)),
+    ("frames-100", |_, folder| clouds::frames(folder)),
     ("jet-plate", |_, _| interactions::plate()),
     ("jet-sphere", |_, _| interactions::sphere()),
     ("obstacle", |_, _| interactions::obstacle()),
@@ -60,6 +61,7 @@ const NEXT: &str = "next mode over the shear modulus";
 const HELD: &str = "rms of the other states, per point over one modulus";
 const RATIO: &str = "outer half over inner half";
 const TIPS: &str = "tip of points over tip of cells";
+const HUNDRED: &str = "cost and gradient of 100 frames [s]";
 const LN: &str = "ln of the moduli's ratio";
 const UNMOVED: &str = "rms of the other frames, not moving [mm]";
 
@@ -149,6 +151,7 @@ const AIMS: &[Aim] = &[
     ("A8", "stiffness of the outer half over the inner one", "two-parts", Of(RATIO), "–", Between(0.2, 0.3)),
     ("A12", "tip of points over that of cells, one cloud", "both-bodies", Of(TIPS), "–", Between(0.95, 1.05)),
     ("A12", "ln of the moduli's ratio", "both-bodies", Of(LN), "–", Between(-0.1, 0.1)),
+    ("§", "100 frames of 3100 points: cost and gradient [s]", "frames-100", Of(HUNDRED), "–", AtMost(10.0)),
     ("A13", "points: E of all six states [kPa]", "cloud-states", Of(MODULUS), "–", Between(221.4, 287.1)),
 ];
 
