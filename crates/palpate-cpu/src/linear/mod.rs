@@ -7,6 +7,7 @@ pub mod dense;
 pub mod gmres;
 pub mod jacobi;
 pub mod matrix;
+pub mod side_by_side;
 pub mod simd;
 pub mod vector;
 
@@ -18,7 +19,7 @@ use jacobi::BlockJacobi;
 use matrix::{Matrix, Operator, Packed};
 use palpate_model::scene::LinearSolver;
 use palpate_model::space::body::Body;
-use palpate_model::space::pattern::Pattern;
+use palpate_model::space::pattern::{BlockRows, Pattern};
 use std::sync::OnceLock;
 
 /// Most CG iterations; a solve that needs more is a symptom.
@@ -143,6 +144,12 @@ impl Solvers {
     /// Solvers for a choice made in the scene.
     pub fn new(choice: LinearSolver) -> Solvers {
         Solvers { choice, most: MOST_ITERATIONS, analysis: OnceLock::new(), coarsening: OnceLock::new() }
+    }
+
+    /// Factorises a matrix.
+    pub fn factor(&self, rows: &BlockRows, matrix: &Matrix) -> Result<Factor, Trouble> {
+        let analysis = self.analysis.get_or_init(|| Analysis::new(rows));
+        analysis.as_ref().map_err(Clone::clone).and_then(|a| a.factor(matrix)).map_err(Trouble::Indefinite)
     }
 
     /// Factorises or preconditions a matrix. A second level that is there already is used as it is; else it is made.
