@@ -1,5 +1,6 @@
 //! [`Backend`] on the CPU: every pass over all members of the batch, side by side.
 
+use crate::ahead;
 use crate::costs::{Along, Instant, blend};
 use crate::linear::vector::{self, Nodes};
 use crate::newton;
@@ -179,12 +180,13 @@ impl Backend for CpuBackend {
     fn step(&self, world: &mut World, stage: &Stage, past: &[&State], next: &mut State, tally: &mut Tally) {
         let shared = &world.shared;
         (&mut world.members, &mut next.members, &mut tally.members).into_par_iter().enumerate().for_each(|(b, (m, next, t))| {
-            if !t.failed()
-                && m.takes(stage)
-                && let Err(reason) = simulate::step(shared, m, stage, &of_member(past, b), next)
-            {
+            if t.failed() || !m.takes(stage) {
+                return;
+            }
+            if let Err(reason) = simulate::step(shared, m, stage, &of_member(past, b), next) {
                 t.fail(newton::at(stage.time)(reason), &shared.plan, &m.theta);
             }
+            t.gradient.iter_mut().for_each(|g| ahead::hand_on(m, stage, g));
         });
     }
 

@@ -2,10 +2,13 @@
 //!
 //! Invariant: this room does not know where a plan comes from nor what gradients are for.
 
+mod ahead;
+mod back;
 mod backend;
 #[cfg(test)]
 mod collapse_tests;
 pub mod costs;
+mod kept;
 pub mod linear;
 #[cfg(test)]
 mod local_bodies;
@@ -17,6 +20,8 @@ mod newton;
 #[cfg(test)]
 mod product_tests;
 mod quasi_static;
+#[cfg(test)]
+mod sequence_tests;
 mod simulate;
 #[cfg(test)]
 mod solver_choice_tests;

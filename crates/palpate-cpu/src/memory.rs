@@ -1,5 +1,6 @@
 //! How much memory simulations take, from the sizes of what they keep; found before anything is computed.
 
+use crate::kept::BACK;
 use crate::linear::{Purpose, is_direct};
 use crate::terms::elastic_cells::POSED;
 use glam::{DMat3, DVec3};
@@ -23,7 +24,7 @@ const FILL: f64 = 150.0;
 pub struct Memory {
     /// The body, its band, the matrices of its cells, what was measured: once for all members.
     pub shared: u64,
-    /// The matrix of every member.
+    /// The matrix of every member, and in a sequence its factor.
     pub matrices: u64,
     /// What the members solved side by side keep meanwhile: poses of cells, a copy or factor of the matrix, vectors.
     pub solves: u64,
@@ -82,17 +83,30 @@ impl<'a> Sizes<'a> {
         // A copy is padded to vector registers. With many right-hand sides larger bodies are factorised as well.
         let direct = is_direct(plan.solver.linear, nodes, Purpose::Step(usize::MAX));
         let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
-        let solve = copy + cells * (POSED + size_of::<V24>()) + VECTORS * vector;
+        let [stays, beside] = self.side_by_side(factor);
+        let solve = copy + beside + cells * (POSED + size_of::<V24>()) + VECTORS * vector;
         let kept = if request.gradient.any() { plan.clock.stages().len() + 3 } else { 3 };
         let bytes = |n: usize| n as u64;
         Memory {
             shared: bytes(tables + ratios * matrices * MATRICES),
             // Beside the stiffness tetrahedra keep a mass of every block.
-            matrices: bytes(members * blocks * (size_of::<DMat3>() + if plan.body.cut.is_none() { 8 } else { 0 })),
+            matrices: bytes(members * (stays + blocks * (size_of::<DMat3>() + if plan.body.cut.is_none() { 8 } else { 0 }))),
             solves: bytes(members.min(threads.max(1)) * solve),
             states: bytes(members * 2 * kept * vector),
             tangents: bytes(members * 4 * request.sensitivities.len() * vector),
         }
+    }
+
+    /// What states of a sequence that are solved for together take: the factor that stays with the member, rounded to half of its size, and meanwhile as
+    /// much in matrices, the moduli of points, and vectors.
+    fn side_by_side(&self, factor: usize) -> [usize; 2] {
+        let (plan, nodes) = (self.plan, self.plan.body.nodes.len());
+        if plan.times.is_empty() || !is_direct(plan.solver.linear, nodes, Purpose::Static) {
+            return [0; 2];
+        }
+        let moduli = plan.body.points.len() * size_of::<[[f64; 9]; 9]>();
+        let states = BACK.min(plan.times.len());
+        [factor / 2, factor / 2 + states * (moduli + VECTORS * nodes * size_of::<DVec3>())]
     }
 
     /// The same of a product with the Gauss–Newton matrix: one simulation with all its states, and the tangents of all of them.

@@ -17,7 +17,7 @@ pub type Reason = (FailureKind, String);
 /// Accuracy that linear solves for derivatives cannot usefully pass in f64.
 const FINEST: f64 = 1e-12;
 /// Accuracy of the first Newton direction: that of the tangent at the guess.
-const FIRST: f64 = 0.03;
+pub(crate) const FIRST: f64 = 0.03;
 /// Accuracy of a later one far from the solution: contact and rotation leave more error than this anyway.
 const COARSEST: f64 = 0.1;
 
@@ -146,8 +146,7 @@ pub fn solve(
             None => purpose != Purpose::Static && after <= KEEP * norm,
         };
         kept = serves.then_some(tangent);
-        // As accurate as the next step's quadratic model is (Eisenstat & Walker 1996, choice 2).
-        forcing = (0.9 * (after / norm).powi(2)).clamp(1e-4, COARSEST);
+        forcing = self::forcing(after, norm);
     }
     let reference = scale.unwrap_or(1.0);
     let (first, last) = (history.first().copied().unwrap_or(0.0), history.last().copied().unwrap_or(0.0));
@@ -161,17 +160,21 @@ pub fn solve(
     ))
 }
 
+/// Accuracy of the next direction, after a step that took the residual's norm from `norm` to `after`: as accurate as the next step's quadratic
+/// model is (Eisenstat & Walker 1996, choice 2).
+pub(crate) fn forcing(after: f64, norm: f64) -> f64 {
+    (0.9 * (after / norm).powi(2)).clamp(1e-4, COARSEST)
+}
+
+/// What conjugate gradients may leave of a residual, a third of what is allowed: the residual after the step decides.
+pub(crate) fn slack(tolerance: f64, reference: f64) -> f64 {
+    0.3 * tolerance * reference
+}
+
 /// What rounding of the positions alone leaves of the scaled residual: stiff bodies under small loads get no closer.
-fn rounding(equation: &Equation, matrix: &Matrix, u: &[DVec3]) -> f64 {
-    let body = &equation.context.plan.body;
-    let squares = equation
-        .context
-        .pattern
-        .blocks
-        .diagonal
-        .iter()
-        .zip(body.nodes.iter().zip(u))
-        .map(|(&k, (x, u))| matrix.mean_diagonal(k) * (*x + *u).length_squared());
+/// `means` are those of the diagonal of every node's block [N/m].
+pub(crate) fn rounding(nodes: &[DVec3], means: impl IntoIterator<Item = f64>, u: &[DVec3]) -> f64 {
+    let squares = means.into_iter().zip(nodes.iter().zip(u)).map(|(k, (x, u))| k * (*x + *u).length_squared());
     // Each of the 81 products of a row rounds once; their errors add like a random walk.
     9.0 * f64::EPSILON * squares.sum::<f64>().sqrt()
 }
@@ -209,7 +212,8 @@ fn direction(
         let diagonal = &tangent.diagonal;
         let reference = *scale.get_or_insert_with(|| equation.scale(u1, |f| diagonal.norm(f)));
         let norm = diagonal.norm(residual);
-        if norm <= tolerance * reference || norm <= rounding(equation, matrix, u1) {
+        let means = equation.context.pattern.blocks.diagonal.iter().map(|k| matrix.mean_diagonal(*k));
+        if norm <= tolerance * reference || norm <= rounding(&equation.context.plan.body.nodes, means, u1) {
             return Ok((None, norm, tangent));
         }
         let mut d: Nodes = residual.iter().map(|r| -*r).collect();
@@ -219,8 +223,7 @@ fn direction(
                 Ok(d)
             }
             None => {
-                // CG may leave a third of what is allowed: the residual after the step decides.
-                let absolute = 0.3 * tolerance * reference;
+                let absolute = slack(tolerance, reference);
                 let digits = if purpose == Purpose::Static { Digits::All } else { Digits::Few };
                 let prepared = solvers.prepare(task(equation, matrix, diagonal, u1, purpose, digits), level);
                 let solved = prepared.and_then(|p| p.solve(&mut d, forcing, absolute).map(|n| (n, p.into_factor())));
@@ -245,7 +248,7 @@ fn direction(
 /// (Armijo 1966), or one of 2, 4, 8 … while the potential falls nearly as fast at the end of the step as at its beginning: there the tangent,
 /// made positive where contact squeezes a cell flat, is far too stiff, and thirty full steps were seen to lead nowhere. Returns the residual
 /// there and its norm.
-fn line_search(
+pub(crate) fn line_search(
     equation: &mut Equation,
     diagonal: &BlockJacobi,
     u1: &mut Nodes,
@@ -322,6 +325,11 @@ pub fn with_tangent<T>(
     None
 }
 
+/// Accuracy of linear solves for derivatives of states that are found to `tolerance`.
+pub(crate) fn accuracy_of_derivatives(tolerance: f64) -> f64 {
+    tolerance.clamp(FINEST, 1e-6)
+}
+
 /// Solves A x = b with the exact tangent at a converged state, for derivatives; the iterations that took. The residual has been computed
 /// there.
 pub fn solve_exact(
@@ -337,5 +345,5 @@ pub fn solve_exact(
     let mut level = None;
     let task = task(equation, matrix, &diagonal, u1, purpose, Digits::All);
     let prepared: Prepared = solvers.prepare(task, &mut level).map_err(trouble)?;
-    prepared.solve_many(columns, equation.context.plan.solver.tolerance.clamp(FINEST, 1e-6)).map_err(trouble)
+    prepared.solve_many(columns, accuracy_of_derivatives(equation.context.plan.solver.tolerance)).map_err(trouble)
 }

@@ -1,5 +1,7 @@
 //! One member's start and stages, with their adjoints and tangents.
 
+use crate::ahead::Ahead;
+use crate::kept::{self, Kept};
 use crate::linear::Purpose;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::{Nodes, add_scaled, is_finite};
@@ -100,6 +102,7 @@ pub(crate) fn context<'a>(shared: &'a Shared, member: &'a Member, stage: Option<
         strains: shared.strains.as_ref(),
         coefficients: &member.coefficients,
         masses: &member.masses,
+        springs: &member.springs,
         planes: &member.planes,
         effects: &member.effects,
         altered: &member.altered,
@@ -175,6 +178,7 @@ pub(crate) fn make_stress_free(shared: &Shared, member: &mut Member) -> Result<(
 pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Result<(), Reason> {
     let plan = &shared.plan;
     make_stress_free(shared, member)?;
+    member.ahead = Ahead::default();
     s.u.fill(DVec3::ZERO);
     if let (InitialShape::Rest, Some(w)) = (plan.initial, &member.coefficients.changes.rest) {
         // At rest is where nothing is strained.
@@ -190,11 +194,17 @@ pub fn start(shared: &Shared, member: &mut Member, s: &mut MemberState) -> Resul
             return Err((FailureKind::NoEquilibrium, "no clamp holds the body".into()));
         }
         let still = Start::still(s.u.len());
-        with_matrix(member, |member, matrix| {
+        let kept = with_matrix(member, |member, matrix| {
             quasi_static::settle(shared, member, None, matrix, &mut s.u, &mut Effort::default())?;
             let mut e = equation(shared, member, None, &still);
-            if plan.times.is_empty() { Ok(()) } else { quasi_static::check_stable(shared, &mut e, &s.u, 0) }
+            // What has a factor is stable.
+            let kept = if kept::applies(shared) { Kept::new(shared, &mut e, &s.u, matrix) } else { None };
+            if kept.is_none() && !plan.times.is_empty() {
+                quasi_static::check_stable(shared, &mut e, &s.u, 0)?;
+            }
+            Ok(kept)
         })?;
+        member.ahead = Ahead::new(kept);
     }
     check(shared, s)
 }
@@ -230,6 +240,7 @@ pub fn start_adjoint(
     if !at_rest && (!given || member.balanced.is_some()) {
         quasi_static::pull(shared, member, None, s, adj, gradient)?;
     }
+    quasi_static::pull_waiting(shared, member, gradient)?;
     if given { stress_free::pull(shared, member, gradient) } else { Ok(()) }
 }
 

@@ -291,7 +291,8 @@ impl StressFreeShapes for World {
     }
 
     fn pull(&self, member: usize, sought: &Sought, gradient: &mut Coefficients) -> Result<(), Failure> {
-        let mut own = Gradient { coefficients: gradient.clone(), sought: sought.clone(), wanted: Vec::new() };
+        let (coefficients, sought) = (gradient.clone(), sought.clone());
+        let mut own = Gradient { coefficients, sought, wanted: Vec::new(), waiting: Vec::new(), kept: None };
         pull(&self.shared, &self.members[member], &mut own).map_err(self.failed_at_start(member))?;
         *gradient = own.coefficients;
         Ok(())

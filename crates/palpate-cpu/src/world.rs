@@ -1,6 +1,8 @@
 //! What the backend holds: a world of members, their states, adjoints, tangents and tallies.
 
+use crate::ahead::Ahead;
 use crate::costs::{Compared, Costs, Instant, Look};
+use crate::kept::Kept;
 use crate::linear::Solvers;
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::Nodes;
@@ -18,7 +20,7 @@ use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::Plan;
 use palpate_model::plan::scheme::Stage;
 use palpate_model::space::pattern::{Pattern, Places};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A plan made ready, and the current batch.
 #[derive(Debug)]
@@ -66,6 +68,10 @@ pub struct Member {
     pub(crate) rates: Option<Rated>,
     /// What balances in the shape given, where effects change the stress-free shape beyond.
     pub(crate) balanced: Option<Box<Balanced>>,
+    /// States of a sequence that are known already.
+    pub(crate) ahead: Ahead,
+    /// What the penalty of a cloud's stars has in every block, over its modulus [m]; once somebody multiplies with it.
+    pub(crate) springs: OnceLock<Vec<f64>>,
 }
 
 /// Coefficients with the stress-free shape of the shape given.
@@ -165,6 +171,8 @@ impl World {
                 effort: Effort::default(),
                 rates: None,
                 balanced: None,
+                ahead: Ahead::default(),
+                springs: OnceLock::new(),
             });
         }
     }
@@ -229,13 +237,27 @@ pub struct Gradient {
     pub(crate) sought: Sought,
     /// Parameters that are wanted `[P]`.
     pub(crate) wanted: Vec<bool>,
+    /// Equilibria whose derivatives wait for those that are solved for with them.
+    pub(crate) waiting: Vec<Waiting>,
+    /// The tangent that served the last ones.
+    pub(crate) kept: Option<Kept>,
+}
+
+/// An equilibrium of a sequence with dJ/du.
+#[derive(Clone, Debug)]
+pub struct Waiting {
+    /// Its stage; `None` = the start.
+    pub(crate) stage: Option<Stage>,
+    pub(crate) at: Nodes,
+    pub(crate) by_u: Nodes,
 }
 
 impl Gradient {
     /// Zero.
     pub(crate) fn new(plan: &Plan, wanted: Vec<bool>) -> Gradient {
         let sought = Sought::new(plan, &wanted);
-        Gradient { coefficients: Coefficients::zero_gradient(plan, &sought), sought, wanted }
+        let coefficients = Coefficients::zero_gradient(plan, &sought);
+        Gradient { coefficients, sought, wanted, waiting: Vec::new(), kept: None }
     }
 
     /// Adds −z · ∂r/∂(coefficients) at `u1`.

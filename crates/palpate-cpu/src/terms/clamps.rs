@@ -7,6 +7,7 @@
 //! Clamps are weighted in time like the cells: Nitsche's traction terms are bounded by the cells' energy only where both see the same state.
 
 use super::elastic_cells::blocks::block;
+use super::products::Parts;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;
@@ -206,6 +207,12 @@ impl Term for Clamped<'_> {
                 }
             }
         }
+    }
+
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        // Clamps hold nodes of bodies without cells.
+        let holds = (0..self.c.plan.clamps.len()).any(|index| !self.cells(index).is_empty());
+        if holds { Parts::Matrix } else { Parts::Nothing }
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {

@@ -3,6 +3,7 @@
 //! plan's and no parameter, but for a layer of thickness ℓ that gives way ([`palpate_model::effects`], "compliant-clamp"): the layer is in series with
 //! the spring, S/ℓ with S = (λ + 2μ) times the area that the node stands for. Effects move what is wanted as they move the clamps of cells.
 
+use super::products::{Part, Parts};
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
@@ -138,6 +139,15 @@ impl<'a> HeldNodes<'a> {
     }
 }
 
+/// Nodes and the stiffness of their springs [N/m].
+struct Springs(Vec<(usize, f64)>);
+
+impl Part for Springs {
+    fn add(&self, x: &[DVec3], y: &mut [DVec3]) {
+        self.0.iter().for_each(|(n, k)| y[*n] += *k * x[*n]);
+    }
+}
+
 impl Term for HeldNodes<'_> {
     fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
         self.away(u1).for_each(|(h, away)| out[h.node] += h.stiffness * away);
@@ -150,6 +160,10 @@ impl Term for HeldNodes<'_> {
     fn tangent(&self, _u1: &[DVec3], _curvature: Curvature, matrix: &mut Matrix) {
         let diagonal = &self.c.pattern.blocks.diagonal;
         self.held().for_each(|h| add_to_diagonal(&mut matrix.values[diagonal[h.node]], h.stiffness));
+    }
+
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        Parts::Free(Box::new(Springs(self.held().map(|h| (h.node, h.stiffness)).collect())))
     }
 
     fn by_past(&self, _u1: &[DVec3], _change: &PastChange, _out: &mut [DVec3]) {

@@ -2,6 +2,7 @@
 //! (`Consistent`).
 
 use super::consistent::{Consistent, add_product};
+use super::products::Parts;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal, zeros};
 use crate::linear::matrix::Matrix;
 use crate::linear::vector::dot;
@@ -119,6 +120,11 @@ impl Term for Inertia<'_> {
                 add_to_diagonal(&mut matrix.values[*place as usize], s);
             }
         }
+    }
+
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        // Weight does not depend on where the body is.
+        if self.c.inertia.is_none() { Parts::Nothing } else { Parts::Matrix }
     }
 
     fn by_past(&self, _u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {

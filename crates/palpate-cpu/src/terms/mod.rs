@@ -17,6 +17,7 @@ pub mod inertia;
 pub mod jets;
 pub mod obstacles;
 pub mod point_laws;
+pub mod products;
 mod seen;
 pub mod star_penalty;
 pub mod tet_laws;
@@ -42,7 +43,9 @@ use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::space::pattern::{Pattern, Places};
 use point_laws::PointLaws;
+use products::Parts;
 use star_penalty::StarPenalty;
+use std::sync::OnceLock;
 use tet_laws::TetLaws;
 
 pub use elastic_cells::laws::{CellActing, cell_laws};
@@ -155,6 +158,8 @@ pub struct Context<'a> {
     pub coefficients: &'a Coefficients,
     /// Its mass matrix by block [kg], of a body of tetrahedra.
     pub masses: &'a [f64],
+    /// The penalty of a cloud's stars by block, over γ and the shear modulus where no field varies it [m]; once it is asked for.
+    pub springs: &'a OnceLock<Vec<f64>>,
     /// The member's planes.
     pub planes: &'a [PlaneNow],
     /// The member's effects.
@@ -289,13 +294,17 @@ pub struct Forces {
 
 /// One term of the residual, at one member and one solve. What it needs of the past it takes when it is made; `u1` is the new
 /// displacement `[N]` [m]. All but the residual may rely on the residual having been computed last at the same `u1`.
-pub trait Term {
+pub trait Term: Send + Sync {
     /// Adds the residual [N].
     fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]);
     /// Potential whose gradient by u₁ is the residual, up to a constant [J].
     fn potential(&self, u1: &[DVec3]) -> f64;
     /// Adds the tangent stiffness ∂r/∂u₁, symmetric [N/m].
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix);
+    /// The exact one as products with vectors, where that takes less than the matrix.
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        Parts::Matrix
+    }
     /// Adds the derivative of the residual along a change of the past.
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]);
     /// Its transpose: adds z·∂r/∂(past).

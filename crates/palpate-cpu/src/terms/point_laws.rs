@@ -3,6 +3,7 @@
 //! The loop knows no effect by name: a law gives a potential and its derivatives at one point
 //! ([`palpate_model::effects::law`]), this file spreads them over the nodes.
 
+use super::products::Parts;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
 use glam::{DMat3, DVec3};
@@ -284,6 +285,11 @@ impl Term for PointLaws<'_> {
                 }
             });
         }
+    }
+
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        // Loads are the same wherever the body is.
+        if self.felt().next().is_none() { Parts::Nothing } else { Parts::Matrix }
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {

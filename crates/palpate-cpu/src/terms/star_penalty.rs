@@ -3,8 +3,10 @@
 //! The potential is ½ γ μ_i u·A_i u of every star with θ, and the old state's force with 1 − θ. μ = E/(2 (1 + ν)) carries its derivatives by the
 //! modulus, its field and Poisson's ratio. It is elastic: damping in proportion to stiffness leaves it out, because its rate is not objective.
 
+use super::products::{Part, Parts, padded};
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term, add_to_diagonal};
 use crate::linear::matrix::Matrix;
+use crate::linear::simd::wide;
 use glam::DVec3;
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::stars::penalty::Penalty;
@@ -14,6 +16,8 @@ use rayon::prelude::*;
 const CHUNK: usize = 64;
 /// Nodes that one task sums at least.
 const NODES: usize = 256;
+/// Nodes that one task multiplies.
+const PIECE: usize = 512;
 
 /// The term.
 pub struct StarPenalty<'a> {
@@ -48,6 +52,19 @@ impl<'a> StarPenalty<'a> {
     /// z·A u of a star.
     fn form(&self, star: usize, z: &[DVec3], u: &[DVec3]) -> f64 {
         self.nodes(star).iter().zip(self.product(star, u)).map(|(n, f)| z[*n as usize].dot(f)).sum()
+    }
+
+    /// Σ A of all stars by block, each times its factor on the modulus: the same at every state.
+    fn springs(&self) -> &'a [f64] {
+        self.c.springs.get_or_init(|| {
+            let mut all = vec![0.0; self.c.pattern.blocks.columns.len()];
+            for star in 0..self.stars() {
+                let factor = self.c.factor(star);
+                let places = self.c.places.points.of(star);
+                self.penalty.of(star).iter().zip(places).for_each(|(a, place)| all[*place as usize] += factor * a);
+            }
+            all
+        })
     }
 
     fn stars(&self) -> usize {
@@ -87,6 +104,44 @@ impl<'a> StarPenalty<'a> {
     }
 }
 
+/// The term as products: its force is linear.
+struct Springs<'a, 'b>(&'b StarPenalty<'a>);
+
+impl Springs<'_, '_> {
+    /// Σ A x of a node's row, where `springs` has A. Every fourth block is summed by itself, so no sum waits for the one before.
+    #[inline(always)]
+    fn row(&self, springs: &[f64], n: usize, x: &[[f64; 4]]) -> DVec3 {
+        let blocks = &self.0.c.pattern.blocks;
+        let range = blocks.rows[n]..blocks.rows[n + 1];
+        let mut sums = [[0.0; 4]; 4];
+        for (springs, columns) in springs[range.clone()].chunks(4).zip(blocks.columns[range].chunks(4)) {
+            for ((sum, a), b) in sums.iter_mut().zip(springs).zip(columns) {
+                let x = &x[*b as usize];
+                for r in 0..4 {
+                    sum[r] += a * x[r];
+                }
+            }
+        }
+        DVec3::from_array([0, 1, 2].map(|r| (sums[0][r] + sums[1][r]) + (sums[2][r] + sums[3][r])))
+    }
+}
+
+impl Part for Springs<'_, '_> {
+    fn add(&self, x: &[DVec3], y: &mut [DVec3]) {
+        let (scale, springs, x) = (self.0.stiffness * self.0.c.weights.new, self.0.springs(), padded(x));
+        y.par_chunks_mut(PIECE).enumerate().for_each(|(piece, y)| {
+            wide(
+                #[inline(always)]
+                || {
+                    for (i, y) in y.iter_mut().enumerate() {
+                        *y += scale * self.row(springs, PIECE * piece + i, &x);
+                    }
+                },
+            );
+        });
+    }
+}
+
 impl Term for StarPenalty<'_> {
     fn residual(&mut self, u1: &[DVec3], out: &mut [DVec3]) {
         self.add(|s| self.stiffness_of(s), &self.mean(u1), out);
@@ -105,6 +160,10 @@ impl Term for StarPenalty<'_> {
                 add_to_diagonal(&mut matrix.values[*place as usize], scale * a);
             }
         }
+    }
+
+    fn products<'b>(&'b self, _u1: &[DVec3]) -> Parts<'b> {
+        Parts::Free(Box::new(Springs(self)))
     }
 
     fn by_past(&self, _u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {

@@ -9,8 +9,10 @@
 //! What a point gives is computed side by side and summed by the points around a node in their order, so bits do not depend on threads.
 
 mod blocks;
+mod products;
 
 use super::assembly::assemble;
+use super::products::Parts;
 use super::unstrained;
 use super::{Context, Curvature, Forces, PastChange, PastGradient, Term};
 use crate::linear::matrix::Matrix;
@@ -22,6 +24,7 @@ use palpate_model::mechanics::lame::{lame, lame_by_nu};
 use palpate_model::params::coefficients::{Coefficients, Sought};
 use palpate_model::space::points::Share;
 use palpate_model::space::stencil::{Stencil, Stencils};
+use products::Moduli;
 use rayon::prelude::*;
 
 /// Points that one task treats at least.
@@ -323,6 +326,10 @@ impl Term for ElasticPoints<'_> {
 
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
         assemble(&Tangents { term: self, u1, curvature }, self.c.pattern, matrix);
+    }
+
+    fn products<'b>(&'b self, u1: &[DVec3]) -> Parts<'b> {
+        Parts::Free(Box::new(Moduli::new(self, u1)))
     }
 
     fn by_past(&self, u1: &[DVec3], change: &PastChange, out: &mut [DVec3]) {
