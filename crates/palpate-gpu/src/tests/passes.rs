@@ -24,6 +24,7 @@ use palpate_model::params::coefficients::Coefficients;
 use palpate_model::plan::{Physics, Plan};
 use palpate_model::scene::Scene;
 use palpate_model::space::pattern::{Pattern, Places};
+use std::sync::OnceLock;
 
 /// What one pass computed: its name, numbers, and the part of the largest number that may differ.
 pub(super) type Part = (&'static str, Vec<f64>, f64);
@@ -191,6 +192,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
     let planes = planes(plan, physics);
     let (dt, theta) = (plan.clock.step, plan.clock.theta);
     let (u0, v0): (Vec<DVec3>, Vec<DVec3>) = plan.body.nodes.iter().map(|x| (given(*x)[0], given(*x)[1])).unzip();
+    let springs = OnceLock::new();
     let context = Context {
         plan,
         pattern: &pattern,
@@ -199,6 +201,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
         strains: None,
         coefficients: &coefficients,
         masses: &masses,
+        springs: &springs,
         planes: &planes,
         effects: &effects,
         altered: &altered,
