@@ -53,8 +53,9 @@ pub fn run(root: &Path, minutes: f64, only: &[String]) -> Result<(), String> {
 
 /// Files that one target read in so many minutes.
 fn one(root: &Path, target: &str, seed: u64, minutes: f64) -> Result<u64, String> {
+    // All of the workspace, so that crates keep the features that the other tests were built with.
     let done = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()))
-        .args(["test", "--release", "-p", "palpate", "--test", "fuzz", "no_reader", "--", "--nocapture"])
+        .args(["test", "--release", "--workspace", "--test", "fuzz", "no_reader", "--", "--nocapture"])
         .env("PALPATE_FUZZ_MINUTES", minutes.to_string())
         .env("PALPATE_FUZZ_ONLY", target)
         .env("PALPATE_FUZZ_SEED", seed.to_string())
