@@ -29,11 +29,16 @@ impl<'a> StarLookup<'a> {
         StarLookup { body, near: InCubes::new(body), nodes, surface }
     }
 
-    /// Weights and gradients of the points around a place, and how far outside the body it is [m], zero inside.
+    /// Weights and gradients of the points around a place, and how far outside the body it is [m], zero inside; no number where the place is none.
     pub fn carry(&self, place: DVec3) -> (StencilBuf, f64) {
-        let fit = AffineFit::new(self.body, &self.near, place, RADIUS * self.body.length);
+        let nearest = self.nodes.nearest(place, 1).first().copied();
+        let radius = RADIUS * self.body.length;
+        // Beyond the kernel's reach the field of the nearest point goes on: a place may be anywhere, whoever asks refuses those far away.
+        let near = nearest.is_some_and(|n| n.0 <= radius);
+        let center = if near { place } else { self.body.nodes[nearest.map_or(0, |n| n.1 as usize)] };
+        let fit = AffineFit::new(self.body, &self.near, center, radius);
         let mut s = StencilBuf { value: fit.value(place), gradient: fit.gradient(), nodes: fit.nodes.clone() };
-        if let Some((distance, nearest)) = self.nodes.nearest(place, 1).first().copied() {
+        if let Some((distance, nearest)) = nearest {
             // What is added has no affine part, so that affine motion stays exact.
             let pull = (1.0 - (distance / (OWN * self.body.length)).powi(2)).max(0.0).powi(2);
             let there = fit.value(self.body.nodes[nearest as usize]);
@@ -46,6 +51,9 @@ impl<'a> StarLookup<'a> {
     }
 
     fn outside(&self, place: DVec3) -> f64 {
+        if !place.is_finite() {
+            return f64::NAN;
+        }
         let nearest = self.surface.nearest(place, 1).first().map(|n| &self.body.patches[n.1 as usize]);
         nearest.map_or(0.0, |patch| (place - patch.point).dot(patch.normal).max(0.0))
     }

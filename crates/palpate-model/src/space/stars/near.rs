@@ -69,14 +69,15 @@ impl Near {
         }
     }
 
-    /// The nearest points with their distances [m], nearest first, the lower number first where they are equally far: as many as asked, or all.
+    /// The nearest points with their distances [m], nearest first, the lower number first where they are equally far: as many as asked, or all;
+    /// none of a place that is no number.
     pub fn nearest(&self, center: DVec3, count: usize) -> Vec<(f64, u32)> {
         let count = count.min(self.points.len());
         let mut radius = self.edge;
         loop {
             let mut found = Vec::new();
             self.within(center, radius, |p, square| found.push((square, p)));
-            if found.len() >= count {
+            if found.len() >= count || !radius.is_finite() {
                 found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 found.truncate(count);
                 return found.into_iter().map(|(square, p)| (square.sqrt(), p)).collect();

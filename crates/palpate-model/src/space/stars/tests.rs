@@ -100,6 +100,10 @@ fn places_are_carried_by_what_is_around_them() {
         assert!((s.get().gradient_of(&affine) - f).to_cols_array().iter().all(|e| e.abs() < 1e-10));
         assert!((away - (x.z - 0.04).max(0.0)).abs() < 1e-12, "{away} at {x}");
     }
+    // Places in millimetres are far away, and some are no numbers: that is said, whoever asks decides.
+    let (s, away) = carrier.carry(DVec3::new(300.0, 20.0, 20.0));
+    assert!(away > 290.0 && s.get().at(&affine).is_finite(), "{away}");
+    assert!(carrier.carry(DVec3::new(f64::NAN, 0.0, 0.0)).1.is_nan());
     // A point of the cloud follows itself.
     let bent: Vec<DVec3> = body.nodes.iter().map(|x| DVec3::Z * x.x * x.x).collect();
     assert!((carrier.carry(body.nodes[40]).0.get().at(&bent) - bent[40]).length() < 1e-15);
