@@ -90,9 +90,9 @@ pub fn markdown(root: &Path) -> Result<String, String> {
     let mut out = String::from("| target | files | minutes | last run |\n| --- | --- | --- | --- |\n");
     let mut line = |name: &str, of: &[&Row]| {
         let files: u64 = of.iter().map(|r| r.files).sum();
-        let minutes: f64 = of.iter().map(|r| r.minutes).sum();
+        let minutes = of.iter().fold(0.0, |sum, r| sum + r.minutes);
         let last = of.iter().map(|r| &r.date).max().map_or("never", |d| d);
-        out += &format!("| {name} | {files} | {minutes:.0} | {last} |\n");
+        out += &format!("| {name} | {files} | {minutes:.1} | {last} |\n");
     };
     for target in targets(root)? {
         line(&target, &rows.iter().filter(|r| r.target == target).collect::<Vec<_>>());
