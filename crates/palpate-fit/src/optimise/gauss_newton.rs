@@ -1,8 +1,9 @@
 //! Gauss–Newton with Levenberg–Marquardt damping in a box.
 //!
-//! After a step that is taken, damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed.
-//! 2004, eq. 2.21); after one that is refused, it makes the next half as long. It counts in each number's own curvature (Marquardt, J. SIAM 11, 1963, § 4), so that a number that the
-//! data say a thousandth as much of moves as early as the others. A step may also not exceed a length in z: parameters far from their optimum otherwise jump
+//! After a step that is taken, damping follows Nielsen's rule (Madsen, Nielsen & Tingleff, Methods for Non-Linear Least Squares
+//! Problems, 2nd ed. 2004, eq. 2.21); after one that is refused, it makes the next half as long. It counts in each number's own
+//! curvature (Marquardt, J. SIAM 11, 1963, § 4), so that a number that the data say a thousandth as much of moves as early as the
+//! others. A step may also not exceed a length in z: parameters far from their optimum otherwise jump
 //! into regions where a simulation fails.
 //!
 //! It ends where a free step promises less than a hundredth of a standard error ([`crate::Tolerance::decrement`]): what is left to gain
