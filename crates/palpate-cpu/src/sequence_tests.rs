@@ -63,6 +63,13 @@ fn evaluated(plan: &Plan) -> (Evaluation, [usize; 2]) {
     (found, [effort.linear, effort.adjoint])
 }
 
+/// A plan's world at its own parameters.
+fn opened(plan: &Plan) -> World {
+    let mut world = World::new(plan);
+    world.set_params(&ParamBatch::of(&plan.theta));
+    world
+}
+
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
     norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
@@ -111,8 +118,7 @@ fn bits_do_not_depend_on_threads() {
 #[test]
 fn products_are_those_with_the_matrix() {
     let plan = planned(&scene(cloud(4), false), 3);
-    let mut world = World::new(&plan);
-    world.set_params(&ParamBatch::of(&plan.theta));
+    let world = opened(&plan);
     let (shared, member) = (&world.shared, &world.members[0]);
     let n = plan.body.nodes.len();
     let some = |seed: usize, i: usize| (DVec3::new(0.37, 0.71, 0.13) * (i + seed) as f64).fract() - 0.5;
@@ -133,8 +139,7 @@ fn products_are_those_with_the_matrix() {
 #[test]
 fn a_factor_serves_until_another_one_pays() {
     let plan = planned(&scene(cloud(3), false), 3);
-    let mut world = World::new(&plan);
-    world.set_params(&ParamBatch::of(&plan.theta));
+    let world = opened(&plan);
     let (shared, member) = (&world.shared, &world.members[0]);
     let u = vec![DVec3::ZERO; plan.body.nodes.len()];
     let still = Start::still(u.len());
