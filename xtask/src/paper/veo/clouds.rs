@@ -140,13 +140,12 @@ pub fn two_parts(folder: &Path) -> Result<Figures, String> {
         places.join(", "),
         total.join(", ")
     );
-    let (hull, halves) = (HULL, HALVES);
     let times: Vec<f64> = (0..LOADS.len()).map(|k| k as f64).collect();
-    let truth = format!("{hull}cell_size = 0.005");
-    record(&bar(&truth, &format!("{loads}{halves}")), &points, &times, 0.02 * SPACING, folder)?;
+    let truth = format!("{HULL}cell_size = 0.005");
+    record(&bar(&truth, &format!("{loads}{HALVES}")), &points, &times, 0.02 * SPACING, folder)?;
     let observation =
         "[observation]\nrecording = \"seen\"\ncost = \"points\"\n[fit]\nframes = { train = { every = 1, count = 4 } }\n";
-    let object = format!("points = \"rest.ply\"\ndiscretisation = \"points\"\n{hull}");
+    let object = format!("points = \"rest.ply\"\ndiscretisation = \"points\"\n{HULL}");
     let one = "[[fit.parameter]]\npath = \"material.youngs_modulus\"\nstart = 1e5\n";
     let (field, prior) = (FIELD, PRIOR);
     let free = "[[fit.parameter]]\npath = \"field.0\"\n";
@@ -161,7 +160,7 @@ pub fn two_parts(folder: &Path) -> Result<Figures, String> {
     write_field(folder, &values)?;
     let modulus = crate::real::found(&one, "material.youngs_modulus");
     // What the fits did not see, without the noise that was laid over it.
-    let right = seen(&bar(&truth, &format!("{loads}{halves}")), &points, &times, folder)?;
+    let right = seen(&bar(&truth, &format!("{loads}{HALVES}")), &points, &times, folder)?;
     let apart = |scene: String| -> Result<f64, String> {
         let found = seen(&scene, &points, &times, folder)?;
         let all = right.iter().zip(&found).skip(TRAINED).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)));
