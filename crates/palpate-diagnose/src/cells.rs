@@ -85,6 +85,8 @@ pub struct Cells {
     pub regions: Regions,
     /// Standard deviation of each cell's mean, by noise alone [m].
     pub sd: Vec<f64>,
+    /// Variance of a mean whose readings are all off by the same, over that of one of independent readings; of all cells in the mean.
+    pub alike: f64,
     of_row: Vec<Option<u32>>,
 }
 
@@ -134,16 +136,21 @@ impl Cells {
             times: count.values().map(|c| c.1).collect(),
             regions,
             sd: Vec::new(),
+            alike: 1.0,
             of_row,
         };
-        let mut sums = vec![(0.0, 0.0); cells.keys.len()];
+        let mut sums = vec![(0.0, 0.0, 0.0); cells.keys.len()];
         for (r, c) in rows.iter().zip(&cells.of_row) {
             if let Some(c) = c {
                 let s = &mut sums[*c as usize];
-                s.0 += (r.row.weight * r.row.noise * r.row.along_sight).powi(2);
+                let noise = r.row.weight * r.row.noise * r.row.along_sight;
+                s.0 += noise.powi(2);
                 s.1 += r.row.weight;
+                s.2 += noise.abs();
             }
         }
+        let alike = sums.iter().map(|s| if s.0 > 0.0 { s.2 * s.2 / s.0 } else { 1.0 }).sum::<f64>();
+        cells.alike = alike / sums.len().max(1) as f64;
         // A cell seen edge-on has almost no noise of its own; a tenth of the reading's keeps it from ruling all others.
         cells.sd = sums.iter().map(|s| s.0.sqrt() / s.1).collect();
         let floor = 0.1 * crate::linear::quantile(&mut cells.sd.clone(), 0.5);

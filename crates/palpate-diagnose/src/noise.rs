@@ -100,9 +100,13 @@ impl Shapes {
     }
 }
 
+/// Factor on the stated variance of readings that may pass for noise: who states a noise knows it within a factor of two.
+const STATED: f64 = 4.0;
+
 /// Factor on the variance of cells' means: how many times more they scatter from frame to frame than independent readings would; and the
 /// shapes that this noise takes. `y` are residuals in units of that noise with everything projected out, which has taken a share
-/// `leverage` of their variance. Without three frames in a row the factor is 1 and there are no shapes.
+/// `leverage` of their variance. Without three frames in a row the factor is 1 and there are no shapes. Noise that all readings of a cell share
+/// makes it as large as their number; what scatters more is no noise, though it is new in every frame.
 pub fn design_effect(cells: &Cells, y: &[f64], leverage: impl Fn(usize) -> f64) -> (f64, Shapes) {
     let sequences = cells.sequences();
     let mut shapes = Shapes { sequence: vec![0; cells.len()], frames: Vec::new(), uncertainty: 0.0 };
@@ -151,5 +155,5 @@ pub fn design_effect(cells: &Cells, y: &[f64], leverage: impl Fn(usize) -> f64) 
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     let spread = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / squares.len() as f64).sqrt();
     shapes.uncertainty = (1.25 * spread / (mean.max(1e-300) * (squares.len() as f64 / 2.0).sqrt())).min(0.7);
-    (factor.max(1.0), shapes)
+    (factor.clamp(1.0, cells.alike.max(STATED)), shapes)
 }

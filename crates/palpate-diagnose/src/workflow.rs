@@ -73,6 +73,8 @@ struct State {
     elsewhere: Option<String>,
     /// True where the fields are of this very model.
     own: bool,
+    /// By how much its fit would still move its numbers, where it has not arrived.
+    unmet: Vec<f64>,
     /// Numbers that the recording asks for, of every change.
     needed: Vec<usize>,
     /// What is strange about its numbers.

@@ -268,6 +268,20 @@ fn an_adequate_answer_says_what_it_does_not_exclude() {
 }
 
 #[test]
+fn what_scatters_more_than_one_reading_is_no_noise() {
+    let mut bench = Bench::new(1000, &[], true);
+    let model = bench.baseline();
+    let readings = bench.linearise(&[(Vec::new(), model.values)]).remove(0).unwrap();
+    let cells = Cells::new(&readings);
+    let y = cells.table(&readings, None).y;
+    let factor = |times: f64| design_effect(&cells, &y.iter().map(|y| times * y).collect::<Vec<_>>(), |_| 0.0).0;
+    // Readings of the same noise: all of a cell are off alike where the variance of its mean is their number times that of independent ones.
+    let number = readings.rows.len() as f64 / cells.len() as f64;
+    assert!((cells.alike / number - 1.0).abs() < 0.2 && number > 4.0, "{} of {number}", cells.alike);
+    assert!(factor(1.0) < cells.alike && factor(100.0) == cells.alike, "{} {}", factor(1.0), factor(100.0));
+}
+
+#[test]
 fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
     let (mut alarms, mut factors) = (0, Vec::new());
     const RECORDINGS: u64 = 120;
@@ -293,6 +307,7 @@ fn false_alarms_are_as_rare_as_stated_under_correlated_pixels() {
             moves,
             known: vec![false, false, true],
             rough: vec![times(&change, field.rough), times(&blocks.size(&change), field.rough)],
+            unmet: Vec::new(),
         };
         let seen = SIZES.map(|tau| model.left_out(&blocks, tau).iter().map(|d| d.seen).collect());
         let judged = Judged {

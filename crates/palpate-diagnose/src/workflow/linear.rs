@@ -4,12 +4,15 @@ use super::State;
 use crate::cells::{Cells, Table};
 use crate::judgement::density::{Blocks, Linear};
 use crate::laboratory::{Field, Model, Readings};
-use crate::linear::dot;
+use crate::linear::{dot, least_squares};
 use faer::Mat;
 
 /// Standard errors of a number, by its own data alone, that its prior spans where nothing is known beforehand: it is left to the data, and what
 /// only one fold tells of is not predicted to be anything.
 const WIDE: f64 = 100.0;
+
+/// Ridge that keeps numbers apart of which the readings cannot tell: rounding of their squares, no more.
+const SINGULAR: f64 = 1e-9;
 
 /// One thing that moves residuals: its mean and standard deviation before any reading, in units of its column.
 #[derive(Clone, Copy)]
@@ -53,6 +56,10 @@ pub(super) fn around(cells: &Cells, blocks: &Blocks, state: &State) -> Linear {
         out.moves.push(column);
         out.known.push(m.known);
     }
+    out.unmet = vec![0.0; cells.len()];
+    for (by, c) in state.unmet.iter().zip(&state.table.columns) {
+        out.unmet.iter_mut().zip(c).for_each(|(u, c)| *u -= by * c);
+    }
     for f in &state.fields {
         let change = cells.means(&f.change);
         let column = field(f).apply(&mut out.y, &change);
@@ -60,6 +67,25 @@ pub(super) fn around(cells: &Cells, blocks: &Blocks, state: &State) -> Linear {
         out.known.push(true);
         out.rough.extend(rough(f, &change, blocks));
     }
+    out
+}
+
+/// By how much the cost's sensitivities would still move each number of a model, were all of them linear and without bounds: by nothing where its
+/// fit has arrived. Numbers that are known beforehand stay: their optimum is not the readings' alone.
+pub(super) fn unmet(model: &Model, readings: &Readings) -> Vec<f64> {
+    let free: Vec<usize> = (0..readings.columns).filter(|k| model.numbers[*k].known.is_none()).collect();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); free.len()];
+    let mut y = Vec::new();
+    for (i, r) in readings.rows.iter().enumerate() {
+        let Some(value) = r.row.value else { continue };
+        let root = r.row.weight.sqrt() / r.row.noise;
+        y.push(root * value);
+        columns.iter_mut().zip(&free).for_each(|(c, k)| c.push(root * readings.sensitivity[i * readings.columns + k]));
+    }
+    let chosen: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let mut out = vec![0.0; readings.columns];
+    let moves = least_squares(&chosen, &y, SINGULAR).unwrap_or_default();
+    free.into_iter().zip(moves).for_each(|(k, by)| out[k] = by);
     out
 }
 

@@ -87,6 +87,7 @@ impl Session<'_> {
         let frame = self.frame(&table, &fields);
         let predicted = self.predict(&readings, &table, &frame);
         State {
+            unmet: linear::unmet(&model, &readings),
             needed: Vec::new(),
             judged: Judged::default(),
             held_out_finer: Vec::new(),
