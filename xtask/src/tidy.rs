@@ -10,7 +10,8 @@ use crate::paper;
 use crate::real::report::Report;
 use crate::real::{diagnoses, models};
 use crate::suite::report as suite;
-use crate::table::mark;
+use crate::suite::rules;
+use crate::table::{self, mark};
 use crate::verify::report::Report as Verification;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -140,6 +141,12 @@ fn generated(root: &Path, found: &mut Vec<String>) {
     }
     check("docs/fuzzing.md", "fuzz", fuzz::markdown(root), "fuzz --report");
     check("docs/suite.md", "suite", suite, "suite --report");
+    check(
+        "docs/suite.md",
+        "rules",
+        table::stored(root, "rules").map(|l: Vec<rules::Line>| rules::markdown(&l)),
+        "suite --report",
+    );
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
     check("docs/speed.md", "speed", page::shown(root), "bench, and its name in xtask/src/bench/page.rs");

@@ -17,6 +17,7 @@ mod named;
 mod record;
 mod regions;
 pub mod report;
+pub mod rules;
 pub mod score;
 pub mod setup;
 mod short;
@@ -111,7 +112,9 @@ pub fn run(options: &Options) -> Result<(), String> {
     match &options.instead {
         Instead::Calibrate => return calibrate(list, options),
         Instead::Report => {
-            report::write(&all_rows(&list.cases()?)?)?;
+            let all = all_rows(&list.cases()?)?;
+            report::write(&all)?;
+            rules::write(&all)?;
             return ablation::write(&rows::load(&rows::path("ablation"))?);
         }
         Instead::Record(folder) => return record(&options.wanted(list.cases()?)?, folder),

@@ -2,9 +2,9 @@
 
 use super::case::GROUPS;
 use super::score::Row;
-use crate::real::report::Made;
 use crate::table;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Strength below which nothing is to be seen [σ]: some effects cannot be made stronger in a scene within what they allow.
@@ -39,7 +39,7 @@ pub fn line(r: &Row) -> String {
 }
 
 /// The group that a row counts for.
-fn group_of(r: &Row) -> &str {
+pub(super) fn group_of(r: &Row) -> &str {
     let shows = r.hidden.is_empty() || r.strength >= FAINT;
     if shows { &r.group } else { "faint" }
 }
@@ -51,8 +51,8 @@ pub struct Line {
     pub group: String,
     /// Method.
     pub method: String,
-    /// Commit that was measured.
-    pub commit: String,
+    /// Commits that were measured, in their order, with the cases that each one answered last.
+    pub commits: Vec<(String, usize)>,
     /// Cases.
     pub cases: usize,
     /// Named first (nulls: called adequate; outside: unexplained).
@@ -79,55 +79,61 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!v.is_empty()).then(|| 0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2]))
 }
 
-/// The last row of every case, method and state of the code.
-fn latest(all: &[Row]) -> Vec<&Row> {
-    let mut out: Vec<&Row> = Vec::new();
-    for r in all.iter().rev() {
-        if !out.iter().any(|o| (&o.case, &o.method) == (&r.case, &r.method) && o.made.is_same(&r.made)) {
-            out.push(r);
-        }
-    }
+/// The last row of every case and method: a case that a later state of the code has not answered stands as it was answered before.
+pub(super) fn latest(all: &[Row]) -> Vec<&Row> {
+    let mut seen = BTreeSet::new();
+    let mut out: Vec<&Row> = all.iter().rev().filter(|r| seen.insert((&r.case, &r.method))).collect();
     out.reverse();
     out
 }
 
-/// The table: groups in their order, in each methods and states of the code in the order in which they were measured first.
+/// The table: groups in their order, in each the methods in the order in which they were measured first.
 pub fn lines(all: &[Row]) -> Vec<Line> {
-    let all = latest(all);
-    let mut columns: Vec<(&str, &Made)> = Vec::new();
-    for r in &all {
-        if !columns.iter().any(|(method, made)| *method == r.method && made.is_same(&r.made)) {
-            columns.push((&r.method, &r.made));
+    let mut methods: Vec<&str> = Vec::new();
+    for r in all {
+        if !methods.contains(&r.method.as_str()) {
+            methods.push(&r.method);
         }
     }
+    let all = latest(all);
+    let of = |group: &str, method: &str| all.iter().copied().filter(|r| group_of(r) == group && r.method == method).collect();
     let mut out = Vec::new();
     for group in GROUPS.into_iter().chain(["faint"]) {
-        for (method, made) in &columns {
-            let of: Vec<&&Row> =
-                all.iter().filter(|r| group_of(r) == group && r.method == *method && r.made.is_same(made)).collect();
-            if of.is_empty() {
-                continue;
+        for method in &methods {
+            let rows: Vec<&Row> = of(group, method);
+            if !rows.is_empty() {
+                out.push(line_of(group, method, &rows));
             }
-            let count = |f: &dyn Fn(&Row) -> bool| of.iter().filter(|r| f(r)).count();
-            let sizes: Vec<f64> = of.iter().filter_map(|r| r.size_error).collect();
-            let good = sizes.iter().filter(|s| **s <= GOOD).count() as f64 / sizes.len().max(1) as f64;
-            out.push(Line {
-                group: group.into(),
-                method: method.to_string(),
-                commit: made.commit.clone(),
-                cases: of.len(),
-                right: count(&|r| r.score == 1.0),
-                as_good: count(&|r| r.score == 0.5),
-                among_three: count(&|r| r.rank.is_some_and(|k| k <= 3)),
-                alarms: count(&|r| r.verdict != "adequate"),
-                f1: median(of.iter().filter_map(|r| r.f1)),
-                size: median(sizes.iter().copied()).map(|m| [m, good]),
-                modulus: [0, 1].map(|k| median(of.iter().filter_map(|r| r.modulus_error[k]))),
-                seconds: [median(of.iter().map(|r| r.seconds)).unwrap_or(0.0), of.iter().map(|r| r.seconds).fold(0.0, f64::max)],
-            });
         }
     }
     out
+}
+
+fn line_of(group: &str, method: &str, of: &[&Row]) -> Line {
+    let count = |f: &dyn Fn(&Row) -> bool| of.iter().filter(|r| f(r)).count();
+    let sizes: Vec<f64> = of.iter().filter_map(|r| r.size_error).collect();
+    let good = sizes.iter().filter(|s| **s <= GOOD).count() as f64 / sizes.len().max(1) as f64;
+    let mut commits: Vec<(String, usize)> = Vec::new();
+    for commit in of.iter().map(|r| &r.made.commit).filter(|c| !c.is_empty()) {
+        match commits.iter_mut().find(|(c, _)| c == commit) {
+            Some((_, n)) => *n += 1,
+            None => commits.push((commit.clone(), 1)),
+        }
+    }
+    Line {
+        group: group.into(),
+        method: method.into(),
+        commits,
+        cases: of.len(),
+        right: count(&|r| r.score == 1.0),
+        as_good: count(&|r| r.score == 0.5),
+        among_three: count(&|r| r.rank.is_some_and(|k| k <= 3)),
+        alarms: count(&|r| r.verdict != "adequate"),
+        f1: median(of.iter().filter_map(|r| r.f1)),
+        size: median(sizes.iter().copied()).map(|m| [m, good]),
+        modulus: [0, 1].map(|k| median(of.iter().filter_map(|r| r.modulus_error[k]))),
+        seconds: [median(of.iter().map(|r| r.seconds)).unwrap_or(0.0), of.iter().map(|r| r.seconds).fold(0.0, f64::max)],
+    }
 }
 
 const HEAD: [&str; 11] = [
@@ -144,6 +150,15 @@ const HEAD: [&str; 11] = [
     "E off, before → after",
 ];
 
+/// The commit that was measured, or the first and the last of several.
+fn measured(commits: &[(String, usize)]) -> String {
+    match commits {
+        [] => "–".into(),
+        [(one, _)] => one.clone(),
+        [(first, _), .., (last, _)] => format!("{first} to {last}"),
+    }
+}
+
 fn cells(l: &Line) -> Vec<String> {
     let percent = |x: Option<f64>| match x {
         None => "–".to_string(),
@@ -153,7 +168,7 @@ fn cells(l: &Line) -> Vec<String> {
     vec![
         l.group.clone(),
         l.method.clone(),
-        if l.commit.is_empty() { "–".into() } else { l.commit.clone() },
+        measured(&l.commits),
         l.cases.to_string(),
         format!("{} ({:.0} %)", l.right, 100.0 * l.right as f64 / l.cases as f64),
         l.as_good.to_string(),
