@@ -4,6 +4,8 @@
 //! track → fit of the tracked points → values into the scene → track → …
 //! settled:  max_i |v_i − v_i of the round before| / standard error_i < SETTLED
 //! ```
+//!
+//! Rounds also end where the model of the last one says more of every place than its readings do: a fit to such places would be one to itself.
 
 use super::{TrackedBody, track_on};
 use crate::engine::Backend;
@@ -55,12 +57,14 @@ pub struct Refined {
     pub rounds: Vec<Round>,
     /// True where the last round moved nothing that counts.
     pub settled: bool,
+    /// Why there was nothing to fit after a round, if so.
+    pub ended: Option<String>,
 }
 
 impl Refined {
     /// A body that was tracked once, in an experiment's recording.
     pub fn once(experiment: Experiment, tracked: TrackedBody) -> Refined {
-        Refined { tracked, text: experiment.text().into(), experiment, rounds: Vec::new(), settled: true }
+        Refined { tracked, text: experiment.text().into(), experiment, rounds: Vec::new(), settled: true, ended: None }
     }
 }
 
@@ -113,9 +117,16 @@ pub fn refine(
     };
     let (mut at, mut text) = (experiment.clone(), experiment.text().to_string());
     let mut tracked = look(&at, 1)?;
-    let (mut rounds, mut settled) = (Vec::<Round>::new(), false);
+    let (mut rounds, mut settled, mut ended) = (Vec::<Round>::new(), false, None);
     while rounds.len() < most && !settled && !tracked.interrupted {
-        let recording = tracked.recording(&at.scene().title, tracked.noise)?;
+        let recording = match tracked.recording(&at.scene().title, tracked.noise) {
+            Ok(recording) => recording,
+            Err(why) if rounds.is_empty() => return Err(why),
+            Err(why) => {
+                ended = Some(why.to_string());
+                break;
+            }
+        };
         let fitted = started(&at, rounds.last()).measured(recording)?.fit(FitOptions {
             backend,
             interrupt: interrupt.clone(),
@@ -134,7 +145,7 @@ pub fn refine(
         at = Experiment::from_toml(&text, folder.join("scene.toml"))?;
         tracked = look(&at, rounds.len() + 1)?;
     }
-    Ok(Refined { tracked, experiment: at, text, rounds, settled })
+    Ok(Refined { tracked, experiment: at, text, rounds, settled, ended })
 }
 
 /// The experiment with starts of the round: vibrations in the first one, what was found before in the others.
