@@ -266,7 +266,7 @@ pub fn rounds(folder: &Path) -> Result<Figures, String> {
         if most > 1 {
             let last = r.rounds.last().ok_or("no round")?;
             figures.insert("rounds".into(), r.rounds.len() as f64);
-            figures.insert("last move".into(), last.moved.unwrap_or(f64::NAN));
+            last.moved.map(|m| figures.insert("last move".into(), m));
             figures.insert("E off [%]".into(), off(last.values[0].value, body.modulus()));
             figures.insert("stiffness damping, off [%]".into(), off(last.values[1].value, 0.002));
             figures.insert("settled".into(), f64::from(u8::from(r.settled)));
