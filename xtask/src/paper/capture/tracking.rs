@@ -16,6 +16,8 @@ use std::time::Instant;
 
 /// Noise of a depth reading [m].
 const NOISE: f64 = 0.002;
+/// Seeds of the noise.
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=10;
 const RATE: f64 = 30.0;
 const DURATION: f64 = 1.0;
 const STEP: f64 = 1.0 / 120.0;
@@ -41,14 +43,6 @@ impl Body {
         match self {
             Body::Bar => 1.5e5,
             Body::Sheet => 1.5e5,
-        }
-    }
-
-    /// Seeds of the noise: a sheet, which folds over itself, takes ten minutes a seed.
-    fn seeds(self) -> std::ops::RangeInclusive<u64> {
-        match self {
-            Body::Bar => 1..=10,
-            Body::Sheet => 1..=2,
         }
     }
 
@@ -191,7 +185,7 @@ pub fn run(folder: &Path, body: Body, cameras: usize, stiffer: f64) -> Result<Fi
     let own = Experiment::from_toml(&body.scene(stiffer), folder.join("track.toml")).map_err(|e| text(&e))?;
     let (mut sums, mut warm, mut frames, mut doubted, mut worst) = ([Sum::default(); 2], 0.0, 0usize, 0usize, 0.0f64);
     let mut points = 0;
-    for seed in body.seeds() {
+    for seed in SEEDS {
         let e = own.measured(seen(body, &motion, cameras, seed)?).map_err(|e| text(&e))?;
         points = e.plan().observation.residuals() / e.plan().observation.frames.len();
         let clock = Instant::now();
@@ -215,7 +209,7 @@ pub fn run(folder: &Path, body: Body, cameras: usize, stiffer: f64) -> Result<Fi
         }
         println!("seed {seed}: {:.2} mm, seen {:.2}, hidden {:.2}", 1e3 * all, now[0].rms(), now[1].rms());
     }
-    let seeds = body.seeds().count() as f64;
+    let seeds = SEEDS.count() as f64;
     let rms = ((sums[0].squares + sums[1].squares) / (sums[0].count + sums[1].count)).sqrt();
     let away = truth.iter().map(|((_, k), p)| p.distance(body.places()[*k])).fold(0.0, f64::max);
     Ok([
