@@ -82,6 +82,15 @@ pub fn replace(page: &str, name: &str, text: &str) -> Result<(), String> {
     std::fs::write(&path, format!("{before}{mark}{text}{mark}{after}")).map_err(fail)
 }
 
+/// Stores what a table is made of as `bench/NAME.json`, says where, and puts the table into its page.
+///
+/// # Errors
+/// As of [`save`] and [`replace`].
+pub fn publish(page: &str, name: &str, value: &impl Serialize, text: &str) -> Result<(), String> {
+    println!("written to {}", save(name, value)?.display());
+    replace(page, name, text)
+}
+
 /// Root of the workspace.
 pub fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -192,8 +192,8 @@ pub fn write(from: &Path) -> Result<(), String> {
     let head = HEAD.map(String::from).to_vec();
     let cells: Vec<Vec<String>> = std::iter::once(head).chain(lines.iter().map(cells)).collect();
     table::print("Truths inside stated intervals", &cells);
-    println!("\nwritten to {}", table::save("coverage", &lines)?.display());
-    table::replace("docs/coverage.md", "coverage", &markdown(&lines))
+    println!();
+    table::publish("docs/coverage.md", "coverage", &lines, &markdown(&lines))
 }
 
 /// What `bench/coverage.json` holds.

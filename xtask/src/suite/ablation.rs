@@ -85,9 +85,9 @@ pub fn markdown(lines: &[Line]) -> String {
 /// A file cannot be read or written.
 pub fn write(rows: &[Row]) -> Result<(), String> {
     let lines = lines(rows);
-    println!("\n{}", markdown(&lines));
-    println!("written to {}", table::save("ablation", &lines)?.display());
-    table::replace("docs/suite.md", "ablation", &markdown(&lines))
+    let text = markdown(&lines);
+    println!("\n{text}");
+    table::publish("docs/suite.md", "ablation", &lines, &text)
 }
 
 #[cfg(test)]

@@ -208,8 +208,8 @@ pub fn markdown(lines: &[Line]) -> String {
 pub fn write(all: &[Row]) -> Result<(), String> {
     print(all);
     let lines = lines(all);
-    println!("\nwritten to {}", table::save("suite", &lines)?.display());
-    table::replace("docs/suite.md", "suite", &markdown(&lines))
+    println!();
+    table::publish("docs/suite.md", "suite", &lines, &markdown(&lines))
 }
 
 /// What `bench/suite.json` holds.

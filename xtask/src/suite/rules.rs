@@ -6,6 +6,7 @@ use super::report::{group_of, latest};
 use super::score::Row;
 use crate::table;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Answers of the rule before, at the last commit that had it.
 const BEFORE: &str = "f-test-709412b";
@@ -26,17 +27,16 @@ pub struct Line {
 /// Groups in their order.
 pub fn lines(rows: &[Row]) -> Vec<Line> {
     let all = latest(rows);
-    let of = |method: &str, case: &str| all.iter().find(|r| r.method == method && r.case == case).copied();
-    let both: Vec<(&Row, &Row)> =
-        all.iter().filter_map(|r| Some((of(BEFORE, &r.case)?, *r))).filter(|(_, r)| r.method == Method::Palpate.name()).collect();
+    let before: BTreeMap<&str, f64> = all.iter().filter(|r| r.method == BEFORE).map(|r| (r.case.as_str(), r.score)).collect();
+    let now: Vec<&Row> = all.into_iter().filter(|r| r.method == Method::Palpate.name()).collect();
     let groups = GROUPS.into_iter().chain(["faint"]).map(|group| {
-        let both: Vec<&(&Row, &Row)> = both.iter().filter(|(_, now)| group_of(now) == group).collect();
-        let only = |a: fn(&(&Row, &Row)) -> [f64; 2]| both.iter().filter(|b| a(b)[0] == 1.0 && a(b)[1] < 1.0).count();
+        let of = now.iter().filter(|r| group_of(r) == group);
+        let scores: Vec<[f64; 2]> = of.filter_map(|r| Some([*before.get(r.case.as_str())?, r.score])).collect();
         Line {
             group: group.into(),
-            cases: both.len(),
-            score: [both.iter().map(|b| b.0.score).sum(), both.iter().map(|b| b.1.score).sum()],
-            only: [only(|b| [b.0.score, b.1.score]), only(|b| [b.1.score, b.0.score])],
+            cases: scores.len(),
+            score: [0, 1].map(|k| scores.iter().map(|s| s[k]).sum()),
+            only: [0, 1].map(|k| scores.iter().filter(|s| s[k] == 1.0 && s[1 - k] < 1.0).count()),
         }
     });
     groups.filter(|l| l.cases > 0).collect()
@@ -59,7 +59,7 @@ pub fn markdown(lines: &[Line]) -> String {
 /// A file cannot be read or written.
 pub fn write(rows: &[Row]) -> Result<(), String> {
     let lines = lines(rows);
-    println!("\n{}", markdown(&lines));
-    println!("written to {}", table::save("rules", &lines)?.display());
-    table::replace("docs/suite.md", "rules", &markdown(&lines))
+    let text = markdown(&lines);
+    println!("\n{text}");
+    table::publish("docs/suite.md", "rules", &lines, &text)
 }

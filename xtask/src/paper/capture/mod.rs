@@ -40,6 +40,7 @@ const RMS: &str = "rms of the surface [mm]";
 const HIDDEN: &str = "rms of what is hidden [mm]";
 const INSIDE: &str = "share within 2 sd, seen";
 const INSIDE_HIDDEN: &str = "share within 2 sd, hidden";
+const SETTLED: &str = "rounds until they settled";
 const FRAME: &str = "seconds a warm frame";
 const WORST: &str = "worst E, off [%]";
 const DAMPING: &str = "stiffness damping, off [%]";
@@ -84,7 +85,7 @@ const AIMS: &[Aim] = &[
         AtMost(0.7),
     ),
     ("F", "last move in standard errors", "rounds", Of("last move"), "–", AtMost(0.3)),
-    ("F", "rounds until then", "rounds", Of("rounds"), "2 to 3", AtMost(4.0)),
+    ("F", "rounds until then", "rounds", Of(SETTLED), "2 to 3", AtMost(4.0)),
     ("F", "E after them, off [%]", "rounds", Of("E off [%]"), "–", AtMost(5.0)),
     ("F", "a fit of the depth images from 10 E, led by tracking: E off [%]", "led", Of("E off [%]"), "–", AtMost(5.0)),
     ("G", "sag of 14 % of the length: worst start, E off [%]", "vibrations-14", Of(START), "–", AtMost(5.0)),

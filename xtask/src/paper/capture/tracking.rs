@@ -1,7 +1,7 @@
 //! Bodies that swing in front of depth cameras, moved by the simulator that shares nothing with the tracker: a bar that is let go, and a sheet that is
 //! held at one edge and folds down. Their true surface is known.
 
-use super::{FRAME, Figures, HIDDEN, INSIDE, INSIDE_HIDDEN, RMS, off};
+use super::{FRAME, Figures, HIDDEN, INSIDE, INSIDE_HIDDEN, RMS, SETTLED, off};
 use crate::tetrahedra::change::Change;
 use crate::tetrahedra::motion::{Motion, Resolution, simulate};
 use crate::tetrahedra::watch::{Watchers, record};
@@ -260,7 +260,12 @@ pub fn rounds(folder: &Path) -> Result<Figures, String> {
         if most > 1 {
             let last = r.rounds.last().ok_or("no round")?;
             figures.insert("rounds".into(), r.rounds.len() as f64);
-            last.moved.map(|m| figures.insert("last move".into(), m));
+            if let Some(moved) = last.moved {
+                figures.insert("last move".into(), moved);
+            }
+            if r.settled {
+                figures.insert(SETTLED.into(), r.rounds.len() as f64);
+            }
             figures.insert("E off [%]".into(), off(last.values[0].value, body.modulus()));
             figures.insert("stiffness damping, off [%]".into(), off(last.values[1].value, 0.002));
             figures.insert("settled".into(), f64::from(u8::from(r.settled)));
