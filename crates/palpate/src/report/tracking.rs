@@ -81,16 +81,18 @@ fn verdict(r: &Refined) -> (&'static str, String) {
             ("interrupted", format!("{} of {} frames were tracked. {why}", t.frames.len(), t.recorded).trim_end().to_string())
         }
         (false, 0) if r.settled => ("tracked", String::new()),
-        (false, 0) if r.ended.is_some() => {
-            let (rounds, why) = (r.rounds.len(), r.ended.as_deref().unwrap_or_default());
-            let rounds = if rounds == 1 { "one round".into() } else { format!("{rounds} rounds") };
-            ("doubtful", format!("after {rounds} nothing was left to fit, as the model says more than the readings do; {why}"))
-        }
-        (false, 0) => match r.rounds.last().and_then(|r| r.moved) {
-            Some(moved) => {
+        (false, 0) => match (&r.ended, r.rounds.last().and_then(|r| r.moved)) {
+            (Some(why), _) => {
+                let rounds = if r.rounds.len() == 1 { "one round".into() } else { format!("{} rounds", r.rounds.len()) };
+                (
+                    "doubtful",
+                    format!("after {rounds} nothing was left to fit, as the model says more than the readings do; {why}"),
+                )
+            }
+            (None, Some(moved)) => {
                 ("doubtful", format!("after {} rounds a number still moved by {} standard errors", r.rounds.len(), number(moved)))
             }
-            None => ("doubtful", "one round does not say whether its numbers would move in another".into()),
+            (None, None) => ("doubtful", "one round does not say whether its numbers would move in another".into()),
         },
         _ => ("doubtful", why),
     }
