@@ -4,7 +4,7 @@
 //! Problems, 2nd ed. 2004, eq. 2.21); after one that is refused, it makes the next half as long. It counts in each number's own
 //! curvature (Marquardt, J. SIAM 11, 1963, § 4), so that a number that the data say a thousandth as much of moves as early as the
 //! others. A step may also not exceed a length in z: parameters far from their optimum otherwise jump
-//! into regions where a simulation fails.
+//! into regions where a simulation fails. Where the cost jumps, a [`Watchdog`] looks at the other side.
 //!
 //! It ends where a free step promises less than a hundredth of a standard error ([`crate::Tolerance::decrement`]): what is left to gain
 //! says nothing that the noise does not hide.
@@ -13,6 +13,7 @@
 
 use super::conjugate::{self, Model};
 use super::metric::{self, Metric};
+use super::watchdog::{Stand, Watchdog};
 use super::{Sample, Search, Status, Stop};
 use crate::dense::{box_step, dot, max_abs};
 use crate::settings::Walk;
@@ -76,79 +77,114 @@ pub fn minimise_by_products(search: &mut Search, z: Vec<f64>, at: Sample) -> Res
     walk(search, z, at, &Curvature::Products { size, steepest: square.sqrt(), numbers: Vec::new() })
 }
 
-fn walk(search: &mut Search, mut z: Vec<f64>, mut at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
+/// How an iteration went.
+enum Next {
+    /// The walk ends here.
+    Ended(Status),
+    /// A shorter step has to be tried; nothing was evaluated.
+    Shorter,
+    /// The step was taken.
+    Taken,
+    /// This point was refused.
+    Refused(Vec<f64>, Sample),
+}
+
+fn walk(search: &mut Search, z: Vec<f64>, at: Sample, curvature: &Curvature) -> Result<Status, Stop> {
+    // The largest finite number stands for no limit in files.
+    let reach = Some(search.settings.walk.reach).filter(|r| *r < f64::MAX).unwrap_or(search.settings.max_step);
+    let mut stand = Stand { z, at, walk: Walk { reach, ..search.settings.walk } };
+    let mut watchdog = Watchdog::default();
+    loop {
+        let before = stand.walk;
+        stand = match iterate(search, &mut stand, curvature)? {
+            Next::Shorter => continue,
+            Next::Ended(Status::IterationLimit) => return Ok(Status::IterationLimit),
+            Next::Ended(status) => match watchdog.back() {
+                Some(home) => {
+                    stand = home;
+                    continue;
+                }
+                None => return Ok(status),
+            },
+            Next::Taken => watchdog.taken(stand),
+            Next::Refused(z, at) => watchdog.refused(&before, stand, (z, at), COST_NOISE),
+        };
+        let counts = watchdog.counts(&stand);
+        search.walk = counts.walk;
+        search.iterated(counts.at.cost, &counts.z);
+    }
+}
+
+/// One step, taken or refused.
+fn iterate(search: &mut Search, stand: &mut Stand, curvature: &Curvature) -> Result<Next, Stop> {
+    let Stand { z, at, walk } = stand;
     let q = z.len();
     let tolerance = search.settings.tolerance.clone();
-    let Walk { reach, mut damping, mut level } = search.settings.walk;
     let unit = curvature.unit();
-    // The largest finite number stands for no limit in files.
-    let mut longest = if reach < f64::MAX { reach } else { search.settings.max_step };
     // Where λ counts in each number's curvature h, a step g / (h (1 + λ)) becomes half as long.
     let halved = |lambda: f64| 2.0 * lambda + unit;
-    loop {
-        if matches!(curvature, Curvature::Matrix) && at.curvature.len() != q * q {
-            return Ok(Status::Failed("no sensitivities were computed".into()));
-        }
-        if search.is_flat(&z, &at) {
-            return Ok(Status::Converged);
-        }
-        if search.out_of_iterations() {
-            return Ok(Status::IterationLimit);
-        }
-        let scale = match curvature {
-            Curvature::Matrix => (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i])),
-            Curvature::Products { size, .. } => *size,
-        };
-        if scale <= 0.0 {
-            return Ok(Status::Stalled);
-        }
-        let lambda = *damping.get_or_insert(curvature.first());
-        let Some((p, promised)) = step(search, &z, &at, curvature, lambda, scale, longest)? else {
-            if lambda > MOST_DAMPING * unit {
-                return Ok(Status::Stalled);
-            }
-            damping = Some(halved(lambda));
-            continue;
-        };
-        let length = max_abs(&p);
-        let limited = length >= longest * (1.0 - 1e-12);
-        if length <= tolerance.step || promised <= tolerance.cost * at.cost {
-            return Ok(if settled(search, &z, &at, curvature, scale)? { Status::Converged } else { Status::Stalled });
-        }
-        // A damped step promises less than a free one: that is asked where the first is near the end, as it may cost products.
-        if search.decrement(&at, promised) <= tolerance.decrement {
-            let free = free_step(search, &z, &at, curvature, scale)?;
-            if free.is_some_and(|(_, promised)| search.decrement(&at, promised) <= tolerance.decrement) {
-                return Ok(Status::Converged);
-            }
-        }
-        let trial_z = search.project(&(0..q).map(|i| z[i] + p[i]).collect::<Vec<_>>());
-        let trial = search.evaluate(&trial_z)?;
-        if trial.cost < at.cost {
-            let ratio = (at.cost - trial.cost) / promised;
-            damping = Some(lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0));
-            if ratio > 0.75 && limited {
-                longest *= 2.0;
-            }
-            z = trial_z;
-            at = trial;
-            level = 0;
-        } else {
-            level = if trial.cost <= at.cost * (1.0 + SAME_COST) { level + 1 } else { 0 };
-            if level == LEVEL && settled(search, &z, &at, curvature, scale)? {
-                return Ok(Status::Converged);
-            }
-            // A failure says nothing about the curvature, only that the step was too long.
-            if trial.failure.is_some() {
-                longest = 0.25 * length;
-            } else {
-                damping = Some(halved(lambda));
-                longest *= if limited { 0.5 } else { 1.0 };
-            }
-        }
-        search.walk = Walk { reach: longest, damping, level };
-        search.iterated(at.cost, &z);
+    if matches!(curvature, Curvature::Matrix) && at.curvature.len() != q * q {
+        return Ok(Next::Ended(Status::Failed("no sensitivities were computed".into())));
     }
+    if search.is_flat(z, at) {
+        return Ok(Next::Ended(Status::Converged));
+    }
+    if search.out_of_iterations() {
+        return Ok(Next::Ended(Status::IterationLimit));
+    }
+    let scale = match curvature {
+        Curvature::Matrix => (0..q).fold(0.0, |m: f64, i| m.max(at.curvature[i * q + i])),
+        Curvature::Products { size, .. } => *size,
+    };
+    if scale <= 0.0 {
+        return Ok(Next::Ended(Status::Stalled));
+    }
+    let longest = walk.reach;
+    let lambda = *walk.damping.get_or_insert(curvature.first());
+    let Some((p, promised)) = step(search, z, at, curvature, lambda, scale, longest)? else {
+        if lambda > MOST_DAMPING * unit {
+            return Ok(Next::Ended(Status::Stalled));
+        }
+        walk.damping = Some(halved(lambda));
+        return Ok(Next::Shorter);
+    };
+    let length = max_abs(&p);
+    let limited = length >= longest * (1.0 - 1e-12);
+    if length <= tolerance.step || promised <= tolerance.cost * at.cost {
+        let ends = settled(search, z, at, curvature, scale)?;
+        return Ok(Next::Ended(if ends { Status::Converged } else { Status::Stalled }));
+    }
+    // A damped step promises less than a free one: that is asked where the first is near the end, as it may cost products.
+    if search.decrement(at, promised) <= tolerance.decrement {
+        let free = free_step(search, z, at, curvature, scale)?;
+        if free.is_some_and(|(_, promised)| search.decrement(at, promised) <= tolerance.decrement) {
+            return Ok(Next::Ended(Status::Converged));
+        }
+    }
+    let trial_z = search.project(&(0..q).map(|i| z[i] + p[i]).collect::<Vec<_>>());
+    let trial = search.evaluate(&trial_z)?;
+    if trial.cost < at.cost {
+        let ratio = (at.cost - trial.cost) / promised;
+        walk.damping = Some(lambda * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0));
+        if ratio > 0.75 && limited {
+            walk.reach *= 2.0;
+        }
+        walk.level = 0;
+        (*z, *at) = (trial_z, trial);
+        return Ok(Next::Taken);
+    }
+    walk.level = if trial.cost <= at.cost * (1.0 + SAME_COST) { walk.level + 1 } else { 0 };
+    if walk.level == LEVEL && settled(search, z, at, curvature, scale)? {
+        return Ok(Next::Ended(Status::Converged));
+    }
+    // A failure says nothing about the curvature, only that the step was too long.
+    if trial.failure.is_some() {
+        walk.reach = 0.25 * length;
+    } else {
+        walk.damping = Some(halved(lambda));
+        walk.reach *= if limited { 0.5 } else { 1.0 };
+    }
+    Ok(Next::Refused(trial_z, trial))
 }
 
 /// Minimiser of the damped model within the box and the longest step, and the decrease that the undamped model promises for it; `None`

@@ -8,6 +8,7 @@ mod line;
 mod metric;
 mod rprop;
 mod simplex;
+mod watchdog;
 
 use crate::dense::max_abs;
 use crate::priors::Priors;
