@@ -13,7 +13,8 @@ pub struct Policy {
     pub laps: [usize; 4],
     /// Relative decrease of the cost by an iteration at which a fit has arrived: of the first laps, and of the last ones.
     pub tolerance: [f64; 2],
-    /// Share of those on the way that go on after a lap, the ones whose curvature promises the lowest cost, and how many do at least.
+    /// Share of those on the way, with no more numbers, that go on after a lap, the ones whose curvature promises the lowest cost, and how many do
+    /// at least.
     pub kept: (f64, usize),
     /// Share of what the leader gains by which that promise may lag behind what the leader has reached.
     pub lag: f64,

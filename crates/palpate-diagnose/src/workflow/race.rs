@@ -138,17 +138,23 @@ fn promise(runner: &Runner) -> f64 {
     runner.1.as_ref().map_or(f64::INFINITY, |f| f.cost - if f.settled { 0.0 } else { f.promised })
 }
 
-/// Who goes on: those whose promise reaches the leader, and of those on the way the better half.
+/// Who goes on: those whose promise reaches the leader, and of those on the way the better half. A variant competes with those that have no
+/// more numbers: what has more always costs less in the end, and whether these are worth it the judgement says, not the cost.
 fn going_on(policy: &Policy, before: f64, running: &[Runner]) -> Vec<bool> {
-    let reached = running.iter().filter_map(|r| r.1.as_ref()).map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let worst = reached + policy.lag * (before - reached).max(0.0);
-    let on_the_way = |i: &usize| running[*i].1.as_ref().is_some_and(|f| !f.settled);
-    let mut order: Vec<usize> = (0..running.len()).filter(on_the_way).collect();
-    order.sort_by(|a, b| promise(&running[*a]).total_cmp(&promise(&running[*b])));
-    let (share, least) = policy.kept;
-    let most = ((share * order.len() as f64).ceil() as usize).max(least);
-    let behind = &order[most.min(order.len())..];
-    (0..running.len()).map(|i| promise(&running[i]) <= worst && !behind.contains(&i)).collect()
+    let goes_on = |i: usize| {
+        let freedom = running[i].0.columns.len();
+        let class: Vec<&Runner> = running.iter().filter(|r| r.0.columns.len() <= freedom).collect();
+        let reached = class.iter().filter_map(|r| r.1.as_ref()).map(|f| f.cost).fold(f64::INFINITY, f64::min);
+        let worst = reached + policy.lag * (before - reached).max(0.0);
+        let mine = promise(&running[i]);
+        let on_the_way: Vec<f64> =
+            class.iter().filter(|r| r.1.as_ref().is_some_and(|f| !f.settled)).map(|r| promise(r)).collect();
+        let (share, least) = policy.kept;
+        let most = ((share * on_the_way.len() as f64).ceil() as usize).max(least);
+        let arrived = running[i].1.as_ref().is_none_or(|f| f.settled);
+        mine <= worst && (arrived || on_the_way.iter().filter(|p| **p < mine).count() < most)
+    };
+    (0..running.len()).map(goes_on).collect()
 }
 
 /// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer.
@@ -203,4 +209,45 @@ fn start(state: &State, v: &Variant, share: f64) -> Start {
     let own = state.model.values.iter().zip(with).map(|(v, d)| v + d);
     let values = own.chain((0..v.numbers.len()).map(|k| v.numbers[k].after(step(k)))).collect();
     Start { changes, values, reach: f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laboratory::Model;
+    use crate::workflow::CandidateId;
+
+    /// A variant of so many numbers.
+    fn variant(freedom: usize) -> Variant {
+        Variant {
+            candidate: CandidateId::Single(freedom),
+            changes: Vec::new(),
+            columns: vec![Vec::new(); freedom],
+            amplitudes: Vec::new(),
+            numbers: Vec::new(),
+            blunt: None,
+            score: crate::score::Score::default(),
+        }
+    }
+
+    fn at(cost: f64) -> Option<Fit> {
+        let model = Model { changes: Vec::new(), values: Vec::new(), numbers: Vec::new(), errors: Vec::new() };
+        Some(Fit { model, cost, promised: 0.0, reach: f64::INFINITY, settled: false })
+    }
+
+    #[test]
+    fn a_variant_competes_with_those_that_have_no_more_numbers() {
+        let (one, six) = (variant(1), variant(6));
+        let policy = Policy { kept: (0.5, 2), lag: 0.1, ..Policy::default() };
+        let ends = |costs: &[(&'static str, f64)]| -> Vec<bool> {
+            let of = |name: &str| if name == "one" { &one } else { &six };
+            let running: Vec<Runner> = costs.iter().map(|(name, cost)| (of(name), at(*cost))).collect();
+            going_on(&policy, 10.0, &running)
+        };
+        // With one number the best of its class goes on, though four with six numbers are far ahead; what is behind in its own class does not.
+        let six_ahead = [("six", 1.0), ("six", 1.1), ("six", 1.2), ("six", 1.3), ("one", 4.0), ("one", 8.0)];
+        assert_eq!(ends(&six_ahead), [true, true, true, false, true, false]);
+        // With six it must be as good as what has one.
+        assert_eq!(ends(&[("one", 1.0), ("six", 4.0), ("six", 1.2)]), [true, false, true]);
+    }
 }
