@@ -93,7 +93,7 @@ enum Verb {
         #[arg(long, value_name = "MINUTES")]
         slice: Option<f64>,
         /// Time for the search of one case, of all its processors together [s]
-        #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
+        #[arg(long, value_name = "SECONDS", default_value_t = 180.0)]
         budget: f64,
         /// Measure again what this commit has measured already
         #[arg(long)]
