@@ -154,7 +154,8 @@ impl Case {
                 Ok(_) => return Ok(()),
             }
         }
-        self.record(folder).map(|_| ())
+        self.record(folder)?;
+        if self.strength.is_none() { self.measure(folder) } else { Ok(()) }
     }
 }
 
