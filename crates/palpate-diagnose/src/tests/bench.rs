@@ -34,6 +34,8 @@ pub struct Bench {
     pub stopped: bool,
     /// True while its own numbers are still to be fitted.
     pub unfitted: bool,
+    /// Kind with which a second recording, which there is then, cannot be simulated.
+    pub lost: Option<&'static str>,
     /// Simulations that it makes before it answers everything so.
     pub limit: Option<(usize, LabError)>,
     /// Iterations that there is time for.
@@ -128,6 +130,7 @@ impl Bench {
             rough,
             hidden: hidden.iter().map(|h| (h.0.to_string(), h.1)).collect(),
             held,
+            lost: None,
             slow: Vec::new(),
             no_slack: false,
             stopped: false,
@@ -337,8 +340,12 @@ impl Laboratory for Bench {
         Ok(vec![Field::refined("grid", change)])
     }
 
-    fn held_out(&mut self, _: &Model) -> Result<Option<Readings>, LabError> {
-        Ok(None)
+    fn held_out(&mut self, model: &Model) -> Result<Option<Readings>, LabError> {
+        let Some(lost) = self.lost else { return Ok(None) };
+        if model.changes.iter().any(|c| c.kind() == lost) {
+            return Err(LabError::failed("the step did not converge"));
+        }
+        self.linearise(&[(model.changes.clone(), model.values.clone())]).pop().transpose()
     }
 
     fn separations(&mut self, _: &Model, rivals: &[&Model]) -> Vec<Separation> {

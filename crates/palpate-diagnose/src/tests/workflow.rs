@@ -121,6 +121,22 @@ fn an_answer_says_what_there_was_no_time_for() {
 }
 
 #[test]
+fn a_candidate_that_cannot_follow_a_second_recording_is_no_explanation_and_no_error() {
+    let hidden = Bench::first_pattern("uniform-force");
+    let answer = |lost| {
+        let mut bench = Bench::new(9, &[(&hidden, -2.0 * NOISE)], false);
+        bench.lost = lost;
+        let baseline = bench.baseline();
+        diagnose(&mut bench, baseline, &Options::default()).unwrap()
+    };
+    let all = answer(Some("air-drag"));
+    assert_eq!((all.verdict, all.effects[0].kind.as_str()), (Verdict::MissingEffect, "uniform-force"), "{}", all.sentence());
+    let without = answer(Some("uniform-force"));
+    assert!(without.not_tried.iter().any(|t| t == "uniform-force: the step did not converge"), "{:?}", without.not_tried);
+    assert!(without.effects.iter().all(|e| e.kind != "uniform-force"), "{}", without.sentence());
+}
+
+#[test]
 fn a_wall_is_tried_for_what_it_does_from_the_first_round_on() {
     let law = &ALL[find("second-plane").unwrap()];
     // Small amplitudes tell nothing of a wall: it is scored at its typical size, and this one stands there.

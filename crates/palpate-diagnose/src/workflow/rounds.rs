@@ -168,11 +168,8 @@ impl Session<'_> {
         self.lab.say(&format!("judging {} candidates", jobs.len()));
         let mut fitted = before;
         for ((v, fit), readings) in arrived.into_iter().zip(self.lab.linearise(&jobs)) {
-            match readings {
-                Ok(readings) => {
-                    let new = self.beside(state, fit.model, readings)?;
-                    fitted.push(self.compared(state, v, new));
-                }
+            match readings.and_then(|readings| self.beside(state, fit.model, readings)) {
+                Ok(new) => fitted.push(self.compared(state, v, new)),
                 Err(LabError::Interrupted) => return Err(LabError::Interrupted),
                 Err(why) => self.missed(&v.kind(), &why),
             }
