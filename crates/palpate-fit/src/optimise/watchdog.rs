@@ -54,7 +54,8 @@ impl Watchdog {
         }
     }
 
-    /// Where to go on after `trial` was refused, at rises below `noise` of the cost where they are: those come from its accuracy.
+    /// Where to go on after `trial` was refused. `before` is how the walk stood when it tried; rises below `noise` of the cost come from its
+    /// accuracy.
     pub fn refused(&mut self, before: &Walk, stand: Stand, trial: (Vec<f64>, Sample), noise: f64) -> Stand {
         if self.home.is_some() {
             return self.spent(stand);
