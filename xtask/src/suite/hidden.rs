@@ -121,6 +121,7 @@ pub const TABLE: &[Hidden] = &[
         &[("camera", &[0.0])],
     ),
     h("coulomb-friction", "ramp", &[("coefficient", &[0.25])], &[]),
+    h("coulomb-friction", "boulder", &[("coefficient", &[0.3])], &[]),
 ];
 
 /// Names that mean the same physics in these scenes, so that no data can tell them apart: a force on a homogeneous body is gravity,

@@ -140,6 +140,27 @@ const RAMP: Short = Short {
     other_start: [[0.3, 0.2, -0.4], [0.0, 0.6, 0.0]],
 };
 
+/// A spinning ball of 1400 nodes lands and is dragged round by friction, which is what is hidden: how long a larger body takes.
+const BOULDER: Short = Short {
+    shape: "{ ball = { radius = 0.06, center = [0, 0, 0.075] } }",
+    cell_size: 0.0095,
+    density: 500.0,
+    material: [2.0e4, 0.4, 0.3, 0.004],
+    support: "[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n",
+    given: &[],
+    step: 0.005,
+    steps: 74,
+    theta: 0.6,
+    free: &[(E, 1.6e4), (BETA, 0.005)],
+    cameras: &["eye=0.15,-0.6,0.25 target=0.05,0,0.05 fov=28 size=36x36"],
+    markers: &[],
+    spacing: 0.025,
+    noise: NOISE,
+    start: [[0.3, 0.0, -0.3], [0.0, 15.0, 3.0]],
+    pivot: None,
+    other_start: [[0.0; 3]; 2],
+};
+
 /// The scene of this name.
 pub fn setup(name: &str) -> Option<Setup> {
     let short = match name {
@@ -149,6 +170,7 @@ pub fn setup(name: &str) -> Option<Setup> {
         "blob" => &BLOB,
         "plate" => &PLATE,
         "ramp" => &RAMP,
+        "boulder" => &BOULDER,
         _ => return super::watched::setup(name),
     };
     Some(short.setup(name))
