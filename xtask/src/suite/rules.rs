@@ -8,7 +8,7 @@ use crate::table;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Answers of the rule before, at the last commit that had it.
+/// Answers of the rule before, by the last commit that had it, to the same recordings.
 const BEFORE: &str = "f-test-709412b";
 
 /// A group.

@@ -67,7 +67,7 @@ impl Watchdog {
             return stand;
         }
         self.refusals += 1;
-        let (_, first) = self.first.get_or_insert_with(|| (Stand { z, at, walk: *before }, rise));
+        let (_, first) = self.first.get_or_insert((Stand { z, at, walk: *before }, rise));
         if self.refusals < REFUSALS || rise < KEPT * *first {
             return stand;
         }
