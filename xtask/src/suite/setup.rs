@@ -138,7 +138,7 @@ mod tests {
                     "material.stiffness_damping" => s.material.stiffness_damping,
                     "material.mass_damping" => s.material.mass_damping,
                     "plane.0.height" => s.planes[0].point.dot(s.planes[0].normal),
-                    "plane.0.theta" => s.planes[0].normal.z.acos(),
+                    "plane.0.phi" => s.planes[0].normal.z.atan2(s.planes[0].normal.x),
                     // Everybody knows what it is on earth; that it is free is the difficulty.
                     "world.gravity.z" => f64::NAN,
                     other => panic!("{}: {other}", c.name),
