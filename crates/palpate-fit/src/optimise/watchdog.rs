@@ -23,13 +23,19 @@ pub struct Stand {
     pub walk: Walk,
 }
 
+/// Refusals in a row.
+struct Refused {
+    /// The first point that was refused, and how the walk stood when it tried.
+    there: Stand,
+    /// By how much the cost rose there.
+    rise: f64,
+    times: u32,
+}
+
 /// Watches a walk from step to step.
 #[derive(Default)]
 pub struct Watchdog {
-    /// Refusals in a row.
-    refusals: u32,
-    /// The first of them: how the walk stood, with the point that was refused.
-    first: Option<(Stand, f64)>,
+    refused: Option<Refused>,
     /// The lowest point, while the walk is beyond a wall, and evaluations that are left there.
     home: Option<(Stand, u32)>,
     /// True where the other side was looked at already.
@@ -44,7 +50,7 @@ impl Watchdog {
 
     /// Where to go on after a step that was taken.
     pub fn taken(&mut self, stand: Stand) -> Stand {
-        (self.refusals, self.first) = (0, None);
+        self.refused = None;
         match &self.home {
             Some((home, _)) if stand.at.cost >= home.at.cost => self.spent(stand),
             _ => {
@@ -63,24 +69,23 @@ impl Watchdog {
         let (z, at) = trial;
         let rise = at.cost - stand.at.cost;
         if self.seen || at.failure.is_some() || rise <= noise * stand.at.cost {
-            (self.refusals, self.first) = (0, None);
+            self.refused = None;
             return stand;
         }
-        self.refusals += 1;
-        let (_, first) = self.first.get_or_insert((Stand { z, at, walk: *before }, rise));
-        if self.refusals < REFUSALS || rise < KEPT * *first {
+        let mut refused = self.refused.take().unwrap_or(Refused { there: Stand { z, at, walk: *before }, rise, times: 0 });
+        refused.times += 1;
+        if refused.times < REFUSALS || rise < KEPT * refused.rise {
+            self.refused = Some(refused);
             return stand;
         }
-        let beyond = self.first.take().map(|(s, _)| s);
-        self.refusals = 0;
-        self.home = Some((stand.clone(), BEYOND));
-        beyond.unwrap_or(stand)
+        self.home = Some((stand, BEYOND));
+        refused.there
     }
 
     /// The point before the wall, if the walk is beyond one; the other side is not looked at again from there.
     pub fn back(&mut self) -> Option<Stand> {
         let (home, _) = self.home.take()?;
-        (self.refusals, self.first, self.seen) = (0, None, true);
+        (self.refused, self.seen) = (None, true);
         Some(home)
     }
 
