@@ -141,20 +141,18 @@ fn promise(runner: &Runner) -> f64 {
 /// Who goes on: those whose promise reaches the leader, and of those on the way the better half. A variant competes with those that have no
 /// more numbers: what has more always costs less in the end, and whether these are worth it the judgement says, not the cost.
 fn going_on(policy: &Policy, before: f64, running: &[Runner]) -> Vec<bool> {
-    let goes_on = |i: usize| {
-        let freedom = running[i].0.columns.len();
-        let class: Vec<&Runner> = running.iter().filter(|r| r.0.columns.len() <= freedom).collect();
+    let on_the_way = |r: &Runner| r.1.as_ref().is_some_and(|f| !f.settled);
+    let goes_on = |me: &Runner| {
+        let class: Vec<&Runner> = running.iter().filter(|r| r.0.columns.len() <= me.0.columns.len()).collect();
         let reached = class.iter().filter_map(|r| r.1.as_ref()).map(|f| f.cost).fold(f64::INFINITY, f64::min);
         let worst = reached + policy.lag * (before - reached).max(0.0);
-        let mine = promise(&running[i]);
-        let on_the_way: Vec<f64> =
-            class.iter().filter(|r| r.1.as_ref().is_some_and(|f| !f.settled)).map(|r| promise(r)).collect();
+        let mine = promise(me);
+        let promises: Vec<f64> = class.into_iter().filter(|r| on_the_way(r)).map(promise).collect();
         let (share, least) = policy.kept;
-        let most = ((share * on_the_way.len() as f64).ceil() as usize).max(least);
-        let arrived = running[i].1.as_ref().is_none_or(|f| f.settled);
-        mine <= worst && (arrived || on_the_way.iter().filter(|p| **p < mine).count() < most)
+        let most = ((share * promises.len() as f64).ceil() as usize).max(least);
+        mine <= worst && (!on_the_way(me) || promises.iter().filter(|p| **p < mine).count() < most)
     };
-    (0..running.len()).map(goes_on).collect()
+    running.iter().map(goes_on).collect()
 }
 
 /// By how much a state's numbers move, were they fitted to residuals `y` in its cells: a linear answer.
