@@ -15,6 +15,8 @@ pub struct Short {
     pub cell_size: f64,
     /// Density [kg/m³].
     pub density: f64,
+    /// Model of the material, where it is not the default.
+    pub model: Option<&'static str>,
     /// E [Pa], ν, α [1/s], β [s].
     pub material: [f64; 4],
     /// What it stands on or is held by.
@@ -49,8 +51,9 @@ impl Short {
     /// In full.
     pub fn setup(&self, name: &str) -> Setup {
         let [e, nu, alpha, beta] = self.material;
+        let model = self.model.map_or_else(String::new, |m| format!("model = \"{m}\"\n"));
         let body = format!(
-            "format = \"scene/1\"\n[object]\nshape = {}\ncell_size = {}\n[material]\ndensity = {}\nyoungs_modulus = {e}\n\
+            "format = \"scene/1\"\n[object]\nshape = {}\ncell_size = {}\n[material]\n{model}density = {}\nyoungs_modulus = {e}\n\
              poisson_ratio = {nu}\nmass_damping = {alpha}\nstiffness_damping = {beta}\n{}[time]\nstep = {}\nsteps = {}\ntheta = {}\n",
             self.shape, self.cell_size, self.density, self.support, self.step, self.steps, self.theta
         );

@@ -14,6 +14,7 @@ const ROD: Short = Short {
     shape: "{ box = { min = [0, -0.015, 0.1], max = [0.2, 0.015, 0.13] } }",
     cell_size: 0.015,
     density: 1000.0,
+    model: None,
     material: [2.4e5, 0.4, 0.0, 0.003],
     support: "[world]\ngravity = [8.496, 0.0, -4.905]\n[[clamp]]\nbox = { min = [-0.01, -0.03, 0.08], max = [0.03, 0.03, 0.15] }\n",
     given: &[],
@@ -44,10 +45,12 @@ const BAR: Short = Short {
     ..ROD
 };
 
+/// It lands with strains of a fifth, where laws differ: by the default one a fit to it is 15 % too stiff. So its scene states the law of the tetrahedra.
 const PEA: Short = Short {
     shape: "{ ball = { radius = 0.05, center = [0, 0, 0.06] } }",
     cell_size: 0.0205,
     density: 1000.0,
+    model: Some("stable-neo-hookean"),
     material: [2.0e4, 0.4, 0.0, 0.002],
     support: "[[plane]]\npoint = [0, 0, 0]\nnormal = [0.25, 0, 1]\n",
     given: &[],
@@ -68,6 +71,7 @@ const SLAB: Short = Short {
     shape: "{ box = { min = [-0.07, -0.012, 0], max = [0.07, 0.012, 0.13] } }",
     cell_size: 0.019,
     density: 1000.0,
+    model: None,
     material: [1.2e5, 0.4, 0.0, 0.003],
     support: "[[clamp]]\nbox = { min = [-0.1, -0.03, 0.1], max = [0.1, 0.03, 0.15] }\n",
     given: &[],
@@ -88,6 +92,7 @@ const PILLAR: Short = Short {
     shape: "{ box = { min = [-0.03, -0.025, 0], max = [0.03, 0.025, 0.12] } }",
     cell_size: 0.022,
     density: 1000.0,
+    model: None,
     material: [5.0e4, 0.4, 0.0, 0.003],
     support: "[[clamp]]\nbox = { min = [-0.1, -0.1, -0.02], max = [0.1, 0.1, 0.02] }\n",
     given: &[],

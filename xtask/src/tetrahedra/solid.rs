@@ -12,8 +12,10 @@ use palpate_model::scene::{Analytic, BodySource, Clamp, Inertia, Scene};
 const AIR: f64 = 1.2;
 /// Penetration of the ground, over the body's size, at a pressure of a quarter of Young's modulus.
 const PENETRATION: f64 = 1e-3;
-/// Bricks along the shortest side of a block, of a plate one; along the side of the cube in a ball there are three.
+/// Bricks along the shortest side of a block, of a plate one.
 const THIN: usize = 2;
+/// Bricks along the side of the cube in a ball: its surface, drawn by quadratic faces, is then in the mean within 3e-4 of its radius.
+const ROUND: usize = 4;
 /// The second side over the shortest from which on a block is a plate: one quadratic element across bends right.
 const PLATE: f64 = 3.0;
 /// Longest edge of a brick over the shortest side of the block, along sides that bend.
@@ -27,7 +29,7 @@ const FIRST: f64 = 0.15;
 /// The shape is another.
 pub fn mesh(scene: &Scene, fine: usize) -> Result<Mesh, String> {
     match &scene.object.source {
-        BodySource::Analytic(Analytic::Ball { radius, center }) => Ok(Mesh::ball(*center, *radius, 3 * fine, fine)),
+        BodySource::Analytic(Analytic::Ball { radius, center }) => Ok(Mesh::ball(*center, *radius, ROUND * fine, fine)),
         BodySource::Analytic(Analytic::Box { min, max }) => {
             let size = *max - *min;
             let thin = size.min_element();

@@ -17,8 +17,8 @@ use std::path::PathBuf;
 
 /// Metres per count: rounding stays far below the noise.
 const DEPTH_SCALE: f64 = 5e-5;
-/// Every edge of a quadratic triangle is drawn as so many straight ones.
-const PARTS: usize = 4;
+/// Every edge of a quadratic triangle is drawn as so many straight ones: with four, a ball of 50 mm reads 0.1 mm too small.
+const PARTS: usize = 16;
 
 /// What watches a body.
 #[derive(Clone, Debug)]
