@@ -242,7 +242,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
                     continue;
                 }
                 // Nothing is named where nothing is missing: what helps there follows errors of the grid more closely than their fields do.
-                if out.accepted.is_empty() && !state.lacks() {
+                if out.accepted.is_empty() && !state.may_lack() {
                     break;
                 }
                 let before = (state.clone(), out.accepted.clone());
@@ -279,6 +279,7 @@ pub fn diagnose(lab: &mut dyn Laboratory, start: Model, options: &Options) -> Re
         }
         out.close = std::mem::replace(&mut out.accepted, accepted).into_iter().last().into_iter().collect();
         out.close.iter_mut().for_each(|f| f.accepted = false);
+        out.taken_back = true;
         state = before;
         blocks = s.map(&state);
     }
@@ -296,6 +297,8 @@ struct Progress {
     /// The baseline's residuals in blocks.
     blocks: Vec<Block>,
     interrupted: bool,
+    /// True where an effect helped and was no explanation.
+    taken_back: bool,
     /// True where the baseline's fit ended before its end.
     cut: bool,
     /// True where there was a reason to look for what is missing, and no time.
@@ -348,7 +351,7 @@ impl Session<'_> {
     fn is_worth_a_look(&self, state: &State) -> bool {
         let price = Prior { candidates: self.candidates, readings: self.cells.len() };
         let promises = |v: &Variant| 0.5 * v.score.gain + price.log(&[v.score.freedom], &[]) > 0.0;
-        state.lacks() || self.scored.iter().flatten().any(promises)
+        state.may_lack() || self.scored.iter().flatten().any(promises)
     }
 
     fn frame(&self, table: &Table, fields: &[Field]) -> Frame {

@@ -1,8 +1,9 @@
 //! The rule: which of two models predicts better, and whether that is clear.
 //!
 //! ```text
-//! something is missing in M     S(M⁺) > S(M°), or three standard deviations from what is known
-//! an effect helps               S(M_j⁺) > S(M₀⁺), by more than two standard errors of elpd(M_j⁺) − elpd(M₀⁺)
+//! something may be missing in M S(M⁺) > S(M°), or three standard deviations from what is known: reason to search
+//! something is missing in M     S(M⁺) > S(M°), by more than three standard errors, or the same deviations
+//! an effect helps               S(M_j⁺) > S(M₀⁺), by more than three standard errors of elpd(M_j⁺) − elpd(M₀⁺)
 //! the one that is named         the largest S(M_j⁺) of those that help, where something is missing in M₀
 //! as good as that               S lower by no more than two standard errors, or than ln O
 //! an explanation                S(M_j⁺) − S(M₀⁺) > S*(M_j) − S(M_j⁺): it explains more than it leaves
@@ -12,11 +13,12 @@
 
 use super::prior::Prior;
 
-/// Standard errors of a difference from which on it is clear.
+/// Standard errors of a difference between two models from which on it is clear.
 const CLEAR: f64 = 2.0;
 
-/// Standard deviations from what is known beforehand from which on the readings contradict it.
-const CONTRADICTS: f64 = 3.0;
+/// Standard errors, or standard deviations from what is known beforehand, from which on a scene is said to be wrong. Of fifty candidates the
+/// luckiest is two ahead by chance; three one in fifteen times.
+const SURE: f64 = 3.0;
 
 /// What a model predicts of every block that was left out.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +57,11 @@ impl Difference {
         self.nats > 0.0 && self.nats > CLEAR * self.error
     }
 
+    /// True if the first is better beyond what chance among blocks does even for the luckiest of many.
+    pub fn is_sure(self) -> bool {
+        self.nats > 0.0 && self.nats > SURE * self.error
+    }
+
     /// True if the first is better, or no worse than chance, or than what one thing more costs, allows.
     pub fn is_as_good(self) -> bool {
         -self.nats <= (CLEAR * self.error).max(Prior::odds())
@@ -88,10 +95,26 @@ impl Judged {
         Difference { nats: d.nats - self.price, ..d }
     }
 
-    /// True where something is missing: a discrepancy predicts better, or readings contradict what is known beforehand. What is
+    /// True where something may be missing: a discrepancy predicts better, or readings contradict what is known beforehand. What is
     /// missing must not hide behind an error of the grid that would have to be many times what finer cells show.
+    pub fn may_be_missing(&self) -> bool {
+        self.missing().nats > 0.0 || self.conflict > SURE
+    }
+
+    /// True where something is missing, beyond what a few blocks do by chance.
     pub fn is_missing(&self) -> bool {
-        self.missing().nats > 0.0 || self.conflict > CONTRADICTS
+        self.missing().is_sure() || self.conflict > SURE
+    }
+
+    /// What is said where something may be missing and nothing surely is.
+    pub fn chance(&self) -> Option<String> {
+        let Difference { nats, error } = self.missing();
+        let said = || {
+            format!(
+                "A discrepancy would predict better by {nats:.0} ± {error:.0} nats, which {SURE} standard errors of chance can do."
+            )
+        };
+        (self.may_be_missing() && !self.is_missing()).then(said)
     }
 
     /// By how much this model predicts better than another.
@@ -126,6 +149,7 @@ mod tests {
         // Differences 1, 1, 4: mean 2, variance 3, of the sum three times that.
         assert!((d.nats - 6.0).abs() < 1e-12 && (d.error - 3.0).abs() < 1e-12, "{d:?}");
         assert!(!d.is_clear() && Difference { nats: 6.1, error: 3.0 }.is_clear());
+        assert!(!Difference { nats: 8.9, error: 3.0 }.is_sure() && Difference { nats: 9.1, error: 3.0 }.is_sure());
         assert!(Difference { nats: -5.9, error: 3.0 }.is_as_good() && !Difference { nats: -6.1, error: 3.0 }.is_as_good());
     }
 
@@ -141,5 +165,17 @@ mod tests {
         let far = judged(&[-9.0; 10], &[-3.0; 10], 0.0);
         assert!(most.over(&far).is_clear() && most.explains(&far));
         assert!(some.over(&far).is_clear() && !some.explains(&far));
+    }
+
+    #[test]
+    fn one_block_that_is_not_met_is_reason_to_search_and_not_to_say_that_something_is_missing() {
+        let one = |y: f64, far: usize| (0..50).map(|b| if b < far { y } else { -1.0 }).collect::<Vec<f64>>();
+        let lucky = judged(&one(-40.0, 1), &one(-5.0, 1), 0.0);
+        assert!(lucky.may_be_missing() && !lucky.is_missing());
+        assert!(lucky.chance().is_some_and(|said| said.contains("32 ± 35 nats")), "{:?}", lucky.chance());
+        let many = judged(&one(-40.0, 12), &one(-5.0, 12), 0.0);
+        assert!(many.is_missing() && many.chance().is_none());
+        // What is known beforehand is contradicted by one reading as well.
+        assert!(Judged { conflict: 3.1, ..lucky }.is_missing());
     }
 }

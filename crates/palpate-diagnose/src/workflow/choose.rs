@@ -6,11 +6,11 @@ use super::{Fitted, Session, State};
 const SAME: f64 = 1.0;
 
 impl Session<'_> {
-    /// True if a candidate predicts clearly better than the model before, and a pair than each of its halves as well.
+    /// True if a candidate surely predicts better than the model before, and a pair clearly better than each of its halves.
     pub(super) fn helps(&self, f: &Fitted, before: &State, fitted: &[Fitted]) -> bool {
-        let over = |other: &State| f.state.judged.over(&other.judged).is_clear();
+        let over = |other: &State| f.state.judged.over(&other.judged);
         let halves = fitted.iter().filter(|h| h.effects < f.effects && h.is_within(f));
-        over(before) && halves.map(|h| &h.state).all(over)
+        over(before).is_sure() && halves.map(|h| over(&h.state)).all(|d| d.is_clear())
     }
 
     /// The candidate to be named and those that the data cannot tell from it, itself among them. `None` when none helps.

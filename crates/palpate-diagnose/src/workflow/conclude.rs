@@ -71,10 +71,10 @@ impl Session<'_> {
         let gap_closed = if b.gap() > 0.0 { (1.0 - a.gap() / b.gap()).clamp(0.0, 1.0) } else { 0.0 };
         // The noise may have become known better since.
         self.remeasure(&mut base);
-        let remains = state.lacks();
+        let remains = state.may_lack();
         let stopped = out.interrupted || self.no_time;
         let verdict = match out.accepted.len() {
-            0 if !(remains || out.open || out.cut) => Verdict::Adequate,
+            0 if !(state.lacks() || out.taken_back || out.open || out.cut) => Verdict::Adequate,
             _ if out.unsure.is_some() => Verdict::Undecided,
             1.. if state.judged.explains(&base.judged) && !(stopped && remains) => Verdict::MissingEffect,
             // What was not tried may explain it.
@@ -87,6 +87,7 @@ impl Session<'_> {
         let strange = if verdict == Verdict::Unexplained { &base.strange } else { &state.strange };
         caveats.extend(strange.iter().filter(|s| s.deviations >= WORTH_SAYING).map(|s| format!("The fit ends with {}.", s.what)));
         if verdict == Verdict::Adequate {
+            caveats.extend(state.judged.chance());
             caveats.extend(self.not_excluded().map(|m| format!("Not excluded: {}", m.sentence())));
         }
         if stopped {

@@ -29,6 +29,6 @@ impl Session<'_> {
     /// True if the best of the candidates is an explanation that leaves nothing.
     pub(super) fn explained(&self, fitted: &[Fitted]) -> bool {
         let best = fitted.iter().map(|f| &f.state.judged).max_by(|a, b| a.score().total_cmp(&b.score()));
-        best.is_some_and(|j| !j.is_missing())
+        best.is_some_and(|j| !j.may_be_missing())
     }
 }

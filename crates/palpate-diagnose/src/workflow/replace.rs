@@ -10,14 +10,14 @@ use crate::diagnosis::Found;
 use crate::laboratory::LabError;
 
 impl Session<'_> {
-    /// The state with one effect in the place of the newest and an older one of its family or, while something is missing, of a single one;
+    /// The state with one effect in the place of the newest and an older one of its family or, while something may be missing, of a single one;
     /// `None` if there is none that is as good.
     pub(super) fn replace(&mut self, state: &State, accepted: &mut Vec<Found>) -> Option<State> {
         let first = state.model.changes.len() - accepted.len();
         let is_kin = |a: usize, b: usize| state.model.changes[first + a].is_kin(&state.model.changes[first + b]);
         let newest = accepted.len().checked_sub(1)?;
         let mut places: Vec<Vec<usize>> = (0..newest).filter(|k| is_kin(*k, newest)).map(|k| vec![k, newest]).collect();
-        if state.judged.is_missing() {
+        if state.judged.may_be_missing() {
             places.extend((0..=newest).rev().filter(|k| is_kin(*k, *k)).map(|k| vec![k]));
         }
         for old in places {

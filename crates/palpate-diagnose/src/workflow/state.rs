@@ -9,9 +9,18 @@ use crate::judgement::stack::{SIZES, stacked};
 use crate::laboratory::{Field, LabError, Model, Readings};
 
 impl State {
-    /// True when something is missing in the model: a discrepancy beside it predicts better, or its numbers are not of this world.
+    /// True when something may be missing in the model: a discrepancy beside it predicts better, or its numbers are not of this world.
+    pub(super) fn may_lack(&self) -> bool {
+        self.judged.may_be_missing() || self.is_strange()
+    }
+
+    /// The same beyond chance.
     pub(super) fn lacks(&self) -> bool {
-        self.judged.is_missing() || self.strange.iter().any(|s| s.deviations > STRANGE)
+        self.judged.is_missing() || self.is_strange()
+    }
+
+    fn is_strange(&self) -> bool {
+        self.strange.iter().any(|s| s.deviations > STRANGE)
     }
 }
 
