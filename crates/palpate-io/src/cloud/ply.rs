@@ -2,6 +2,7 @@
 
 use super::CloudFile;
 use crate::error::InputError;
+use crate::mesh::announces_no_more_than_it_holds;
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
@@ -58,6 +59,7 @@ fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// The points of a file's bytes.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<CloudFile, InputError> {
     let wrong = |text: String| InputError::file(path, text);
+    announces_no_more_than_it_holds(bytes).map_err(&wrong)?;
     let ply = Parser::<Element>::new()
         .read_ply(&mut Cursor::new(&readable(bytes)[..]))
         .map_err(|e| wrong(format!("not a readable PLY file: {e}")))?;

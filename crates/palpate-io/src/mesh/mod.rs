@@ -2,6 +2,8 @@
 
 mod fast;
 mod parse;
+
+pub(crate) use parse::announces_no_more_than_it_holds;
 #[cfg(test)]
 mod tests;
 mod volume;

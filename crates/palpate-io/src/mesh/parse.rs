@@ -4,7 +4,7 @@ use super::fast;
 use glam::DVec3;
 use palpate_model::shape::TriMesh;
 use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{DefaultElement, Property, PropertyAccess, PropertyAccessResult};
 use std::io::Cursor;
 
 /// Fan of a polygon with vertices `at(0..n)`; the solid is the same for planar polygons that are convex.
@@ -80,7 +80,18 @@ pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
     fast::ply(bytes).map_or_else(|| slow_ply(bytes), finite)
 }
 
+/// Refuses a PLY file that announces more items of an element than it has bytes: even items without properties, which take none, would be kept.
+///
+/// # Errors
+/// It does; the element is named. A header that cannot be read is left to whoever reads the file.
+pub(crate) fn announces_no_more_than_it_holds(bytes: &[u8]) -> Result<(), String> {
+    let header = Parser::<DefaultElement>::new().read_ply_header(&mut Cursor::new(bytes));
+    let many = header.ok().and_then(|h| h.elements.into_iter().find(|(_, e)| e.count > bytes.len()));
+    many.map_or(Ok(()), |(name, e)| Err(format!("announces {} of element \"{name}\" in {} bytes", e.count, bytes.len())))
+}
+
 pub(super) fn slow_ply(bytes: &[u8]) -> Result<TriMesh, String> {
+    announces_no_more_than_it_holds(bytes)?;
     let ply = Parser::<Row>::new().read_ply(&mut Cursor::new(bytes)).map_err(|e| format!("not a readable PLY file: {e}"))?;
     let part = |name: &str| ply.payload.get(name).ok_or_else(|| format!("has no element \"{name}\""));
     let mut mesh = TriMesh::default();
@@ -120,4 +131,17 @@ pub(super) fn stl(bytes: &[u8]) -> Result<TriMesh, String> {
         mesh.triangles.push([base, base + 1, base + 2]);
     }
     finite(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::slow_ply;
+
+    #[test]
+    fn a_ply_file_that_announces_more_than_it_holds_is_refused_before_memory_is_taken() {
+        let file =
+            b"ply\nformat binary_little_endian 1.0\nelement ver 4294967295\nelement vertex 1\nproperty float x\nend_header\n";
+        let said = slow_ply(file).unwrap_err();
+        assert!(said.contains("announces 4294967295 of element \"ver\""), "{said}");
+    }
 }
