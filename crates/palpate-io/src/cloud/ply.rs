@@ -59,9 +59,10 @@ fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// The points of a file's bytes.
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<CloudFile, InputError> {
     let wrong = |text: String| InputError::file(path, text);
-    announces_no_more_than_it_holds(bytes).map_err(&wrong)?;
+    let bytes = readable(bytes);
+    announces_no_more_than_it_holds(&bytes).map_err(&wrong)?;
     let ply = Parser::<Element>::new()
-        .read_ply(&mut Cursor::new(&readable(bytes)[..]))
+        .read_ply(&mut Cursor::new(&bytes[..]))
         .map_err(|e| wrong(format!("not a readable PLY file: {e}")))?;
     let vertices = ply.payload.get("vertex").ok_or_else(|| wrong("has no element \"vertex\"".into()))?;
     let point = |(i, v): (usize, &Element)| match v.0 {

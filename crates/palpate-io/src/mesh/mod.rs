@@ -2,11 +2,11 @@
 
 mod fast;
 mod parse;
-
-pub(crate) use parse::announces_no_more_than_it_holds;
 #[cfg(test)]
 mod tests;
 mod volume;
+
+pub(crate) use parse::announces_no_more_than_it_holds;
 
 pub use volume::read_tets;
 
