@@ -87,7 +87,9 @@ pub(super) fn ply(bytes: &[u8]) -> Result<TriMesh, String> {
 pub(crate) fn announces_no_more_than_it_holds(bytes: &[u8]) -> Result<(), String> {
     let header = Parser::<DefaultElement>::new().read_ply_header(&mut Cursor::new(bytes));
     let many = header.ok().and_then(|h| h.elements.into_iter().find(|(_, e)| e.count > bytes.len()));
-    many.map_or(Ok(()), |(name, e)| Err(format!("announces {} of element \"{name}\" in {} bytes", e.count, bytes.len())))
+    many.map_or(Ok(()), |(name, e)| {
+        Err(format!("not a readable PLY file: announces {} of element \"{name}\" in {} bytes", e.count, bytes.len()))
+    })
 }
 
 pub(super) fn slow_ply(bytes: &[u8]) -> Result<TriMesh, String> {
