@@ -92,8 +92,8 @@ enum Verb {
         /// Stop after so many minutes; the next run goes on
         #[arg(long, value_name = "MINUTES")]
         slice: Option<f64>,
-        /// Time for the search of one case, of all its processors together [s]
-        #[arg(long, value_name = "SECONDS", default_value_t = 180.0)]
+        /// Time for the search of one case, of all its processors together [s]: three minutes of two of them
+        #[arg(long, value_name = "SECONDS", default_value_t = 360.0)]
         budget: f64,
         /// Measure again what this commit has measured already
         #[arg(long)]
