@@ -17,7 +17,7 @@ pub enum Verdict {
     Adequate,
     /// Something is missing, and what was added explains it.
     MissingEffect,
-    /// Something is missing that no known effect explains.
+    /// Something is missing that no known effect explains: surely so beside those that were added, if any explained most of it.
     Unexplained,
     /// Something is missing, and the search ended before every explanation was tried.
     Undecided,
@@ -264,6 +264,12 @@ impl Diagnosis {
                 let slack = self.slack.as_ref().map_or(String::new(), |s| {
                     format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
                 });
+                if !open && self.effects.iter().any(|e| e.accepted) {
+                    return format!(
+                        "Something is missing{why}: {apart}{place}{slack}. The nearest that is known: {}",
+                        self.added()
+                    );
+                }
                 let open = if open { self.open() } else { String::new() };
                 // Where what is left has no structure, candidates that promise something are why the search went on.
                 let what =
@@ -271,32 +277,31 @@ impl Diagnosis {
                 format!("{what}{why}: {apart}{place}; {close}{slack}.{open}")
             }
             Verdict::MissingEffect => {
-                let accepted: Vec<&Found> = self.effects.iter().filter(|e| e.accepted).collect();
-                let what: Vec<String> = accepted
-                    .iter()
-                    .map(|e| {
-                        let others = if e.indistinguishable_from.is_empty() {
-                            String::new()
-                        } else {
-                            format!("; these data cannot tell it from {}", e.indistinguishable_from.join(", "))
-                        };
-                        format!("{} ({}: {}{others})", e.sentence, e.kind, in_words(&e.parameters))
-                    })
-                    .collect();
-                format!(
-                    "The model lacks something{place}: {}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of \
-                     the gap on data left out.{}{}{}",
-                    what.join("; and "),
-                    mm(self.before.rms),
-                    mm(self.after.rms),
-                    mm(self.after.noise),
-                    100.0 * self.gap_closed,
-                    self.moved(),
-                    if self.remains { self.caution() } else { String::new() },
-                    self.unfinished()
-                )
+                let caution = if self.remains { self.caution() } else { String::new() };
+                format!("The model lacks something{place}: {}{caution}{}", self.added(), self.unfinished())
             }
         }
+    }
+
+    /// What was added, what that does to the distance, and what to the fitted numbers; a sentence or more.
+    fn added(&self) -> String {
+        let in_full = |e: &Found| {
+            let others = match e.indistinguishable_from.as_slice() {
+                [] => String::new(),
+                others => format!("; these data cannot tell it from {}", others.join(", ")),
+            };
+            format!("{} ({}: {}{others})", e.sentence, e.kind, in_words(&e.parameters))
+        };
+        let what: Vec<String> = self.effects.iter().filter(|e| e.accepted).map(in_full).collect();
+        format!(
+            "{}. That brings the distance from {} to {} (noise and grid: {}) and closes {:.0} % of the gap on data left out.{}",
+            what.join("; and "),
+            mm(self.before.rms),
+            mm(self.after.rms),
+            mm(self.after.noise),
+            100.0 * self.gap_closed,
+            self.moved(),
+        )
     }
 
     /// What the corrected model does to the free number that it moves most, where that is more than its error.

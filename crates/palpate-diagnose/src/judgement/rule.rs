@@ -6,7 +6,8 @@
 //! an effect helps               S(M_j⁺) > S(M₀⁺), by more than three standard errors of elpd(M_j⁺) − elpd(M₀⁺)
 //! the one that is named         the largest S(M_j⁺) of those that help, where something may be missing in M₀
 //! as good as that               S lower by no more than two standard errors, or than ln O
-//! an explanation                S(M_j⁺) − S(M₀⁺) > S*(M_j) − S(M_j⁺): it explains more than it leaves
+//! an effect stays               S(M_j⁺) − S(M₀⁺) > S*(M_j) − S(M_j⁺): it explains more than it leaves
+//! an explanation                effects that stay, and beside which nothing is missing
 //!
 //! S* is what the model would score in the mean, were it the whole truth.
 //! ```

@@ -73,18 +73,22 @@ impl Session<'_> {
         self.remeasure(&mut base);
         let remains = state.may_lack();
         let stopped = out.interrupted || self.no_time;
+        // Less than half of an explanation is shown, but not believed.
+        let helped = state.judged.explains(&base.judged);
         let verdict = match out.accepted.len() {
             0 if !(state.lacks() || out.taken_back || out.open || out.cut) => Verdict::Adequate,
             _ if out.unsure.is_some() => Verdict::Undecided,
-            1.. if state.judged.explains(&base.judged) && !(stopped && remains) => Verdict::MissingEffect,
+            1.. if helped && !(state.lacks() || stopped && remains) => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if stopped => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
         // Of all that is missing, not of what a rejected explanation leaves.
         let slack = if verdict == Verdict::Unexplained { self.slack_or_why(&base) } else { None };
-        let mut caveats = caveats(held_out, verdict, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
-        let strange = if verdict == Verdict::Unexplained { &base.strange } else { &state.strange };
+        let dropped = verdict == Verdict::Unexplained && !helped;
+        let mut caveats =
+            caveats(held_out, !out.accepted.is_empty() && !dropped, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
+        let strange = if dropped { &base.strange } else { &state.strange };
         caveats.extend(strange.iter().filter(|s| s.deviations >= WORTH_SAYING).map(|s| format!("The fit ends with {}.", s.what)));
         if verdict == Verdict::Adequate {
             caveats.extend(state.judged.chance());
@@ -94,8 +98,7 @@ impl Session<'_> {
             self.note_open(if out.interrupted { &LabError::Interrupted } else { &LabError::NoTime });
         }
         let baseline = base.model.clone();
-        if verdict == Verdict::Unexplained {
-            // Part of an explanation is not one: it is shown, but not believed.
+        if dropped {
             out.accepted.iter_mut().for_each(|f| f.accepted = false);
         }
         let mut effects = out.accepted;
@@ -103,8 +106,7 @@ impl Session<'_> {
         let told = if verdict == Verdict::Adequate { &[] } else { effects.as_slice() };
         let mut movements = named_movements(&baseline, &state.model, told);
         movements.extend(if stopped { self.open_movements() } else { Vec::new() });
-        let unexplained = verdict == Verdict::Unexplained;
-        let course = course(&base.readings, if unexplained { &base.readings } else { &state.readings });
+        let course = course(&base.readings, if dropped { &base.readings } else { &state.readings });
         Diagnosis {
             verdict,
             missing: base.judged.missing().parts(),
@@ -117,10 +119,10 @@ impl Session<'_> {
             tried: std::mem::take(&mut self.tried),
             not_tried: std::mem::take(&mut self.not_tried),
             movements,
-            strange: (base.strange, if unexplained { Vec::new() } else { state.strange }),
+            strange: (base.strange, if dropped { Vec::new() } else { state.strange }),
             course,
-            model: if unexplained { baseline } else { state.model },
-            after: if unexplained { before } else { after },
+            model: if dropped { baseline } else { state.model },
+            after: if dropped { before } else { after },
             held_out,
             predicted,
             gap_closed,
@@ -211,8 +213,8 @@ fn course(before: &Readings, after: &Readings) -> Vec<Instant> {
 }
 
 /// What to know of the second recording: distances before and after, and why it could not be simulated, if so.
-fn caveats(held_out: Option<(Level, Level)>, verdict: Verdict, failure: Option<&String>) -> Vec<String> {
-    let level = held_out.map(|(before, after)| if verdict == Verdict::MissingEffect { after } else { before });
+fn caveats(held_out: Option<(Level, Level)>, corrected: bool, failure: Option<&String>) -> Vec<String> {
+    let level = held_out.map(|(before, after)| if corrected { after } else { before });
     let missed = level.filter(|l| l.rms > MET * l.noise).map(|l| {
         let (apart, explained) = (millimetres(l.rms), millimetres(l.noise));
         format!("The second recording is not explained: it is {apart} apart, noise and grid explain {explained}.")
