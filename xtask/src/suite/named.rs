@@ -135,8 +135,8 @@ const RAMP: Short = Short {
         (BETA, 0.025),
         ("world.gravity.z", -9.5),
         ("plane.0.height", -0.19),
-        // Its tilt, from the slope that is given: the polar axis of a floor's normal is y.
-        ("plane.0.phi", 1.22173),
+        // Its tilt, from the slope that is given: the polar axis of a floor's normal is y, and the azimuth counts from z towards x.
+        ("plane.0.phi", 0.349066),
     ],
     cameras: &["eye=0.5,-1.9,0.7 target=0.1,0,-0.15 fov=30 size=50x50"],
     markers: &[],
