@@ -118,3 +118,22 @@ fn objects_of_some_metres_are_possible_and_get_a_word() {
     assert!(line.contains(wanted), "{line}");
     assert_eq!(told.matches("warning: ").count(), 1, "{told}");
 }
+
+#[test]
+fn an_angle_that_starts_far_from_the_planes_own_gets_a_word() {
+    let folder = folder();
+    // A slope of 20°, whose azimuth counts from z towards x: 0.349 rad, not the 1.222 rad of its elevation.
+    let slope = |start: &str| {
+        let plane = "[[plane]]\npoint = [0, 0, -0.1]\nnormal = [0.34202, 0, 0.939693]\n";
+        let fit = format!("{plane}[[fit.parameter]]\npath = {start}\n[[fit.parameter]]\npath = \"material.youngs_modulus\"\n");
+        write(folder.path(), &changed(SCENE, "[[fit.parameter]]\npath = \"material.youngs_modulus\"\n", &fit))
+    };
+    let told = |start: &str| succeed(&["inspect", arg(&slope(start))]).out;
+    let wrong = told("\"plane.0.phi\"\nstart = 1.222");
+    assert!(wrong.contains("plane.0.phi starts 50° from the scene's own normal, of which it is 0.349 rad"), "{wrong}");
+    for right in
+        ["\"plane.0.phi\"\nstart = 0.3", "\"plane.0.phi\"\nstart = [0.0, 1.5]", "\"plane.0.normal\"\nstart = [0.9, 0, 0.1]"]
+    {
+        assert!(!told(right).contains("own normal"), "{right}");
+    }
+}

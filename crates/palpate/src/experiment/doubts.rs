@@ -5,7 +5,9 @@ use crate::fitting::held_whole;
 use palpate_engine::number;
 use palpate_io::recording::Recording;
 use palpate_io::scene::states;
+use palpate_model::params::ParamKey;
 use palpate_model::scene::ObservationSpec;
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 /// Depth readings up to which all are used: a hundred million bytes of points, and a cost of about a second a time step.
@@ -14,6 +16,8 @@ const MOST_READINGS: usize = 3_000_000;
 const FAST: f64 = 300.0;
 /// Steps beyond this take hours.
 const MANY_STEPS: usize = 200_000;
+/// Angle between a plane's normal and where its fit starts [rad] from which on the angle may count about another axis than was meant.
+const TURNED: f64 = std::f64::consts::FRAC_PI_4;
 /// Views narrower or wider than this [°] are of no depth camera.
 const VIEW: [f64; 2] = [0.05, 179.0];
 
@@ -56,6 +60,7 @@ pub(super) fn doubts(e: &Experiment) -> Vec<String> {
                 .map(|leap| format!("{name}: {leap}; is its motion in metres and seconds, and relative to the rest place?")),
         );
     }
+    out.extend(angles(e).into_iter().map(|text| format!("{name}: {text}")));
     if held_whole(e) {
         out.push(format!("{name}: clamp: clamps hold the whole surface; nothing of the body can move by itself"));
     }
@@ -63,6 +68,31 @@ pub(super) fn doubts(e: &Experiment) -> Vec<String> {
         out.extend(cameras(e, r));
     }
     out
+}
+
+/// Angles of planes whose fit starts far from the scene's own normal.
+fn angles(e: &Experiment) -> Vec<String> {
+    let plan = e.plan();
+    let (keys, fit) = (plan.layout.keys.iter().zip(&plan.theta), e.scene().fit.as_ref());
+    let of_planes = keys.filter(|(key, _)| matches!(key, ParamKey::PlaneTheta(_) | ParamKey::PlanePhi(_)));
+    let far = of_planes.filter_map(|(key, own)| {
+        let path = key.spec().path;
+        // Who states a direction means it.
+        if e.text().contains(&path.replace(".theta", ".normal").replace(".phi", ".normal")) {
+            return None;
+        }
+        let (from, to) = fit?.parameters.iter().find(|p| p.path == path)?.start;
+        let away = |x: f64| ((x - own + PI).rem_euclid(TAU) - PI).abs();
+        let least = if (from..=to).contains(own) { 0.0 } else { away(from).min(away(to)) };
+        (least > TURNED).then(|| {
+            format!(
+                "{path} starts {:.0}° from the scene's own normal, of which it is {own:.3} rad; an angle counts about z, or another axis where \
+                 the normal is near z: plane.N.normal takes a direction",
+                least.to_degrees()
+            )
+        })
+    });
+    far.collect()
 }
 
 fn cameras(e: &Experiment, r: &Recording) -> Vec<String> {
