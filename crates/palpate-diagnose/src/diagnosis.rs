@@ -245,12 +245,21 @@ impl Diagnosis {
         let apart =
             format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
+        let slack = self.slack.as_ref().map_or(String::new(), |s| {
+            format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
+        });
         match self.verdict {
             Verdict::Adequate => format!("Nothing is missing that these data could show: {apart}."),
             Verdict::Undecided if self.unsure.is_some() => {
                 let why = self.unsure.as_deref().unwrap_or_default();
                 let close = self.effects.first().map_or(String::new(), |e| format!("; {}", helps(e)));
                 format!("Nothing is decided: {why}; so far {apart}{close}.{}", self.open())
+            }
+            Verdict::Unexplained if self.effects.iter().any(|e| e.accepted) => {
+                let added = self.added();
+                format!(
+                    "Something is missing that no known effect explains: {apart}{place}{slack}. The nearest that is known: {added}"
+                )
             }
             Verdict::Unexplained | Verdict::Undecided => {
                 let open = self.verdict == Verdict::Undecided;
@@ -261,15 +270,6 @@ impl Diagnosis {
                     (true, true) => ", and the search was interrupted before every known effect was tried",
                     (true, false) => ", and the time was over before every known effect was tried",
                 };
-                let slack = self.slack.as_ref().map_or(String::new(), |s| {
-                    format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
-                });
-                if !open && self.effects.iter().any(|e| e.accepted) {
-                    return format!(
-                        "Something is missing{why}: {apart}{place}{slack}. The nearest that is known: {}",
-                        self.added()
-                    );
-                }
                 let open = if open { self.open() } else { String::new() };
                 // Where what is left has no structure, candidates that promise something are why the search went on.
                 let what =

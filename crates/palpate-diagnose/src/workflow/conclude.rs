@@ -73,19 +73,19 @@ impl Session<'_> {
         self.remeasure(&mut base);
         let remains = state.may_lack();
         let stopped = out.interrupted || self.no_time;
-        // Less than half of an explanation is shown, but not believed.
-        let helped = state.judged.explains(&base.judged);
+        let stays = state.judged.explains(&base.judged);
         let verdict = match out.accepted.len() {
             0 if !(state.lacks() || out.taken_back || out.open || out.cut) => Verdict::Adequate,
             _ if out.unsure.is_some() => Verdict::Undecided,
-            1.. if helped && !(state.lacks() || stopped && remains) => Verdict::MissingEffect,
+            1.. if stays && !(state.lacks() || stopped && remains) => Verdict::MissingEffect,
             // What was not tried may explain it.
             _ if stopped => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
         // Of all that is missing, not of what a rejected explanation leaves.
         let slack = if verdict == Verdict::Unexplained { self.slack_or_why(&base) } else { None };
-        let dropped = verdict == Verdict::Unexplained && !helped;
+        // Less than half of an explanation is shown, but not believed.
+        let dropped = verdict == Verdict::Unexplained && !stays;
         let mut caveats =
             caveats(held_out, !out.accepted.is_empty() && !dropped, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
         let strange = if dropped { &base.strange } else { &state.strange };

@@ -7,7 +7,7 @@ use palpate_io::recording::Recording;
 use palpate_io::scene::states;
 use palpate_model::params::ParamKey;
 use palpate_model::scene::ObservationSpec;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 use std::path::Path;
 
 /// Depth readings up to which all are used: a hundred million bytes of points, and a cost of about a second a time step.
@@ -17,7 +17,7 @@ const FAST: f64 = 300.0;
 /// Steps beyond this take hours.
 const MANY_STEPS: usize = 200_000;
 /// Angle between a plane's normal and where its fit starts [rad] from which on the angle may count about another axis than was meant.
-const TURNED: f64 = std::f64::consts::FRAC_PI_4;
+const TURNED: f64 = FRAC_PI_4;
 /// Views narrower or wider than this [°] are of no depth camera.
 const VIEW: [f64; 2] = [0.05, 179.0];
 
