@@ -17,6 +17,8 @@ const COARSEST = 0.1;
 // Part of the slope at the beginning of a step that is left at its end where the step is too short: a direction that is right leaves none, one
 // from a solve that is as coarse as it may be a tenth.
 const STEEP = 0.5;
+// A step that leaves more than this part of the residual is followed by one with the majorised tangent, as in newton.rs.
+const KINKED = 0.5;
 // The longest step, over a full one.
 const FARTHEST = 1024.0;
 
@@ -90,6 +92,8 @@ fn judge_trial(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             if smoothness * after <= goal || stuck {
                 n.stage = IDLE;
             }
+            // A step that leaves most of the residual has passed a kink of some dissipation, and so would the next, back again.
+            n.majorised = select(0u, 1u, n.majorised == 0u && after > KINKED * n.norm && n.stage != IDLE);
             n.norm = after;
         }
     }

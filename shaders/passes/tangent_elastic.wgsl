@@ -26,7 +26,8 @@ fn tangent_elastic(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
     if mix.rate != 0.0 {
         held = linear_stress(strained(p.member, p.item, h), lame);
     }
-    let flow = flow_at(m, p.member, p.item, h);
+    var flow = flow_at(m, p.member, p.item, h);
+    flow.along = of_dissipation(newton[p.member].majorised != 0u, flow.along);
     for (var column = 0u; column < 9u; column++) {
         var dh = mat3x3<f32>();
         dh[column % 3u][column / 3u] = 1.0;

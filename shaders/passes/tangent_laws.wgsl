@@ -35,6 +35,7 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
     var ds = nowhere();
     ds[row] = 1.0;
     let convex = newton[c.member].convex != 0u;
+    let majorised = newton[c.member].majorised != 0u;
     var r = ask(c, ENERGY_PART, fresh.s, ds);
     if material() != 0u {
         add_answer(&r, material_row(c, fresh.s, ds, convex));
@@ -58,7 +59,8 @@ fn tangent_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         law_modes[own + n] = vec4(by_way, 0.0);
         law_modes[own + n + 1u] = vec4(by_flow, 0.0);
         if c.number == 0u {
-            law_modes[at] = vec4(scale, flow.by.y, unit * loss.z, flow.by.z / volume_of(c));
+            law_modes[at] = vec4(scale, flow.by.y, unit * of_dissipation(majorised, loss.z),
+                                 of_dissipation(majorised, flow.by.z) / volume_of(c));
         }
         if c.number < n {
             let b = r.bend;

@@ -22,6 +22,7 @@ fn tangent_tet_laws(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgr
     q.past = past_stretch(p.member, p.item);
     q.weight = mix_of(m).fresh;
     q.lossy = call.mode != 0u;
+    q.majorised = newton[p.member].majorised != 0u;
     // T, and its changes with the components of ε.
     var t = mat3x3<f32>();
     var by: array<mat3x3<f32>, 6>;

@@ -20,6 +20,11 @@ fn flow_loss(m: Member, squared: f32) -> vec3<f32> {
     return vec3(first * g / (2.0 * p * rate * rate), first, first * (p - 1.0) * 2.0 * rate * rate / g);
 }
 
+// Second derivative of a dissipation that a tangent has; the majorised one has no negative curvature.
+fn of_dissipation(majorised: bool, second: f32) -> f32 {
+    return select(second, max(second, 0.0), majorised);
+}
+
 // Derivatives of φ's first derivative by η and h.
 fn flow_by_numbers(m: Member, squared: f32) -> vec2<f32> {
     if call.mode == 0u {

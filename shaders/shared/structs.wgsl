@@ -152,6 +152,7 @@ const WANTS_TRIAL = 3u;
 struct Newton { // mirrored
     stage: u32,
     convex: u32,
+    majorised: u32,
     iteration: u32,
     trial: u32,
     norm: f32,

@@ -14,6 +14,8 @@ struct Question {
     lossy: bool,
     // Derivatives are by ε̃ instead of ε₁.
     by_past: bool,
+    // Of φ's curvature by d only what is not negative counts.
+    majorised: bool,
 }
 
 // What a force asks at the old state, which loses nothing, or at the new one.
@@ -26,6 +28,15 @@ fn question_of(member: u32, element: u32, mix: Mix, a: Stretch, old: bool) -> Qu
         q.lossy = true;
     }
     return q;
+}
+
+// The change of a dissipation's derivative without negative curvature by d: d in `input` is taken as if it were bilinear in both changes, and what that
+// alters has the sign of φ's second derivative times those of d's.
+fn majorised_change(law: u32, change: f32) -> f32 {
+    let both = input[0].y * input[0].z;
+    input[0].z = 0.0;
+    let without = cell_law(law, LOSS_PART).w;
+    return select(change, without, (change - without) * both < 0.0);
 }
 
 fn ask_laws(m: Member, member: u32, q: Question) -> Said {
@@ -61,7 +72,11 @@ fn ask_laws(m: Member, member: u32, q: Question) -> Said {
                 asked.first = unit * select(1.0, -1.0, q.by_past);
                 asked.first_past = unit * f32(q.by_past);
                 put_scalars(part, asked);
-                let v = cell_law(effect.law, part) * weight;
+                var v = cell_law(effect.law, part);
+                if loses && q.majorised {
+                    v.w = majorised_change(effect.law, v.w);
+                }
+                v *= weight;
                 // Components off the diagonal stand for two entries.
                 let half = unit * select(1.0, 0.5, c >= 3u);
                 said.value += select(0.0, v.x, c == 0u);

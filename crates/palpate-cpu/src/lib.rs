@@ -9,6 +9,8 @@ mod backend;
 mod collapse_tests;
 pub mod costs;
 mod kept;
+#[cfg(test)]
+mod kink_tests;
 pub mod linear;
 #[cfg(test)]
 mod local_bodies;

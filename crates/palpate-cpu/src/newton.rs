@@ -33,6 +33,9 @@ const KEEP_FACTOR: f64 = 0.3;
 /// Residual, over the forces, from which on a factor may serve again: further away contact sets in from one step to the next, and an old
 /// tangent does not know of it.
 const CLOSE: f64 = 0.01;
+/// A step of Newton's method that leaves more than this part of the residual is followed by one with the majorised tangent. Alone that one
+/// converges linearly, the exact one hops about kinks for dozens of steps: in turn they end within ten.
+const KINKED: f64 = 0.5;
 /// Share of the tolerance that steps with a factor from before must reach.
 const STRICT: f64 = 0.01;
 
@@ -120,6 +123,7 @@ pub fn solve(
     let mut history: Vec<f64> = Vec::new();
     let mut forcing = FIRST;
     let (mut kept, mut misled): (Option<TangentStiffness>, bool) = (None, false);
+    let mut first = Curvature::Exact;
     for _ in 0..most {
         if !is_finite(&residual) {
             return Err((FailureKind::NotFinite, format!("residual forces after {} Newton iterations", history.len())));
@@ -130,8 +134,9 @@ pub fn solve(
         // Steps with the last tangent converge linearly: they stop at the tolerance, where Newton's pass it by far.
         let again = kept.as_ref().is_some_and(|t| t.factor.is_some());
         let aim = if again { STRICT * tolerance } else { tolerance };
-        let (direction, norm, tangent) =
-            direction(equation, solvers, matrix, purpose, u1, &residual, forcing, aim, &mut scale, &mut level, effort, kept)?;
+        let (direction, norm, tangent) = direction(
+            equation, solvers, matrix, purpose, u1, &residual, first, forcing, aim, &mut scale, &mut level, effort, kept,
+        )?;
         let Some(direction) = direction else { return Ok(()) };
         history.push(norm);
         effort.newton += 1;
@@ -140,6 +145,9 @@ pub fn solve(
         if after <= aim * scale.unwrap_or(0.0) {
             return Ok(());
         }
+        // A step that leaves most of the residual has passed a kink of some dissipation, and so would the next, back again.
+        let passed = after > KINKED * norm && first == Curvature::Exact;
+        first = if passed { Curvature::Majorised } else { Curvature::Exact };
         misled |= again && after > KEEP_FACTOR * norm;
         let serves = match tangent.factor {
             Some(_) => !misled && after <= KEEP_FACTOR * norm && after <= CLOSE * scale.unwrap_or(0.0),
@@ -181,7 +189,7 @@ pub(crate) fn rounding(nodes: &[DVec3], means: impl IntoIterator<Item = f64>, u:
 
 /// Newton direction −A⁻¹ r, or `None` when the residual is small already; the residual's norm, and the tangent. Where the exact one is
 /// not positive definite one that is gives a descent direction instead. With an earlier tangent in `kept`, that one is used, and the
-/// matrix stays.
+/// matrix stays. `first` is the curvature to begin with.
 fn direction(
     equation: &Equation,
     solvers: &Solvers,
@@ -189,6 +197,7 @@ fn direction(
     purpose: Purpose,
     u1: &[DVec3],
     residual: &[DVec3],
+    first: Curvature,
     forcing: f64,
     tolerance: f64,
     scale: &mut Option<f64>,
@@ -196,7 +205,7 @@ fn direction(
     effort: &mut Effort,
     mut kept: Option<TangentStiffness>,
 ) -> Result<(Option<Nodes>, f64, TangentStiffness), Reason> {
-    for curvature in EVER_TAMER {
+    for curvature in [first, Curvature::Tamed, Curvature::Convex] {
         let last = curvature == Curvature::Convex;
         let mut tangent = match kept.take() {
             Some(tangent) => tangent,

@@ -309,6 +309,8 @@ pub struct Newton {
     pub stage: u32,
     /// 1: use the convex part of the tangent.
     pub convex: u32,
+    /// 1: use dissipation's tangent without negative curvature.
+    pub majorised: u32,
     /// Newton iterations so far.
     pub iteration: u32,
     /// Trials of the line search so far.

@@ -9,6 +9,7 @@ mod assembly;
 pub mod clamps;
 pub mod consistent;
 pub mod contact;
+mod curvature;
 pub mod elastic_cells;
 pub mod elastic_points;
 pub mod ghost;
@@ -48,6 +49,7 @@ use star_penalty::StarPenalty;
 use std::sync::OnceLock;
 use tet_laws::TetLaws;
 
+pub use curvature::Curvature;
 pub use elastic_cells::laws::{CellActing, cell_laws};
 pub use point_laws::{Acting, acting};
 
@@ -127,18 +129,6 @@ impl PastGradient {
     pub fn zero(n: usize, states: usize) -> PastGradient {
         PastGradient { u: zeros(n), v: zeros(n), each: vec![zeros(n); states] }
     }
-}
-
-/// How the tangent stiffness treats negative curvature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Curvature {
-    /// As it is.
-    Exact,
-    /// Without the negative eigenvalues of squeezed cells (Teran, Sifakis, Irving & Fedkiw, Robust quasistatic finite elements and
-    /// flesh simulation, SCA 2005).
-    Tamed,
-    /// Without all parts that may be indefinite: the second derivative of the rotation.
-    Convex,
 }
 
 /// What all terms read: one member and one solve.

@@ -183,7 +183,7 @@ impl Term for Obstacles<'_> {
             for t in self.touches(now, u1) {
                 let n = t.gaps[0].normal;
                 let mut block = DMat3::from_cols(n * n.x, n * n.y, n * n.z) * -t.slopes[0];
-                if curvature == Curvature::Exact {
+                if curvature.keeps() {
                     block -= t.gaps[0].hessian * t.pressure;
                 }
                 let (block, w) = (block * (now.stiffness * t.area), t.place.value);

@@ -268,7 +268,7 @@ impl Term for PointLaws<'_> {
             self.points(a, u1, |at| {
                 let h = at.point.hessian(&at.place, at.z);
                 let h = DMat3::from_cols_array_2d(&h);
-                if curvature != Curvature::Exact && !positive(h) {
+                if !curvature.keeps() && !positive(h) {
                     return;
                 }
                 let places = match (at.patch, at.driven) {

@@ -129,7 +129,7 @@ impl<'a> TetLaws<'a> {
     /// The laws at the new state.
     fn now(&self, el: Element, u1: &[DVec3]) -> (Stretch, Slopes) {
         let new = self.stretch(el, u1);
-        let slopes = self.laws.slopes(&new.value, self.past.get(el.e));
+        let slopes = self.laws.slopes(Curvature::Exact, &new.value, self.past.get(el.e));
         (new, slopes)
     }
 
@@ -236,12 +236,13 @@ impl Term for TetLaws<'_> {
 
     fn tangent(&self, u1: &[DVec3], curvature: Curvature, matrix: &mut Matrix) {
         let of = |el: Element| {
-            let (new, slopes) = self.now(el, u1);
+            let new = self.stretch(el, u1);
+            let slopes = self.laws.slopes(curvature, &new.value, self.past.get(el.e));
             let bend = Stretch::bend(&el.h(u1), &slopes.first);
             let image: [[f64; 6]; 9] = std::array::from_fn(|l| product(&slopes.second, &new.slopes.map(|row| row[l])));
             let entry = |k: usize, l: usize| bend[k][l] + (0..6).map(|c| new.slopes[c][k] * image[l][c]).sum::<f64>();
             let mut t: [[f64; 9]; 9] = std::array::from_fn(|k| std::array::from_fn(|l| el.scale * entry(k, l)));
-            if curvature != Curvature::Exact {
+            if !curvature.keeps() {
                 crate::linear::dense::without_negative_eigenvalues(&mut t);
             }
             t

@@ -18,6 +18,7 @@ mod labels;
 mod lanes;
 mod limits;
 mod loops;
+mod majorised;
 mod material_passes;
 mod materials;
 mod memory;

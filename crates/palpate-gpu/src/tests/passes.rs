@@ -1,10 +1,10 @@
 //! The passes of a step one by one, at one given state, against the same quantities of the CPU; each comparison must see one percent.
 
+use super::majorised::ask;
 use super::products::crowded;
 use super::scenes::{device, plan, solving_part};
 use crate::device::pipelines::pass;
-use crate::device::pipelines::shared::asks;
-use crate::device::pipelines::shared::solving::{EVEN_WAY, IMAGE};
+use crate::device::pipelines::shared::{asks, solving::EVEN_WAY, solving::IMAGE};
 use crate::passes::{ALL, Passes, Per};
 use crate::world::{SOLVING, State, World};
 use crate::{GpuBackend, Product};
@@ -121,6 +121,7 @@ pub(super) fn found(backend: &GpuBackend, plan: &Plan, right: &Exact) -> Vec<Par
     let residual = trial(1.0);
     let cells = 8 * plan.body.cells().len();
     let forces = if cells == 0 { Vec::new() } else { three(&get("cell_force", cells)) };
+    ask(world, right.curvature);
     step(world, &now, &next, &tally, |s| s.assemble(ALL));
     let placed: Vec<[f32; 4]> = world.gpu.download(&next.0.buffer, 2 * n).unwrap_or_else(|e| panic!("{e}"));
     let u1: Vec<DVec3> = vectors(&placed[..n]).iter().zip(vectors(&placed[n..])).map(|(a, b)| *a + b).collect();
@@ -174,6 +175,7 @@ fn step(world: &World, now: &State, next: &State, tally: &crate::Tally, work: im
 /// The CPU's numbers, and its matrix.
 pub(super) struct Exact {
     given: Given,
+    curvature: Curvature,
     pattern: Pattern,
     matrix: Matrix,
     parts: Vec<(&'static str, Vec<f64>)>,
@@ -183,7 +185,8 @@ pub(super) struct Exact {
 pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOnce(Context<'a>, &'a [DVec3]) -> T) -> T {
     let coefficients = Coefficients::new(plan, &plan.theta);
     let physics = &coefficients.physics;
-    let elements = Elements::new(plan, &Classes::new(plan), physics.poisson_ratio);
+    let of = |ratio: f64| Elements::new(plan, &Classes::new(plan), ratio);
+    let (elements, strains) = (of(physics.poisson_ratio), plan.layout.is_viscous().then(|| of(0.0)));
     let pattern = Pattern::of(plan);
     let places = Places::new(plan, &pattern);
     let altered = Altered::new(plan, &coefficients, &elements);
@@ -198,7 +201,7 @@ pub(super) fn with_context<T>(plan: &Plan, given: Given, work: impl for<'a> FnOn
         pattern: &pattern,
         places: &places,
         elements: &elements,
-        strains: None,
+        strains: strains.as_ref(),
         coefficients: &coefficients,
         masses: &masses,
         springs: &springs,
@@ -223,10 +226,15 @@ fn placed(c: &Context, given: Given, length: f64) -> Vec<DVec3> {
 
 impl Exact {
     pub(super) fn new(plan: &Plan, given: Given) -> Exact {
-        with_context(plan, given, |c, u1| Exact::of(c, u1, given))
+        Exact::curved(plan, given, Curvature::Exact)
     }
 
-    fn of(c: Context, u1: &[DVec3], given: Given) -> Exact {
+    /// The same with tangents of another curvature.
+    pub(super) fn curved(plan: &Plan, given: Given, curvature: Curvature) -> Exact {
+        with_context(plan, given, |c, u1| Exact::of(c, u1, given, curvature))
+    }
+
+    fn of(c: Context, u1: &[DVec3], given: Given, curvature: Curvature) -> Exact {
         let Context { plan, elements, altered, weights, .. } = c;
         let physics = c.physics();
         let u_half = placed(&c, given, 0.5);
@@ -260,11 +268,11 @@ impl Exact {
         // On the device inertia is kept out of the matrix.
         let mut weightless = Equation::new(Context { inertia: c.inertia.map(|t| Rates { displacement: 0.0, ..t }), ..c });
         weightless.residual(u1);
-        weightless.tangent(u1, Curvature::Exact, &mut light);
-        whole.tangent(u1, Curvature::Exact, &mut matrix);
+        weightless.tangent(u1, curvature, &mut light);
+        whole.tangent(u1, curvature, &mut matrix);
         // Rows of blocks, as the device keeps them.
         let values = light.values.iter().flat_map(|b| b.transpose().to_cols_array()).collect();
-        let mut exact = Exact { given, pattern: Pattern::of(plan), matrix, parts: Vec::new() };
+        let mut exact = Exact { given, curvature, pattern: Pattern::of(plan), matrix, parts: Vec::new() };
         let load = exact.scaled(&load(plan));
         exact.parts = vec![
             ("place_next", flat(u1)),
@@ -336,7 +344,7 @@ pub(super) fn scene() -> Scene {
 }
 
 /// Laws of cells, strong beside the material.
-fn lawful() -> Scene {
+pub(super) fn lawful() -> Scene {
     let mut s = crowded();
     for (kind, value) in
         [("strain-stiffening", 60.0), ("transverse-anisotropy", 2.0), ("power-law-viscosity", 0.2), ("structural-damping", 1.0)]

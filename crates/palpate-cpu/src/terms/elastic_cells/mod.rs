@@ -217,7 +217,7 @@ impl<'a> ElasticCells<'a> {
                     Some(k) => pose.upper_hessian(&k, 1.0, (!convex).then_some(&both), out),
                     None => pose.upper_hessian(self.cells.stiffness(e), scale + state.scale, (!convex).then_some(&both), out),
                 }
-                laws.add_upper_tangent(e, pose, state, convex.then_some(scale + state.scale), out);
+                laws.add_upper_tangent(e, pose, &state.of(curvature), convex.then_some(scale + state.scale), out);
             }
             _ => pose.upper_hessian(self.cells.stiffness(e), scale, (!convex).then_some(stress), out),
         }

@@ -15,6 +15,11 @@ pub(super) struct Tangents<'a, 'b> {
 impl ElasticPoints<'_> {
     /// ∂P/∂F of a point at the new state [Pa].
     pub(super) fn tangent_of(&self, point: &Point, u1: &[DVec3]) -> [[f64; 9]; 9] {
+        self.tangent_with(Curvature::Exact, point, u1)
+    }
+
+    /// The same with the curvature of dissipation that is wanted.
+    fn tangent_with(&self, curvature: Curvature, point: &Point, u1: &[DVec3]) -> [[f64; 9]; 9] {
         let (w, Point { e, moduli: (lambda, mu), .. }) = (self.c.weights_of(point.element), point);
         let h = point.h(u1);
         let f = h + DMat3::IDENTITY;
@@ -28,7 +33,7 @@ impl ElasticPoints<'_> {
             let g = green(h) - self.past[*e];
             let [_, first, second] = law.loss(contract(g, g), rate);
             add_rate(&mut tangent, f, g * (2.0 * first), (0.0, first));
-            let along = rows(f * g);
+            let (along, second) = (rows(f * g), curvature.of_dissipation(second));
             for (k, row) in tangent.iter_mut().enumerate() {
                 (0..9).for_each(|l| row[l] += 4.0 * second * along[k / 3][k % 3] * along[l / 3][l % 3]);
             }
@@ -40,8 +45,8 @@ impl ElasticPoints<'_> {
 impl Tangents<'_, '_> {
     /// The same times the point's volume, with the curvature that is wanted.
     fn tangent(&self, point: &Point) -> [[f64; 9]; 9] {
-        let mut tangent = self.term.tangent_of(point, self.u1);
-        if self.curvature != Curvature::Exact {
+        let mut tangent = self.term.tangent_with(self.curvature, point, self.u1);
+        if !self.curvature.keeps() {
             crate::linear::dense::without_negative_eigenvalues(&mut tangent);
         }
         tangent.map(|r| r.map(|t| t * point.v))

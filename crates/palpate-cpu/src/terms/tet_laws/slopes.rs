@@ -1,6 +1,7 @@
 //! What laws of cells say of a strain: potential and its derivatives by ε₁ and ε̃, over E.
 
 use super::{dot, plus};
+use crate::terms::Curvature;
 use crate::terms::elastic_cells::laws::material::{linear_stress, linear_tangent};
 use crate::terms::elastic_cells::laws::{CellActing, input};
 use palpate_model::effects::cell::{ENERGY, Part};
@@ -130,8 +131,8 @@ impl<'a> Laws<'a> {
         (first, second)
     }
 
-    /// All derivatives of θ ψ + φ.
-    pub(super) fn slopes(&self, strain: &Six, past: Option<&Six>) -> Slopes {
+    /// All derivatives of θ ψ + φ; the second ones by the strain with the curvature that is wanted.
+    pub(super) fn slopes(&self, curvature: Curvature, strain: &Six, past: Option<&Six>) -> Slopes {
         let (first, second) = self.energy_slopes(strain);
         let mut all = Slopes {
             first: first.map(|f| self.new * f),
@@ -146,7 +147,7 @@ impl<'a> Laws<'a> {
             let [by_d, _, by_dd] = l.law.slopes(self.loss(), &z[..len], 0, 0);
             let by_da = l.law.slopes(self.loss(), &z[..len], 0, 1)[2];
             all.first = plus(all.first, by_d, by_change);
-            outer(&mut all.second, by_dd, &by_change, &by_change);
+            outer(&mut all.second, curvature.of_dissipation(by_dd), &by_change, &by_change);
             outer(&mut all.by_past, -by_dd, &by_change, &by_change);
             outer(&mut all.by_past, by_da, &by_change, &by_past);
             for c in 0..6 {

@@ -2,7 +2,8 @@
 //!
 //! That mean is twice d = ½ (q₁ − q̃)ᵀK₀(q₁ − q̃)/V, with K₀ the matrix for E = 1 and ν = 0, whose energy is ½|ε|². No modulus scales it.
 
-use super::{CellLaws, Local, Side, V24, add, dot, multiply};
+use super::{CellLaws, LawState, Local, Side, V24, add, dot, multiply};
+use crate::terms::Curvature;
 use palpate_model::cutcells::corotation::M24;
 use palpate_model::cutcells::elements::Elements;
 use palpate_model::materials::viscosity::Viscosity;
@@ -45,6 +46,18 @@ impl Flow {
     /// For a cell of this volume.
     pub fn state(&self, volume: f64) -> FlowState {
         FlowState { scale: self.by_d, kd: self.kd, second: self.by_dd / volume }
+    }
+}
+
+impl LawState {
+    /// With the curvature of what dissipates that a tangent asks for.
+    pub(in crate::terms::elastic_cells) fn of(&self, curvature: Curvature) -> LawState {
+        let mut state = *self;
+        state.loss.1 = curvature.of_dissipation(state.loss.1);
+        if let Some(flow) = &mut state.flow {
+            flow.second = curvature.of_dissipation(flow.second);
+        }
+        state
     }
 }
 
