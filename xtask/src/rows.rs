@@ -2,6 +2,8 @@
 
 use crate::real::report::Made;
 use crate::table;
+use cpu_time::ProcessTime;
+use palpate::Clock;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::OpenOptions;
@@ -94,6 +96,12 @@ pub fn measured(of: Measured) -> Result<Made, String> {
     let differs = if git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty() { "" } else { "+" };
     let (commit, files) = (git(&["log", "-1", "--format=%h"])?, git(&["ls-files", "--stage"])?);
     Ok(Made { date: table::today(), commit: commit + differs, code: format!("{:016x}{differs}", hash(&files)) })
+}
+
+/// Time that all processors together have spent on this process: what else a machine does must not decide what is found.
+pub fn processor_clock() -> Clock {
+    let began = ProcessTime::now();
+    Clock::new(move || began.elapsed())
 }
 
 /// A number that spreads names evenly, the order in which slices run: FNV-1a with the finaliser of MurmurHash3, without which names that

@@ -71,6 +71,12 @@ struct Shape {
     markers: Vec<(String, [f64; 3])>,
 }
 
+/// True where the scene of a body, by its number or its seed, states the material that the recorded body has. The others state the default: both are
+/// the same for small strains.
+pub fn states_its_material(number: u64) -> bool {
+    !number.is_multiple_of(2)
+}
+
 /// The true body of a kind and number.
 pub fn truth(kind: usize, number: u64) -> Truth {
     let seed = 1_000 * (kind as u64 + 1) + number;
@@ -85,8 +91,7 @@ pub fn truth(kind: usize, number: u64) -> Truth {
     let density = d.log(300.0, 1200.0);
     let modulus = density * 9.81 * size * shape.stiff;
     let (nu, beta) = (d.between(0.3, 0.42), d.log(0.002, 0.006));
-    // Both laws are the same for small strains; the recorded body has the second.
-    let model = if number.is_multiple_of(2) { "corotated-linear" } else { "stable-neo-hookean" };
+    let model = if states_its_material(number) { "stable-neo-hookean" } else { "corotated-linear" };
     let touches = kind >= 3;
     let (step, steps) = if touches { (0.005, 50) } else { (0.008, 36) };
     let body = format!(

@@ -1,5 +1,6 @@
 //! How many truths lie inside intervals: `bench/coverage.json` and the table of `docs/coverage.md`.
 
+use super::bodies;
 use crate::real::report::Made;
 use crate::{rows, table};
 use serde::{Deserialize, Serialize};
@@ -68,7 +69,7 @@ pub fn line(r: &Row) -> String {
 pub struct Line {
     /// What is counted: a number, a body, sensors, or everything.
     pub of: String,
-    /// Commit that was measured.
+    /// Commit that was measured, or the first and the last of several.
     pub commit: String,
     /// Numbers that were found by fits that converged.
     pub numbers: usize,
@@ -94,7 +95,16 @@ fn median(mut v: Vec<f64>) -> Option<f64> {
     (!v.is_empty()).then(|| 0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2]))
 }
 
-fn count(of: &str, commit: &str, all: &[&Row]) -> Line {
+/// Commits of rows, the newest first.
+fn commits(all: &[&Row]) -> String {
+    match (all.last(), all.first()) {
+        (Some(a), Some(b)) if a.made.commit != b.made.commit => format!("{} to {}", a.made.commit, b.made.commit),
+        (Some(a), _) => a.made.commit.clone(),
+        _ => String::new(),
+    }
+}
+
+fn count(of: &str, all: &[&Row]) -> Line {
     let z: Vec<f64> = all.iter().filter_map(|r| r.off()).collect();
     let n = z.len().max(1) as f64;
     let inside = INTERVALS.map(|(_, reach)| z.iter().filter(|z| z.abs() <= reach).count() as f64 / n);
@@ -105,7 +115,7 @@ fn count(of: &str, commit: &str, all: &[&Row]) -> Line {
     let relative = |r: &&&Row| Some((r.value? / r.truth - 1.0).abs()).filter(|_| r.off().is_some() && r.truth != 0.0);
     Line {
         of: of.into(),
-        commit: commit.into(),
+        commit: commits(all),
         numbers: z.len(),
         truths: truths.len(),
         others: all.len() - z.len(),
@@ -117,25 +127,29 @@ fn count(of: &str, commit: &str, all: &[&Row]) -> Line {
     }
 }
 
-/// The table of the last commit that was measured: everything, then by number, by body and by sensors.
+/// The table of the last row of every trial and number: scenes with the recording's material, all and by number, by body and by sensors; then those
+/// with another material, all and by body.
 pub fn lines(all: &[Row]) -> Vec<Line> {
-    let Some(made) = all.last().map(|r| r.made.clone()) else { return Vec::new() };
-    // The last row of every trial and number.
     let mut of: Vec<&Row> = Vec::new();
-    for r in all.iter().rev().filter(|r| r.made.is_same(&made)) {
+    for r in all.iter().rev() {
         if !of.iter().any(|o| (&o.case, &o.parameter) == (&r.case, &r.parameter)) {
             of.push(r);
         }
     }
-    let mut out = vec![count("everything", &made.commit, &of)];
+    let (own, other): (Vec<&Row>, Vec<&Row>) = of.into_iter().partition(|r| bodies::states_its_material(r.seed / 100));
     let by: [fn(&Row) -> &str; 3] = [|r| &r.parameter, |r| &r.body, |r| &r.sensors];
-    for key in by {
-        let mut names: Vec<&str> = of.iter().map(|r| key(r)).collect();
-        names.sort_unstable();
-        names.dedup();
-        for name in names {
-            let part: Vec<&Row> = of.iter().copied().filter(|r| key(r) == name).collect();
-            out.push(count(name, &made.commit, &part));
+    let mut out = Vec::new();
+    for (name, all, by) in [("all", &own, &by[..]), ("another material", &other, &by[1..2])] {
+        out.extend((!all.is_empty()).then(|| count(name, all)));
+        for key in by {
+            let mut parts: Vec<&str> = all.iter().map(|r| key(r)).collect();
+            parts.sort_unstable();
+            parts.dedup();
+            for part in parts {
+                let rows: Vec<&Row> = all.iter().copied().filter(|r| key(r) == part).collect();
+                let name = if name == "all" { part.into() } else { format!("{name}: {part}") };
+                out.push(count(&name, &rows));
+            }
         }
     }
     out
@@ -214,7 +228,7 @@ mod tests {
             made: Made::default(),
             case: format!("case {k}"),
             body: "ball".into(),
-            seed: 100 * k,
+            seed: 100 * (2 * k + 1),
             set: "E".into(),
             sensors: "markers".into(),
             noise: 1e-3,
@@ -239,5 +253,12 @@ mod tests {
         // A trial that was measured again counts once, as it was last.
         let again: Vec<Row> = all.iter().cloned().chain([row(4, 10.0, "converged")]).collect();
         assert_eq!(lines(&again)[0].inside, [0.5, 0.75, 1.0]);
+        // Bodies whose scenes state another material stand apart.
+        let other = Row { seed: 1400, ..row(9, 99.0, "converged") };
+        let apart = lines(&again.into_iter().chain([other]).collect::<Vec<_>>());
+        let named = |l: &Line| (l.of.clone(), l.numbers, l.inside[2]);
+        assert_eq!((named(&apart[0]), apart[0].others), (("all".into(), 4, 1.0), 1));
+        let last: Vec<_> = apart[apart.len() - 2..].iter().map(named).collect();
+        assert_eq!(last, [("another material".into(), 1, 0.0), ("another material: ball".into(), 1, 0.0)]);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::report::Made;
 use super::{open, studies};
+use crate::rows;
 use palpate::{DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
 use palpate_diagnose::{FoundNumber, in_words, stated};
 use serde::{Deserialize, Serialize};
@@ -9,8 +10,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-/// Time for one diagnosis: what was not tried then is said.
-const BUDGET: Duration = Duration::from_secs(18 * 60);
+/// Time for one diagnosis, of all processors together: what was not tried then is said.
+const BUDGET: Duration = Duration::from_secs(36 * 60);
 
 /// Most numbers of an effect that its row of the table says.
 const FEW: usize = 4;
@@ -182,7 +183,12 @@ pub fn measure(
             })
             .collect::<Result<Vec<Experiment>, Error>>()?;
         let mut say = |what: &str| eprintln!("{}: {what}", case.name);
-        let options = DiagnoseOptions { budget: Some(BUDGET), on_progress: Some(&mut say), ..DiagnoseOptions::default() };
+        let options = DiagnoseOptions {
+            budget: Some(BUDGET),
+            clock: rows::processor_clock(),
+            on_progress: Some(&mut say),
+            ..DiagnoseOptions::default()
+        };
         let found = answer(&case, made, &diagnose(&experiments, None, options)?);
         println!("{}: {} ({:.0} s)", case.name, found.sentence, found.seconds);
         stored.retain(|a| a.name != case.name);

@@ -4,8 +4,8 @@ use super::ablation;
 use super::answer::Answer;
 use super::baselines;
 use super::case::Recorded;
-use cpu_time::ProcessTime;
-use palpate::{Backend, Clock, DiagnoseOptions, Error, diagnose};
+use crate::rows;
+use palpate::{Backend, DiagnoseOptions, Error, diagnose};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -50,9 +50,7 @@ impl Method {
         budget: Duration,
         say: &mut (dyn FnMut(&str) + Send),
     ) -> Result<Answer, Error> {
-        // Time of processors: what else a machine does must not decide what is found.
-        let began = ProcessTime::now();
-        let clock = Clock::new(move || began.elapsed());
+        let clock = rows::processor_clock();
         let timed = |a: Answer| Answer { seconds: clock.elapsed().as_secs_f64(), ..a };
         match self {
             Method::Plain => baselines::plain(case, &recorded.seen).map(timed),
