@@ -219,7 +219,7 @@ pub struct Diagnosis {
     pub predicted: (f64, f64),
     /// Share of the gap that is closed.
     pub gap_closed: f64,
-    /// What any load could explain of what is left; only for unexplained residuals.
+    /// What any load could explain of what the corrected model leaves; only for unexplained residuals.
     pub slack: Option<Slack>,
     /// Noise of single readings over the stated one.
     pub noise_ratio: f64,
@@ -245,9 +245,11 @@ impl Diagnosis {
         let apart =
             format!("measurement and model are {} apart, noise and grid explain {}", mm(self.before.rms), mm(self.before.noise));
         let place = self.places.first().map_or(String::new(), |w| format!(", mostly at: {}", w.region));
-        let slack = self.slack.as_ref().map_or(String::new(), |s| {
-            format!("; a free load would explain {:.0} % of what is left and {}", 100.0 * s.share, s.words())
-        });
+        let slack = |begin: &str, end: &str| {
+            let say =
+                |s: &Slack| format!("{begin} would explain {:.0} % of what is left and {}{end}", 100.0 * s.share, s.words());
+            self.slack.as_ref().map_or(String::new(), say)
+        };
         match self.verdict {
             Verdict::Adequate => format!("Nothing is missing that these data could show: {apart}."),
             Verdict::Undecided if self.unsure.is_some() => {
@@ -256,9 +258,9 @@ impl Diagnosis {
                 format!("Nothing is decided: {why}; so far {apart}{close}.{}", self.open())
             }
             Verdict::Unexplained if self.effects.iter().any(|e| e.accepted) => {
-                let added = self.added();
+                let (added, load) = (self.added(), slack(" A free load", "."));
                 format!(
-                    "Something is missing that no known effect explains: {apart}{place}{slack}. The nearest that is known: {added}"
+                    "Something is missing that no known effect explains: {apart}{place}. The nearest that is known: {added}{load}"
                 )
             }
             Verdict::Unexplained | Verdict::Undecided => {
@@ -274,7 +276,7 @@ impl Diagnosis {
                 // Where what is left has no structure, candidates that promise something are why the search went on.
                 let what =
                     if self.remains || !self.effects.is_empty() { "Something is missing" } else { "Something may be missing" };
-                format!("{what}{why}: {apart}{place}; {close}{slack}.{open}")
+                format!("{what}{why}: {apart}{place}; {close}{}.{open}", slack("; a free load", ""))
             }
             Verdict::MissingEffect => {
                 let caution = if self.remains { self.caution() } else { String::new() };

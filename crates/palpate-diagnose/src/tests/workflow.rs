@@ -171,6 +171,9 @@ fn an_answer_that_surely_leaves_something_says_so_and_is_none_where_time_cut_the
     assert_eq!((whole.verdict, kept.as_slice()), (Verdict::Unexplained, ["uniform-force"].as_slice()), "{}", whole.sentence());
     assert!(whole.model.changes.len() == 1 && whole.after.rms < 0.2 * whole.before.rms, "{}", whole.sentence());
     assert!(whole.sentence().contains(". The nearest that is known: "), "{}", whole.sentence());
+    // Of what the force leaves, which is the magnet's: a load would explain all of the force.
+    let share = whole.slack.as_ref().map_or(1.0, |s| s.share);
+    assert!(share < 0.8 && whole.sentence().contains(" A free load would explain "), "{share}: {}", whole.sentence());
     // What there was no time for may explain it better.
     let hurried = answer(vec!["depth-bias"]);
     assert_eq!(hurried.verdict, Verdict::Undecided, "{}", hurried.sentence());

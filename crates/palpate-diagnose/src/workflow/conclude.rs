@@ -82,10 +82,10 @@ impl Session<'_> {
             _ if stopped => Verdict::Undecided,
             _ => Verdict::Unexplained,
         };
-        // Of all that is missing, not of what a rejected explanation leaves.
-        let slack = if verdict == Verdict::Unexplained { self.slack_or_why(&base) } else { None };
         // Less than half of an explanation is shown, but not believed.
         let dropped = verdict == Verdict::Unexplained && !stays;
+        let answer = if dropped { &base } else { &state };
+        let slack = if verdict == Verdict::Unexplained { self.slack_or_why(answer) } else { None };
         let mut caveats =
             caveats(held_out, !out.accepted.is_empty() && !dropped, base.elsewhere.as_ref().or(state.elsewhere.as_ref()));
         let strange = if dropped { &base.strange } else { &state.strange };

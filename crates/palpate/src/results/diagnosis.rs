@@ -41,7 +41,7 @@ pub struct DiagnosisDocument {
     pub movements: Vec<Movement>,
     /// Numbers that leave the known world or end at a bound.
     pub strange: Vec<Strange>,
-    /// What any load could explain; only where nothing else does.
+    /// What any load could explain of what the corrected model leaves; only where the verdict is unexplained.
     pub slack: Option<Slack>,
     /// Residual map, block by block.
     pub map: Vec<MapEntry>,
