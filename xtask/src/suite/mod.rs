@@ -220,20 +220,29 @@ fn calibrate(mut list: List, options: &Options) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes recordings and scenes of cases for methods of others.
+/// Writes recordings and scenes of cases for methods of others. A case that cannot be recorded does not keep the others from it.
 fn record(cases: &[Case], folder: &Path) -> Result<(), String> {
+    let mut failed = Vec::new();
     for (i, c) in cases.iter().enumerate() {
         let place = folder.join(c.name.replace(' ', "-"));
-        std::fs::create_dir_all(&place).map_err(|e| format!("{}: {e}", place.display()))?;
         println!("{}/{} {}", i + 1, cases.len(), place.display());
-        c.record(&place).map_err(|e| format!("{}: {e}", c.name))?;
-        let setup = c.setup().map_err(|e| e.to_string())?;
-        for (name, other) in [("seen", false), ("other", true)].into_iter().filter(|(_, other)| !other || c.held_out) {
-            let file = place.join(format!("{name}.toml"));
-            std::fs::write(&file, setup.text(Path::new(name), other)).map_err(|e| format!("{}: {e}", file.display()))?;
+        if let Err(why) = record_one(c, &place) {
+            println!("  {why}");
+            failed.push(c.name.as_str());
         }
     }
-    println!("\n{} cases; answers go to cargo xtask suite --score FILE (benchmark/README.md)", cases.len());
+    println!("\n{} cases; answers go to cargo xtask suite --score FILE (benchmark/README.md)", cases.len() - failed.len());
+    if failed.is_empty() { Ok(()) } else { Err(format!("not recorded: {}", failed.join(", "))) }
+}
+
+fn record_one(c: &Case, place: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(place).map_err(|e| format!("{}: {e}", place.display()))?;
+    c.record(place).map_err(|e| e.to_string())?;
+    let setup = c.setup().map_err(|e| e.to_string())?;
+    for (name, other) in [("seen", false), ("other", true)].into_iter().filter(|(_, other)| !other || c.held_out) {
+        let file = place.join(format!("{name}.toml"));
+        std::fs::write(&file, setup.text(Path::new(name), other)).map_err(|e| format!("{}: {e}", file.display()))?;
+    }
     Ok(())
 }
 
