@@ -98,6 +98,15 @@ pub fn measured(of: Measured) -> Result<Made, String> {
     Ok(Made { date: table::today(), commit: commit + differs, code: format!("{:016x}{differs}", hash(&files)) })
 }
 
+/// The commit of rows in the order in which they were measured, or the first and the last of several; a dash of none.
+pub fn commits<'a>(mut all: impl DoubleEndedIterator<Item = &'a str>) -> String {
+    match (all.next(), all.next_back()) {
+        (None, _) => "–".into(),
+        (Some(first), Some(last)) if first != last => format!("{first} to {last}"),
+        (Some(one), _) => one.into(),
+    }
+}
+
 /// Time that all processors together have spent on this process: what else a machine does must not decide what is found.
 pub fn processor_clock() -> Clock {
     let began = ProcessTime::now();

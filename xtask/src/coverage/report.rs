@@ -95,15 +95,7 @@ fn median(mut v: Vec<f64>) -> Option<f64> {
     (!v.is_empty()).then(|| 0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2]))
 }
 
-/// Commits of rows, the newest first.
-fn commits(all: &[&Row]) -> String {
-    match (all.last(), all.first()) {
-        (Some(a), Some(b)) if a.made.commit != b.made.commit => format!("{} to {}", a.made.commit, b.made.commit),
-        (Some(a), _) => a.made.commit.clone(),
-        _ => String::new(),
-    }
-}
-
+/// A line of rows, the newest first.
 fn count(of: &str, all: &[&Row]) -> Line {
     let z: Vec<f64> = all.iter().filter_map(|r| r.off()).collect();
     let n = z.len().max(1) as f64;
@@ -115,7 +107,7 @@ fn count(of: &str, all: &[&Row]) -> Line {
     let relative = |r: &&&Row| Some((r.value? / r.truth - 1.0).abs()).filter(|_| r.off().is_some() && r.truth != 0.0);
     Line {
         of: of.into(),
-        commit: commits(all),
+        commit: rows::commits(all.iter().rev().map(|r| r.made.commit.as_str())),
         numbers: z.len(),
         truths: truths.len(),
         others: all.len() - z.len(),
@@ -139,16 +131,15 @@ pub fn lines(all: &[Row]) -> Vec<Line> {
     let (own, other): (Vec<&Row>, Vec<&Row>) = of.into_iter().partition(|r| bodies::states_its_material(r.seed / 100));
     let by: [fn(&Row) -> &str; 3] = [|r| &r.parameter, |r| &r.body, |r| &r.sensors];
     let mut out = Vec::new();
-    for (name, all, by) in [("all", &own, &by[..]), ("another material", &other, &by[1..2])] {
-        out.extend((!all.is_empty()).then(|| count(name, all)));
+    for (title, prefix, all, by) in [("all", "", &own, &by[..]), ("another material", "another material: ", &other, &by[1..2])] {
+        out.extend((!all.is_empty()).then(|| count(title, all)));
         for key in by {
             let mut parts: Vec<&str> = all.iter().map(|r| key(r)).collect();
             parts.sort_unstable();
             parts.dedup();
             for part in parts {
                 let rows: Vec<&Row> = all.iter().copied().filter(|r| key(r) == part).collect();
-                let name = if name == "all" { part.into() } else { format!("{name}: {part}") };
-                out.push(count(&name, &rows));
+                out.push(count(&format!("{prefix}{part}"), &rows));
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::case::GROUPS;
 use super::score::Row;
-use crate::table;
+use crate::{rows, table};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -150,15 +150,6 @@ const HEAD: [&str; 11] = [
     "E off, before → after",
 ];
 
-/// The commit that was measured, or the first and the last of several.
-fn measured(commits: &[(String, usize)]) -> String {
-    match commits {
-        [] => "–".into(),
-        [(one, _)] => one.clone(),
-        [(first, _), .., (last, _)] => format!("{first} to {last}"),
-    }
-}
-
 fn cells(l: &Line) -> Vec<String> {
     let percent = |x: Option<f64>| match x {
         None => "–".to_string(),
@@ -168,7 +159,7 @@ fn cells(l: &Line) -> Vec<String> {
     vec![
         l.group.clone(),
         l.method.clone(),
-        measured(&l.commits),
+        rows::commits(l.commits.iter().map(|c| c.0.as_str())),
         l.cases.to_string(),
         format!("{} ({:.0} %)", l.right, 100.0 * l.right as f64 / l.cases as f64),
         l.as_good.to_string(),
