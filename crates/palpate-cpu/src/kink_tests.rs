@@ -5,11 +5,11 @@ use crate::collapse_tests;
 use crate::linear::matrix::{Matrix, Operator, Packed};
 use crate::linear::vector::dot;
 use crate::local_bodies::tetrahedra;
+use crate::local_tests::world;
 use crate::simulate;
 use crate::terms::{Curvature, zeros};
-use crate::world::World;
+use crate::world::{MemberState, World};
 use glam::DVec3;
-use palpate_engine::ParamBatch;
 use palpate_model::effects::{Effect, find};
 use palpate_model::observation::Observation;
 use palpate_model::plan::Plan;
@@ -62,9 +62,7 @@ fn the_majorised_tangent_lies_above_the_exact_one_and_is_it_without_dissipation(
         if !lossy {
             plan.theta[plan.layout.keys.iter().position(|k| k.spec().path.ends_with("loss")).unwrap()] = 0.0;
         }
-        let mut world = World::new(&plan);
-        world.set_params(&ParamBatch::from_rows(std::slice::from_ref(&plan.theta)));
-        let World { shared, members } = &mut world;
+        let World { shared, members } = &world(&plan, &plan.theta);
         let member = &members[0];
         let n = plan.body.nodes.len();
         // What clamps hold is too stiff to see the rest beside it.
@@ -76,7 +74,7 @@ fn the_majorised_tangent_lies_above_the_exact_one_and_is_it_without_dissipation(
                 .map(|x| 1e-3 * DVec3::from_array((k * 50.0 * (*x + DVec3::ONE)).to_array().map(f64::sin)))
                 .collect()
         };
-        let (old, u) = (crate::world::MemberState { u: wave(1.0), v: zeros(n) }, wave(1.3));
+        let (old, u) = (MemberState { u: wave(1.0), v: zeros(n) }, wave(1.3));
         let stage = &plan.clock.stages()[0];
         let start = simulate::Start::new(stage, &[&old]);
         let mut e = simulate::equation(shared, member, Some(stage), &start);

@@ -32,7 +32,7 @@ fn random(n: usize, size: f64, seed: u64) -> Vec<DVec3> {
     (0..n).map(|_| DVec3::new(next(), next(), next())).collect()
 }
 
-fn world(plan: &Plan, theta: &[f64]) -> World {
+pub(crate) fn world(plan: &Plan, theta: &[f64]) -> World {
     let mut w = World::new(plan);
     w.set_params(&ParamBatch::from_rows(&[theta.to_vec()]));
     w
