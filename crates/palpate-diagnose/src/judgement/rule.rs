@@ -4,7 +4,7 @@
 //! something may be missing in M S(M⁺) > S(M°), or three standard deviations from what is known: reason to search
 //! something is missing in M     S(M⁺) > S(M°), by more than three standard errors, or the same deviations
 //! an effect helps               S(M_j⁺) > S(M₀⁺), by more than three standard errors of elpd(M_j⁺) − elpd(M₀⁺)
-//! the one that is named         the largest S(M_j⁺) of those that help, where something may be missing in M₀
+//! the one that is named         the largest S(M_j⁺) of those that help, of those that stay if any do, where something may be missing in M₀
 //! as good as that               S lower by no more than two standard errors, or than ln O
 //! an effect stays               S(M_j⁺) − S(M₀⁺) > S*(M_j) − S(M_j⁺): it explains more than it leaves
 //! an explanation                effects that stay, and beside which nothing is missing
