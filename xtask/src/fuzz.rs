@@ -15,7 +15,7 @@ pub struct Row {
     pub target: String,
     /// What its damages were drawn with.
     pub seed: u64,
-    /// How long it ran [min].
+    /// How long a processor worked for it [min].
     pub minutes: f64,
     /// Damaged files that it read.
     pub files: u64,

@@ -3,18 +3,19 @@
 #[path = "../../../fuzz/src/lib.rs"]
 mod targets;
 
+use cpu_time::ProcessTime;
 use palpate::{Backend, Experiment};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use targets::TARGETS;
 
 /// Mutated files for every file of the corpus; `PALPATE_FUZZ_MINUTES` goes on for so long instead. `PALPATE_FUZZ_ONLY` names one target, and
 /// `PALPATE_FUZZ_SEED` draws other damages.
 const EXECUTIONS: usize = 150;
 
-/// Longest time that one small file may take: it announces something, and somebody believes it.
+/// Longest time of a processor that one small file may take: it announces something, and somebody believes it.
 const LONGEST: Duration = Duration::from_secs(20);
 
 /// Texts that readers trip over.
@@ -94,7 +95,7 @@ fn no_reader_panics_or_hangs_on_a_damaged_file() {
         let files = corpus(name);
         let mut random = ChaCha8Rng::seed_from_u64(seed * TARGETS.len() as u64 + number as u64);
         let run = |data: &[u8]| {
-            let begun = Instant::now();
+            let begun = ProcessTime::now();
             let kept = dir.path().join("last");
             std::fs::write(&kept, data).expect("writable");
             let done = std::panic::catch_unwind(|| target(dir.path(), data));
@@ -106,7 +107,7 @@ fn no_reader_panics_or_hangs_on_a_damaged_file() {
             }
         };
         files.iter().for_each(|f| run(f));
-        let (begun, mut done) = (Instant::now(), 0);
+        let (begun, mut done) = (ProcessTime::now(), 0);
         let share = all.map(|a| a / count as u32);
         while share.map_or(done < EXECUTIONS * files.len(), |s| begun.elapsed() < s) {
             let (of, with) = (random.random_range(0..files.len()), random.random_range(0..files.len()));
