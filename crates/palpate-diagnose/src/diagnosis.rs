@@ -38,7 +38,7 @@ impl Verdict {
 /// What is said of candidates that there was no time to score.
 pub(crate) const NOT_SCORED: &str = "not even scored";
 
-/// Candidates that a sentence names where they were not fitted.
+/// Candidates that were not fitted, and numbers of what helps most, that a sentence names.
 const TOLD: usize = 3;
 
 /// How far measurement and model are apart.
@@ -359,9 +359,19 @@ impl Diagnosis {
     }
 }
 
-/// The effect that came closest, in words.
+/// The effect that came closest, in words: its first numbers too, which is where an amplitude stands.
 fn helps(e: &Found) -> String {
-    format!("the known effect that helps most, {}, closes {:.0} % of the gap on data left out", e.kind, 100.0 * e.held_out_gain)
+    let (told, rest) = e.parameters.split_at(TOLD.min(e.parameters.len()));
+    let numbers = match (told.len(), rest.len()) {
+        (0, _) => String::new(),
+        (_, 0) => format!(" ({})", in_words(told)),
+        (_, more) => format!(" ({} and {more} more)", in_words(told)),
+    };
+    format!(
+        "the known effect that helps most, {}{numbers}, closes {:.0} % of the gap on data left out",
+        e.kind,
+        100.0 * e.held_out_gain
+    )
 }
 
 #[cfg(test)]
@@ -371,6 +381,32 @@ mod tests {
     fn slack(forces: &[[f64; 3]]) -> Slack {
         let window = |f: &[f64; 3]| SlackWindow { time: 0.0, values: f.iter().copied().chain([0.0; 14]).collect() };
         Slack { share: 0.8, windows: forces.iter().map(window).collect() }
+    }
+
+    #[test]
+    fn what_helps_most_is_told_with_its_first_numbers() {
+        let number = |name: &str| (format!("effect.0.{name}"), 0.024, Some(0.0011), "m".to_string());
+        let told = |names: &[&str]| {
+            helps(&Found {
+                kind: "depth-bias-part".into(),
+                sentence: String::new(),
+                parameters: names.iter().map(|n| number(n)).collect(),
+                nats: (254.0, 25.0),
+                held_out_gain: 0.94,
+                accepted: false,
+                indistinguishable_from: Vec::new(),
+                movements: Vec::new(),
+                separated_by: None,
+            })
+        };
+        let closes = ", closes 94 % of the gap on data left out";
+        let begins = |numbers: &str| format!("the known effect that helps most, depth-bias-part{numbers}{closes}");
+        assert_eq!(told(&[]), begins(""));
+        assert_eq!(told(&["bias"]), begins(" (bias 0.0240 ± 0.0011 m)"));
+        assert_eq!(
+            told(&["a", "b", "c", "d", "e"]),
+            begins(" (a 0.0240 ± 0.0011 m, b 0.0240 ± 0.0011 m, c 0.0240 ± 0.0011 m and 2 more)")
+        );
     }
 
     #[test]

@@ -177,7 +177,7 @@ fn an_answer_that_surely_leaves_something_says_so_and_is_none_where_time_cut_the
     // What there was no time for may explain it better.
     let hurried = answer(vec!["depth-bias"]);
     assert_eq!(hurried.verdict, Verdict::Undecided, "{}", hurried.sentence());
-    assert!(hurried.sentence().contains("the known effect that helps most, uniform-force,"), "{}", hurried.sentence());
+    assert!(hurried.sentence().contains("the known effect that helps most, uniform-force ("), "{}", hurried.sentence());
 }
 
 #[test]
