@@ -2,9 +2,10 @@
 
 use super::methods::Method;
 use super::score::Row;
-use crate::table;
+use crate::{rows, table};
 use palpate_diagnose::Policy;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// A change of the search.
 pub struct Ablation {
@@ -39,7 +40,7 @@ pub const ALL: [Ablation; 16] = [
 pub struct Line {
     /// What was changed.
     pub name: String,
-    /// Commit that was measured.
+    /// Commit that was measured, or the first and the last of several.
     pub commit: String,
     /// Cases that both answered.
     pub cases: usize,
@@ -49,19 +50,28 @@ pub struct Line {
     pub seconds: [f64; 2],
 }
 
-/// Every ablation against the search as it is, on the cases that both answered at the same commit.
+/// Every ablation against the search as it is, on the cases that the same code answered both ways: of each case the newest answers.
 pub fn lines(rows: &[Row]) -> Vec<Line> {
-    let plain: Vec<&Row> = rows.iter().filter(|r| r.method == Method::Palpate.name()).collect();
+    let newest = |method: Method| rows.iter().rev().filter(move |r| r.method == method.name());
     let mut out = Vec::new();
     for (k, a) in ALL.iter().enumerate() {
-        let mine = rows.iter().filter(|r| r.method == Method::Ablated(k).name());
-        let both: Vec<(&Row, &&Row)> =
-            mine.filter_map(|r| Some((r, plain.iter().rev().find(|p| p.case == r.case && p.made.is_same(&r.made))?))).collect();
-        let Some((last, _)) = both.last() else { continue };
-        let both: Vec<_> = both.iter().filter(|(r, _)| r.made.is_same(&last.made)).collect();
+        let mut seen = BTreeSet::new();
+        let as_it_is = |r: &Row| newest(Method::Palpate).find(|p| p.case == r.case && p.made.is_same(&r.made));
+        let both: Vec<(&Row, &Row)> = newest(Method::Ablated(k))
+            .filter_map(|r| Some((r, as_it_is(r)?)))
+            .filter(|(r, _)| seen.insert(r.case.as_str()))
+            .collect();
+        if both.is_empty() {
+            continue;
+        }
         let sum = |of: fn(&Row) -> f64| [both.iter().map(|b| of(b.0)).sum(), both.iter().map(|b| of(b.1)).sum()];
-        let (name, commit) = (a.name.into(), last.made.commit.clone());
-        out.push(Line { name, commit, cases: both.len(), score: sum(|r| r.score), seconds: sum(|r| r.seconds) });
+        out.push(Line {
+            name: a.name.into(),
+            commit: rows::commits(both.iter().rev().map(|b| b.0.made.commit.as_str())),
+            cases: both.len(),
+            score: sum(|r| r.score),
+            seconds: sum(|r| r.seconds),
+        });
     }
     out
 }
@@ -93,6 +103,39 @@ pub fn write(rows: &[Row]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cases_of_several_commits_are_counted_once_each_where_both_searches_answered() {
+        let row = |commit: &str, method: Method, case: &str, score: f64| -> Row {
+            let text = format!(
+                r#"{{"date":"2026-11-28","commit":"{commit}","code":"{commit}","method":"{}","case":"{case}","group":"strong",
+                "simulator":"cells","strength":9,"hidden":[],"verdict":"adequate","named":[],"as_good":[],"rank":null,"score":{score},
+                "size_error":null,"f1":null,"modulus_error":[0,0],"gap_closed":0,"missing":[0,0],"distance":[0,0,0],"points_at":null,
+                "seconds":60,"sentence":""}}"#,
+                method.name()
+            );
+            serde_json::from_str(&text).unwrap()
+        };
+        let (whole, changed) = (Method::Palpate, Method::Ablated(0));
+        let rows = [
+            row("aaaaaaa", whole, "ball", 1.0),
+            row("aaaaaaa", changed, "ball", 0.0),
+            row("aaaaaaa", whole, "beam", 1.0),
+            row("aaaaaaa", changed, "beam", 1.0),
+            // Again, and one that only the change has answered there.
+            row("bbbbbbb", whole, "ball", 1.0),
+            row("bbbbbbb", changed, "ball", 0.5),
+            row("bbbbbbb", changed, "rod", 0.0),
+        ];
+        let line = Line {
+            name: ALL[0].name.into(),
+            commit: "aaaaaaa to bbbbbbb".into(),
+            cases: 2,
+            score: [1.5, 2.0],
+            seconds: [120.0, 120.0],
+        };
+        assert_eq!(lines(&rows), [line]);
+    }
 
     #[test]
     fn every_ablation_changes_the_search_and_has_its_own_name() {
