@@ -6,6 +6,7 @@ use crate::rows;
 use palpate::{DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
 use palpate_diagnose::{FoundNumber, in_words, stated};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
@@ -210,7 +211,7 @@ pub fn markdown(all: &[Answer]) -> String {
     for a in all {
         let said = match a.effects.as_slice() {
             [] if a.closest.is_empty() => a.verdict.clone(),
-            [] => format!("{}; nearest: {}", a.verdict, a.closest.join(", ")),
+            [] => format!("{}; nearest: {}", a.verdict, once_each(&a.closest).join(", ")),
             effects => effects.iter().map(words).collect::<Vec<_>>().join("; "),
         };
         let nats = a.effects.iter().map(|e| format!("{:.0} ± {:.0}", e.nats.0, e.nats.1)).collect::<Vec<_>>().join("; ");
@@ -228,6 +229,12 @@ pub fn markdown(all: &[Answer]) -> String {
         );
     }
     out
+}
+
+/// Names in their order: the same number of two scenes is two candidates of one name.
+fn once_each(names: &[String]) -> Vec<&str> {
+    let mut seen = BTreeSet::new();
+    names.iter().map(String::as_str).filter(|n| seen.insert(*n)).collect()
 }
 
 fn words(e: &Effect) -> String {
