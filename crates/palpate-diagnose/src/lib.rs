@@ -29,7 +29,7 @@ pub use linear::least_squares;
 pub use locate::{Place, direction};
 pub use movement::Movement;
 pub use quantity::{millimetres, stated};
-pub use separation::{Separated, Separation};
+pub use separation::{Separated, Separation, Way};
 pub use workflow::{Options, Policy, diagnose};
 
 #[cfg(test)]

@@ -1,12 +1,28 @@
 //! Which measurement should be made next to tell what is named from what explains the data as well.
 
 use crate::quantity::millimetres;
+use glam::{DAffine3, DQuat, DVec3};
+
+/// How a measurement differs from the one that was made; by default in nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Way {
+    /// Where cameras stand that stand elsewhere: number, and pose, world from camera.
+    pub cameras: Vec<(u32, DAffine3)>,
+    /// Added to the velocity at the start [m/s].
+    pub push: DVec3,
+    /// Added to the angular velocity at the start [rad/s].
+    pub spin: DVec3,
+    /// Turns gravity.
+    pub turn: DQuat,
+}
 
 /// One measurement that could be made next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
-    /// What would be done.
+    /// What would be done, in words.
     pub measurement: String,
+    /// The same for a simulation.
+    pub way: Way,
     /// How far its readings of every rival would lie from those of the model that is named, root mean square [m], and the noise of a single
     /// such reading [m].
     pub differences: Vec<(f64, f64)>,
@@ -15,8 +31,10 @@ pub struct Separation {
 /// The measurement that tells what is named from most of its rivals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separated {
-    /// What would be done.
+    /// What would be done, in words.
     pub measurement: String,
+    /// The same for a simulation.
+    pub way: Way,
     /// Names of the rivals whose readings would differ by at least the noise of a single one; empty when none of the measurements tried tells
     /// any of them.
     pub from: Vec<String>,
@@ -42,7 +60,8 @@ impl Separated {
                 let chosen = names.iter().zip(&w.differences).filter(|(_, d)| told(d) == yes);
                 chosen.map(|(n, _)| n.clone()).collect::<Vec<String>>()
             };
-            Some(Separated { measurement: w.measurement.clone(), from: with(true), not_from: with(false), difference, noise })
+            let (measurement, way) = (w.measurement.clone(), w.way.clone());
+            Some(Separated { measurement, way, from: with(true), not_from: with(false), difference, noise })
         });
         let rank = |s: &Separated| (s.from.len(), s.difference / s.noise.max(1e-300));
         judged.reduce(|a, b| if rank(&b).partial_cmp(&rank(&a)) == Some(std::cmp::Ordering::Greater) { b } else { a })
@@ -70,7 +89,10 @@ mod tests {
     use super::*;
 
     fn way(measurement: &str, differences: &[f64]) -> Separation {
-        Separation { measurement: measurement.into(), differences: differences.iter().map(|d| (*d, 1e-3)).collect() }
+        let differences = differences.iter().map(|d| (*d, 1e-3)).collect();
+        // Told apart by their pushes below.
+        let way = Way { push: DVec3::X * measurement.len() as f64, ..Way::default() };
+        Separation { measurement: measurement.into(), way, differences }
     }
 
     #[test]
@@ -79,6 +101,7 @@ mod tests {
         let ways = [way("spin", &[9e-3, 0.5e-3]), way("view", &[2e-3, 4e-3]), way("drop", &[3e-3, 1.5e-3])];
         let best = Separated::best(&ways, &names).unwrap();
         assert_eq!((best.measurement.as_str(), best.difference, best.not_from.len()), ("view", 2e-3, 0));
+        assert_eq!(best.way, ways[1].way);
         assert_eq!(best.sentence(), "Next: view would tell it from a, b, by 2.000 mm where a reading has a noise of 1.000 mm.");
         // Where no measurement tells both, the one that tells one.
         let best = Separated::best(&ways[..1], &names).unwrap();

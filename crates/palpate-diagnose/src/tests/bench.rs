@@ -3,7 +3,7 @@
 use crate::change::Change;
 use crate::laboratory::*;
 use crate::linear::least_squares;
-use crate::separation::Separation;
+use crate::separation::{Separation, Way};
 use glam::DVec3;
 use palpate_engine::{ResidualRow, Source};
 use palpate_model::effects::{Effect, Unstated, find};
@@ -349,7 +349,8 @@ impl Laboratory for Bench {
     }
 
     fn separations(&mut self, _: &Model, rivals: &[&Model]) -> Vec<Separation> {
-        vec![Separation { measurement: "from twice the height".into(), differences: vec![(2.0 * NOISE, NOISE); rivals.len()] }]
+        let differences = vec![(2.0 * NOISE, NOISE); rivals.len()];
+        vec![Separation { measurement: "from twice the height".into(), way: Way::default(), differences }]
     }
 
     fn out_of_time(&self) -> bool {

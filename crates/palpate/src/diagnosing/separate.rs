@@ -10,7 +10,7 @@ use crate::residuals::spread;
 use crate::synthetic::read_depths;
 use crate::viewers::viewers;
 use glam::{DAffine3, DQuat, DVec3};
-use palpate_diagnose::{Model, Separation, direction};
+use palpate_diagnose::{Model, Separation, Way, direction};
 use palpate_engine::{Snapshot, Stop};
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::mechanics::rotation::Polar;
@@ -29,76 +29,63 @@ const FRAMES: usize = 12;
 /// Most columns and rows of a simulated depth image: differences of models are smooth.
 const PIXELS: usize = 96;
 
-/// Another way to load the body or to set it in motion.
-struct Trial {
-    what: String,
-    /// Added to the velocity at the start [m/s].
-    push: DVec3,
-    /// Added to the spin at the start [rad/s].
-    spin: DVec3,
-    /// Turns gravity.
-    turn: DQuat,
-}
-
 /// What several measurements would read of every rival, the models after the first, against the first one; those that could be simulated
 /// before `stop`.
 pub(super) fn separations(base: &[Experiment], backend: Backend, models: &[&Model], stop: &Stop) -> Vec<Separation> {
     let ready: Result<Vec<Prepared>, _> = models.iter().map(|m| prepare(base, &m.changes)).collect();
     let (Ok(ready), watch) = (ready, Watch::new(&base[0])) else { return Vec::new() };
     let mut out = Vec::new();
-    let simulate = |trial: &Trial| -> Option<Vec<Motion>> {
-        let one = |(m, r): (&&Model, &Prepared)| watch.motion(r, &m.values, trial, backend, stop);
+    let simulate = |way: &Way| -> Option<Vec<Motion>> {
+        let one = |(m, r): (&&Model, &Prepared)| watch.motion(r, &m.values, way, backend, stop);
         models.par_iter().zip(&ready).map(one).collect()
     };
-    let mut compare = |measurement: String, motions: &[Motion], cameras: &[(u32, Pinhole)], markers: bool| {
+    let mut compare = |measurement: String, way: Way, motions: &[Motion], cameras: &[(u32, Pinhole)], markers: bool| {
         let seen: Vec<Seen> = motions.par_iter().map(|m| watch.read(m, cameras, markers)).collect();
         let differences: Option<Vec<(f64, f64)>> = seen[1..].iter().map(|s| watch.apart(&seen[0], s)).collect();
-        out.extend(differences.map(|differences| Separation { measurement, differences }));
+        out.extend(differences.map(|differences| Separation { measurement, way, differences }));
     };
     if !watch.cameras.is_empty()
-        && let Some(motions) =
-            simulate(&Trial { what: String::new(), push: DVec3::ZERO, spin: DVec3::ZERO, turn: DQuat::IDENTITY })
+        && let Some(motions) = simulate(&Way::default())
     {
         for (what, cameras) in watch.views(&motions[0], base[0].up()) {
-            compare(what, &motions, &cameras, false);
+            let poses = cameras.iter().map(|(number, c)| (*number, c.world_from_camera)).collect();
+            compare(what, Way { cameras: poses, ..Way::default() }, &motions, &cameras, false);
         }
     }
-    for trial in trials(&base[0]) {
-        if let Some(motions) = simulate(&trial) {
-            compare(trial.what, &motions, &watch.cameras, true);
+    for (what, way) in trials(&base[0]) {
+        if let Some(motions) = simulate(&way) {
+            compare(what, way, &motions, &watch.cameras, true);
         }
     }
     out
 }
 
-/// Motions that start in another way, and loads from another side.
-fn trials(e: &Experiment) -> Vec<Trial> {
+/// Motions that start in another way, and loads from another side, in words and for a simulation.
+fn trials(e: &Experiment) -> Vec<(String, Way)> {
     let (low, high) = e.shape().bounds();
     let size = (high - low).max_element();
     let up = e.up();
     let side = up.any_orthonormal_vector();
     let gravity = e.scene.gravity;
     let speed = (2.0 * gravity.length().max(1.0) * size).sqrt();
-    let plain = |what: String| Trial { what, push: DVec3::ZERO, spin: DVec3::ZERO, turn: DQuat::IDENTITY };
+    let pushed = |push| Way { push, ..Way::default() };
+    let spun = |spin| Way { spin, ..Way::default() };
     let mut out = Vec::new();
     if e.plan.clock.moves() {
         let rate = speed / size;
-        let pushed = plain(format!("a push of {:.2} m/s sideways at the start", 0.5 * speed));
-        out.push(Trial { push: 0.5 * speed * side, ..pushed });
-        out.push(Trial { spin: rate * up, ..plain(format!("a spin of {rate:.1} rad/s about the vertical at the start")) });
-        out.push(Trial { spin: rate * side, ..plain(format!("a spin of {rate:.1} rad/s about a horizontal axis at the start")) });
+        out.push((format!("a push of {:.2} m/s sideways at the start", 0.5 * speed), pushed(0.5 * speed * side)));
+        out.push((format!("a spin of {rate:.1} rad/s about the vertical at the start"), spun(rate * up)));
+        out.push((format!("a spin of {rate:.1} rad/s about a horizontal axis at the start"), spun(rate * side)));
         if e.plan.clamps.is_empty() && !e.plan.planes.is_empty() {
-            out.push(Trial { push: -speed * up, ..plain(format!("a drop from {size:.2} m higher")) });
+            out.push((format!("a drop from {size:.2} m higher"), pushed(-speed * up)));
         }
     }
     // On the ground a body would slide away.
     if gravity != DVec3::ZERO && e.plan.planes.is_empty() {
         for (axis, angle) in [(side, FRAC_PI_2), (side.cross(up), FRAC_PI_2), (side, PI)] {
             let turn = DQuat::from_axis_angle(axis, angle);
-            out.push(Trial {
-                turn,
-                ..plain(format!("the setup turned, so that gravity pulls towards {}", direction(turn * gravity)))
-            });
+            let what = format!("the setup turned, so that gravity pulls towards {}", direction(turn * gravity));
+            out.push((what, Way { turn, ..Way::default() }));
         }
     }
     out
@@ -152,14 +139,14 @@ impl Watch {
     }
 
     /// Simulates a model of the first scene; `None` where that fails or is stopped.
-    fn motion(&self, ready: &Prepared, values: &[f64], trial: &Trial, backend: Backend, stop: &Stop) -> Option<Motion> {
+    fn motion(&self, ready: &Prepared, values: &[f64], way: &Way, backend: Backend, stop: &Stop) -> Option<Motion> {
         let plan = Plan { observation: self.observation.clone(), ..ready.experiments[0].plan.clone() };
         let mut theta = ready.theta(0, values);
         let place = |key| plan.layout.index(key);
-        let gravity = trial.turn * DVec3::from_array([0u8, 1, 2].map(|a| theta[place(ParamKey::Gravity(a))]));
+        let gravity = way.turn * DVec3::from_array([0u8, 1, 2].map(|a| theta[place(ParamKey::Gravity(a))]));
         for a in 0..3u8 {
-            theta[place(ParamKey::Velocity(a))] += trial.push[usize::from(a)];
-            theta[place(ParamKey::AngularVelocity(a))] += trial.spin[usize::from(a)];
+            theta[place(ParamKey::Velocity(a))] += way.push[usize::from(a)];
+            theta[place(ParamKey::AngularVelocity(a))] += way.spin[usize::from(a)];
             theta[place(ParamKey::Gravity(a))] = gravity[usize::from(a)];
         }
         let sensors = Sensors::new(&plan.layout, &theta);
