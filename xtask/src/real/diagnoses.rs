@@ -4,7 +4,7 @@ use super::report::Made;
 use super::{open, studies};
 use crate::rows;
 use palpate::{DiagnoseOptions, Diagnosed, Error, Experiment, diagnose};
-use palpate_diagnose::{FoundNumber, in_words, stated};
+use palpate_diagnose::{FoundNumber, Verdict, in_words, stated};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -212,7 +212,11 @@ pub fn markdown(all: &[Answer]) -> String {
         let said = match a.effects.as_slice() {
             [] if a.closest.is_empty() => a.verdict.clone(),
             [] => format!("{}; nearest: {}", a.verdict, once_each(&a.closest).join(", ")),
-            effects => effects.iter().map(words).collect::<Vec<_>>().join("; "),
+            effects => {
+                let all = effects.iter().map(words).collect::<Vec<_>>().join("; ");
+                // Beside which nothing is missing; otherwise they are the nearest that is known.
+                if a.verdict == Verdict::MissingEffect.name() { all } else { format!("{}; nearest: {all}", a.verdict) }
+            }
         };
         let nats = a.effects.iter().map(|e| format!("{:.0} ± {:.0}", e.nats.0, e.nats.1)).collect::<Vec<_>>().join("; ");
         let modulus = a.youngs_modulus.map(|(v, se)| stated(1e-3 * v, se.map(|e| 1e-3 * e)));
