@@ -324,10 +324,7 @@ impl Diagnosis {
         let all = self.not_yet_fitted();
         let one = |t: &&Tried| format!("{} ({:.0} % of the squared residual)", t.kind, 100.0 * t.promised);
         let told: Vec<String> = all.iter().take(TOLD).map(one).collect();
-        let more = match all.len().saturating_sub(TOLD) {
-            0 => String::new(),
-            n => format!(" and {n} more"),
-        };
+        let more = and_more(all.len().saturating_sub(TOLD));
         let unscored = match self.not_tried.iter().filter(|n| n.contains(NOT_SCORED)).count() {
             0 => String::new(),
             n => format!(" Not even scored: {n} candidates."),
@@ -359,14 +356,16 @@ impl Diagnosis {
     }
 }
 
+/// How many are not told.
+fn and_more(left: usize) -> String {
+    if left == 0 { String::new() } else { format!(" and {left} more") }
+}
+
 /// The effect that came closest, in words: its first numbers too, which is where an amplitude stands.
 fn helps(e: &Found) -> String {
-    let (told, rest) = e.parameters.split_at(TOLD.min(e.parameters.len()));
-    let numbers = match (told.len(), rest.len()) {
-        (0, _) => String::new(),
-        (_, 0) => format!(" ({})", in_words(told)),
-        (_, more) => format!(" ({} and {more} more)", in_words(told)),
-    };
+    let told = &e.parameters[..TOLD.min(e.parameters.len())];
+    let more = and_more(e.parameters.len() - told.len());
+    let numbers = if told.is_empty() { String::new() } else { format!(" ({}{more})", in_words(told)) };
     format!(
         "the known effect that helps most, {}{numbers}, closes {:.0} % of the gap on data left out",
         e.kind,
