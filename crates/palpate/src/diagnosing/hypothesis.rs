@@ -20,9 +20,12 @@ pub(super) struct Prepared {
     pub given: usize,
 }
 
-/// A number that belongs to one recording, never to the body.
-pub(super) fn is_own(path: &str) -> bool {
-    path.starts_with("initial.") || path.starts_with("time.") || path.starts_with("mass.")
+/// A number that belongs to one recording, never to the body. Gravity is one where scenes state different ones: the setup was turned between
+/// them, and an error of its direction turns with nothing that both share.
+pub(super) fn is_own(path: &str, scenes: &[Experiment]) -> bool {
+    let of_recording = ["initial.", "time.", "mass."].iter().any(|p| path.starts_with(p));
+    let turned = || scenes.iter().any(|e| e.scene.gravity != scenes[0].scene.gravity);
+    of_recording || path.starts_with("world.gravity") && turned()
 }
 
 /// Path in the scene file of a key.
@@ -43,7 +46,7 @@ pub(super) fn held(experiments: &[Experiment]) -> Vec<String> {
         if experiments.iter().any(|e| is_free(e, &path) || !has(e, &path)) {
             continue;
         }
-        if experiments.len() > 1 && is_own(&path) {
+        if experiments.len() > 1 && is_own(&path, experiments) {
             let label = |s| FreeNumber { path: path.clone(), scene: Some(s) }.label();
             out.extend((0..experiments.len()).map(label));
         } else {
@@ -91,7 +94,7 @@ pub(super) fn prepare(base: &[Experiment], changes: &[Change]) -> Result<Prepare
                 for (s, e) in experiments.iter_mut().enumerate() {
                     for label in paths {
                         let path = label.split(" [scene").next().unwrap_or(label);
-                        let own = several && is_own(path);
+                        let own = several && is_own(path, base);
                         if !own || (FreeNumber { path: path.into(), scene: Some(s) }).label() == *label {
                             set_free(e, path.to_string(), own);
                         }
@@ -218,5 +221,39 @@ pub(super) fn lab_error(e: Error) -> LabError {
     match e {
         Error::Interrupted => LabError::Interrupted,
         other => LabError::failed(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube under this gravity [m/s²].
+    fn cube(gravity: &str) -> Experiment {
+        let text = format!(
+            "format = \"scene/1\"\n[object]\nshape = {{ box = {{ min = [0, 0, 0], max = [0.1, 0.1, 0.1] }} }}\ncells = 2\n\
+             [material]\ndensity = 1000.0\nyoungs_modulus = 1.0e4\npoisson_ratio = 0.3\n[world]\ngravity = {gravity}\n\
+             [time]\nstep = 0.01\nsteps = 2\n"
+        );
+        Experiment::from_toml(&text, "cube.toml").unwrap()
+    }
+
+    #[test]
+    fn gravity_belongs_to_a_recording_where_the_setup_was_turned() {
+        let free = |scenes: &[Experiment]| {
+            let paths: Vec<String> = held(scenes).into_iter().filter(|p| p.starts_with("world.gravity")).collect();
+            let change = Change::Freed { name: "gravity", sentence: "", paths };
+            let ready = prepare(scenes, &[change]).unwrap();
+            // Every scene keeps what it states.
+            for (s, e) in scenes.iter().enumerate() {
+                assert_eq!(ready.theta(s, &ready.own_values()), e.plan.theta);
+            }
+            ready.numbers().into_iter().map(|n| n.path).collect::<Vec<_>>()
+        };
+        let (upright, turned) = (cube("[0, 0, -9.81]"), cube("[9.81, 0, 0]"));
+        assert_eq!(free(&[upright.clone(), upright.clone()]), ["world.gravity.x", "world.gravity.y", "world.gravity.z"]);
+        let own = free(&[upright, turned]);
+        assert_eq!(own.len(), 6, "{own:?}");
+        assert!(own.contains(&"world.gravity.x [scene 2]".into()), "{own:?}");
     }
 }

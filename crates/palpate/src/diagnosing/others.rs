@@ -76,6 +76,8 @@ pub(super) fn held_out(
     model: &Model,
 ) -> Result<Readings, LabError> {
     let trained = prepare(base, &model.changes).map_err(lab_error)?;
+    let all: Vec<Experiment> = base.iter().chain([e]).cloned().collect();
+    let is_own = |path: &str| is_own(path, &all);
     // A label of another scene's number means nothing here.
     let changes: Vec<Change> = model
         .changes
