@@ -191,6 +191,9 @@ enum Verb {
         /// Targets to run, by name; all of them without
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
+        /// By cargo-fuzz, which seeks files that reach other code; it needs a nightly compiler
+        #[arg(long)]
+        guided: bool,
         /// Write the table of the page from what is stored, and run nothing
         #[arg(long)]
         report: bool,
@@ -276,7 +279,7 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Adapter { install } => println!("{}", test::find_adapter(install)?),
         Verb::Dawn { compile } => dawn::run(dawn::Options { compile })?,
         Verb::Fuzz { report: true, .. } => fuzz::report(&table::root())?,
-        Verb::Fuzz { minutes, only, .. } => fuzz::run(&table::root(), minutes, &only)?,
+        Verb::Fuzz { minutes, only, guided, .. } => fuzz::run(&table::root(), minutes, &only, guided)?,
         Verb::Mutants { report: true, .. } => mutants::report(&table::root())?,
         Verb::Mutants { shard, .. } => mutants::run(&table::root(), shard.as_deref())?,
         Verb::Tidy => {
