@@ -116,6 +116,9 @@ enum Verb {
         /// Instead: measure the cases once more for every number of the search, changed (--first 3 keeps it affordable)
         #[arg(long, conflicts_with_all = ["calibrate", "record", "score", "report", "method"])]
         ablate: bool,
+        /// Instead: of cases that end in a tie, make the measurement that is proposed next, and diagnose both recordings
+        #[arg(long, conflicts_with_all = ["calibrate", "record", "score", "report", "method", "ablate"])]
+        settle: bool,
         /// Instead: print the tables of all that was measured, and store them
         #[arg(long)]
         report: bool,
@@ -258,9 +261,25 @@ fn run(verb: Verb) -> Result<(), String> {
         Verb::Coverage { only, slice, fits, fresh, report } => {
             coverage::run(&coverage::Options { only, slice, fits, fresh, report })?;
         }
-        Verb::Suite { only, method, first, slice, budget, fresh, keep, verbose, calibrate, record, score, ablate, report } => {
+        Verb::Suite {
+            only,
+            method,
+            first,
+            slice,
+            budget,
+            fresh,
+            keep,
+            verbose,
+            calibrate,
+            record,
+            score,
+            ablate,
+            settle,
+            report,
+        } => {
             let instead = match (calibrate, record, score, report) {
                 _ if ablate => suite::Instead::Ablate,
+                _ if settle => suite::Instead::Settle,
                 (true, ..) => suite::Instead::Calibrate,
                 (_, Some(folder), ..) => suite::Instead::Record(folder),
                 (_, _, Some(file), _) => suite::Instead::Score(file),

@@ -11,6 +11,7 @@ use crate::real::report::Report;
 use crate::real::{diagnoses, models};
 use crate::suite::report as suite;
 use crate::suite::rules;
+use crate::suite::settle;
 use crate::table::{self, mark};
 use crate::verify::report::Report as Verification;
 use std::fs;
@@ -147,6 +148,8 @@ fn generated(root: &Path, found: &mut Vec<String>) {
         table::stored(root, "rules").map(|l: Vec<rules::Line>| rules::markdown(&l)),
         "suite --report",
     );
+    let settle = table::stored(root, "settle").map(|l: Vec<settle::Line>| settle::markdown(&l));
+    check("docs/suite.md", "settle", settle, "suite --report");
     check("docs/coverage.md", "coverage", coverage, "coverage --report");
     check("docs/gpu.md", "counts", counts, "bench --gpu --counts --only torus");
     check("docs/speed.md", "speed", page::shown(root), "bench, and its name in xtask/src/bench/page.rs");

@@ -197,6 +197,7 @@ impl Truth {
             given: Vec::new(),
             fit: String::new(),
             cameras: Vec::new(),
+            poses: Vec::new(),
             markers: Vec::new(),
             spacing: 2.0 * self.step,
             noise: 0.0,

@@ -52,7 +52,9 @@ impl Case {
         let setup = self.setup()?;
         let amplitudes = self.amplitudes()?;
         let moved = match self.simulator {
-            Simulator::Tetrahedra => strength::left(&self.watched(&setup, &amplitudes, &folder.join("exact"), false, false)?)?,
+            Simulator::Tetrahedra => {
+                strength::left(&self.watched(&setup, &self.change(&amplitudes)?.0, &folder.join("exact"), false, None)?)?
+            }
             Simulator::Cells => {
                 let hidden = self.hide(&setup.truth(false)?, &amplitudes)?.0;
                 strength::left(&observed(&setup, &hidden, &Maker::own(), &folder.join("exact"), false)?)?
@@ -116,7 +118,9 @@ impl Case {
         let mut best: Option<(f64, f64, Vec<Moved>)> = None;
         for _ in 0..WATCHED_TRIES {
             let amplitudes = stated.clone().unwrap_or_else(|| vec![round(a); self.hidden.len()]);
-            match self.watched(&setup, &amplitudes, &folder.join("exact"), false, false).and_then(|e| strength::left(&e)) {
+            let watched =
+                self.change(&amplitudes).and_then(|(c, _)| self.watched(&setup, &c, &folder.join("exact"), false, None));
+            match watched.and_then(|e| strength::left(&e)) {
                 Ok(moved) => {
                     let s = rms(&moved).max(1e-6);
                     let off = (s / aim).ln().abs();

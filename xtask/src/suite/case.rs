@@ -13,6 +13,7 @@ use crate::tetrahedra::motion::{Resolution, simulate};
 use crate::tetrahedra::watch::record;
 use glam::DVec3;
 use palpate::{Error, Experiment};
+use palpate_diagnose::Way;
 use palpate_io::write_recording;
 use palpate_model::scene::Scene;
 use palpate_model::shape::shape_of;
@@ -157,7 +158,7 @@ impl Case {
     }
 
     /// What is hidden of the tetrahedra.
-    fn change(&self, amplitudes: &[f64]) -> Result<(Change, Vec<(usize, Number)>), Error> {
+    pub(super) fn change(&self, amplitudes: &[f64]) -> Result<(Change, Vec<(usize, Number)>), Error> {
         let (mut change, mut numbers) = (Change::default(), Vec::new());
         for (k, (put, a)) in self.hidden.iter().zip(amplitudes).enumerate() {
             let none =
@@ -168,21 +169,20 @@ impl Case {
         Ok((change, numbers))
     }
 
-    /// A recording of the tetrahedra, opened.
+    /// A recording of the tetrahedra, opened; without a seed it has no noise.
     pub(super) fn watched(
         &self,
         setup: &Setup,
-        amplitudes: &[f64],
+        change: &Change,
         place: &Path,
         other: bool,
-        noisy: bool,
+        seed: Option<u64>,
     ) -> Result<Experiment, Error> {
-        let change = self.change(amplitudes)?.0;
         let scene = setup.truth(other)?;
         let end = scene.time.step * scene.time.steps as f64 - SPARE;
         let times: Vec<f64> = (1..).map(|k| f64::from(k) * setup.spacing).take_while(|t| *t < end).collect();
-        let motion = simulate(&scene, &change, &times, RESOLUTION)?;
-        let recording = record(&motion, &change, &setup.watchers(noisy, 2 * self.seed + u64::from(other))?)?;
+        let motion = simulate(&scene, change, &times, RESOLUTION)?;
+        let recording = record(&motion, change, &setup.watchers(seed.is_some(), seed.unwrap_or(0))?)?;
         write_recording(place, &recording).map_err(|e| Error::Failed(e.to_string()))?;
         let text = setup.text(place, other);
         Experiment::new(setup.parse(&text)?, text, Vec::new())
@@ -202,10 +202,29 @@ impl Case {
         let place = folder.join(if other { "other" } else { "seen" });
         let setup = self.setup()?;
         if self.simulator == Simulator::Tetrahedra {
-            return self.watched(&setup, amplitudes, &place, other, true);
+            let seed = 2 * self.seed + u64::from(other);
+            return self.watched(&setup, &self.change(amplitudes)?.0, &place, other, Some(seed));
         }
         let (scene, _) = self.hide(&setup.truth(other)?, amplitudes)?;
         observed(&setup, &scene, &Maker::other(self.seed, other), &place, other)
+    }
+
+    /// One more recording of what was seen, made as a way says. Gravity turns as it truly is, and everything else stays with the setup.
+    ///
+    /// # Errors
+    /// As [`Case::record`].
+    pub fn next(&self, way: &Way, folder: &Path) -> Result<Experiment, Error> {
+        let (amplitudes, place) = (self.amplitudes()?, folder.join("next"));
+        let (setup, maker) = (self.setup()?.moved(way), Maker::other(self.seed, false));
+        let (stated, seed) = (setup.clone().turned(way.turn)?, NEXT + maker.seed);
+        if self.simulator == Simulator::Tetrahedra {
+            let change = self.change(&amplitudes)?.0;
+            let change = Change { gravity: way.turn * change.gravity, ..change };
+            return self.watched(&stated, &change, &place, false, Some(seed));
+        }
+        let (mut scene, _) = self.hide(&setup.truth(false)?, &amplitudes)?;
+        scene.gravity = way.turn * scene.gravity;
+        observed(&stated, &scene, &Maker { seed, ..maker }, &place, false)
     }
 
     /// What is right.
@@ -249,6 +268,8 @@ impl Case {
     }
 }
 
+/// Seeds of further recordings come behind those of all cases.
+const NEXT: u64 = 1 << 32;
 /// Of the tetrahedra.
 const RESOLUTION: Resolution = Resolution { fine: 1, substeps: 5 };
 /// The last frame is taken this long before the scene ends [s]: room for a clock that is off.

@@ -216,6 +216,7 @@ impl Kind {
             given: Vec::new(),
             fit,
             cameras,
+            poses: Vec::new(),
             markers,
             spacing: step * d.one(&[1.0, 2.0, 2.5]),
             noise: size * d.log(0.003, 0.02),

@@ -5,7 +5,7 @@ use super::answer::Answer;
 use super::baselines;
 use super::case::Recorded;
 use crate::rows;
-use palpate::{Backend, DiagnoseOptions, Error, diagnose};
+use palpate::{Backend, Clock, DiagnoseOptions, Error, diagnose};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -57,13 +57,7 @@ impl Method {
             Method::Field => baselines::field::answer(case, &recorded.seen).map(timed),
             Method::Process => baselines::process::answer(case, &recorded.seen).map(timed),
             Method::Palpate | Method::Ablated(_) => {
-                let mut options = DiagnoseOptions {
-                    backend: Backend::Cpu,
-                    budget: Some(budget),
-                    clock: clock.clone(),
-                    on_progress: Some(say),
-                    ..DiagnoseOptions::default()
-                };
+                let mut options = options(budget, &clock, say);
                 if let Method::Ablated(k) = self {
                     (ablation::ALL[k].set)(&mut options.statistics.search);
                 }
@@ -71,6 +65,17 @@ impl Method {
                 Ok(Answer::of(case, &found))
             }
         }
+    }
+}
+
+/// With what a diagnosis of a case runs.
+pub(super) fn options<'a>(budget: Duration, clock: &Clock, say: &'a mut (dyn FnMut(&str) + Send)) -> DiagnoseOptions<'a> {
+    DiagnoseOptions {
+        backend: Backend::Cpu,
+        budget: Some(budget),
+        clock: clock.clone(),
+        on_progress: Some(say),
+        ..DiagnoseOptions::default()
     }
 }
 

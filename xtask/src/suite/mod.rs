@@ -19,6 +19,7 @@ mod regions;
 pub mod report;
 pub mod rules;
 pub mod score;
+pub mod settle;
 pub mod setup;
 mod short;
 mod strength;
@@ -74,6 +75,8 @@ pub enum Instead {
     Score(PathBuf),
     /// Measure the suite with a search of other numbers.
     Ablate,
+    /// Make the measurements that ties propose.
+    Settle,
     /// Print and store the report.
     Report,
 }
@@ -115,10 +118,12 @@ pub fn run(options: &Options) -> Result<(), String> {
             let all = all_rows(&list.cases()?)?;
             report::write(&all)?;
             rules::write(&all)?;
-            return ablation::write(&rows::load(&rows::path("ablation"))?);
+            ablation::write(&rows::load(&rows::path("ablation"))?)?;
+            return settle::write(&rows::load(&rows::path("settle"))?);
         }
         Instead::Record(folder) => return record(&options.wanted(list.cases()?)?, folder),
         Instead::Score(file) => return score_file(&list.cases()?, file),
+        Instead::Settle => return settle(&options.wanted(list.cases()?)?, options),
         Instead::Nothing | Instead::Ablate => {}
     }
     let (methods, path): (Vec<Method>, _) = if options.instead == Instead::Ablate {
@@ -159,6 +164,35 @@ pub fn run(options: &Options) -> Result<(), String> {
         }
     }
     println!("\n{done} answers appended to {}; cargo xtask suite --report prints the table", path.display());
+    Ok(())
+}
+
+/// Makes the measurements that ties propose: of cases with a name, whose last answer has something as good.
+fn settle(wanted: &[Case], options: &Options) -> Result<(), String> {
+    let (made, path) = (rows::measured(rows::Measured::Diagnoses)?, rows::path("settle"));
+    let (all, known): (Vec<Row>, Vec<settle::Row>) = (rows::load(&rows::path("suite"))?, rows::load(&path)?);
+    let newest = |c: &Case| all.iter().rev().find(|r| r.case == c.name && r.method == Method::Palpate.name());
+    let is_known = |c: &Case| known.iter().any(|r| r.case == c.name && (options.keep || r.made.is_same(&made)));
+    let ties = |c: &&Case| !["outside", "null"].contains(&c.group.as_str()) && newest(c).is_some_and(|r| !r.as_good.is_empty());
+    let open: Vec<&Case> = wanted.iter().filter(ties).filter(|c| options.fresh || !is_known(c)).collect();
+    let clock = Instant::now();
+    for (i, c) in open.iter().enumerate() {
+        if options.slice.is_some_and(|minutes| clock.elapsed().as_secs_f64() > 60.0 * minutes) {
+            println!("the slice is over: {} cases are open", open.len() - i);
+            return Ok(());
+        }
+        println!("{}/{} {}", i + 1, open.len(), c.name);
+        let mut say = |what: &str| {
+            if options.verbose {
+                println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
+            }
+        };
+        let row = settle::measure(&made, c, folder()?.path(), Duration::from_secs_f64(options.budget), &mut say);
+        let row = row.map_err(|e| format!("{}: {e}", c.name))?;
+        println!("  {}", settle::line(&row));
+        rows::append(&path, &row)?;
+    }
+    println!("\ncargo xtask suite --report prints the table");
     Ok(())
 }
 

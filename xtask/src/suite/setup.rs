@@ -1,9 +1,10 @@
 //! A scene of the suite: a body whose truth is known, what is free in it, and what watches it.
 
 use crate::tetrahedra::watch::Watchers;
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 use palpate::Error;
 use palpate::render::Pinhole;
+use palpate_diagnose::Way;
 use palpate_io::parse_scene;
 use palpate_model::scene::Scene;
 use std::path::Path;
@@ -25,6 +26,8 @@ pub struct Setup {
     pub given: Vec<(String, String)>,
     /// Cameras as on the command line.
     pub cameras: Vec<String>,
+    /// Where cameras stand that stand elsewhere: number, and pose, world from camera.
+    pub poses: Vec<(u32, DAffine3)>,
     /// Markers on the rest surface [m].
     pub markers: Vec<(String, [f64; 3])>,
     /// Frames are this far apart [s].
@@ -84,6 +87,31 @@ impl Setup {
         format!("[initial]\nvelocity = {v:?}\nangular_velocity = {w:?}\n{pivot}")
     }
 
+    /// The same with cameras elsewhere and another start, as a way says.
+    #[must_use]
+    pub fn moved(mut self, way: &Way) -> Setup {
+        for (start, more) in self.start.iter_mut().zip([way.push, way.spin]) {
+            *start = (DVec3::from(*start) + more).to_array();
+        }
+        self.poses.extend(&way.cameras);
+        self
+    }
+
+    /// The same, with gravity from another side.
+    ///
+    /// # Errors
+    /// The scene cannot be read.
+    pub fn turned(mut self, turn: DQuat) -> Result<Setup, Error> {
+        if turn != DQuat::IDENTITY {
+            let line = format!("gravity = {:?}", (turn * self.truth(false)?.gravity).to_array());
+            self.body = match self.body.lines().find(|l| l.starts_with("gravity = ")) {
+                Some(stated) => self.body.replace(stated, &line),
+                None => format!("{}[world]\n{line}\n", self.body),
+            };
+        }
+        Ok(self)
+    }
+
     /// Its cameras.
     ///
     /// # Errors
@@ -91,7 +119,9 @@ impl Setup {
     pub fn cameras(&self) -> Result<Vec<Pinhole>, Error> {
         let one = |(i, text): (usize, &String)| {
             let c: Pinhole = text.parse().map_err(|e| Error::Input(format!("{}: {e}", self.name)))?;
-            Ok(Pinhole { name: format!("cam{i}"), ..c })
+            let moved = self.poses.iter().rev().find(|(number, _)| *number as usize == i);
+            let world_from_camera = moved.map_or(c.world_from_camera, |(_, pose)| *pose);
+            Ok(Pinhole { name: format!("cam{i}"), world_from_camera, ..c })
         };
         self.cameras.iter().enumerate().map(one).collect()
     }

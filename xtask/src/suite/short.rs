@@ -63,6 +63,7 @@ impl Short {
             given: self.given.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect(),
             fit: self.free.iter().map(|(path, start)| Setup::free(path, *start)).collect(),
             cameras: self.cameras.iter().map(|c| c.to_string()).collect(),
+            poses: Vec::new(),
             markers: self.markers.iter().map(|(n, p)| (n.to_string(), *p)).collect(),
             spacing: self.spacing,
             noise: self.noise,
