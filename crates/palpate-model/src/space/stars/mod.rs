@@ -3,6 +3,7 @@
 //!
 //! After Chen et al., Virtual Elastic Objects (CVPR 2022), whose weights fail the patch test ([`compatible`]); those are to be had as [`Weights::Published`].
 
+#[cfg(feature = "sparse")]
 pub mod compatible;
 pub mod graph;
 pub mod lookup;
@@ -16,7 +17,11 @@ use crate::shape::{Shape, TriMesh};
 use crate::space::body::{Body, Patch};
 use crate::space::points::Points;
 use crate::space::stencil::Stencils;
+#[cfg(feature = "sparse")]
+use compatible::make_compatible;
 use glam::DVec3;
+#[cfg(not(feature = "sparse"))]
+use graph::Star;
 use near::Near;
 use penalty::Penalty;
 use rayon::prelude::*;
@@ -46,6 +51,12 @@ impl Default for StarSpec {
     fn default() -> StarSpec {
         StarSpec { neighbours: 6, weights: Weights::default(), residual_penalty: 0.05 }
     }
+}
+
+/// There are no compatible weights without a factorisation.
+#[cfg(not(feature = "sparse"))]
+fn make_compatible(_: &mut [Star], _: &[DVec3], _: &[f64], _: &[DVec3], _: f64) -> Result<(), String> {
+    Err("compatible weights need the feature `sparse` of palpate-model".into())
 }
 
 /// Fewest points of a body.
@@ -149,7 +160,7 @@ impl Body {
         let Surface { patches, stencils } = surface(&body, &mesh, &near);
         (body.patches, body.surface) = (patches, stencils);
         if spec.weights == Weights::Compatible {
-            compatible::make_compatible(&mut stars, points, &node_volume, &body.outward_areas(), length)?;
+            make_compatible(&mut stars, points, &node_volume, &body.outward_areas(), length)?;
         }
         for (star, v) in stars.iter().zip(&node_volume) {
             let mut value = vec![0.0; star.nodes.len()];
