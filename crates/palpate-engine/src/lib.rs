@@ -22,7 +22,7 @@ pub use evaluate::{Curvature, Direction, Evaluate, Evaluation, MOST_SENSITIVITIE
 pub use failure::{Failure, FailureKind, number};
 pub use part::{Part, Share};
 pub use residuals::{FrameResiduals, Misfit, ReadingResidual};
-pub use rollout::{Rollout, Snapshot};
+pub use rollout::{Rollout, Snapshot, Visitor};
 pub use rows::{Linearised, ResidualRow, Rows, Source, Stream};
 pub use stop::Stop;
 pub use stress_free::{StressFree, StressFreeShapes};

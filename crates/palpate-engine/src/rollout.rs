@@ -39,6 +39,9 @@ pub struct Snapshot {
     pub velocity: Vec<DVec3>,
 }
 
+/// Gets the states of a simulation by number, with the residuals of the frames of their step, and may end it.
+pub type Visitor<'a> = dyn FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()> + 'a;
+
 /// A step that has been taken and observed, or the start.
 struct Moment<'a, B: Backend> {
     world: &'a B::World,
@@ -69,7 +72,7 @@ impl<B: Backend> Forward<'_, B> {
         &self,
         w: &mut B::World,
         tally: &mut B::Tally,
-        mut visit: impl FnMut(Moment<B>) -> ControlFlow<()>,
+        visit: &mut dyn FnMut(Moment<B>) -> ControlFlow<()>,
     ) -> ControlFlow<(), Tape<B::State>> {
         let (b, directions) = (self.backend, self.directions);
         let mut first = b.new_state(w);
@@ -216,13 +219,13 @@ impl<B: Backend> Rollout<B> {
             }
             b.set_params(w, theta);
             let mut tally = b.new_tally(w, request);
-            let visit = |m: Moment<B>| {
+            let mut visit = |m: Moment<B>| {
                 if let Some([t0, t1]) = m.tangents.filter(|_| m.step.is_some() || stages.is_empty()) {
                     b.observe_tangent(m.world, m.step.unwrap_or(0), m.ends[0], m.ends[1], t0, t1, m.tally);
                 }
                 ControlFlow::Continue(())
             };
-            let ControlFlow::Continue(states) = forward.run(w, &mut tally, visit) else { return None };
+            let ControlFlow::Continue(states) = forward.run(w, &mut tally, &mut visit) else { return None };
             if request.gradient.any() && !b.all_failed(&tally) && forward.back(w, states, &mut tally).is_break() {
                 return None;
             }
@@ -242,6 +245,11 @@ impl<B: Backend> Rollout<B> {
         theta: &[f64],
         mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Failure> {
+        self.show(theta, &mut visit)
+    }
+
+    /// [`Rollout::visit`], compiled once for all visitors.
+    fn show(&mut self, theta: &[f64], visit: &mut Visitor<'_>) -> Result<Evaluation, Failure> {
         let _span = tracing::debug_span!("evaluation", members = 1).entered();
         self.let_go();
         let (b, dt, times) = (&self.backend, self.plan.clock.step, &self.plan.times);
@@ -250,7 +258,7 @@ impl<B: Backend> Rollout<B> {
         b.rollout(&mut self.world, true, |w| {
             b.set_params(w, &ParamBatch::of(theta));
             let mut tally = b.new_tally(w, &Request::default());
-            let each = |m: Moment<B>| {
+            let mut each = |m: Moment<B>| {
                 let (displacement, velocity) = b.read_state(m.world, m.ends[1], 0);
                 let state = m.step.map_or(0, |k| k + 1);
                 let observed = m.step.is_some() || stages.is_empty();
@@ -259,7 +267,7 @@ impl<B: Backend> Rollout<B> {
                 let time = times.get(state).map_or(state as f64 * dt, |t| t - times[0]);
                 visit(state, Snapshot { time, displacement, velocity }, residuals)
             };
-            forward.run(w, &mut tally, each).continue_value().ok_or_else(stopped)?;
+            forward.run(w, &mut tally, &mut each).continue_value().ok_or_else(stopped)?;
             let evaluation = b.read(w, &tally).remove(0);
             evaluation.failure.clone().map_or(Ok(evaluation), Err)
         })
@@ -281,7 +289,7 @@ impl<B: Backend> Rollout<B> {
             let request = Request { sensitivities: directions.to_vec(), ..Request::default() };
             let mut tally = b.new_tally(w, &request);
             let (mut rows, mut without_rows) = (Rows::default(), false);
-            let each = |m: Moment<B>| {
+            let mut each = |m: Moment<B>| {
                 if m.step.is_none() && !stages.is_empty() {
                     return ControlFlow::Continue(());
                 }
@@ -300,7 +308,7 @@ impl<B: Backend> Rollout<B> {
                     }
                 }
             };
-            forward.run(w, &mut tally, each).continue_value().ok_or_else(stopped)?;
+            forward.run(w, &mut tally, &mut each).continue_value().ok_or_else(stopped)?;
             let evaluation = b.read(w, &tally).remove(0);
             if without_rows {
                 let detail = format!("backend {} has no single residuals", b.name());
@@ -331,8 +339,8 @@ impl<B: Backend> Rollout<B> {
         let states = b.rollout(&mut self.world, false, |w| {
             b.set_params(w, at);
             let mut tally = b.new_tally(w, &Request::default());
-            let visit = |_: Moment<B>| ControlFlow::Continue(());
-            let states = forward.run(w, &mut tally, visit).continue_value().ok_or_else(stopped)?;
+            let mut visit = |_: Moment<B>| ControlFlow::Continue(());
+            let states = forward.run(w, &mut tally, &mut visit).continue_value().ok_or_else(stopped)?;
             b.read(w, &tally).remove(0).failure.map_or(Ok(states), Err)
         })?;
         self.held.push(Held { at: at.clone(), states });

@@ -20,8 +20,11 @@ pub(crate) struct Source {
 /// # Errors
 /// It is not there, may not be read, or is not UTF-8.
 pub fn read_text(path: impl AsRef<Path>) -> Result<String, InputError> {
-    let bytes = read_bytes(&path)?;
-    String::from_utf8(bytes).map_err(|_| InputError::file(&path, "is not UTF-8 text"))
+    text(path.as_ref())
+}
+
+fn text(path: &Path) -> Result<String, InputError> {
+    String::from_utf8(read_bytes(path)?).map_err(|_| InputError::file(path, "is not UTF-8 text"))
 }
 
 impl Source {

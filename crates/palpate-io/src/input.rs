@@ -49,7 +49,10 @@ fn plain(path: &Path) -> Result<u64, InputError> {
 /// # Errors
 /// It is not there, may not be read, is no plain file, or is larger than the memory that is left.
 pub fn read_bytes(path: impl AsRef<Path>) -> Result<Vec<u8>, InputError> {
-    let path = path.as_ref();
+    bytes(path.as_ref())
+}
+
+fn bytes(path: &Path) -> Result<Vec<u8>, InputError> {
     let size = plain(path)?;
     if let Some(room) = room::available().filter(|r| r.bytes < size) {
         let text = format!("has {} of bytes, and {room}", gigabytes(size));

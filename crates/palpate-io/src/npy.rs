@@ -185,6 +185,10 @@ fn to_c_order(shape: &[usize], values: &[f64]) -> Vec<f64> {
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &Array)]) -> Result<(), OutputError> {
+    write(path.as_ref(), arrays)
+}
+
+fn write(path: &Path, arrays: &[(&str, &Array)]) -> Result<(), OutputError> {
     write_file(path, |out| {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);

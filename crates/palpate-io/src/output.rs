@@ -14,7 +14,12 @@ pub fn write_file(
     path: impl AsRef<Path>,
     content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), OutputError> {
-    let path = path.as_ref();
+    let mut content = Some(content);
+    write_whole(path.as_ref(), &mut |out| content.take().map_or(Ok(()), |content| content(out)))
+}
+
+/// [`write_file`], compiled once for all contents.
+fn write_whole(path: &Path, content: &mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<(), OutputError> {
     let special = fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
     let target = if special { path.to_path_buf() } else { temporary(path) };
     let written = (|| {

@@ -30,7 +30,10 @@ pub struct SdfGrid {
 /// # Errors
 /// A file that is too short or too long for its size, or a value that is not finite.
 pub fn read_sdf(path: impl AsRef<Path>, scale: f64) -> Result<SdfGrid, InputError> {
-    let path = path.as_ref();
+    sdf(path.as_ref(), scale)
+}
+
+fn sdf(path: &Path, scale: f64) -> Result<SdfGrid, InputError> {
     let bytes = read_bytes(path)?;
     let (head, body) =
         bytes.split_at_checked(28).ok_or_else(|| InputError::file(path, "is shorter than the header of 28 bytes"))?;

@@ -10,6 +10,10 @@ use std::path::Path;
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), OutputError> {
+    obj(path.as_ref(), mesh)
+}
+
+fn obj(path: &Path, mesh: &TriMesh) -> Result<(), OutputError> {
     write_file(path, |out| {
         for v in &mesh.vertices {
             writeln!(out, "v {:?} {:?} {:?}", v.x, v.y, v.z)?;
@@ -26,6 +30,10 @@ pub fn write_obj(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), OutputErr
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), OutputError> {
+    ply(path.as_ref(), mesh)
+}
+
+fn ply(path: &Path, mesh: &TriMesh) -> Result<(), OutputError> {
     write_file(path, |out| {
         write!(
             out,

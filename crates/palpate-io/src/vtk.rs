@@ -99,7 +99,15 @@ pub fn write_vtu(
     of_points: &Arrays,
     of_elements: &Arrays,
 ) -> Result<(), OutputError> {
-    let path = path.as_ref();
+    write_grid(path.as_ref(), points, elements, [of_points, of_elements])
+}
+
+fn write_grid(
+    path: &Path,
+    points: &[DVec3],
+    elements: &Elements,
+    [of_points, of_elements]: [&Arrays; 2],
+) -> Result<(), OutputError> {
     let data =
         Attributes { point: attributes(path, of_points, points.len())?, cell: attributes(path, of_elements, elements.len())? };
     let Elements { connectivity, offsets, types } = elements.clone();
@@ -143,6 +151,10 @@ fn attributes(path: &Path, arrays: &Arrays, wanted: usize) -> Result<Vec<Attribu
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_pvd(path: impl AsRef<Path>, frames: &[(f64, String)]) -> Result<(), OutputError> {
+    write_series(path.as_ref(), frames)
+}
+
+fn write_series(path: &Path, frames: &[(f64, String)]) -> Result<(), OutputError> {
     let escape = |s: &str| s.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
     write_file(path, |out| {
         writeln!(

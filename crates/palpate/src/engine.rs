@@ -7,7 +7,7 @@ use crate::memory::{Demand, require_on_cpu};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::tracking::Correspond;
-use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop};
+use palpate_engine::{Evaluate, Evaluation, FrameResiduals, Part, Rollout, Snapshot, Stop, Visitor};
 use palpate_gpu::{Choice, Gpu, GpuBackend, GpuError, Skinning};
 use palpate_model::plan::Plan;
 use palpate_model::plan::join::{Joint, join};
@@ -216,8 +216,13 @@ impl Backend {
         plan: &Plan,
         theta: &[f64],
         stop: Stop,
-        visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
+        mut visit: impl FnMut(usize, Snapshot, Vec<FrameResiduals>) -> ControlFlow<()>,
     ) -> Result<Evaluation, Error> {
+        self.show(plan, theta, stop, &mut visit)
+    }
+
+    /// [`Backend::visit_until`], compiled once for all visitors.
+    fn show(self, plan: &Plan, theta: &[f64], stop: Stop, visit: &mut Visitor<'_>) -> Result<Evaluation, Error> {
         match self.resolve(plan, 1).0 {
             Backend::Gpu => Ok(Rollout::new(gpu_for(1)?, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
             _ => {

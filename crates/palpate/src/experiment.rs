@@ -74,8 +74,12 @@ impl Experiment {
     /// # Errors
     /// [`Error::File`] with the first thing that is wrong with a file, or when the recording lies nowhere near the object.
     pub fn open(path: impl AsRef<Path>) -> Result<Experiment, Error> {
-        let _span = tracing::info_span!("open", scene = %path.as_ref().display()).entered();
-        Experiment::from_toml(&read_text(&path)?, path)
+        Experiment::open_at(path.as_ref())
+    }
+
+    fn open_at(path: &Path) -> Result<Experiment, Error> {
+        let _span = tracing::info_span!("open", scene = %path.display()).entered();
+        Experiment::of_text(&read_text(path)?, path)
     }
 
     /// Reads a scene file and leaves its recording alone, which need not exist: enough to simulate.
@@ -83,9 +87,13 @@ impl Experiment {
     /// # Errors
     /// [`Error::File`] with the first thing that is wrong with a file.
     pub fn open_without_recording(path: impl AsRef<Path>) -> Result<Experiment, Error> {
-        let text = read_text(&path)?;
+        Experiment::open_unseen(path.as_ref())
+    }
+
+    fn open_unseen(path: &Path) -> Result<Experiment, Error> {
+        let text = read_text(path)?;
         let _stage = Stage::begin("read the scene");
-        let _span = tracing::info_span!("open", scene = %path.as_ref().display()).entered();
+        let _span = tracing::info_span!("open", scene = %path.display()).entered();
         let loaded = tracing::info_span!("load").in_scope(|| parse_scene(&text, path))?;
         let scene = Scene { observation: None, ..loaded.value };
         Experiment::new(scene, text, loaded.warnings)
@@ -96,6 +104,10 @@ impl Experiment {
     /// # Errors
     /// As [`Experiment::open`].
     pub fn from_toml(text: &str, path: impl AsRef<Path>) -> Result<Experiment, Error> {
+        Experiment::of_text(text, path.as_ref())
+    }
+
+    fn of_text(text: &str, path: &Path) -> Result<Experiment, Error> {
         let loaded = tracing::info_span!("load").in_scope(|| parse_scene(text, path))?;
         Experiment::new(loaded.value, text.to_string(), loaded.warnings)
     }

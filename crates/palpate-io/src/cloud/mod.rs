@@ -57,7 +57,10 @@ pub(crate) fn ending(path: &Path) -> String {
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_cloud(path: impl AsRef<Path>, points: &[DVec3]) -> Result<(), OutputError> {
-    let path = path.as_ref();
+    write(path.as_ref(), points)
+}
+
+fn write(path: &Path, points: &[DVec3]) -> Result<(), OutputError> {
     let n = points.len();
     let head = match ending(path).as_str() {
         "pcd" => format!(

@@ -29,15 +29,19 @@ const SMALLEST_SIDE: f64 = 1e-4;
 /// A file that cannot be parsed, holds no triangle, is in the wrong unit, is open, one-sided, or encloses no volume. Small holes
 /// are closed and inward faces turned, with a warning.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Loaded<TriMesh>, InputError> {
-    read_mesh_in(path, |_| 1.0)
+    repaired(path.as_ref(), &mut |_| 1.0)
 }
 
 /// The same of a mesh in any unit: `metres` is asked with its longest side in the file's own unit and answers with the metres of one.
 ///
 /// # Errors
 /// As [`read_mesh`].
-pub fn read_mesh_in(path: impl AsRef<Path>, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<TriMesh>, InputError> {
-    let Loaded { value, warnings } = read_scaled(path.as_ref(), metres)?;
+pub fn read_mesh_in(path: impl AsRef<Path>, mut metres: impl FnMut(f64) -> f64) -> Result<Loaded<TriMesh>, InputError> {
+    repaired(path.as_ref(), &mut metres)
+}
+
+fn repaired(path: &Path, metres: &mut dyn FnMut(f64) -> f64) -> Result<Loaded<TriMesh>, InputError> {
+    let Loaded { value, warnings } = read_scaled(path, metres)?;
     Ok(Loaded { value: value.shape.into_mesh(), warnings })
 }
 
@@ -51,10 +55,10 @@ pub(crate) struct Surface {
 
 /// As [`read_mesh`], with what the file was like.
 pub(crate) fn read_repaired(path: &Path) -> Result<Loaded<Surface>, InputError> {
-    read_scaled(path, |_| 1.0)
+    read_scaled(path, &mut |_| 1.0)
 }
 
-fn read_scaled(path: &Path, metres: impl FnOnce(f64) -> f64) -> Result<Loaded<Surface>, InputError> {
+fn read_scaled(path: &Path, metres: &mut dyn FnMut(f64) -> f64) -> Result<Loaded<Surface>, InputError> {
     let bytes = read_bytes(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.as_str() {

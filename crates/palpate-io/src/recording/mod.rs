@@ -81,7 +81,10 @@ pub struct RecordedFrame {
 /// # Errors
 /// The first thing that is wrong, naming file, line and key; see the format's description for what is allowed.
 pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, InputError> {
-    let path = path.as_ref();
+    read(path.as_ref())
+}
+
+fn read(path: &Path) -> Result<Recording, InputError> {
     let file = if path.is_dir() { path.join("recording.toml") } else { path.to_path_buf() };
     let source = Source::read(&file)?;
     let root = source.root();

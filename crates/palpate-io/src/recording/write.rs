@@ -19,7 +19,10 @@ use tiff::encoder::colortype::Gray32Float;
 /// # Errors
 /// The file that could not be written and why.
 pub fn write_recording(folder: impl AsRef<Path>, recording: &Recording) -> Result<(), OutputError> {
-    let folder = folder.as_ref();
+    write(folder.as_ref(), recording)
+}
+
+fn write(folder: &Path, recording: &Recording) -> Result<(), OutputError> {
     make_folder(folder)?;
     let mut toml = String::new();
     // Writing to a string cannot fail.

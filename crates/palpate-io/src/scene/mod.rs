@@ -63,8 +63,11 @@ pub fn read_scene(path: impl AsRef<Path>) -> Result<Loaded<Scene>, InputError> {
 /// # Errors
 /// As [`read_scene`].
 pub fn parse_scene(text: &str, path: impl AsRef<Path>) -> Result<Loaded<Scene>, InputError> {
-    let source = Source::parse(path.as_ref(), text.to_string())?;
-    scene(&source)
+    parse(text, path.as_ref())
+}
+
+fn parse(text: &str, path: &Path) -> Result<Loaded<Scene>, InputError> {
+    scene(&Source::parse(path, text.to_string())?)
 }
 
 /// An error about a key of a scene (`clamp.0.box`) that was found after reading, with its line where the file's `text` has the

@@ -118,7 +118,10 @@ impl Raw {
 /// # Errors
 /// The file cannot be read or is damaged, holds other volume elements, is in the wrong unit, or its tetrahedra are no body.
 pub fn read_tets(path: impl AsRef<Path>) -> Result<Loaded<TetMesh>, InputError> {
-    let path = path.as_ref();
+    tets(path.as_ref())
+}
+
+fn tets(path: &Path) -> Result<Loaded<TetMesh>, InputError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let wrong = |f: Fault| match f.line {
         Some(line) => InputError::line(path, line, f.message),
