@@ -23,9 +23,15 @@ pub struct Said {
     pub named: Vec<String>,
     /// Names that cannot be told from the first.
     pub as_good: Vec<String>,
+    /// Names by how well they predict, the best first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ranking: Vec<String>,
     /// 1 right, ½ said to be as good as what is named first, 0 wrong.
     pub score: f64,
 }
+
+/// So many names of a ranking are kept.
+const FIRST: usize = 6;
 
 /// A case that was diagnosed, with the measurement that was made then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,9 +81,9 @@ impl Row {
     /// True where both recordings together name something, and nothing that the measurement is said to tell is as good: neither one of the rivals
     /// nor, where one of them is named now, what was named first.
     fn is_told(&self) -> bool {
-        let mut from = rivals(&self.first, &self.from);
-        from.push(self.first.named.join(" + "));
-        let open = |then: &Said| rivals(then, &then.as_good).iter().any(|n| from.iter().any(|r| alike(r, n)));
+        let named = self.first.named.join(" + ");
+        let from = || self.from.iter().chain([&named]);
+        let open = |then: &Said| rivals(then, &then.as_good).iter().any(|n| from().any(|r| alike(r, n)));
         self.is_tie() && self.then.as_ref().is_some_and(|then| then.verdict == "missing-effect" && !open(then))
     }
 
@@ -95,7 +101,8 @@ pub fn measure(made: &Made, c: &Case, folder: &Path, budget: Duration, say: &mut
     let truth = c.truth()?;
     let said = |a: &Answer| {
         let row = score::score(made, "palpate", c, &truth, a);
-        Said { verdict: row.verdict, named: row.named, as_good: row.as_good, score: row.score }
+        let ranking = a.ranking.iter().take(FIRST).cloned().collect();
+        Said { verdict: row.verdict, named: row.named, as_good: row.as_good, ranking, score: row.score }
     };
     let recorded = c.record(folder)?;
     let other = recorded.other.as_ref();
@@ -209,7 +216,7 @@ mod tests {
 
     fn said(named: &[&str], as_good: &[&str], score: f64) -> Said {
         let all = |names: &[&str]| names.iter().map(|n| n.to_string()).collect();
-        Said { verdict: "missing-effect".into(), named: all(named), as_good: all(as_good), score }
+        Said { verdict: "missing-effect".into(), named: all(named), as_good: all(as_good), ranking: Vec::new(), score }
     }
 
     fn row(first: Said, from: &[&str], then: Option<Said>) -> Row {
@@ -242,6 +249,10 @@ mod tests {
         assert!(!of(None).is_told());
         let lines = lines(&[right, wrong, open, same, lost]);
         assert_eq!((lines[0].ties, lines[0].among, lines[0].told, lines[0].settled), (5, 5, 2, 1));
+        // Also where the rival is a part of what was named.
+        let part =
+            row(said(&["clamp-edge", "inclusion"], &["two-part-stiffness"], 0.5), &["inclusion", "two-part-stiffness"], None);
+        assert!(!Row { then: Some(said(&["two-part-stiffness"], &["inclusion"], 1.0)), ..part }.is_told());
         assert_eq!(lines[1].group, "all");
     }
 
