@@ -288,8 +288,8 @@ pub trait Laboratory {
     fn held_out_finer(&mut self, _model: &Model, _coarse: &Readings) -> Result<Vec<Field>, LabError> {
         Ok(Vec::new())
     }
-    /// What other measurements would read of each of several rivals, compared with what they would read of the model that is named; those
-    /// that there is time to simulate.
+    /// What other measurements would read of each of several rivals, fitted to them as well, compared with what they would read of the model that
+    /// is named; those that there is time to simulate.
     fn separations(&mut self, named: &Model, rivals: &[&Model]) -> Vec<Separation>;
     /// Numbers of a model that lie outside the world as it is known, once they are `corrected` by what errors of grid and step make of them, or that
     /// a fit left at a bound.

@@ -23,8 +23,8 @@ pub struct Separation {
     pub measurement: String,
     /// The same for a simulation.
     pub way: Way,
-    /// How far its readings of every rival would lie from those of the model that is named, root mean square [m], and the noise of a single
-    /// such reading [m].
+    /// How far every rival, fitted to both recordings, would lie from the readings of the model that is named, root mean square [m], and the
+    /// noise of a single such reading [m].
     pub differences: Vec<(f64, f64)>,
 }
 

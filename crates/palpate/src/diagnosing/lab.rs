@@ -411,7 +411,7 @@ impl Laboratory for Lab<'_> {
         // What else may be missing comes first.
         let limits = self.search().share(0.25);
         let models: Vec<&Model> = std::iter::once(&named).chain(rivals).copied().collect();
-        separations(&self.base, self.backend, &models, &limits.stop())
+        separations(&self.base, self.backend, &models, &limits)
     }
 
     fn strange(&self, model: &Model, corrected: &[f64]) -> Vec<Strange> {
