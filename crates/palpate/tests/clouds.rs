@@ -10,23 +10,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::Command;
 
-/// A bar that is let go when it is straight, and swings under its weight.
-const BAR: &str = r#"
-    format = "scene/1"
-    [object]
-    shape = { box = { min = [0, 0, 0], max = [0.12, 0.03, 0.03] } }
-    cell_size = 0.015
-    [material]
-    density = 1000.0
-    youngs_modulus = 6.0e4
-    poisson_ratio = 0.4
-    stiffness_damping = 0.004
-    [[clamp]]
-    box = { min = [-0.01, -0.1, -0.1], max = [0.005, 0.1, 0.1] }
-    [time]
-    step = 0.01
-    steps = 8
-"#;
+/// The first steps of the bar.
+fn bar() -> String {
+    include_str!("bar.toml").replace("steps = 12", "steps = 8")
+}
 
 const FREE: &str = r#"
     [fit]
@@ -39,7 +26,7 @@ const TRUTH: f64 = 6.0e4;
 
 /// What one camera sees of the bar.
 fn seen() -> Recording {
-    let truth = Experiment::from_toml(BAR, "bar.toml").unwrap_or_else(|e| panic!("{e}"));
+    let truth = Experiment::from_toml(&bar(), "bar.toml").unwrap_or_else(|e| panic!("{e}"));
     let camera = Pinhole::looking_at(DVec3::new(0.1, -0.35, 0.12), DVec3::new(0.06, 0.0, 0.0), DVec3::Z, 24.0, 40, 40);
     let observers = Observers {
         cameras: vec![camera.unwrap_or_else(|e| panic!("{e}"))],
@@ -85,7 +72,8 @@ fn in_metres(images: &Recording) -> Recording {
 
 /// The bar with what was measured of it in a folder beside the scene.
 fn scene(recording: &str) -> String {
-    format!("{BAR}\n[observation]\nrecording = \"{recording}\"\ncost = \"sparse-surface\"\n{FREE}")
+    let bar = bar();
+    format!("{bar}\n[observation]\nrecording = \"{recording}\"\ncost = \"sparse-surface\"\n{FREE}")
 }
 
 /// Stiffness found, and its standard error.

@@ -10,30 +10,7 @@ use palpate_io::write_recording;
 use palpate_model::observation::ReadingKind;
 use std::ops::ControlFlow;
 
-/// A bar that swings under its weight.
-const BAR: &str = r#"
-    format = "scene/1"
-    [object]
-    shape = { box = { min = [0, 0, 0], max = [0.12, 0.03, 0.03] } }
-    cell_size = 0.015
-    [material]
-    density = 1000.0
-    youngs_modulus = 6.0e4
-    poisson_ratio = 0.4
-    stiffness_damping = 0.004
-    [[clamp]]
-    box = { min = [-0.01, -0.1, -0.1], max = [0.005, 0.1, 0.1] }
-    [time]
-    step = 0.01
-    steps = 12
-    [fit]
-    [[fit.parameter]]
-    path = "material.youngs_modulus"
-    start = 8.0e4
-    [[fit.parameter]]
-    path = "material.stiffness_damping"
-    start = 0.008
-"#;
+const BAR: &str = concat!(include_str!("bar.toml"), include_str!("bar-fit.toml"));
 
 fn bar() -> Experiment {
     Experiment::from_toml(BAR, "bar.toml").unwrap_or_else(|e| panic!("{e}"))

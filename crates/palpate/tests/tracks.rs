@@ -7,33 +7,8 @@ use palpate::{Backend, Experiment, FitOptions};
 use palpate_io::{read_recording, write_recording};
 use std::ops::ControlFlow;
 
-/// A bar that is let go when it is straight, and swings under its weight.
-const BAR: &str = r#"
-    format = "scene/1"
-    [object]
-    shape = { box = { min = [0, 0, 0], max = [0.12, 0.03, 0.03] } }
-    cell_size = 0.015
-    [material]
-    density = 1000.0
-    youngs_modulus = 6.0e4
-    poisson_ratio = 0.4
-    stiffness_damping = 0.004
-    [[clamp]]
-    box = { min = [-0.01, -0.1, -0.1], max = [0.005, 0.1, 0.1] }
-    [time]
-    step = 0.01
-    steps = 12
-"#;
-
-const FREE: &str = r#"
-    [fit]
-    [[fit.parameter]]
-    path = "material.youngs_modulus"
-    start = 8.0e4
-    [[fit.parameter]]
-    path = "material.stiffness_damping"
-    start = 0.008
-"#;
+const BAR: &str = include_str!("bar.toml");
+const FREE: &str = include_str!("bar-fit.toml");
 
 /// Fits the bar to what was seen of it, by one cost; the true values in units of their errors away from the fit.
 fn misses(folder: &std::path::Path, cost: &str) -> Vec<f64> {
