@@ -135,7 +135,7 @@ pub struct Effect {
 pub struct SeparatedBy {
     /// What would be done.
     pub measurement: String,
-    /// Smallest difference of its readings [m], root mean square.
+    /// Smallest difference that its readings and the known ones leave of a rival fitted to both [m], root mean square.
     pub difference: Option<f64>,
     /// Noise of a single reading [m].
     pub noise: Option<f64>,
