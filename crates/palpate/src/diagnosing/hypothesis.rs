@@ -22,9 +22,10 @@ pub(super) struct Prepared {
 
 /// A number that belongs to one recording, never to the body. Gravity is one where scenes state different ones: the setup was turned between
 /// them, and an error of its direction turns with nothing that both share.
-pub(super) fn is_own(path: &str, scenes: &[Experiment]) -> bool {
+pub(super) fn is_own<'a>(path: &str, scenes: impl IntoIterator<Item = &'a Experiment>) -> bool {
     let of_recording = ["initial.", "time.", "mass."].iter().any(|p| path.starts_with(p));
-    let turned = || scenes.iter().any(|e| e.scene.gravity != scenes[0].scene.gravity);
+    let mut stated = scenes.into_iter().map(|e| e.scene.gravity);
+    let mut turned = || stated.next().is_some_and(|first| stated.any(|other| other != first));
     of_recording || path.starts_with("world.gravity") && turned()
 }
 

@@ -76,8 +76,7 @@ pub(super) fn held_out(
     model: &Model,
 ) -> Result<Readings, LabError> {
     let trained = prepare(base, &model.changes).map_err(lab_error)?;
-    let all: Vec<Experiment> = base.iter().chain([e]).cloned().collect();
-    let is_own = |path: &str| is_own(path, &all);
+    let is_own = |path: &str| is_own(path, base.iter().chain([e]));
     // A label of another scene's number means nothing here.
     let changes: Vec<Change> = model
         .changes
