@@ -8,10 +8,6 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-fn is_false(x: &bool) -> bool {
-    !x
-}
-
 /// Files of one target in one go.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -24,7 +20,7 @@ pub struct Row {
     /// Damaged files that it read.
     pub files: u64,
     /// True where cargo-fuzz made them.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub guided: bool,
     /// Day of the run.
     pub date: String,
