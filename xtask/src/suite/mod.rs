@@ -82,6 +82,20 @@ pub enum Instead {
 }
 
 impl Options {
+    /// True once the slice that began with a clock is over.
+    fn is_over(&self, clock: &Instant) -> bool {
+        self.slice.is_some_and(|minutes| clock.elapsed().as_secs_f64() > 60.0 * minutes)
+    }
+
+    /// Says what is being computed, where that is asked for.
+    fn say<'a>(&'a self, clock: &'a Instant) -> impl FnMut(&str) + Send + 'a {
+        move |what| {
+            if self.verbose {
+                println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
+            }
+        }
+    }
+
     fn wants(&self, c: &Case) -> bool {
         let word = |w: &str| c.scene.split(' ').any(|s| s == w) || c.hidden.iter().any(|h| h.what == w);
         let asked = |w: &str| c.group == w || c.name == w || c.scene == w || word(w);
@@ -141,7 +155,6 @@ pub fn run(options: &Options) -> Result<(), String> {
     };
     let wanted = options.wanted(list.cases()?)?;
     let clock = Instant::now();
-    let over = || options.slice.is_some_and(|minutes| clock.elapsed().as_secs_f64() > 60.0 * minutes);
     let mut done = 0;
     let (ready, raw): (Vec<&Case>, Vec<&Case>) = wanted.iter().partition(|c| c.hidden.iter().all(|h| h.amplitude.is_some()));
     if !raw.is_empty() {
@@ -152,7 +165,7 @@ pub fn run(options: &Options) -> Result<(), String> {
         if open.is_empty() {
             continue;
         }
-        if over() {
+        if options.is_over(&clock) {
             println!("the slice is over: {done} answers, cases from {}/{} on are open", i + 1, ready.len());
             return Ok(());
         }
@@ -177,17 +190,13 @@ fn settle(wanted: &[Case], options: &Options) -> Result<(), String> {
     let open: Vec<&Case> = wanted.iter().filter(ties).filter(|c| options.fresh || !is_known(c)).collect();
     let clock = Instant::now();
     for (i, c) in open.iter().enumerate() {
-        if options.slice.is_some_and(|minutes| clock.elapsed().as_secs_f64() > 60.0 * minutes) {
+        if options.is_over(&clock) {
             println!("the slice is over: {} cases are open", open.len() - i);
             return Ok(());
         }
         println!("{}/{} {}", i + 1, open.len(), c.name);
-        let mut say = |what: &str| {
-            if options.verbose {
-                println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
-            }
-        };
-        let row = settle::measure(&made, c, folder()?.path(), Duration::from_secs_f64(options.budget), &mut say);
+        let budget = Duration::from_secs_f64(options.budget);
+        let row = settle::measure(&made, c, folder()?.path(), budget, &mut options.say(&clock));
         let row = row.map_err(|e| format!("{}: {e}", c.name))?;
         println!("  {}", settle::line(&row));
         rows::append(&path, &row)?;
@@ -205,11 +214,7 @@ fn folder() -> Result<tempfile::TempDir, String> {
 fn measure(c: &Case, methods: &[Method], options: &Options, made: &crate::real::report::Made) -> Result<Vec<Row>, String> {
     let folder = folder()?;
     let clock = Instant::now();
-    let mut say = |what: &str| {
-        if options.verbose {
-            println!("  {:5.1} s {what}", clock.elapsed().as_secs_f64());
-        }
-    };
+    let mut say = options.say(&clock);
     let truth = c.truth().map_err(|e| e.to_string())?;
     say("recordings");
     let recorded = c.record(folder.path());
@@ -237,7 +242,7 @@ fn calibrate(mut list: List, options: &Options) -> Result<(), String> {
         if !options.wants(c) || c.hidden.is_empty() || c.strength.is_some() && c.acts.is_some() {
             continue;
         }
-        if options.slice.is_some_and(|minutes| clock.elapsed().as_secs_f64() > 60.0 * minutes) {
+        if options.is_over(&clock) {
             println!("the slice is over");
             return Ok(());
         }

@@ -4,7 +4,7 @@
 use super::answer::Answer;
 use super::case::{Case, GROUPS};
 use super::hidden::same;
-use super::methods::options;
+use super::methods::{Method, options};
 use super::score;
 use crate::real::report::Made;
 use crate::{rows, table};
@@ -100,7 +100,7 @@ impl Row {
 pub fn measure(made: &Made, c: &Case, folder: &Path, budget: Duration, say: &mut (dyn FnMut(&str) + Send)) -> Result<Row, Error> {
     let truth = c.truth()?;
     let said = |a: &Answer| {
-        let row = score::score(made, "palpate", c, &truth, a);
+        let row = score::score(made, Method::Palpate.name(), c, &truth, a);
         let ranking = a.ranking.iter().take(FIRST).cloned().collect();
         Said { verdict: row.verdict, named: row.named, as_good: row.as_good, ranking, score: row.score }
     };
