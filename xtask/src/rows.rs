@@ -6,6 +6,7 @@ use cpu_time::ProcessTime;
 use palpate::Clock;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeSet;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,6 +35,15 @@ pub fn append(path: &Path, row: &impl Serialize) -> Result<(), String> {
     let line = serde_json::to_string(row).map_err(|e| e.to_string())? + "\n";
     let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(fail)?;
     file.write_all(line.as_bytes()).map_err(fail)
+}
+
+/// The last row of every key, in the order in which they were measured: what a later state of the code has not answered stands as it was answered
+/// before.
+pub fn newest<T: Copy, K: Ord>(all: impl DoubleEndedIterator<Item = T>, key: impl Fn(T) -> K) -> Vec<T> {
+    let mut seen = BTreeSet::new();
+    let mut out: Vec<T> = all.rev().filter(|row| seen.insert(key(*row))).collect();
+    out.reverse();
+    out
 }
 
 /// What a study measures, by the files that can move its figures: studies run on the CPU and read no pages.
@@ -143,5 +153,11 @@ mod tests {
         assert_eq!(super::load::<[u32; 2]>(&path).unwrap(), [[1, 2], [3, 4]]);
         std::fs::write(&path, "[1,2]\nnothing\n").unwrap();
         assert!(super::load::<[u32; 2]>(&path).unwrap_err().contains(":2:"));
+    }
+
+    #[test]
+    fn the_last_row_of_every_key_stays_in_its_order() {
+        let rows = [("b", 1), ("a", 2), ("b", 3), ("c", 4), ("a", 5)];
+        assert_eq!(super::newest(rows.iter(), |r| r.0), [&("b", 3), &("c", 4), &("a", 5)]);
     }
 }

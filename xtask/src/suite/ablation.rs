@@ -5,7 +5,6 @@ use super::score::Row;
 use crate::{rows, table};
 use palpate_diagnose::Policy;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 
 /// A change of the search.
 pub struct Ablation {
@@ -52,22 +51,19 @@ pub struct Line {
 
 /// Every ablation against the search as it is, on the cases that the same code answered both ways: of each case the newest answers.
 pub fn lines(rows: &[Row]) -> Vec<Line> {
-    let newest = |method: Method| rows.iter().rev().filter(move |r| r.method == method.name());
+    let of = |method: Method| rows.iter().filter(move |r| r.method == method.name());
     let mut out = Vec::new();
     for (k, a) in ALL.iter().enumerate() {
-        let mut seen = BTreeSet::new();
-        let as_it_is = |r: &Row| newest(Method::Palpate).find(|p| p.case == r.case && p.made.is_same(&r.made));
-        let both: Vec<(&Row, &Row)> = newest(Method::Ablated(k))
-            .filter_map(|r| Some((r, as_it_is(r)?)))
-            .filter(|(r, _)| seen.insert(r.case.as_str()))
-            .collect();
+        let as_it_is = |r: &Row| of(Method::Palpate).rfind(|p| p.case == r.case && p.made.is_same(&r.made));
+        let answered = of(Method::Ablated(k)).filter_map(|r| Some((r, as_it_is(r)?)));
+        let both = rows::newest(answered, |(r, _)| r.case.as_str());
         if both.is_empty() {
             continue;
         }
         let sum = |of: fn(&Row) -> f64| [both.iter().map(|b| of(b.0)).sum(), both.iter().map(|b| of(b.1)).sum()];
         out.push(Line {
             name: a.name.into(),
-            commit: rows::commits(both.iter().rev().map(|b| b.0.made.commit.as_str())),
+            commit: rows::commits(both.iter().map(|b| b.0.made.commit.as_str())),
             cases: both.len(),
             score: sum(|r| r.score),
             seconds: sum(|r| r.seconds),

@@ -4,7 +4,6 @@ use super::case::GROUPS;
 use super::score::Row;
 use crate::{rows, table};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Strength below which nothing is to be seen [σ]: some effects cannot be made stronger in a scene within what they allow.
@@ -79,12 +78,9 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!v.is_empty()).then(|| 0.5 * (v[(v.len() - 1) / 2] + v[v.len() / 2]))
 }
 
-/// The last row of every case and method: a case that a later state of the code has not answered stands as it was answered before.
+/// The last row of every case and method.
 pub(super) fn latest(all: &[Row]) -> Vec<&Row> {
-    let mut seen = BTreeSet::new();
-    let mut out: Vec<&Row> = all.iter().rev().filter(|r| seen.insert((&r.case, &r.method))).collect();
-    out.reverse();
-    out
+    rows::newest(all.iter(), |r| (&r.case, &r.method))
 }
 
 /// The table: groups in their order, in each the methods in the order in which they were measured first.

@@ -10,7 +10,6 @@ use crate::real::report::Made;
 use crate::{rows, table};
 use palpate::{Error, diagnose};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
@@ -75,7 +74,12 @@ fn rivals(said: &Said, names: &[String]) -> Vec<String> {
 impl Row {
     /// True where the recording alone left rivals of other physics, and a measurement was proposed that tells one of them.
     fn is_tie(&self) -> bool {
-        !rivals(&self.first, &self.first.as_good).is_empty() && !rivals(&self.first, &self.from).is_empty()
+        self.is_open() && !rivals(&self.first, &self.from).is_empty()
+    }
+
+    /// True where other physics is as good as what is named first.
+    fn is_open(&self) -> bool {
+        !rivals(&self.first, &self.first.as_good).is_empty()
     }
 
     /// True where both recordings together name something, and nothing that the measurement is said to tell is as good: neither one of the rivals
@@ -141,9 +145,14 @@ pub fn line(r: &Row) -> String {
     };
     let next = match (&r.next, &r.then) {
         (Some(next), Some(then)) => format!("; {next}, against {}: {}", r.from.join(", "), said(then)),
-        _ => "; no measurement is proposed for a tie".into(),
+        _ if r.is_open() => "; no measurement is proposed".into(),
+        _ => String::new(),
     };
-    let end = if r.is_settled() { "settled" } else { "open" };
+    let end = match (r.is_open(), r.is_settled()) {
+        (false, _) => "no tie",
+        (true, false) => "open",
+        (true, true) => "settled",
+    };
     format!("{}{next}, {:.1} s, {end}", said(&r.first), r.seconds)
 }
 
@@ -166,9 +175,7 @@ pub struct Line {
 
 /// The newest row of every case, counted by group, and together.
 pub fn lines(all: &[Row]) -> Vec<Line> {
-    let mut seen = BTreeSet::new();
-    let mut newest: Vec<&Row> = all.iter().rev().filter(|r| seen.insert(r.case.as_str())).collect();
-    newest.reverse();
+    let newest = rows::newest(all.iter(), |r| r.case.as_str());
     let line = |group: &str, of: Vec<&Row>| {
         let count = |f: fn(&Row) -> bool| of.iter().filter(|r| f(r)).count();
         Line {
