@@ -2,6 +2,7 @@
 
 use crate::error::{ImportError, read, refuse};
 use npyz::{DType, NpyFile, Order, TypeChar};
+use palpate_io::npy::{open, to_c_order};
 use std::io::{Cursor, Read};
 use std::path::Path;
 use zip::ZipArchive;
@@ -83,22 +84,9 @@ pub fn read_arrays(path: &Path) -> Result<Vec<Array>, ImportError> {
     Ok(arrays)
 }
 
-/// False where the header's shape has more entries than the file has bytes: their number need not fit into any integer.
-fn is_plausible(bytes: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
-    let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
-    let Some((lengths, _)) = shape else { return true };
-    let mut lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
-    lengths.try_fold(1u128, |n, x| n.checked_mul(x)).is_some_and(|n| n <= bytes.len() as u128)
-}
-
 /// The array in the bytes of an `.npy` file; `None` where it holds no numbers.
 fn decode(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
-    if !is_plausible(bytes) {
-        return Err("says that it holds more numbers than the file has bytes".into());
-    }
-    let open = || NpyFile::new(bytes).map_err(|e| format!("is not a readable .npy file: {e}"));
-    let file = open()?;
+    let file = open(bytes)?;
     let (dtype, order) = (file.dtype(), file.order());
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
     let DType::Plain(t) = &dtype else { return Ok(None) };
@@ -114,17 +102,17 @@ fn decode(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
     }
     let wide = |v: Vec<i64>| Numbers::Whole(v);
     let numbers = match (kind, size) {
-        (TypeChar::Uint, 2) => Numbers::Counts(all::<u16>(open()?)?),
-        (TypeChar::Bool, 1) => wide(all::<bool>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 1) => wide(all::<u8>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 4) => wide(all::<u32>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 8) => wide(all::<u64>(open()?)?.into_iter().map(|x| x.min(i64::MAX as u64) as i64).collect()),
-        (TypeChar::Int, 1) => wide(all::<i8>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 2) => wide(all::<i16>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 4) => wide(all::<i32>(open()?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 8) => wide(all::<i64>(open()?)?),
-        (TypeChar::Float, 4) => Numbers::Real(all::<f32>(open()?)?.into_iter().map(f64::from).collect()),
-        (TypeChar::Float, 8) => Numbers::Real(all::<f64>(open()?)?),
+        (TypeChar::Uint, 2) => Numbers::Counts(all::<u16>(open(bytes)?)?),
+        (TypeChar::Bool, 1) => wide(all::<bool>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 1) => wide(all::<u8>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 4) => wide(all::<u32>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 8) => wide(all::<u64>(open(bytes)?)?.into_iter().map(|x| x.min(i64::MAX as u64) as i64).collect()),
+        (TypeChar::Int, 1) => wide(all::<i8>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 2) => wide(all::<i16>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 4) => wide(all::<i32>(open(bytes)?)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 8) => wide(all::<i64>(open(bytes)?)?),
+        (TypeChar::Float, 4) => Numbers::Real(all::<f32>(open(bytes)?)?.into_iter().map(f64::from).collect()),
+        (TypeChar::Float, 8) => Numbers::Real(all::<f64>(open(bytes)?)?),
         _ => return Ok(None),
     };
     let numbers = match (order, numbers) {
@@ -134,23 +122,4 @@ fn decode(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
         (Order::Fortran, Numbers::Real(v)) => Numbers::Real(to_c_order(&shape, &v)),
     };
     Ok(Some(Array { name: name.to_string(), shape, numbers }))
-}
-
-/// Numbers in Fortran order (first axis fastest) with the last axis fastest.
-fn to_c_order<T: Copy>(shape: &[usize], values: &[T]) -> Vec<T> {
-    let mut strides = Vec::with_capacity(shape.len());
-    let mut stride = 1;
-    for n in shape {
-        strides.push(stride);
-        stride *= n;
-    }
-    let at = |mut k: usize| {
-        let mut place = 0;
-        for a in (0..shape.len()).rev() {
-            place += k % shape[a] * strides[a];
-            k /= shape[a];
-        }
-        values[place]
-    };
-    (0..values.len()).map(at).collect()
 }

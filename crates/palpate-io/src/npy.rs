@@ -16,6 +16,10 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 /// Largest array that is read [B]: more is a broken file, or more than a recording of this kind can be used for.
 const LARGEST: u64 = 16 << 30;
 
+/// Most brackets within brackets of a header: plain numbers have two, structures with fields a few more. A header that is no Python is given up in
+/// a time that grows threefold with every level.
+const DEEPEST: usize = 8;
+
 /// An array of numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Array {
@@ -107,10 +111,7 @@ pub(crate) fn decode_array(path: &Path, bytes: &[u8]) -> Result<Array, InputErro
 fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, InputError> {
     let which = if name.is_empty() { String::new() } else { format!("array \"{name}\": ") };
     let wrong = |text: String| InputError::file(path, format!("{which}{text}"));
-    if !is_plausible(bytes) {
-        return Err(wrong("says that it holds more numbers than the file has bytes".into()));
-    }
-    let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
+    let file = open(bytes).map_err(&wrong)?;
     let (dtype, order) = (file.dtype(), file.order());
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
     let mut stored = TypeChar::Float;
@@ -133,7 +134,7 @@ fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, I
     if count.checked_mul(size as usize).is_none_or(|n| n > bytes.len() - header) {
         return Err(wrong(format!("ends before its {count} numbers")));
     }
-    let file = NpyFile::new(bytes).map_err(|e| wrong(format!("is not a readable .npy file: {e}")))?;
+    let file = open(bytes).map_err(&wrong)?;
     let short = |e: npyz::DTypeError| wrong(e.to_string());
     let values: Result<Vec<f64>, std::io::Error> = match (stored, size) {
         (TypeChar::Int, 4) => file.data::<i32>().map_err(short)?.map(|x| x.map(f64::from)).collect(),
@@ -147,17 +148,60 @@ fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, I
     Ok(Array { values: if order == Order::Fortran { to_c_order(&shape, &values) } else { values }, shape })
 }
 
+/// Opens an `.npy` file: its header is read, its numbers are next.
+///
+/// # Errors
+/// In words: it is no such file, or its header says what cannot be.
+pub fn open(bytes: &[u8]) -> Result<NpyFile<&[u8]>, String> {
+    let header = header(bytes);
+    if !is_plausible(header, bytes.len()) {
+        return Err("says that it holds more numbers than the file has bytes".into());
+    }
+    if !is_shallow(header) {
+        return Err("is not a readable .npy file: its header is none that NumPy writes".into());
+    }
+    NpyFile::new(bytes).map_err(|e| format!("is not a readable .npy file: {e}"))
+}
+
+/// The text of the header, behind the magic number, the version and its own length.
+fn header(bytes: &[u8]) -> &[u8] {
+    let length = |bytes: &[u8]| bytes.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
+    let from = if bytes.get(6) == Some(&1) { 10 } else { 12 };
+    let Some((start, rest)) = bytes.split_at_checked(from) else { return &[] };
+    &rest[..length(&start[8..]).min(rest.len())]
+}
+
 /// False where the header's shape has more entries than the file has bytes: their number need not fit into any integer.
-fn is_plausible(bytes: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+fn is_plausible(header: &[u8], bytes: usize) -> bool {
+    let text = String::from_utf8_lossy(header);
     let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
     let Some((lengths, _)) = shape else { return true };
     let mut lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
-    lengths.try_fold(1u128, |n, x| n.checked_mul(x)).is_some_and(|n| n <= bytes.len() as u128)
+    lengths.try_fold(1u128, |n, x| n.checked_mul(x)).is_some_and(|n| n <= bytes as u128)
+}
+
+/// False where brackets outside of strings are nested too deep. Strings in three quotation marks, which NumPy never writes, could hide some.
+fn is_shallow(header: &[u8]) -> bool {
+    let (mut depth, mut quote, mut escaped) = (0usize, None, false);
+    for c in header {
+        match (quote, c) {
+            (Some(_), _) if escaped => escaped = false,
+            (Some(_), b'\\') => escaped = true,
+            (Some(q), c) if q == c => quote = None,
+            (None, b'\'' | b'"') => quote = Some(c),
+            (None, b'(' | b'[' | b'{') => depth += 1,
+            (None, b')' | b']' | b'}') => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > DEEPEST {
+            return false;
+        }
+    }
+    header.windows(3).all(|w| w != b"'''" && w != b"\"\"\"")
 }
 
 /// Numbers in Fortran order (first axis fastest) with the last axis fastest.
-fn to_c_order(shape: &[usize], values: &[f64]) -> Vec<f64> {
+pub fn to_c_order<T: Copy>(shape: &[usize], values: &[T]) -> Vec<T> {
     let mut strides = Vec::with_capacity(shape.len());
     let mut stride = 1;
     for n in shape {

@@ -48,6 +48,12 @@ fn what_is_no_array_of_numbers_is_refused_with_its_reason() {
         (npy("<c16", false, "(4,)", &zeros), "expected float32 or float64"),
         (npy("<f8", false, "(2, 5)", &zeros), "ends before its 10 numbers"),
         (npy("<f8", false, "(99999999999, 99999999999)", &zeros), "says that it holds more numbers than the file has bytes"),
+        (npy("<f8", false, &"{".repeat(40), &zeros), "its header is none that NumPy writes"),
+        // Brackets that only look closed: they are within a string, or within one that a reader of short strings takes for another.
+        (npy("<f8", false, &"{'}',".repeat(40), &zeros), "its header is none that NumPy writes"),
+        (npy("<f8", false, &"{'\\'}',".repeat(40), &zeros), "its header is none that NumPy writes"),
+        (npy("<f8", false, &"{''''}''',".repeat(40), &zeros), "its header is none that NumPy writes"),
+        (b"\x93NUMPY\x01\x00".to_vec(), "is not a readable .npy file"),
         (b"not numpy at all".to_vec(), "is not a readable .npy file"),
     ] {
         let e = read(&bytes).unwrap_err();
