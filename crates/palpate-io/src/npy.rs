@@ -7,7 +7,8 @@ use crate::error::{InputError, OutputError};
 use crate::input::read_bytes;
 use crate::keys::suggest;
 use crate::output::write_file;
-use npyz::{DType, NpyFile, Order, TypeChar, WriterBuilder};
+use crate::room::{self, gigabytes};
+use npyz::{DType, NpyFile, NpyHeader, Order, TypeChar, WriterBuilder};
 use std::io::{Cursor, Read, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
@@ -78,8 +79,7 @@ fn read_numbers(path: &Path, name: Option<&str>, whole: bool) -> Result<Array, I
     };
     let member = [format!("{name}.npy"), name.to_string()].into_iter().find(|m| archive.index_for_name(m).is_some());
     let file = archive.by_name(&member.unwrap_or_default()).map_err(|e| broken(&e))?;
-    let mut content = Vec::new();
-    file.take(LARGEST).read_to_end(&mut content).map_err(|e| broken(&e))?;
+    let content = unpack(file).map_err(|e| broken(&e))?;
     decode(path, name, &content, whole)
 }
 
@@ -128,13 +128,6 @@ fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, I
             return Err(wrong(format!("holds {text}, expected float32 or float64; convert it with .astype(numpy.float32)")));
         }
     };
-    // Counted before anything is allocated: what a header says may be anything.
-    let count: usize = shape.iter().product();
-    let header = bytes.len() - file.into_inner().len();
-    if count.checked_mul(size as usize).is_none_or(|n| n > bytes.len() - header) {
-        return Err(wrong(format!("ends before its {count} numbers")));
-    }
-    let file = open(bytes).map_err(&wrong)?;
     let short = |e: npyz::DTypeError| wrong(e.to_string());
     let values: Result<Vec<f64>, std::io::Error> = match (stored, size) {
         (TypeChar::Int, 4) => file.data::<i32>().map_err(short)?.map(|x| x.map(f64::from)).collect(),
@@ -148,19 +141,38 @@ fn decode(path: &Path, name: &str, bytes: &[u8], whole: bool) -> Result<Array, I
     Ok(Array { values: if order == Order::Fortran { to_c_order(&shape, &values) } else { values }, shape })
 }
 
-/// Opens an `.npy` file: its header is read, its numbers are next.
+/// The bytes of an archive's member.
+///
+/// # Errors
+/// The archive is damaged, or the member takes more than half of the memory that is left: its numbers need as much again.
+pub fn unpack(member: impl Read) -> std::io::Result<Vec<u8>> {
+    unfold(member, room::available().map_or(LARGEST, |r| LARGEST.min(r.bytes / 2)))
+}
+
+/// The bytes of a member that has at most so many: an archive of a thousandth of them can hold it.
+fn unfold(member: impl Read, most: u64) -> std::io::Result<Vec<u8>> {
+    let mut content = Vec::new();
+    member.take(most.saturating_add(1)).read_to_end(&mut content)?;
+    match content.len() as u64 > most {
+        true => Err(std::io::Error::other(format!("an array has more than {}, all that there is room for", gigabytes(most)))),
+        false => Ok(content),
+    }
+}
+
+/// Opens an `.npy` file: its header is read, its numbers are next, and none of them is missing.
 ///
 /// # Errors
 /// In words: it is no such file, or its header says what cannot be.
 pub fn open(bytes: &[u8]) -> Result<NpyFile<&[u8]>, String> {
-    let header = header(bytes);
-    if !is_plausible(header, bytes.len()) {
-        return Err("says that it holds more numbers than the file has bytes".into());
+    check(header(bytes))?;
+    let mut rest = bytes;
+    let header = NpyHeader::from_reader(&mut rest).map_err(|e| format!("is not a readable .npy file: {e}"))?;
+    // Counted before anything is allocated: what a header says may be anything. Python's objects have no size.
+    let size = header.dtype().num_bytes().unwrap_or(0) as u64;
+    if header.len().checked_mul(size).is_none_or(|n| n > rest.len() as u64) {
+        return Err(format!("ends before its {} numbers", header.len()));
     }
-    if !is_shallow(header) {
-        return Err("is not a readable .npy file: its header is none that NumPy writes".into());
-    }
-    NpyFile::new(bytes).map_err(|e| format!("is not a readable .npy file: {e}"))
+    Ok(NpyFile::with_header(header, rest))
 }
 
 /// The text of the header, behind the magic number, the version and its own length.
@@ -171,33 +183,51 @@ fn header(bytes: &[u8]) -> &[u8] {
     &rest[..length(&start[8..]).min(rest.len())]
 }
 
-/// False where the header's shape has more entries than the file has bytes: their number need not fit into any integer.
-fn is_plausible(header: &[u8], bytes: usize) -> bool {
-    let text = String::from_utf8_lossy(header);
-    let shape = text.split_once("'shape':").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
-    let Some((lengths, _)) = shape else { return true };
-    let mut lengths = lengths.split(',').filter_map(|n| n.trim().parse::<u128>().ok());
-    lengths.try_fold(1u128, |n, x| n.checked_mul(x)).is_some_and(|n| n <= bytes as u128)
-}
-
-/// False where brackets outside of strings are nested too deep. Strings in three quotation marks, which NumPy never writes, could hide some.
-fn is_shallow(header: &[u8]) -> bool {
-    let (mut depth, mut quote, mut escaped) = (0usize, None, false);
-    for c in header {
-        match (quote, c) {
-            (Some(_), _) if escaped => escaped = false,
-            (Some(_), b'\\') => escaped = true,
-            (Some(q), c) if q == c => quote = None,
-            (None, b'\'' | b'"') => quote = Some(c),
-            (None, b'(' | b'[' | b'{') => depth += 1,
-            (None, b')' | b']' | b'}') => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        if depth > DEEPEST {
-            return false;
+/// Refuses a header that would keep the reader of Python's literals busy, or whose lengths it would multiply beyond 64 bits.
+///
+/// Outside of strings, NumPy writes brackets, whole numbers, `True` and `False` alone. Lengths of axes have two brackets around them; numbers
+/// with more are of structures, whose size the reader checks itself.
+fn check(header: &[u8]) -> Result<(), String> {
+    let odd = || Err("is not a readable .npy file: its header is none that NumPy writes".to_string());
+    // In three quotation marks, a string could hide what follows it.
+    if header.windows(3).any(|w| w == b"'''" || w == b"\"\"\"") {
+        return odd();
+    }
+    let (mut depth, mut count) = (0usize, 1u64);
+    for word in outside_of_strings(header).chunk_by(|a, b| a.is_ascii_alphanumeric() && b.is_ascii_alphanumeric()) {
+        match word {
+            b"(" | b"[" | b"{" if depth < DEEPEST => depth += 1,
+            b")" | b"]" | b"}" => depth = depth.saturating_sub(1),
+            b"True" | b"False" | b":" | b"," | b"'" | b"\"" => {}
+            [c] if c.is_ascii_whitespace() => {}
+            digits if digits.iter().all(u8::is_ascii_digit) => {
+                let number = String::from_utf8_lossy(digits).parse().map(|n: u64| if depth > 2 { 1 } else { n.max(1) });
+                match number.ok().and_then(|n| count.checked_mul(n)) {
+                    Some(n) => count = n,
+                    None => return Err("has a shape that no array has".into()),
+                }
+            }
+            _ => return odd(),
         }
     }
-    header.windows(3).all(|w| w != b"'''" && w != b"\"\"\"")
+    Ok(())
+}
+
+/// The header with only the first mark of every string, so that no word goes on behind it.
+fn outside_of_strings(header: &[u8]) -> Vec<u8> {
+    let (mut within, mut escaped) = (None, false);
+    let mut is_kept = |c: &u8| {
+        let kept = within.is_none();
+        match within {
+            Some(_) if escaped => escaped = false,
+            Some(_) if *c == b'\\' => escaped = true,
+            Some(mark) if mark == *c => within = None,
+            None if matches!(c, b'\'' | b'"') => within = Some(*c),
+            _ => {}
+        }
+        kept
+    };
+    header.iter().copied().filter(|c| is_kept(c)).collect()
 }
 
 /// Numbers in Fortran order (first axis fastest) with the last axis fastest.

@@ -47,7 +47,14 @@ fn what_is_no_array_of_numbers_is_refused_with_its_reason() {
         (npy("<i8", false, "(2, 3)", &zeros), "holds '<i8', expected float32 or float64"),
         (npy("<c16", false, "(4,)", &zeros), "expected float32 or float64"),
         (npy("<f8", false, "(2, 5)", &zeros), "ends before its 10 numbers"),
-        (npy("<f8", false, "(99999999999, 99999999999)", &zeros), "says that it holds more numbers than the file has bytes"),
+        (npy("<f8", false, "(99999999999, 99999999999)", &zeros), "has a shape that no array has"),
+        (npy("<f8", false, "(0, 99999999999, 99999999999)", &zeros), "has a shape that no array has"),
+        (npy("<f8", false, "(99999999999999999999,)", &zeros), "has a shape that no array has"),
+        // Of two shapes the last one counts, and its name may be written in other ways.
+        (npy("<f8", false, "(8,), 'sh\\x61pe': (3, 6148914691236517206)", &zeros), "has a shape that no array has"),
+        (npy("<f8", false, "(8,), \"shape\": (3, 6148914691236517206)", &zeros), "has a shape that no array has"),
+        (npy("<f8", false, "(0xFFFFFFFF, 0xFFFFFFFF, 8)", &zeros), "its header is none that NumPy writes"),
+        (npy("<f8", false, "(8,), u'a': -1", &zeros), "its header is none that NumPy writes"),
         (npy("<f8", false, &"{".repeat(40), &zeros), "its header is none that NumPy writes"),
         // Brackets that only look closed: they are within a string, or within one that a reader of short strings takes for another.
         (npy("<f8", false, &"{'}',".repeat(40), &zeros), "its header is none that NumPy writes"),
@@ -59,6 +66,23 @@ fn what_is_no_array_of_numbers_is_refused_with_its_reason() {
         let e = read(&bytes).unwrap_err();
         assert!(e.starts_with("a.npy: ") && e.contains(expected), "{e}");
     }
+}
+
+#[test]
+fn structures_and_objects_are_called_what_they_are() {
+    let field = |name: &str| format!("('{name}', '<f4', (100,))");
+    let fields: Vec<String> = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k"].map(field).to_vec();
+    let mut header = npy("", false, "(2,)", &[0; 8800]);
+    let at = header.windows(2).position(|w| w == b"''").unwrap();
+    let descr = format!("[{}]", fields.join(", "));
+    header.splice(at..at + 2, descr.bytes());
+    let length = u16::from_le_bytes([header[8], header[9]]) + descr.len() as u16 - 2;
+    header[8..10].copy_from_slice(&length.to_le_bytes());
+    let e = read(&header).unwrap_err();
+    assert!(e.contains("holds [('a', '<f4', (100,)),") && e.contains("expected float32"), "{e}");
+    assert_eq!(read(&header[..header.len() - 1]).unwrap_err(), "a.npy: ends before its 2 numbers");
+    let e = read(&npy("|O", false, "(4,)", b"pickled")).unwrap_err();
+    assert!(e.contains("holds '|O', expected float32"), "{e}");
 }
 
 #[test]
@@ -78,4 +102,11 @@ fn archives_are_read_back_and_name_their_arrays() {
     assert_eq!(read_array(&path, None).unwrap(), b);
     std::fs::write(&path, b"no archive").unwrap();
     assert!(read_array(&path, None).unwrap_err().to_string().contains("is not a readable .npz file"));
+}
+
+#[test]
+fn archives_that_unfold_beyond_the_memory_are_refused() {
+    assert_eq!(unfold(&[7; 1000][..], 1000).unwrap(), [7; 1000]);
+    let e = unfold(std::io::repeat(0), 4_000_000).unwrap_err().to_string();
+    assert_eq!(e, "an array has more than 4 MB, all that there is room for");
 }

@@ -3,6 +3,19 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// Addresses that a thread reserves at its first allocation [B], with glibc, which lets at most [`ARENAS`] threads a core do so. `ulimit -v`
+/// counts addresses.
+const ARENA: u64 = 1 << 26;
+/// See [`ARENA`].
+const ARENAS: usize = 8;
+
+/// Threads that help the main one, and have just been started.
+#[cfg(unix)]
+const HELPERS: u64 = 2;
+
+/// The last cache of a processor that does not say how large it is [B].
+const CACHE: u64 = 1 << 25;
+
 /// Memory that is left, and who sets the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
@@ -10,11 +23,19 @@ pub struct Room {
     pub bytes: u64,
     /// Who says so: the machine, its container, or the shell.
     pub by: &'static str,
+    /// Whether addresses count that nothing is kept at ([`Room::beside`]).
+    pub addresses: bool,
+    /// So much more is left, but threads reserve it [B].
+    pub reserved: u64,
 }
 
 impl fmt::Display for Room {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of memory are left ({})", gigabytes(self.bytes), self.by)
+        write!(f, "{} of memory are left ({}", gigabytes(self.bytes), self.by)?;
+        if self.reserved > 0 {
+            write!(f, ", beside {} that threads reserve", gigabytes(self.reserved))?;
+        }
+        write!(f, ")")
     }
 }
 
@@ -26,12 +47,31 @@ pub fn gigabytes(bytes: u64) -> String {
 
 /// The least of what the machine, the container (cgroup) and `ulimit` leave to this process; `None` where the system does not say.
 pub fn available() -> Option<Room> {
+    let [data, addresses] = shell();
     let all = [
-        (machine(), "free on this machine"),
-        (container(Path::new("/sys/fs/cgroup"), &text("/proc/self/cgroup")), "limit of the container"),
-        (shell(), "limit of the shell, ulimit"),
+        (machine(), "free on this machine", false),
+        (container(Path::new("/sys/fs/cgroup"), &text("/proc/self/cgroup")), "limit of the container", false),
+        (data, "limit of the shell, ulimit -d", false),
+        (addresses, "limit of the shell, ulimit -v", true),
     ];
-    all.into_iter().filter_map(|(bytes, by)| Some(Room { bytes: bytes?, by })).min_by_key(|r| r.bytes)
+    all.into_iter()
+        .filter_map(|(bytes, by, addresses)| Some(Room { bytes: bytes?, by, addresses, reserved: 0 }))
+        .min_by_key(|r| r.bytes)
+}
+
+impl Room {
+    /// What is left beside the addresses that threads reserve and use little of: so many that are yet to be started, and so many that compute, at
+    /// their first product of matrices. Each of the latter keeps twice the last cache to pack them in. Only `ulimit -v` counts that.
+    pub fn beside(self, started: usize, computing: usize) -> Room {
+        if !self.addresses {
+            return self;
+        }
+        let said = text("/sys/devices/system/cpu/cpu0/cache/index3/size");
+        let cache = said.trim().strip_suffix('K').and_then(|k| k.parse::<u64>().ok()).map_or(CACHE, |k| 1024 * k);
+        let arenas = started.min(ARENAS * std::thread::available_parallelism().map_or(1, usize::from));
+        let reserved = arenas as u64 * ARENA + computing as u64 * 2 * cache;
+        Room { bytes: self.bytes.saturating_sub(reserved), reserved, ..self }
+    }
 }
 
 fn text(path: impl AsRef<Path>) -> String {
@@ -76,21 +116,21 @@ fn container(root: &Path, own: &str) -> Option<u64> {
     all.into_iter().min()
 }
 
-/// What `ulimit -v` and `ulimit -d` leave.
+/// What `ulimit -d` and `ulimit -v` leave.
 #[cfg(unix)]
-fn shell() -> Option<u64> {
+fn shell() -> [Option<u64>; 2] {
     use rustix::process::{Resource, getrlimit};
     let status = text("/proc/self/status");
-    let left = |what, used| {
+    let left = |what, used, reserved| {
         let limit = getrlimit(what).current?;
-        Some(limit.saturating_sub(1024 * labelled(&status, used)?))
+        Some(limit.saturating_sub(1024 * labelled(&status, used)? + reserved))
     };
-    [left(Resource::As, "VmSize:"), left(Resource::Data, "VmData:")].into_iter().flatten().min()
+    [left(Resource::Data, "VmData:", 0), left(Resource::As, "VmSize:", HELPERS * ARENA)]
 }
 
 #[cfg(not(unix))]
-fn shell() -> Option<u64> {
-    None
+fn shell() -> [Option<u64>; 2] {
+    [None; 2]
 }
 
 #[cfg(test)]
@@ -127,7 +167,16 @@ mod tests {
     fn linux_says_what_is_left() {
         let room = available().unwrap();
         assert!(room.bytes > 1_000_000, "{room}");
-        assert_eq!(Room { bytes: 1_234_000_000, by: "x" }.to_string(), "1.2 GB of memory are left (x)");
+        let of = |addresses| Room { bytes: 1 << 40, by: "x", addresses, reserved: 0 };
+        assert_eq!(of(false).beside(9, 9), of(false));
+        let taken = |started, computing| (1 << 40) - of(true).beside(started, computing).bytes;
+        assert!(taken(0, 2) == 2 * taken(0, 1) && taken(0, 1) > 0);
+        // However many are started.
+        assert!(taken(1, 1) > taken(0, 1) && taken(1_000_000, 0) == taken(2_000_000, 0));
+        let room = Room { bytes: 1_234_000_000, ..of(false) };
+        assert_eq!(room.to_string(), "1.2 GB of memory are left (x)");
+        let room = Room { reserved: 45_600_000, ..room };
+        assert_eq!(room.to_string(), "1.2 GB of memory are left (x, beside 46 MB that threads reserve)");
         assert_eq!(gigabytes(45_600_000), "46 MB");
     }
 }

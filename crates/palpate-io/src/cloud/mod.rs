@@ -6,6 +6,7 @@ mod ply;
 mod tests;
 
 use crate::error::{InputError, OutputError};
+use crate::input::read_bytes;
 use crate::output::write_file;
 use glam::DVec3;
 use std::path::Path;
@@ -29,8 +30,7 @@ pub struct CloudFile {
 /// # Errors
 /// The file cannot be read, is of another format, or is damaged.
 pub fn read_cloud(path: &Path) -> Result<CloudFile, InputError> {
-    let bytes = std::fs::read(path).map_err(|e| InputError::io(path, &e))?;
-    decode_cloud(path, &bytes)
+    decode_cloud(path, &read_bytes(path)?)
 }
 
 /// The cloud in the bytes of a file, whose ending says how.

@@ -29,6 +29,7 @@ use crate::document::{Source, Table};
 use crate::error::{InputError, Loaded};
 use crate::input::read_bytes;
 use crate::keys::{RECORDING, suggest};
+use crate::room::{self, gigabytes};
 use crate::scene::{check_format, marker_rest};
 use palpate_model::observation::{MarkerRest, ReadingKind};
 use rayon::prelude::*;
@@ -247,6 +248,15 @@ fn frames(
             return Err(table.missing("depth", "a depth image, a mask, or both"));
         }
         headers.push(Header { table, camera, time, depth, mask });
+    }
+    // A count has two bytes at least, a flag of a mask one.
+    let bytes = |h: &Header| {
+        let pixels = cameras[h.camera].width as u64 * cameras[h.camera].height as u64;
+        pixels * (2 * u64::from(h.depth.is_some()) + u64::from(h.mask.is_some()))
+    };
+    let all = headers.iter().map(bytes).fold(0, u64::saturating_add);
+    if let Some(room) = room::available().filter(|r| r.bytes < all) {
+        return Err(root.error("frame", format!("{} frames take {} at least, and {room}", headers.len(), gigabytes(all))));
     }
     // Files are read and decoded side by side; what is wrong is still reported in the order of the file.
     type Images = (Option<Result<DepthImage, InputError>>, Option<Result<Vec<bool>, InputError>>);

@@ -295,3 +295,18 @@ fn a_recording_elsewhere_is_refused_with_numbers() {
     );
     assert_eq!(check_overlap(&Observation::default(), far, far), Ok(()), "nothing measured is another error");
 }
+
+#[test]
+fn frames_that_memory_has_no_room_for_are_refused_before_one_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from(
+        "format = \"recording/1\"\n[[camera]]\nname = \"c\"\nwidth = 65536\nheight = 65536\nfx = 4.0\nfy = 4.0\ncx = 1.5\ncy = 1.0\n\
+         depth_scale = 0.001\nworld_from_camera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
+    );
+    // 13 TB of counts.
+    (0..1500).for_each(|k| text += &format!("[[frame]]\ncamera = \"c\"\ntime = {k}.0\ndepth = \"0.png\"\n"));
+    fs::write(folder.path().join("recording.toml"), text).unwrap();
+    fs::write(folder.path().join("0.png"), b"no image").unwrap();
+    let e = read_recording(folder.path()).unwrap_err().to_string();
+    assert!(e.contains("frame: 1500 frames take 12884.9 GB at least, and ") && e.contains(" of memory are left"), "{e}");
+}
