@@ -2,13 +2,10 @@
 
 use crate::error::{ImportError, read, refuse};
 use npyz::{DType, NpyFile, Order, TypeChar};
-use palpate_io::npy::{open, to_c_order};
-use std::io::{Cursor, Read};
+use palpate_io::npy::{open, to_c_order, unpack};
+use std::io::Cursor;
 use std::path::Path;
 use zip::ZipArchive;
-
-/// Larger arrays than this are no recording [B].
-const LARGEST: u64 = 16 << 30;
 
 /// Numbers as they are stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,15 +62,13 @@ pub fn read_arrays(path: &Path) -> Result<Vec<Array>, ImportError> {
     };
     let mut arrays = Vec::new();
     for i in 0..archive.len() {
-        let mut content = Vec::new();
-        let name = match archive.by_index(i) {
-            Ok(file) => {
-                let name = file.name().map_or_else(|_| format!("array {i}"), |n| n.to_string());
-                if let Err(e) = file.take(LARGEST).read_to_end(&mut content) {
-                    return broken(&e);
-                }
-                name
-            }
+        let file = match archive.by_index(i) {
+            Ok(file) => file,
+            Err(e) => return broken(&e),
+        };
+        let name = file.name().map_or_else(|_| format!("array {i}"), |n| n.to_string());
+        let content = match unpack(file) {
+            Ok(content) => content,
             Err(e) => return broken(&e),
         };
         match decode(name.strip_suffix(".npy").unwrap_or(&name), &content) {
@@ -91,28 +86,23 @@ fn decode(name: &str, bytes: &[u8]) -> Result<Option<Array>, String> {
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
     let DType::Plain(t) = &dtype else { return Ok(None) };
     let (kind, size) = (t.type_char(), t.size_field());
-    let count: usize = shape.iter().product();
-    let rest = file.into_inner().len();
-    if count.checked_mul(size as usize).is_none_or(|n| n > rest) {
-        return Err(format!("ends before its {count} numbers"));
-    }
     fn all<T: npyz::Deserialize>(file: NpyFile<&[u8]>) -> Result<Vec<T>, String> {
         let data = file.data::<T>().map_err(|e| e.to_string())?;
         data.collect::<Result<Vec<T>, _>>().map_err(|e| format!("is not a readable .npy file: {e}"))
     }
     let wide = |v: Vec<i64>| Numbers::Whole(v);
     let numbers = match (kind, size) {
-        (TypeChar::Uint, 2) => Numbers::Counts(all::<u16>(open(bytes)?)?),
-        (TypeChar::Bool, 1) => wide(all::<bool>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 1) => wide(all::<u8>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 4) => wide(all::<u32>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 8) => wide(all::<u64>(open(bytes)?)?.into_iter().map(|x| x.min(i64::MAX as u64) as i64).collect()),
-        (TypeChar::Int, 1) => wide(all::<i8>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 2) => wide(all::<i16>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 4) => wide(all::<i32>(open(bytes)?)?.into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 8) => wide(all::<i64>(open(bytes)?)?),
-        (TypeChar::Float, 4) => Numbers::Real(all::<f32>(open(bytes)?)?.into_iter().map(f64::from).collect()),
-        (TypeChar::Float, 8) => Numbers::Real(all::<f64>(open(bytes)?)?),
+        (TypeChar::Uint, 2) => Numbers::Counts(all::<u16>(file)?),
+        (TypeChar::Bool, 1) => wide(all::<bool>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 1) => wide(all::<u8>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 4) => wide(all::<u32>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Uint, 8) => wide(all::<u64>(file)?.into_iter().map(|x| x.min(i64::MAX as u64) as i64).collect()),
+        (TypeChar::Int, 1) => wide(all::<i8>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 2) => wide(all::<i16>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 4) => wide(all::<i32>(file)?.into_iter().map(i64::from).collect()),
+        (TypeChar::Int, 8) => wide(all::<i64>(file)?),
+        (TypeChar::Float, 4) => Numbers::Real(all::<f32>(file)?.into_iter().map(f64::from).collect()),
+        (TypeChar::Float, 8) => Numbers::Real(all::<f64>(file)?),
         _ => return Ok(None),
     };
     let numbers = match (order, numbers) {

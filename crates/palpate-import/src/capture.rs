@@ -1,9 +1,11 @@
 //! What every format is read into: images, clouds, markers or tracks with their times, and what is known about them.
 
+use crate::budget::Budget;
+use crate::error::ImportError;
 use crate::lens::Optics;
 use crate::options::Unit;
 use glam::{DAffine3, DVec3};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Everything that a source holds, in its own units and axes.
 #[derive(Clone, Debug, Default)]
@@ -82,6 +84,17 @@ pub enum Pixels {
 }
 
 impl Pixels {
+    /// Counts their memory.
+    ///
+    /// # Errors
+    /// All that was read so far takes more than there is.
+    pub fn take(&self, source: &Path, budget: &mut Budget) -> Result<(), ImportError> {
+        match self {
+            Pixels::Counts(c) => budget.take(source, c),
+            Pixels::Lengths(l) => budget.take(source, l),
+        }
+    }
+
     /// Number of pixels.
     pub fn count(&self) -> usize {
         match self {

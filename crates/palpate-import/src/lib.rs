@@ -5,6 +5,7 @@
 //! room does not simulate.
 
 mod arrays;
+mod budget;
 mod capture;
 mod error;
 mod formats;

@@ -1,6 +1,7 @@
 //! What folders of depth images have in common: which files are images, what belongs to them, when they were taken.
 
 use crate::Watch;
+use crate::budget::Budget;
 use crate::capture::{Capture, DepthCamera, DepthFrame, Guess};
 use crate::error::{ImportError, refuse};
 use crate::images::{ENDINGS, read_depth, read_mask};
@@ -114,7 +115,7 @@ pub fn read_images(
     if !masks.is_empty() && masks.len() != files.len() {
         return refuse(&place.path, format!("holds {} masks for {} depth images", masks.len(), files.len()));
     }
-    let mut frames: Vec<DepthFrame> = Vec::new();
+    let (mut frames, mut budget) = (Vec::<DepthFrame>::new(), Budget::new());
     let mut size = i.size;
     // In parts, so that somebody may look and stop.
     for (part, numbered) in files.iter().enumerate().collect::<Vec<_>>().chunks(32).enumerate() {
@@ -131,7 +132,9 @@ pub fn read_images(
             })
             .collect();
         for frame in read {
-            frames.push(frame?);
+            let frame = frame?;
+            frame.pixels.take(&place.path, &mut budget)?;
+            frames.push(frame);
         }
     }
     let Some(size) = size else { return refuse(&place.path, "holds no depth image") };

@@ -3,6 +3,7 @@
 use super::Format;
 use super::cdr::Cdr;
 use crate::Watch;
+use crate::budget::Budget;
 use crate::capture::{Capture, DepthCamera, DepthFrame, Pixels};
 use crate::error::{ImportError, read as read_bytes, refuse, refuse_option};
 use crate::intrinsics::lens_of;
@@ -10,7 +11,9 @@ use crate::lens::Optics;
 use crate::options::Options;
 use crate::place::{Place, has_ending, head};
 use image::{DynamicImage, ImageFormat};
-use mcap::MessageStream;
+use mcap::io::MessageReader;
+use mcap::records::op;
+use mcap::sans_io::LinearReaderOptions;
 use palpate_io::lens::Lens;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,9 +31,12 @@ pub const FORMAT: Format = Format {
     read,
 };
 
+/// Largest record of a compressed chunk [B], five times an image of twelve million floats: it takes memory before its bytes are there.
+const LARGEST: usize = 1 << 28;
+
 /// Images and infos of a bag, by topic.
-#[derive(Default)]
 struct Topics {
+    budget: Budget,
     images: BTreeMap<String, Vec<Image>>,
     infos: BTreeMap<String, Info>,
     /// Topics of images that are no depth, with their encoding.
@@ -58,18 +64,15 @@ fn read(place: &Place, o: &Options, watch: &mut Watch) -> Result<Capture, Import
     if files.is_empty() {
         return refuse(&place.path, "is a bag, and not in MCAP; convert it: ros2 bag convert, or rosbags-convert for ROS 1");
     }
-    let mut topics = Topics::default();
+    let mut topics = Topics { budget: Budget::new(), images: BTreeMap::new(), infos: BTreeMap::new(), others: BTreeMap::new() };
     for file in &files {
         let bytes = read_bytes(file)?;
-        let broken = |e: mcap::McapError| refuse(file, format!("is not a readable MCAP file: {e}"));
-        let stream = match MessageStream::new(&bytes) {
-            Ok(s) => s,
-            Err(e) => return broken(e),
-        };
-        for (k, message) in stream.enumerate() {
+        check(&bytes).or_else(|e| refuse(file, format!("is not a readable MCAP file: {e}")))?;
+        let allowed = LinearReaderOptions::default().with_record_length_limit(bytes.len().max(LARGEST));
+        for (k, message) in MessageReader::new_with_options(&bytes[..], allowed).enumerate() {
             let m = match message {
                 Ok(m) => m,
-                Err(e) => return broken(e),
+                Err(e) => return refuse(file, format!("is not a readable MCAP file: {e}")),
             };
             if k % 64 == 0 {
                 watch.at(k, k + 1000, "messages of the bag")?;
@@ -99,6 +102,45 @@ fn read(place: &Place, o: &Options, watch: &mut Watch) -> Result<Capture, Import
     };
     let images = topics.images.remove(&topic).unwrap_or_default();
     camera(place, &topic, images, &topics)
+}
+
+/// Refuses records that reach beyond the file or their chunk: the crate subtracts their lengths from what is left without a look. Chunks that are
+/// compressed are not looked into, since their stream has an end of its own.
+fn check(bytes: &[u8]) -> Result<(), &'static str> {
+    let mut rest = bytes.strip_prefix(mcap::MAGIC).ok_or("it does not begin like one")?;
+    loop {
+        let (code, content, behind) = record(rest).ok_or("it ends in the middle of a record (truncated?)")?;
+        match code {
+            op::FOOTER => return Ok(()),
+            op::CHUNK if plain(content).is_some_and(|records| !is_filled(records)) => {
+                return Err("a record reaches beyond its chunk");
+            }
+            _ => rest = behind,
+        }
+    }
+}
+
+/// Code and content of the first record, and what is behind it; `None` where it is not whole.
+fn record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let (code, rest) = bytes.split_first()?;
+    let (length, rest) = rest.split_first_chunk()?;
+    let (content, behind) = rest.split_at_checked(u64::from_le_bytes(*length).try_into().ok()?)?;
+    Some((*code, content, behind))
+}
+
+/// The records of a chunk that is not compressed: its head has two times, a size, a checksum, the name of a compression, and another size.
+fn plain(chunk: &[u8]) -> Option<&[u8]> {
+    let (name, rest) = chunk.get(28..)?.split_first_chunk()?;
+    let (size, rest) = rest.split_first_chunk()?;
+    if u32::from_le_bytes(*name) > 0 { None } else { rest.get(..u64::from_le_bytes(*size).try_into().ok()?) }
+}
+
+/// True where records end where their bytes do.
+fn is_filled(mut records: &[u8]) -> bool {
+    while let Some((_, _, behind)) = record(records) {
+        records = behind;
+    }
+    records.is_empty()
 }
 
 impl Topics {
@@ -142,6 +184,7 @@ impl Topics {
                     if i.stamp == 0 {
                         i.stamp = m.log_time;
                     }
+                    i.pixels.take(file, &mut self.budget)?;
                     self.images.entry(topic.clone()).or_default().push(i);
                     Ok(())
                 }

@@ -66,13 +66,18 @@ fn read(place: &Place, o: &Options, watch: &mut Watch) -> Result<Capture, Import
             all.push(Found { file: (*file).clone(), array });
         }
     }
-    let named = |names: &[&str]| all.iter().find(|f| names.contains(&f.array.name.to_ascii_lowercase().as_str()));
-    let main: Vec<&Found> = all
+    let is = |f: &Found, names: &[&str]| names.contains(&f.array.name.to_ascii_lowercase().as_str());
+    let named = |names: &[&str]| all.iter().find(|f| is(f, names));
+    let mut main: Vec<&Found> = all
         .iter()
-        .filter(|f| f.array.shape.len() == 3 && !MASKS.contains(&f.array.name.to_ascii_lowercase().as_str()))
+        .filter(|f| f.array.shape.len() == 3 && f.array.shape[1..] != [4, 4])
+        .filter(|f| [&MASKS[..], &MATRIX, &POSE].iter().all(|names| !is(f, names)))
         .filter(|f| o.pick.as_ref().is_none_or(|p| *p == f.array.name))
-        .filter(|f| f.array.shape[1..] != [4, 4] && f.array.shape[1..] != [3, 3])
         .collect();
+    // Beside others, what has three by three numbers a frame is matrices; alone, tracks of three points.
+    if main.iter().any(|f| f.array.shape[1..] != [3, 3]) {
+        main.retain(|f| f.array.shape[1..] != [3, 3]);
+    }
     let main = match main[..] {
         [one] => one,
         [] => {

@@ -73,6 +73,8 @@ impl Head {
     fn new(path: &Path, rows: &[Row]) -> Result<Head, ImportError> {
         let find = |word: &str| rows.iter().take(16).position(|r| cell(r, 1) == word);
         let header = rows.iter().take(16).position(|r| cell(r, 0) == "Frame" && cell(r, 1).starts_with("Time"));
+        // A row goes before it that says which columns are positions.
+        let header = header.filter(|h| *h > 0);
         let (Some(names), Some(header)) = (find("Name"), header) else {
             return refuse(
                 path,

@@ -2,6 +2,7 @@
 
 use super::Format;
 use crate::Watch;
+use crate::budget::Budget;
 use crate::capture::{Capture, Cloud};
 use crate::error::{ImportError, read as read_bytes, refuse};
 use crate::options::Options;
@@ -29,13 +30,14 @@ pub fn read_sequence(place: &Place, ending: &str, o: &Options, watch: &mut Watch
     }
     let times = of_files(place, &files, o.fps, None)?;
     let mut capture = Capture { title: place.title(), ..Capture::default() };
-    let (mut lost, mut viewpoints) = (0, Vec::new());
+    let (mut lost, mut viewpoints, mut budget) = (0, Vec::new(), Budget::new());
     for (k, file) in files.iter().enumerate() {
         watch.at(k, files.len(), "point clouds")?;
         let read = decode_cloud(file, &read_bytes(file)?)?;
         let (mut points, viewpoint) = (read.points, read.viewpoint);
         let all = points.len();
         points.retain(|p| p.is_finite());
+        budget.take(&place.path, &points)?;
         if all > 0 && points.is_empty() {
             return refuse(file, format!("none of its {all} points is finite"));
         }

@@ -5,6 +5,7 @@ use super::masks::{ON_PLANE, check_range};
 use super::plane::{Plane, largest};
 use super::settle::{DEPTH_NOISE, Said, median};
 use crate::Watch;
+use crate::budget::Budget;
 use crate::capture::{Cloud, DepthCamera, DepthFrame, Guess, Pixels};
 use crate::error::{ImportError, refuse, refuse_option};
 use crate::lens::Optics;
@@ -143,10 +144,11 @@ pub fn camera(
     let size = span.map(|s| (s * focal).ceil() as usize + 3);
     let center = [1.0 - low[0] * focal, 1.0 - low[1] * focal];
     let scale = if far <= 6.5 { 1e-4 } else { 1e-3 };
-    let (mut met, mut frames) = (0usize, Vec::new());
+    let (mut met, mut frames, mut budget) = (0usize, Vec::new(), Budget::new());
     for (k, (cloud, points)) in clouds.iter().zip(&local).enumerate() {
         watch.at(k, clouds.len(), "clouds to images")?;
         let mut counts = vec![0u16; size[0] * size[1]];
+        budget.take(&cloud.file, &counts)?;
         for p in points.iter().filter(|p| visible(**p)) {
             let pixel = [0, 1].map(|a| ((p[a] / p.z * focal + center[a]).round().max(0.0) as usize).min(size[a] - 1));
             let count = (p.z / scale).round().clamp(1.0, f64::from(u16::MAX)) as u16;

@@ -73,28 +73,34 @@ fn counts_in_single_files_go_through_untouched() {
 
 #[test]
 fn tracks_become_points() {
-    let bench = Bench::new();
-    let mut places: Vec<f64> = Vec::new();
-    for k in 0..FRAMES {
-        for (i, m) in marks().into_iter().enumerate() {
-            let p = (center(time(k)) + m) * 1000.0;
-            let gone = i == 1 && k == 7;
-            places.extend(if gone { [f64::NAN; 3] } else { p.to_array() });
+    // Three points are no matrices; matrices beside four points are no tracks.
+    let turns = array(&[FRAMES, 3, 3], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].repeat(FRAMES));
+    for (count, beside) in [(4, Some(("R", &turns))), (3, None)] {
+        let bench = Bench::new();
+        let mut places: Vec<f64> = Vec::new();
+        for k in 0..FRAMES {
+            for (i, m) in marks().into_iter().take(count).enumerate() {
+                let p = (center(time(k)) + m) * 1000.0;
+                let gone = i == 1 && k == 7;
+                places.extend(if gone { [f64::NAN; 3] } else { p.to_array() });
+            }
         }
-    }
-    write_npz(bench.path("t.npz"), &[("tracks", &array(&[FRAMES, 4, 3], places)), ("times", &times())]).unwrap();
-    let up = Some(-glam::DVec3::Y);
-    let (imported, r, scene) = bench.good("t.npz", &Options { up, ..Options::default() });
-    assert_eq!((imported.tracked_readings, imported.format), (4 * FRAMES - 1, "npy"));
-    let p = r.points.as_ref().unwrap();
-    for t in 0..FRAMES {
-        for (i, x) in p.track.seen(t) {
-            // Doubles, there and back through a unit.
-            assert!(x.distance(center(time(t)) + marks()[i]) < 1e-12);
+        let (tracks, times) = (array(&[FRAMES, count, 3], places), times());
+        let all: Vec<(&str, &Array)> = [("tracks", &tracks), ("times", &times)].into_iter().chain(beside).collect();
+        write_npz(bench.path("t.npz"), &all).unwrap();
+        let up = Some(-glam::DVec3::Y);
+        let (imported, r, scene) = bench.good("t.npz", &Options { up, ..Options::default() });
+        assert_eq!((imported.tracked_readings, imported.format), (count * FRAMES - 1, "npy"));
+        let p = r.points.as_ref().unwrap();
+        for t in 0..FRAMES {
+            for (i, x) in p.track.seen(t) {
+                // Doubles, there and back through a unit.
+                assert!(x.distance(center(time(t)) + marks()[i]) < 1e-12);
+            }
         }
+        assert!(imported.guesses.iter().any(|g| g.what == "unit" && g.text.contains("mm")), "{:?}", imported.guesses);
+        assert!(scene.contains("cost = \"points\"") && scene.contains("gravity = [0.0, 9.81, 0.0]"), "{scene}");
     }
-    assert!(imported.guesses.iter().any(|g| g.what == "unit" && g.text.contains("mm")), "{:?}", imported.guesses);
-    assert!(scene.contains("cost = \"points\"") && scene.contains("gravity = [0.0, 9.81, 0.0]"), "{scene}");
 }
 
 #[test]

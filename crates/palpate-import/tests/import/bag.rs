@@ -177,7 +177,7 @@ fn what_contradicts_itself_is_refused() {
         ),
         ("no depth", with(&|m| m.retain(|x| x.0 != DEPTH)), &["holds no depth images", "/camera/color/image_raw (rgb8)"]),
         ("a short message", with(&|m| m.iter_mut().filter(|x| x.0 == DEPTH).for_each(|x| x.3.truncate(99))), &["ends too early"]),
-        ("truncated", whole[..whole.len() / 2].to_vec(), &["not a readable MCAP"]),
+        ("truncated", whole[..whole.len() / 2].to_vec(), &["not a readable MCAP file: it ends in the middle of a record"]),
     ];
     for (name, bytes, words) in cases {
         let bench = Bench::new();
@@ -198,6 +198,52 @@ fn what_contradicts_itself_is_refused() {
     bench.write("b/b.db3", "SQLite format 3\0");
     let e = bench.bad("b", &far());
     assert!(e.contains("ros2 bag convert"), "{e}");
+}
+
+/// A bag with one chunk of Zstandard, in which a record of one byte says that it has so many.
+fn announcing(length: u64) -> Vec<u8> {
+    let record = [&[5][..], &length.to_le_bytes(), &[0]].concat();
+    // RFC 8878: one frame that states its size, with one block as it is.
+    let frame = [&0xFD2F_B528u32.to_le_bytes()[..], &[0x20, record.len() as u8], &[(record.len() << 3) as u8 | 1, 0, 0], &record];
+    let records = frame.concat();
+    let mut chunk = [0; 16].to_vec();
+    chunk.extend((record.len() as u64).to_le_bytes());
+    chunk.extend([0; 4]);
+    chunk.extend(4u32.to_le_bytes());
+    chunk.extend(b"zstd");
+    chunk.extend((records.len() as u64).to_le_bytes());
+    chunk.extend(records);
+    let mut bytes = mcap::MAGIC.to_vec();
+    for (code, content) in [(1, vec![0; 8]), (6, chunk), (2, vec![0; 20])] {
+        bytes.push(code);
+        bytes.extend((content.len() as u64).to_le_bytes());
+        bytes.extend(content);
+    }
+    bytes
+}
+
+#[test]
+fn no_memory_is_taken_for_what_a_record_only_announces() {
+    for length in [1 << 33, 1 << 62, u64::MAX - 4, u64::MAX] {
+        let bench = Bench::new();
+        bench.write("b.mcap", announcing(length));
+        let e = bench.bad("b.mcap", &far());
+        assert!(e.contains("not a readable MCAP file") && e.contains("length"), "{length}: {e}");
+    }
+}
+
+#[test]
+fn a_record_that_reaches_beyond_its_chunk_is_refused() {
+    let whole = bag(&messages("16UC1"), None);
+    let chunk = whole.windows(9).position(|w| w[0] == 6 && w[8] == 0 && w[4..8] == [0; 4]).unwrap();
+    // The chunk's head and its first record's code are before the length of that record.
+    let length = chunk + 9 + 40 + 1;
+    let mut longer = whole.clone();
+    longer[length] += 1;
+    let bench = Bench::new();
+    bench.write("b.mcap", longer);
+    let e = bench.bad("b.mcap", &far());
+    assert!(e.contains("a record reaches beyond its chunk"), "{e}");
 }
 
 #[test]

@@ -228,6 +228,12 @@ fn what_contradicts_itself_is_refused() {
         ("a wrong unit", "t.csv", motive("Meters", 1000.0), vec!["--unit mm would make it".into()]),
         ("local", "t.csv", motive("Meters", 1.0).replace("Global", "Local"), vec!["Coordinate Space".into()]),
         ("a unit nobody knows", "t.csv", motive("Furlongs", 1.0), vec!["Length Units".into(), "allowed: m, cm, mm".into()]),
+        (
+            "a head with nothing above",
+            "t.csv",
+            "Frame,Time (Seconds),Format Version,Take,X,Y,Z\n,Name,a,a,a,a,a\n".into(),
+            vec!["lacks the rows \"Name\" and".into()],
+        ),
         ("bodies alone", "t.csv", motive("Meters", 1.0).replace("Marker,", "Bone,"), vec!["no labelled marker".into()]),
     ];
     for (name, file, text, words) in cases {
