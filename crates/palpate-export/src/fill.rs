@@ -9,6 +9,7 @@
 use glam::{DAffine3, DVec3};
 use palpate_model::cutcells::build::{BodyError, SUBDIVISIONS};
 use palpate_model::cutcells::cut::ClipBox;
+use palpate_model::plan::build::reference;
 use palpate_model::shape::{Shape, TriMesh};
 use palpate_model::space::body::Body;
 use palpate_model::space::kept_volume::KeptVolume;
@@ -19,8 +20,6 @@ use palpate_model::space::stuffing::{StuffingError, stuff};
 const CLOSEST: f64 = 0.02;
 /// How far from a clamp's region a node may lie that it holds, in edges: places on the surface are found to better than that.
 const ON: f64 = 1e-3;
-/// Cells in the box around a shape whose volume is measured.
-const REFERENCE_CELLS: f64 = 1e5;
 
 /// A shape filled with tetrahedra.
 #[derive(Clone, Debug)]
@@ -142,8 +141,7 @@ pub fn fill(shape: &dyn Shape, clamps: &[ClipBox], edge: f64) -> Result<Filled, 
         return Err(FillError::Nothing);
     }
     // As for bodies of tetrahedra within palpate: cut cells know the volume of what is inside.
-    let h = (0.5 * edge).max(((high - low).element_product() / REFERENCE_CELLS).cbrt()).min((high - low).min_element());
-    let volume = Body::build(shape, h, 0.0, SUBDIVISIONS)?.volume;
+    let volume = Body::build(shape, reference(low, high, edge), 0.0, SUBDIVISIONS)?.volume;
     let kept = mesh.keep_volume(volume);
     Ok(Filled { mesh, held, kept, volume })
 }
@@ -154,6 +152,7 @@ fn in_metres(e: StuffingError, h: f64) -> FillError {
         StuffingError::TooFine { points, suggestion, .. } => {
             StuffingError::TooFine { edge: h, points, suggestion: suggestion * h }
         }
+        StuffingError::TooThin { least, points } => StuffingError::TooThin { least: least * h, points },
         StuffingError::TooCoarse { suggestion, .. } => StuffingError::TooCoarse { edge: h, suggestion: suggestion * h },
         StuffingError::Torn { lost, .. } => StuffingError::Torn { edge: h, lost },
     })

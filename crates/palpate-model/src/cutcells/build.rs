@@ -20,8 +20,11 @@ pub const MAX_CELLS: f64 = 5e6;
 /// Most cells of a body.
 pub const MAX_BODY_CELLS: f64 = 1e6;
 
-/// Memory that a cell of a body takes while its plan is made [B], measured on blocks.
-const CELL_MEMORY: f64 = 2.1e3;
+/// Memory that a cell of the band takes at most while a body is cut [B]: its distances, and what its nodes are continued from.
+const BAND_MEMORY: f64 = 1.95e3;
+
+/// The same of any cell of the lattice [B]: the distances at its samples, each with whether it is wanted.
+const LATTICE_MEMORY: f64 = 7.5e2;
 
 /// Places along the longest side at which a shape is asked how much of its bounding box it fills.
 const ASKED: f64 = 24.0;
@@ -62,7 +65,7 @@ pub enum BodyError {
     #[error(
         "cell size {h} m gives about {cells:.1e} cells, which take {:.1} GB before anything is computed; at most {MAX_BODY_CELLS:.0e} are \
          allowed, use cells of {suggestion:.2e} m or more{}",
-        cells * CELL_MEMORY * 1e-9, unit_hint(*longest)
+        cells * (BAND_MEMORY + LATTICE_MEMORY) * 1e-9, unit_hint(*longest)
     )]
     TooLarge {
         /// Edge of a cell [m].
@@ -255,7 +258,7 @@ pub(super) fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<
         return Err(BodyError::TooManyCells { h, cells: count, size, suggestion });
     }
     if count > MAX_BODY_CELLS {
-        let cells = filled(shape, min, size) * (size / h).element_product();
+        let cells = filled(shape, min, size, 0.0) * (size / h).element_product();
         if cells > MAX_BODY_CELLS {
             let (longest, suggestion) = (size.max_element(), 1.02 * h * (cells / MAX_BODY_CELLS).cbrt());
             return Err(BodyError::TooLarge { h, cells, longest, suggestion });
@@ -265,24 +268,27 @@ pub(super) fn lattice_for(shape: &dyn Shape, h: f64, band_width: f64) -> Result<
     Ok((Grid::covering(min, max, h, border), border as usize - 1))
 }
 
-/// Memory that cutting a shape out of a lattice will take [B], an estimate; `None` where that is refused anyway.
-pub(crate) fn memory(shape: &dyn Shape, h: f64, band_width: f64) -> Option<f64> {
+/// Memory that cutting a shape out of a lattice takes at its peak [B], an estimate; `None` where that is refused anyway.
+pub fn memory(shape: &dyn Shape, h: f64, band_width: f64) -> Option<f64> {
     let (grid, _) = lattice_for(shape, h, band_width).ok()?;
+    let lattice = grid.len() as f64;
     let (min, max) = shape.bounds();
-    let all = ((max - min) / h).ceil().element_product();
+    // The middle of a cell that reaches into the band, and a little more for where its surface bends.
+    let reach = band_width.max(0.0) + 0.7 * h;
+    let (low, size) = (min - reach, max - min + 2.0 * reach);
+    let all = (size / h).element_product().min(lattice);
     // The share is asked for only where it matters.
-    let cells = if all < 1e4 { all } else { all * filled(shape, min, max - min) };
-    // Numbers of nodes and distances of the whole lattice.
-    Some(cells * CELL_MEMORY + grid.len() as f64 * 16.0)
+    let band = if all < 1e4 { all } else { all * filled(shape, low, size, reach) };
+    Some(band * BAND_MEMORY + lattice * LATTICE_MEMORY)
 }
 
-/// Share of its bounding box that a shape fills, by asking at a few places.
-fn filled(shape: &dyn Shape, min: DVec3, size: DVec3) -> f64 {
+/// Share of a box that lies within `reach` [m] of a shape, by asking at a few places.
+pub(crate) fn filled(shape: &dyn Shape, min: DVec3, size: DVec3, reach: f64) -> f64 {
     let n = (size / size.max_element() * ASKED).ceil().max(DVec3::ONE);
     let [nx, ny, nz] = n.to_array().map(|n| n as usize);
     let at = |k: usize| min + size * (DVec3::new((k % nx) as f64, (k / nx % ny) as f64, (k / nx / ny) as f64) + 0.5) / n;
     let all = nx * ny * nz;
-    (0..all).into_par_iter().filter(|&k| shape.signed_distance(at(k)) < 0.0).count() as f64 / all as f64
+    (0..all).into_par_iter().filter(|&k| shape.signed_distance(at(k)) < reach).count() as f64 / all as f64
 }
 
 /// Takes slivers out of `found` and adds their volume and surface to the neighbouring cell nearest to what they hold.

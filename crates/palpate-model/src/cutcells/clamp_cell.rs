@@ -6,6 +6,7 @@ use crate::cutcells::held::{FreePart, Pins};
 use crate::shape::Shape;
 use crate::space::body::Body;
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// One cell of a held region.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,24 +64,23 @@ pub(crate) fn held_cells(region: &ClipBox, parts: &Parts, shape: &dyn Shape) -> 
     let lattice = Lattice { distance: &distance, h, subdivisions: SUBDIVISIONS };
     let misses = |c: [usize; 3]| region.misses(grid.position(c) + 0.5 * h, 0.5 * 3f64.sqrt() * h * 1.01);
 
-    let mut held: Vec<Option<HeldMoments>> = vec![None; body.cells().len()];
+    // Few cells of a body are held, as a rule.
+    let mut held: BTreeMap<u32, HeldMoments> = BTreeMap::new();
     for (n, cell) in body.cells().iter().enumerate().filter(|(_, c)| !misses(c.lattice)) {
         let world = world_cell(grid, cell.lattice);
         // A full cell may still have surface on its faces; only cells away from the surface take the short way.
         let deep = shape.signed_distance(grid.position(cell.lattice) + 0.5 * h) < -0.5 * 3f64.sqrt() * h * 1.01;
-        held_moments(&lattice, world, world, deep, region, held[n].get_or_insert_default());
+        held_moments(&lattice, world, world, deep, region, held.entry(n as u32).or_default());
     }
     for &(from, to) in parts.merged.iter().filter(|(c, _)| !misses(*c)) {
         let (cell, basis) = (world_cell(grid, from), world_cell(grid, body.cells()[to as usize].lattice));
-        held_moments(&lattice, cell, basis, false, region, held[to as usize].get_or_insert_default());
+        held_moments(&lattice, cell, basis, false, region, held.entry(to).or_default());
     }
     let mut cells: Vec<ClampCell> = held
         .into_iter()
-        .enumerate()
-        .filter_map(|(n, m)| Some((n, m?)))
         // Rounding of a box that only touches a cell's face holds nothing.
         .filter(|(_, m)| m.area() > 1e-9 * h * h || m.volume() > 1e-9 * h.powi(3))
-        .map(|(n, m)| ClampCell::new(body, n as u32, &m))
+        .map(|(n, m)| ClampCell::new(body, n, &m))
         .collect();
     let pins = Pins::new(body, cells.iter());
     cells.iter_mut().for_each(|c| c.pins = pins.of(body, c.cell));

@@ -1,13 +1,15 @@
 //! From a scene and what was observed to a [`Plan`]: cuts the body, places clamps, planes, masses and markers, and fills θ.
 
 mod driven;
+mod memory;
 mod obstacles;
 mod sites;
 mod stars;
 mod tets;
 
+pub use memory::plan_memory;
 pub use sites::marker_sites;
-pub use tets::{HELD, made};
+pub use tets::{HELD, made, reference};
 
 use crate::cutcells::build::{self as cutting, BodyError, Parts, SUBDIVISIONS};
 use crate::cutcells::clamp_cell::held_cells;
@@ -99,19 +101,7 @@ pub fn build_plan(scene: &Scene, observation: Observation, marker_rest: &[Marker
     build_plan_of(scene, shape_of(&scene.object), observation, marker_rest)
 }
 
-/// Memory that making the plan of a scene will take [B], an estimate before anything is made; `None` where it is not known: of tetrahedra, or
-/// where the cells will be refused.
-pub fn plan_memory(scene: &Scene, shape: &dyn Shape) -> Option<f64> {
-    let (min, max) = shape.bounds();
-    let h = match scene.object.resolution {
-        Resolution::CellSize(h) => h,
-        Resolution::Cells(n) => (max - min).max_element() / f64::from(n),
-        _ => return None,
-    };
-    cutting::memory(shape, h, band_cells(scene) * h)
-}
-
-/// The same with the scene's shape at hand, which takes time to make of a large mesh.
+/// [`build_plan`] with the scene's shape at hand, which takes time to make of a large mesh.
 pub fn build_plan_of(
     scene: &Scene,
     shape: Arc<dyn Shape>,

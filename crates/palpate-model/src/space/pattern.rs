@@ -37,12 +37,14 @@ pub struct BlockRows {
 impl BlockRows {
     /// Rows from lists of neighbours (with repetitions, each holding the row itself).
     pub fn new(mut neighbours: Vec<Vec<u32>>) -> BlockRows {
-        let mut rows = vec![0];
-        let mut columns = Vec::new();
-        let mut diagonal = Vec::with_capacity(neighbours.len());
-        for (a, list) in neighbours.iter_mut().enumerate() {
+        for list in &mut neighbours {
             list.sort_unstable();
             list.dedup();
+        }
+        let mut rows = vec![0];
+        let mut columns = Vec::with_capacity(neighbours.iter().map(Vec::len).sum());
+        let mut diagonal = Vec::with_capacity(neighbours.len());
+        for (a, list) in neighbours.iter().enumerate() {
             let own = list.binary_search(&(a as u32)).expect("every node belongs to a cell");
             diagonal.push(columns.len() + own);
             columns.extend_from_slice(list);
@@ -98,11 +100,11 @@ impl Pattern {
         let mut points: Vec<Vec<(u32, u8)>> = vec![Vec::new(); n];
         for (e, nodes) in body.points.stencils.iter().map(|s| s.nodes).enumerate() {
             for (i, &a) in nodes.iter().enumerate() {
-                neighbours[a as usize].extend_from_slice(nodes);
                 points[a as usize].push((e as u32, i as u8));
             }
         }
-        for nodes in beyond.iter().flat_map(|all| all.iter()).map(|s| s.nodes) {
+        // All points of an element have the same nodes.
+        for nodes in body.points.means().chain(beyond.iter().flat_map(|all| all.iter())).map(|s| s.nodes) {
             nodes.iter().for_each(|a| neighbours[*a as usize].extend_from_slice(nodes));
         }
         for ghost in body.ghosts() {
@@ -138,7 +140,7 @@ impl Pattern {
 /// Lists in a row, and where each begins.
 fn joined(lists: Vec<Vec<(u32, u8)>>) -> (Vec<usize>, Vec<(u32, u8)>) {
     let mut rows = vec![0];
-    let mut all = Vec::new();
+    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
     for list in lists {
         all.extend(list);
         rows.push(all.len());

@@ -61,6 +61,12 @@ impl Points {
         Points { per_element, ..Points::default() }
     }
 
+    /// The same with memory for so many elements of so many nodes.
+    pub fn with_capacity(per_element: usize, elements: usize, nodes: usize) -> Points {
+        let all = per_element * elements;
+        Points { stencils: Stencils::with_capacity(all, nodes), volume: Vec::with_capacity(all), ..Points::new(per_element) }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.volume.len()

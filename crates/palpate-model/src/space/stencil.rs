@@ -49,6 +49,17 @@ impl StencilBuf {
 }
 
 impl Stencils {
+    /// None yet, with memory for so many with gradients, of so many nodes each.
+    pub fn with_capacity(count: usize, nodes: usize) -> Stencils {
+        let all = count * nodes;
+        Stencils {
+            rows: Vec::with_capacity(count + 1),
+            nodes: Vec::with_capacity(all),
+            value: Vec::with_capacity(all),
+            gradient: Vec::with_capacity(all),
+        }
+    }
+
     /// Adds a stencil without gradient; returns its number.
     pub fn push(&mut self, nodes: &[u32], value: &[f64]) -> usize {
         self.push_with_gradient(nodes, value, &[])

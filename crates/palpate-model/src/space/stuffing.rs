@@ -6,16 +6,19 @@
 //! they are above 18°. Edges and corners of a shape that the lattice does not meet are rounded, which takes volume:
 //! [`TetMesh::keep_volume`] gives it back.
 
+mod lattice;
+
+pub(crate) use lattice::fitted;
+
 use crate::shape::Shape;
 use crate::space::points::TetMesh;
 use glam::{DVec3, IVec3};
+use lattice::{Lattice, MOST_POINTS};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
 /// Fractions of a long and of a short edge within which a vertex is moved to the surface.
 const WARP: [f64; 2] = [0.24999, 0.41189];
-/// Most points of a lattice: nine million tetrahedra of a body that fills its box.
-const MOST_POINTS: f64 = 1.5e6;
 /// Steps of a search along an edge: each takes a digit at least, and four are enough for a mesh.
 const SEARCH: usize = 8;
 
@@ -33,6 +36,17 @@ pub enum StuffingError {
         points: f64,
         /// An edge that fits [m].
         suggestion: f64,
+    },
+    /// Cubes through the shortest side are many along the others.
+    #[error(
+        "tetrahedra are at most as long as the body is thin, {least} m: a lattice of {points:.1e} points, at most {MOST_POINTS:e} are allowed; \
+         use discretisation = \"cells\", or a volume_mesh"
+    )]
+    TooThin {
+        /// The shortest side [m].
+        least: f64,
+        /// Points of the coarsest lattice.
+        points: f64,
     },
     /// No point of the lattice lies inside.
     #[error("{edge} m is too large: no tetrahedron fits into the body; use {suggestion:.2e} m or less")]
@@ -58,66 +72,6 @@ pub enum StuffingError {
 
 /// Share of the volume that may fall off in crumbs.
 const CRUMBS: f64 = 0.002;
-
-/// Corners (even coordinates) and centres (odd ones) of cubes, in halves of an edge.
-struct Lattice {
-    origin: DVec3,
-    /// Half of the long edge [m].
-    half: f64,
-    /// Corners along each axis.
-    size: IVec3,
-}
-
-impl Lattice {
-    /// A lattice around a box, with one cube to spare; its shortest side is met by whole cubes.
-    fn around(lo: DVec3, hi: DVec3, edge: f64) -> Lattice {
-        let span = hi - lo;
-        let least = span.min_element();
-        let edge = least / (least / edge - 1e-9).ceil().max(1.0);
-        let cubes = (span / edge - 1e-9).ceil().max(DVec3::ONE);
-        Lattice { origin: lo - edge, half: 0.5 * edge, size: cubes.as_ivec3() + 3 }
-    }
-
-    /// Number of corners.
-    fn corners(&self) -> usize {
-        self.size.x as usize * self.size.y as usize * self.size.z as usize
-    }
-
-    fn points(&self) -> usize {
-        let c = self.size - 1;
-        self.corners() + c.x as usize * c.y as usize * c.z as usize
-    }
-
-    /// Number of a point, where the lattice has it.
-    fn number(&self, p: IVec3) -> Option<u32> {
-        let odd = p.x & 1;
-        let (q, size) = (p >> 1i32, self.size - odd);
-        let inside = q.cmpge(IVec3::ZERO).all() && q.cmplt(size).all();
-        let n = || q.x as usize + size.x as usize * (q.y as usize + size.y as usize * q.z as usize);
-        inside.then(|| (n() + if odd == 1 { self.corners() } else { 0 }) as u32)
-    }
-
-    /// Coordinates of a point.
-    fn coordinates(&self, number: u32) -> IVec3 {
-        let (n, odd) = match (number as usize).checked_sub(self.corners()) {
-            Some(n) => (n, 1),
-            None => (number as usize, 0),
-        };
-        let (x, y) = ((self.size.x - odd) as usize, (self.size.y - odd) as usize);
-        2 * IVec3::new((n % x) as i32, (n / x % y) as i32, (n / (x * y)) as i32) + odd
-    }
-
-    fn place(&self, p: IVec3) -> DVec3 {
-        self.origin + self.half * p.as_dvec3()
-    }
-
-    /// Ways from a point to its neighbours: six long edges, then eight short ones.
-    fn ways() -> impl Iterator<Item = (IVec3, usize)> {
-        let long = IVec3::AXES.into_iter().flat_map(|a| [(2 * a, 0), (-2 * a, 0)]);
-        let short = (0..8).map(|k| (IVec3::new((k & 1) * 2 - 1, (k >> 1 & 1) * 2 - 1, (k >> 2) * 2 - 1), 1));
-        long.chain(short)
-    }
-}
 
 /// Signs of points and places where the surface crosses edges.
 struct Surface<'a> {
@@ -391,12 +345,7 @@ impl TetMesh {
 pub fn stuff(shape: &dyn Shape, edge: f64) -> Result<TetMesh, StuffingError> {
     let (lo, hi) = shape.bounds();
     let span = hi - lo;
-    let points = 2.0 * (span / edge + 3.0).element_product();
-    if points.is_nan() || points > MOST_POINTS {
-        let suggestion = edge * (points / MOST_POINTS).cbrt() * 1.05;
-        return Err(StuffingError::TooFine { edge, points, suggestion });
-    }
-    let lattice = Lattice::around(lo, hi, edge);
+    let lattice = Lattice::around(lo, hi, edge)?;
     let mut surface = Surface::find(&lattice, shape);
     surface.warp();
     let mut filling = Filling { surface: &surface, number: HashMap::new(), mesh: TetMesh::default() };

@@ -60,6 +60,14 @@ fn what_cannot_be_filled_says_what_would_do() {
     let wide = Placed::new(Analytic::Ball { radius: 1.0, center: DVec3::ZERO }, DAffine3::IDENTITY);
     let e = stuff(&wide, 1e-3).unwrap_err().to_string();
     assert!(e.starts_with("0.001 m gives a lattice of 1.6e10 points, at most 1.5e6 are allowed; use 2.31e-2 m or more"), "{e}");
+    // Five cubes through the thickness fit, to the digits that are said.
+    let plate = |z: f64| Placed::new(Analytic::Box { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, z) }, DAffine3::IDENTITY);
+    let e = stuff(&plate(0.02), 2e-3).unwrap_err().to_string();
+    assert!(e.ends_with("use 4.44e-3 m or more"), "{e}");
+    assert_eq!(fitted(DVec3::new(1.0, 1.0, 0.02), 4.44e-3), 0.004);
+    // A sheet has none.
+    let e = stuff(&plate(1e-3), 0.1).unwrap_err().to_string();
+    assert!(e.starts_with("tetrahedra are at most as long as the body is thin, 0.001 m: a lattice of 8.0e6 points"), "{e}");
     // Two balls a thin rod apart.
     #[derive(Debug)]
     struct Dumbbell;

@@ -91,7 +91,7 @@ impl Parts {
 }
 
 fn linear_parts(mesh: &TetMesh) -> Parts {
-    let points = Points::new(1);
+    let points = Points::with_capacity(1, mesh.tets.len(), 4);
     let mut parts = Parts { nodes: mesh.nodes.clone(), points, patches: Vec::new(), surface: Stencils::default() };
     for t in &mesh.tets {
         let gradient = barycentric_slopes(t.map(|n| mesh.nodes[n as usize]));
@@ -106,7 +106,7 @@ fn linear_parts(mesh: &TetMesh) -> Parts {
 
 fn quadratic_parts(mesh: &TetMesh) -> Parts {
     let (nodes, tets) = with_edges(mesh);
-    let points = Points::new(5);
+    let points = Points::with_capacity(5, tets.len(), 10);
     let mut parts = Parts { nodes, points, patches: Vec::new(), surface: Stencils::default() };
     for t in &tets {
         let corners = [t[0], t[1], t[2], t[3]];

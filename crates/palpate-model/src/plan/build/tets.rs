@@ -36,13 +36,17 @@ pub fn made(object: &Object) -> Result<(TetMesh, KeptVolume), PlanError> {
     let shape = shape_of(&Object { pose: DAffine3::IDENTITY, ..object.clone() });
     let fault = |e: StuffingError| error("object.edge_length", e.to_string());
     let mut mesh = stuff(shape.as_ref(), edge).map_err(fault)?;
-    // Cut cells know the volume of what is inside, also of a surface that passes through itself; finer ones than the tetrahedra, as far as
-    // that costs little.
+    // Cut cells know the volume of what is inside, also of a surface that passes through itself.
     let (low, high) = shape.bounds();
-    let h = (0.5 * edge).max(((high - low).element_product() / REFERENCE_CELLS).cbrt()).min((high - low).min_element());
+    let h = reference(low, high, edge);
     let cells = Body::build(shape.as_ref(), h, 0.0, SUBDIVISIONS).map_err(|e| error("object.edge_length", e.to_string()))?;
     let kept = mesh.keep_volume(cells.volume);
     Ok((mesh.transformed(&object.pose), kept))
+}
+
+/// Edge of the cells that measure the volume between two corners [m]: finer than the tetrahedra, as far as that costs little.
+pub fn reference(low: DVec3, high: DVec3, edge: f64) -> f64 {
+    (0.5 * edge).max(((high - low).element_product() / REFERENCE_CELLS).cbrt()).min((high - low).min_element())
 }
 
 /// Refuses what only cut cells have.
