@@ -39,6 +39,7 @@ mod view_tests;
 mod world;
 
 pub use backend::CpuBackend;
+pub use linear::dense::settle;
 pub use memory::{Memory, Sizes};
 pub use newton::Effort;
 pub use tracking::{Correspondence, Tracker};

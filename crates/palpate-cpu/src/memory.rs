@@ -1,7 +1,7 @@
 //! How much memory simulations take, from the sizes of what they keep; found before anything is computed.
 
 use crate::kept::BACK;
-use crate::linear::{Purpose, is_direct};
+use crate::linear::{Need, Purpose};
 use crate::terms::elastic_cells::POSED;
 use glam::{DMat3, DVec3};
 use palpate_engine::{Request, Wanted};
@@ -10,14 +10,13 @@ use palpate_model::cutcells::domain::BandCell;
 use palpate_model::cutcells::elements::Classes;
 use palpate_model::observation::ObservedPoint;
 use palpate_model::plan::Plan;
+use palpate_model::scene::InitialShape;
 use palpate_model::space::pattern::Pattern;
 
 /// Vectors over all nodes that a solve keeps at a time: forces, directions, conjugate gradients.
 const VECTORS: usize = 16;
 /// Bytes of a cell's matrix and its derivative by Poisson's ratio.
 const MATRICES: usize = 2 * 576 * size_of::<f64>();
-/// Numbers per node^(4/3) in a sparse Cholesky factor of a 3D grid: under nested dissection it grows so (George 1973).
-const FILL: f64 = 150.0;
 
 /// Memory of a batch of simulations [B].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,6 +50,8 @@ pub struct Sizes<'a> {
     blocks: usize,
     /// Matrices of cells for one Poisson's ratio.
     matrices: usize,
+    /// Of linear solves.
+    need: Need,
 }
 
 impl<'a> Sizes<'a> {
@@ -70,21 +71,20 @@ impl<'a> Sizes<'a> {
             + 8 * pattern.cell_list.len()
             + 4 * blocks
             + points * (size_of::<ObservedPoint>() + 8);
-        Sizes { plan, tables, blocks, matrices: Classes::new(plan).parts.len() + held }
+        // With many right-hand sides larger bodies are factorised, and still larger ones where nothing moves.
+        let purpose = if plan.initial == InitialShape::Rest { Purpose::Step(usize::MAX) } else { Purpose::Static };
+        let need = Need::of(plan.solver.linear, body, &pattern, purpose);
+        Sizes { plan, tables: tables + need.shared, blocks, matrices: Classes::new(plan).parts.len() + held, need }
     }
 
     /// Memory that one evaluation of `members` simulations takes on so many threads, an estimate. Matrices of cells are kept for each of
     /// the `ratios` different Poisson's ratios in the batch.
     pub fn memory(&self, members: usize, ratios: usize, threads: usize, request: &Request) -> Memory {
-        let Sizes { plan, tables, blocks, matrices } = *self;
+        let Sizes { plan, tables, blocks, matrices, need } = *self;
         let (nodes, cells) = (plan.body.nodes.len(), plan.body.cells().len());
         let vector = nodes * size_of::<DVec3>();
-        let factor = (8.0 * FILL * (nodes as f64).powf(4.0 / 3.0)) as usize;
-        // A copy is padded to vector registers. With many right-hand sides larger bodies are factorised as well.
-        let direct = is_direct(plan.solver.linear, nodes, Purpose::Step(usize::MAX));
-        let copy = if direct { factor } else { blocks * 12 * size_of::<f64>() };
-        let [stays, beside] = self.side_by_side(factor);
-        let solve = copy + beside + cells * (POSED + size_of::<V24>()) + VECTORS * vector;
+        let [stays, beside] = self.side_by_side();
+        let solve = need.solve + beside + cells * (POSED + size_of::<V24>()) + VECTORS * vector;
         let kept = if request.gradient.any() { plan.clock.stages().len() + 3 } else { 3 };
         let bytes = |n: usize| n as u64;
         Memory {
@@ -99,11 +99,9 @@ impl<'a> Sizes<'a> {
 
     /// What states of a sequence that are solved for together take: the factor that stays with the member, rounded to half of its size, and meanwhile as
     /// much in matrices, the moduli of points, and vectors.
-    fn side_by_side(&self, factor: usize) -> [usize; 2] {
+    fn side_by_side(&self) -> [usize; 2] {
         let (plan, nodes) = (self.plan, self.plan.body.nodes.len());
-        if plan.times.is_empty() || !is_direct(plan.solver.linear, nodes, Purpose::Static) {
-            return [0; 2];
-        }
+        let Some(factor) = self.need.factor.filter(|_| !plan.times.is_empty()) else { return [0; 2] };
         let moduli = plan.body.points.len() * size_of::<[[f64; 9]; 9]>();
         let states = BACK.min(plan.times.len());
         [factor / 2, factor / 2 + states * (moduli + VECTORS * nodes * size_of::<DVec3>())]

@@ -63,6 +63,22 @@ impl Analysis {
         self.symbolic.len_val()
     }
 
+    /// Memory of the structure [B].
+    pub fn bytes(&self) -> usize {
+        self.entries.len() * (size_of::<usize>() + size_of::<(u32, u8)>())
+    }
+
+    /// Memory of a factor [B].
+    pub fn factor_bytes(&self) -> usize {
+        self.entries() * size_of::<f64>()
+    }
+
+    /// Memory that a factorisation takes beside its factor [B]: the matrix in the order of its columns, and what is at work.
+    pub fn work_bytes(&self) -> usize {
+        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        self.entries.len() * (size_of::<usize>() + size_of::<f64>()) + scratch.unaligned_bytes_required()
+    }
+
     /// Factorises; the error names the first pivot that is not positive.
     pub fn factor(&self, matrix: &Matrix) -> Result<Factor, String> {
         let values = self

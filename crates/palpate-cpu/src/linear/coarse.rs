@@ -50,6 +50,19 @@ impl Coarsening {
         Ok(Coarsening { groups, blocks, analysis })
     }
 
+    /// Memory that groups, their pattern and the structure of a factor take [B].
+    pub fn bytes(&self) -> usize {
+        2 * size_of::<u32>() * self.groups.of_node.len() + size_of::<u32>() * self.blocks.columns.len() + self.analysis.bytes()
+    }
+
+    /// Memory that a second level takes while it is made [B].
+    pub fn level_bytes(&self) -> usize {
+        // Strips, and the matrix that they are joined to.
+        let matrices = 2 * size_of::<DMat3>() * self.blocks.columns.len();
+        let arms = size_of::<DVec3>() * self.groups.of_node.len();
+        matrices + arms + self.analysis.factor_bytes() + self.analysis.work_bytes()
+    }
+
     /// The groups' 6 × 6 blocks QᵀAQ, Q = [I, −[arm]×] per node.
     fn project(&self, rows: &BlockRows, matrix: &Matrix, arms: &[DVec3]) -> Matrix {
         let strips: Vec<Vec<DMat3>> = self

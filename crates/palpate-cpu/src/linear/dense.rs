@@ -1,6 +1,19 @@
 //! Small dense matrices.
 
-use faer::{Mat, Side};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par, Side};
+use std::hint::black_box;
+
+/// Rows and columns of a product that is packed.
+const PACKED: usize = 256;
+
+/// Takes the memory that this thread keeps for good from its first large product of matrices on.
+pub fn settle() {
+    let a = Mat::<f64>::identity(PACKED, PACKED);
+    let mut product = Mat::<f64>::zeros(PACKED, PACKED);
+    matmul(product.as_mut(), Accum::Replace, a.as_ref(), a.as_ref(), 1.0, Par::Seq);
+    black_box(product);
+}
 
 /// Removes the negative eigenvalues of a small symmetric matrix.
 #[cold]

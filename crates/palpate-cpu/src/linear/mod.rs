@@ -122,6 +122,35 @@ pub(crate) fn is_direct(choice: LinearSolver, nodes: usize, purpose: Purpose) ->
     }
 }
 
+/// Memory of solves with the matrices of a plan [B].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Need {
+    /// Structures that all solves share.
+    pub shared: usize,
+    /// What a solve takes: a factor and the work on it, or a copy of the matrix and a second level.
+    pub solve: usize,
+    /// A factor alone, where there may be one.
+    pub factor: Option<usize>,
+}
+
+impl Need {
+    /// Of what [`Solvers::prepare`] may choose.
+    pub fn of(choice: LinearSolver, body: &Body, pattern: &Pattern, purpose: Purpose) -> Need {
+        let rows = &pattern.blocks;
+        let copy = rows.columns.len() * 12 * size_of::<f64>();
+        // Where something cannot be analysed the solve says so.
+        if is_direct(choice, rows.len(), purpose)
+            && let Ok(analysis) = Analysis::new(rows)
+        {
+            let factor = analysis.factor_bytes();
+            return Need { shared: analysis.bytes(), solve: copy.max(factor + analysis.work_bytes()), factor: Some(factor) };
+        }
+        let coarsening = if rows.len() < COARSE_FROM { None } else { Coarsening::new(body, pattern, GROUP).ok() };
+        let [shared, level] = coarsening.map_or([0; 2], |c| [c.bytes(), c.level_bytes()]);
+        Need { shared, solve: copy + level, factor: None }
+    }
+}
+
 impl Task<'_> {
     /// True if CG takes less time than a factor with so many entries: where steps are short, a few iterations do.
     fn is_easy(&self, entries: usize) -> bool {
