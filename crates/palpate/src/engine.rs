@@ -3,7 +3,7 @@
 use crate::auto;
 use crate::error::Error;
 use crate::host::host;
-use crate::memory::{Demand, require_on_cpu};
+use crate::memory::{Demand, members_on_cpu, settle, settle_pool};
 use glam::DVec3;
 use palpate_cpu::CpuBackend;
 use palpate_engine::tracking::Correspond;
@@ -143,10 +143,7 @@ impl Backend {
                 let room = gpu().map_err(Error::Device)?.gpu().largest_buffer();
                 Ok(demand.on_device(plan, room).map_err(Error::Device)?.0)
             }
-            _ => {
-                require_on_cpu(plan, demand, threads)?;
-                Ok(demand.on_cpu(plan, threads).0)
-            }
+            _ => members_on_cpu(plan, demand, threads),
         }
     }
 
@@ -226,7 +223,7 @@ impl Backend {
         match self.resolve(plan, 1).0 {
             Backend::Gpu => Ok(Rollout::new(gpu_for(1)?, plan, 1)?.stopped_by(stop).visit(theta, visit)?),
             _ => {
-                require_on_cpu(plan, &Demand::forward(1), 0)?;
+                members_on_cpu(plan, &Demand::forward(1), 0)?;
                 Ok(Rollout::new(CpuBackend, plan, 1)?.stopped_by(stop).visit(theta, visit)?)
             }
         }
@@ -261,14 +258,16 @@ pub(crate) fn most_threads() -> usize {
 /// Runs `work` with so many threads (0 = one per core), but not more than are of use.
 ///
 /// # Errors
-/// The operating system refuses the threads.
+/// The operating system refuses the threads, or memory has no room for what they keep.
 pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     if threads == 0 {
+        settle()?;
         return Ok(work());
     }
     let threads = threads.min(most_threads());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
+    settle_pool(&pool)?;
     // The work goes on in the caller's span.
     let span = tracing::Span::current();
     Ok(pool.install(|| span.in_scope(work)))

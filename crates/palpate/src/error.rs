@@ -56,16 +56,19 @@ pub enum Error {
     /// A diagnosis has no answer.
     #[error(transparent)]
     Diagnosis(LabError),
-    /// The device failed on the way; what was known by then is written.
+    /// The device failed on the way, or memory ran short; what was known by then is written.
     #[error("{why}; {kept} is in {}, --resume goes on from there", folder.display())]
     BrokenOff {
-        /// Why, in the device's words.
+        /// Why, in the words of who broke off.
         why: String,
         /// What is kept.
         kept: &'static str,
         /// Where it is kept.
         folder: PathBuf,
     },
+    /// Memory has no room for what was asked for; nothing of it was taken.
+    #[error("{0}")]
+    Memory(String),
     /// The input is fine, but the computation or the writing of its result failed otherwise.
     #[error("{0}")]
     Failed(String),

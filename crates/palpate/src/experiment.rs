@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::events::Stage;
 use crate::fitting::{self, FitOptions, Fitted};
 use crate::interrupt::Interrupt;
-use crate::memory::require;
+use crate::memory::require_for_body;
 use crate::residuals::ResidualSummary;
 use glam::DVec3;
 use palpate_engine::{FailureKind, FrameResiduals, Snapshot, Stop, number};
@@ -16,7 +16,7 @@ use palpate_io::{check_overlap, parse_scene, read_recording, read_text, scene_er
 use palpate_model::effects::sensors::Sensors;
 use palpate_model::observation::{MarkerRest, Observation};
 use palpate_model::plan::Plan;
-use palpate_model::plan::build::{PlanError, build_plan_of, plan_memory};
+use palpate_model::plan::build::{PlanError, build_plan_of};
 use palpate_model::plan::locking::locking;
 use palpate_model::scene::{InitialShape, ObservationSpec, Scene};
 use palpate_model::shape::{Shape, TriMesh, shape_of};
@@ -183,13 +183,7 @@ impl Experiment {
         warnings: Vec<String>,
     ) -> Result<Experiment, Error> {
         let chosen = choose(&mut scene, shape.as_ref(), &observation);
-        if let Some(bytes) = plan_memory(&scene, shape.as_ref()) {
-            require(
-                bytes as u64,
-                &format!("{}: cutting the body", scene.path.display()),
-                "take coarser cells: object.cell_size",
-            )?;
-        }
+        require_for_body(&scene, shape.as_ref())?;
         let cutting = (Stage::begin("cut the body"), tracing::info_span!("assemble").entered());
         let plan = build_plan_of(&scene, shape.clone(), observation, &rest)
             .map_err(|e| plan_fault(&scene, &text, recording.as_deref(), e))?;

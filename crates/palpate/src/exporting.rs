@@ -1,11 +1,12 @@
 //! From an experiment to what `palpate-export` writes: a mesh of tetrahedra, and the numbers, clamps and world of the scene.
 
+use crate::engine::Backend;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::options::stem;
 use glam::{DAffine3, DVec3};
 use palpate_cpu::CpuBackend;
-use palpate_engine::{Rollout, Snapshot};
+use palpate_engine::Snapshot;
 use palpate_export::fill::{Filled, fill, in_frame};
 use palpate_export::{Clock, Displacement, Ground, Held, Material, Mesh, PointMass, Specimen, Spin};
 use palpate_model::cutcells::cut::ClipBox;
@@ -305,7 +306,7 @@ fn start<'a>(e: &'a Experiment, tets: &mut Tets) -> Result<Option<Displacement<'
 /// The state that a motion begins with.
 fn first_state(plan: &Plan) -> Result<Snapshot, Error> {
     let mut first = None;
-    Rollout::new(CpuBackend, plan, 1)?.visit(&plan.theta, |_, s, _| {
+    Backend::Cpu.visit(plan, &plan.theta, |_, s, _| {
         first = Some(s);
         ControlFlow::Break(())
     })?;

@@ -342,7 +342,7 @@ impl Laboratory for Lab<'_> {
 
     fn linearise(&mut self, tries: &[Try]) -> Vec<Result<Readings, LabError>> {
         let (base, limits) = (&self.base, &self.whole());
-        let one = |(c, v): &Try| linearise(&prepare(base, c).map_err(lab_error)?, v, 0, limits);
+        let one = |(c, v): &Try| linearise(&prepare(base, c).map_err(lab_error)?, v, 0, limits).map_err(|e| limits.alone(e));
         let began = Instant::now();
         let all: Vec<Result<Readings, LabError>> = tries.par_iter().map(one).collect();
         // What was cut short took less than it takes.

@@ -88,13 +88,25 @@ impl Limits {
         match e.into() {
             Error::Simulation(f) if f.kind == FailureKind::Stopped => self.stopped(),
             Error::Simulation(f) if f.kind == FailureKind::Device => self.break_off(f.to_string()),
+            Error::Memory(why) => self.break_off(why),
             Error::Build(e) if e.broken => self.break_off(e.to_string()),
             Error::Device(e @ GpuError::Lost { .. }) => self.break_off(e.to_string()),
             other => lab_error(other),
         }
     }
 
-    /// The device failed: nothing more can be computed with it. The first reason counts; what follows is its consequence.
+    /// What a hypothesis by itself ends with: where memory is short that is no fault of the hypothesis.
+    pub fn alone(&self, e: LabError) -> LabError {
+        match &e {
+            LabError::Failed(cause) => match cause.downcast_ref() {
+                Some(Error::Memory(why)) => self.break_off(why.clone()),
+                _ => e,
+            },
+            _ => e,
+        }
+    }
+
+    /// The device failed, or memory is short: nothing more can be computed. The first reason counts; what follows is its consequence.
     pub fn break_off(&self, why: String) -> LabError {
         self.broken.get_or_init(|| why);
         LabError::Interrupted
@@ -139,7 +151,8 @@ mod tests {
     fn a_broken_device_ends_all_whenever_it_is_met_and_a_refused_plan_only_itself() {
         let none = || Limits::new(&Interrupt::default(), &Clock::default(), None);
         let build = |broken| BuildError { message: "no".into(), hint: "none".into(), broken };
-        let broken: [Error; 3] = [
+        let broken: [Error; 4] = [
+            Error::Memory("no".into()),
             build(true).into(),
             Failure::new(FailureKind::Device, 0.0, "no").into(),
             Error::Device(GpuError::Lost { reason: "no".into() }),
@@ -150,5 +163,8 @@ mod tests {
         }
         let limits = none();
         assert!(matches!(limits.error(build(false)), LabError::Failed(_)) && !limits.is_over());
+        // Several that are too much together may each have room.
+        assert!(matches!(limits.alone(lab_error(build(false).into())), LabError::Failed(_)) && !limits.is_over());
+        assert!(matches!(limits.alone(lab_error(Error::Memory("no".into()))), LabError::Interrupted) && limits.is_over());
     }
 }

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fitting::{self, Fitted, free_parameters};
 use crate::interrupt::{Clock, Interrupt};
-use crate::memory::Demand;
+use crate::memory::{Demand, members_on_cpu};
 use lab::Lab;
 use palpate_diagnose::{Change, Diagnosis, LabError, Model};
 use palpate_io::InputError;
@@ -118,6 +118,11 @@ pub fn diagnose(
     let threads = first.scene().fit.as_ref().map_or(0, |f| f.threads);
     let (backend, clock) = (options.backend, options.clock.clone());
     let Searched { diagnosis, base, fitted, broken } = with_threads(threads, move || {
+        // Each thread fits a hypothesis: memory for that is asked for once, before anything is simulated.
+        let demand = Demand { starts: rayon::current_num_threads(), ..demand(experiments, &options.statistics)? };
+        for e in experiments {
+            members_on_cpu(e.plan(), &demand, 0)?;
+        }
         let lab = Lab::new(experiments, held_out, &options, &mut say)?;
         search(lab, &options.statistics)
     })??;

@@ -7,7 +7,7 @@ use super::limits::Limits;
 use crate::engine::Backend;
 use crate::experiment::Experiment;
 use crate::fitting::demand;
-use crate::memory::Demand;
+use crate::memory::{Demand, members_on_cpu};
 use palpate_cpu::CpuBackend;
 use palpate_diagnose::{Change, LabError, Number, Reading, Readings};
 use palpate_engine::Rollout;
@@ -33,13 +33,10 @@ pub(super) type Try = (Vec<Change>, Vec<f64>);
 /// Physics of its own for a hypothesis.
 pub(super) fn own_physics(ready: &Prepared, backend: Backend, limits: &Limits) -> Result<Physics, LabError> {
     let plans: Vec<_> = ready.experiments.iter().map(|e| &e.plan).collect();
-    // Recordings of one body run side by side, as far as they fit on a device.
-    let members = |joint: &Joint| match joint.parts.len() {
-        starts if starts > 1 && backend == Backend::Gpu => {
-            let demand = demand(&ready.free, joint.parts[0].0, Optimizer::GaussNewton, 1);
-            backend.members(&joint.plan, &Demand { starts, ..demand }, 0)
-        }
-        all => Ok(all),
+    // Recordings of one body run side by side, as far as they fit.
+    let members = |joint: &Joint| {
+        let demand = demand(&ready.free, joint.parts[0].0, Optimizer::GaussNewton, 1);
+        backend.members(&joint.plan, &Demand { starts: joint.parts.len(), ..demand }, 0)
     };
     backend.evaluators_until(&plans, members, &limits.stop()).map_err(|e| limits.error(e))
 }
@@ -147,6 +144,7 @@ pub(super) fn along(
 ) -> Result<Readings, LabError> {
     limits.check()?;
     let places: Vec<usize> = directions.iter().map(|d| d.1).collect();
+    members_on_cpu(&e.plan, &Demand::tangents(&places), 0).map_err(lab_error)?;
     let mut rollout = Rollout::new(CpuBackend, &e.plan, 1).map_err(|e| limits.error(e))?.stopped_by(limits.stop());
     let l = rollout.linearise(theta, &places).map_err(|e| limits.error(e))?;
     let mut out = Readings { columns, cost: l.evaluation.cost, ..Readings::default() };
@@ -195,7 +193,8 @@ fn together(base: &[Experiment], tries: &[Try], from: usize, limits: &Limits) ->
 fn many(base: &[Experiment], tries: &[Try], from: usize, limits: &Limits) -> Vec<Result<Readings, LabError>> {
     match together(base, tries, from, limits) {
         Ok(all) => all.into_iter().map(Ok).collect(),
-        Err(e) if tries.len() == 1 || !matches!(e, LabError::Failed(_)) => vec![Err(e); tries.len()],
+        Err(e) if tries.len() == 1 => vec![Err(limits.alone(e))],
+        Err(e) if !matches!(e, LabError::Failed(_)) => vec![Err(e); tries.len()],
         Err(_) => {
             let (a, b) = tries.split_at(tries.len() / 2);
             [many(base, a, from, limits), many(base, b, from, limits)].concat()

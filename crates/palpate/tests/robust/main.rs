@@ -1,6 +1,8 @@
 //! The program against hostile surroundings: pipes, short memory, second processes, signals, numbers that nothing has.
 #![cfg(target_os = "linux")]
 
+mod memory;
+
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +10,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// A soft block on a clamp, pushed sideways.
-const BLOCK: &str = include_str!("block.toml");
+const BLOCK: &str = include_str!("../block.toml");
 
 /// What turns it into a fit of its recording `seen`.
 const FIT: &str = "[observation]\nrecording = \"seen\"\ncost = \"sparse-surface\"\n[fit]\nstarts = 6\niterations = 12\nseed = 4\n\
@@ -107,11 +109,13 @@ fn what_is_no_plain_file_is_refused_and_never_waited_for() {
     place.pipe("pipe.ply");
     place.pipe("folder/recording.toml");
     place.pipe("scene.toml");
+    place.write("cloud/recording.toml", "format = \"recording/1\"\n[[cloud]]\nfile = \"pipe.ply\"\ntime = 0.0\n");
+    place.pipe("cloud/pipe.ply");
     let image = fs::read_to_string(place.at("seen/recording.toml")).expect("a recording");
     let image = image.split('"').find(|t| t.ends_with(".png")).expect("an image").to_string();
     fs::remove_file(place.at("seen").join(&image)).expect("it is there");
     place.pipe(&format!("seen/{image}"));
-    for path in [mesh, place.at("folder"), place.at("scene.toml"), place.at("seen")] {
+    for path in [mesh, place.at("folder"), place.at("scene.toml"), place.at("cloud"), place.at("seen")] {
         let (code, _, err) = inspect(&path);
         assert_eq!(code, Some(2), "{err}");
         assert!(err.starts_with("error: ") && err.contains("is a named pipe; a plain file is needed"), "{err}");
@@ -152,24 +156,6 @@ fn a_folder_has_one_process() {
     let (code, _, err) = run(&mut fit(&scene, &place.at("out")));
     assert_eq!(code, Some(0), "{err}");
     assert!(place.at("out/previous-1/result.json").exists());
-}
-
-#[test]
-fn short_memory_is_said_before_it_is_taken() {
-    let place = Place::new();
-    // 0.9 mm cells: some 200,000 of them.
-    let scene = place.write("large.toml", &BLOCK.replace("cell_size = 0.02", "cell_size = 0.0009"));
-    for limit in ["600000", "1400000"] {
-        let line = format!("ulimit -v {limit}; exec \"$0\" simulate \"$1\" --backend cpu --out \"$2\"");
-        let mut command = Command::new("sh");
-        command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_palpate")).arg(&scene).arg(place.at("out"));
-        let (code, _, err) = run(command.env("RAYON_NUM_THREADS", "2"));
-        let last = err.lines().last().unwrap_or_default();
-        assert_eq!(code, Some(1), "{err}");
-        for word in ["error: ", " takes about ", " of memory are left (limit of the shell, ulimit)", "hint: take coarser cells"] {
-            assert!(last.contains(word), "\"{word}\" is not in: {err}");
-        }
-    }
 }
 
 /// Rows of a marker file that takes seconds to read.
