@@ -73,12 +73,29 @@ fn mutated(random: &mut ChaCha8Rng, mut data: Vec<u8>, other: &[u8]) -> Vec<u8> 
     data
 }
 
-fn corpus(name: &str) -> Vec<Vec<u8>> {
+/// Files of a target's corpus, with their names.
+fn corpus(name: &str) -> Vec<(String, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(name);
     let mut files: Vec<_> = std::fs::read_dir(&folder).expect("every target has a corpus").flatten().map(|f| f.path()).collect();
     files.sort();
     assert!(!files.is_empty(), "{}", folder.display());
-    files.iter().map(|f| std::fs::read(f).expect("it can be read")).collect()
+    let name = |f: &Path| f.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    files.iter().map(|f| (name(f), std::fs::read(f).expect("it can be read"))).collect()
+}
+
+/// A file that a reader refuses at its first line leads nowhere, unless a run has found it.
+#[test]
+fn what_runs_begin_with_is_read() {
+    let mut wrong = Vec::new();
+    for (name, target) in TARGETS {
+        let dir = tempfile::tempdir().expect("a folder");
+        for (file, data) in corpus(name) {
+            if target(dir.path(), &data) == file.starts_with("refused-") {
+                wrong.push(format!("{name}/{file}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "read or refused against their names: {wrong:?}");
 }
 
 #[test]
@@ -92,7 +109,7 @@ fn no_reader_panics_or_hangs_on_a_damaged_file() {
     assert!(count > 0, "no target is {only:?}");
     for (number, (name, target)) in TARGETS.into_iter().enumerate().filter(|(_, (name, _))| chosen(name)) {
         let dir = tempfile::tempdir().expect("a folder");
-        let files = corpus(name);
+        let files: Vec<Vec<u8>> = corpus(name).into_iter().map(|(_, data)| data).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed * TARGETS.len() as u64 + number as u64);
         let run = |data: &[u8]| {
             let begun = ProcessTime::now();
