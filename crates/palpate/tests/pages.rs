@@ -4,7 +4,10 @@
 //! A page makes its own input. A block behind `<!-- file: NAME -->` becomes that file, one behind `<!-- append to: NAME -->` is added to it; `assets` lies in
 //! the folder, as in a clone. A line of output may leave something out (`…`), and so may a block between two lines. Numbers agree within three in a hundred:
 //! another processor rounds otherwise. Times are not compared.
+//!
+//! Blocks behind `<!-- slow -->` go to a shell, and run in a slow test only.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,6 +23,12 @@ fn root() -> PathBuf {
 fn program() -> PathBuf {
     std::env::var_os("PALPATE_BINARY").map_or_else(|| env!("CARGO_BIN_EXE_palpate").into(), PathBuf::from)
 }
+
+/// Parts that a page breaks a line into, at most.
+const BROKEN: usize = 5;
+
+/// What stands above a slow block.
+const SLOW_MARK: &str = "<!-- slow -->";
 
 /// A code block: language, the comment above it, its lines.
 struct Block {
@@ -107,75 +116,139 @@ fn same(expected: &[&str], said: &[&str]) -> bool {
         })
 }
 
+/// Whether a line of output is the one that a page shows: its first part is the beginning, the last one the end, and others lie between in order.
 fn shows(expected: &str, said: &str) -> bool {
     let said: Vec<&str> = said.split_whitespace().collect();
-    let (before, after) = expected.split_once('…').unwrap_or((expected, "…"));
-    let before: Vec<&str> = before.split_whitespace().collect();
-    if after == "…" {
-        return same(&before, &said);
-    }
-    let after: Vec<&str> = after.split_whitespace().collect();
-    said.len() >= before.len() + after.len()
-        && same(&before, &said[..before.len()])
-        && same(&after, &said[said.len() - after.len()..])
+    let parts: Vec<Vec<&str>> = expected.split('…').map(|part| part.split_whitespace().collect()).collect();
+    let [first, between @ .., last] = &parts[..] else { return same(&parts[0], &said) };
+    let Some(mut left) = said.len().checked_sub(first.len() + last.len()).map(|n| &said[first.len()..first.len() + n]) else {
+        return false;
+    };
+    let ends = same(first, &said[..first.len()]) && same(last, &said[said.len() - last.len()..]);
+    ends && between.iter().all(|part| {
+        let at = (0..(left.len() + 1).saturating_sub(part.len())).find(|&i| same(part, &left[i..i + part.len()]));
+        at.is_some_and(|i| {
+            left = &left[i + part.len()..];
+            true
+        })
+    })
 }
 
-/// Runs the page, and returns how many commands it has.
-fn run(name: &str) -> usize {
+/// A command that works in the folder of a page.
+fn in_folder(name: impl AsRef<OsStr>, folder: &Path) -> Command {
+    let mut command = Command::new(name);
+    command.current_dir(folder).env_remove("PALPATE_ADAPTER").env("XDG_RUNTIME_DIR", std::env::temp_dir());
+    // What memory a fit takes grows with its threads. Pages show two, and other tests beside this one leave it one.
+    command.env("RAYON_NUM_THREADS", "2");
+    command
+}
+
+/// What a command says.
+fn say(mut command: Command, place: &str) -> String {
+    let answer = command.output().unwrap_or_else(|e| panic!("{place}: {command:?}: {e}"));
+    let said = [answer.stderr, answer.stdout].map(|b| String::from_utf8(b).expect("UTF-8")).concat();
+    assert!(answer.status.success(), "{place}: {command:?}\n{said}");
+    said
+}
+
+/// Finds every line of a block in what was said, in order.
+fn compare(block: &str, output: &str, place: &str) {
+    let shown: Vec<&str> = block.lines().filter(|l| l.trim() != "…" && !l.trim().is_empty()).collect();
+    let (mut rest, mut i) = (output.lines(), 0);
+    while i < shown.len() {
+        // A page breaks long lines.
+        let found = (i + 1..=shown.len().min(i + BROKEN)).find_map(|j| {
+            let line = shown[i..j].join(" ");
+            rest.clone().position(|said| shows(&line, said)).map(|at| (j, at))
+        });
+        let (next, at) = found.unwrap_or_else(|| panic!("{place}: the page shows\n{}\nand palpate says\n{output}", shown[i]));
+        rest.nth(at);
+        i = next;
+    }
+}
+
+/// Runs the page, with its slow blocks or without, and returns how many blocks and commands it has.
+fn run(name: &str, slow: bool) -> usize {
     let page = fs::read_to_string(root().join(name)).unwrap();
     let stem = Path::new(name).file_stem().unwrap().to_str().unwrap();
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("pages-{stem}-{}", std::process::id()));
-    copy(&root().join("assets"), &folder.join("assets"));
+    let above = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("pages-{stem}-{}-{slow}", std::process::id()));
+    let folder = above.join("clone");
+    for input in ["assets", "tests/export"] {
+        copy(&root().join(input), &folder.join(input));
+    }
+    #[cfg(unix)]
+    if slow {
+        // Measured recordings lie beside the clone.
+        let recordings = root().join("../shared").canonicalize().expect("the recordings");
+        std::os::unix::fs::symlink(recordings, above.join("shared")).unwrap();
+    }
+    let path = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{path}", program().parent().expect("it lies in a folder").display());
     let (mut output, mut count) = (String::new(), 0);
     for block in blocks(&page) {
         let place = format!("{name}:{}", block.line);
         if let Some(file) = block.comment.strip_prefix("file: ") {
             fs::write(folder.join(file), &block.text).unwrap();
         } else if let Some(file) = block.comment.strip_prefix("append to: ") {
-            let old = fs::read_to_string(folder.join(file)).unwrap_or_else(|e| panic!("{place}: {file}: {e}"));
-            fs::write(folder.join(file), old + "\n" + &block.text).unwrap();
+            match fs::read_to_string(folder.join(file)) {
+                Ok(old) => fs::write(folder.join(file), old + "\n" + &block.text).unwrap(),
+                // What is added to may be made by a slow block.
+                Err(e) => assert!(!slow && page.contains(SLOW_MARK), "{place}: {file}: {e}"),
+            }
+        } else if block.language == "sh" && block.comment == "slow" {
+            output.clear();
+            if slow {
+                let mut command = in_folder("sh", &folder);
+                command.args(["-e", "-c", &block.text]).env("PATH", &path);
+                output = say(command, &place);
+                count += 1;
+            }
         } else if block.language == "sh" {
             output.clear();
             for line in block.text.replace("\\\n", " ").lines().filter(|l| !l.trim().is_empty()) {
                 let words = words(line);
                 assert_eq!(words.first().map(String::as_str), Some("palpate"), "{place}: only palpate is run: {line}");
-                let mut command = Command::new(program());
-                command
-                    .args(&words[1..])
-                    .current_dir(&folder)
-                    .env_remove("PALPATE_ADAPTER")
-                    .env("XDG_RUNTIME_DIR", std::env::temp_dir());
-                let answer = command.output().expect("the program starts");
-                let said = [answer.stderr, answer.stdout].map(|b| String::from_utf8(b).expect("UTF-8"));
-                assert!(answer.status.success(), "{place}: {line}\n{}", said.concat());
-                output += &said.concat();
+                let mut command = in_folder(program(), &folder);
+                command.args(&words[1..]);
+                output += &say(command, &place);
                 count += 1;
             }
         } else if block.language == "text" && !output.is_empty() {
-            let mut rest = output.lines();
-            for line in block.text.lines().filter(|l| l.trim() != "…" && !l.trim().is_empty()) {
-                assert!(rest.any(|said| shows(line, said)), "{place}: the page shows\n{line}\nand palpate says\n{output}");
-            }
+            compare(&block.text, &output, &place);
             output.clear();
         }
     }
-    fs::remove_dir_all(&folder).unwrap();
+    fs::remove_dir_all(&above).unwrap();
     count
 }
 
 #[test]
 fn the_ten_minutes_go_as_the_page_says() {
-    assert_eq!(run("docs/ten-minutes.md"), 7);
+    assert_eq!(run("docs/ten-minutes.md", false), 7);
 }
 
 #[test]
 fn the_effect_is_found_as_the_page_says() {
-    assert_eq!(run("docs/an-effect.md"), 3);
+    assert_eq!(run("docs/an-effect.md", false), 3);
 }
 
 /// Commands of other pages that are marked to be run. Long fits are left to tests of their own: `tests/cli/fitting.rs` has that of the README.
 #[test]
 fn commands_of_other_pages_run() {
+    let commands: usize = other_pages().iter().map(|page| run(page, false)).sum();
+    assert!(commands >= OTHERS, "{commands} commands");
+}
+
+#[test]
+// Three minutes: fits, diagnoses and tracked images.
+#[ignore = "slow: cargo xtask test --full"]
+fn slow_commands_of_pages_run() {
+    let slow = other_pages().into_iter().filter(|p| fs::read_to_string(root().join(p)).unwrap().contains(SLOW_MARK));
+    let commands: usize = slow.map(|page| run(&page, true)).sum();
+    assert!(commands >= SLOW, "{commands} commands");
+}
+
+fn other_pages() -> Vec<String> {
     let mut pages: Vec<String> = fs::read_dir(root().join("docs"))
         .unwrap()
         .map(|e| format!("docs/{}", e.unwrap().file_name().to_str().unwrap()))
@@ -183,12 +256,13 @@ fn commands_of_other_pages_run() {
         .collect();
     pages.push("README.md".into());
     pages.sort();
-    let commands: usize = pages.iter().map(|page| run(page)).sum();
-    assert!(commands >= OTHERS, "{commands} commands");
+    pages
 }
 
 /// So many there are at least.
-const OTHERS: usize = 4;
+const OTHERS: usize = 6;
+/// So many blocks and commands of pages with slow ones.
+const SLOW: usize = 15;
 
 #[test]
 fn lines_are_compared_as_readers_compare_them() {
@@ -197,6 +271,7 @@ fn lines_are_compared_as_readers_compare_them() {
     assert!(!shows(line, "residual: 1.611 mm now (1.495 mm from noise), 12290 points in 99 s"));
     assert!(!shows(line, "residual: 1.511 m now (1.496 mm from noise), 12296 points in 8.2 s"));
     assert!(shows("wrote … files", "wrote 3 and 4 files") && !shows("wrote … files", "wrote 3 and 4 places"));
+    assert!(shows("a … c … e …", "a b c d e f") && !shows("a … e … c …", "a b c d e f") && !shows("a … a", "a"));
     assert!(!shows("± 0.1 s", "± 0.2 s"));
     assert_eq!(
         words("palpate fit a.toml --camera \"eye=1 fov=2\"   # a comment"),
