@@ -33,20 +33,23 @@ const FEW: usize = 1024;
 /// Rows that one task multiplies in a row: few enough that two threads finish together.
 const ROWS: usize = 128;
 
-/// A copy of a matrix for many products: columns of blocks padded to four numbers, one vector register each.
+/// A block with its columns padded to four numbers, one vector register each.
+pub type Block<T> = [T; 12];
+
+/// A copy of a matrix for many products, in padded blocks.
 ///
 /// In `f32` it holds the matrix to 6e-8, good enough for directions that only need a few digits, in half the memory; sums are
 /// made in f64 either way.
 #[derive(Debug)]
 pub struct Packed<'a, T> {
     rows: &'a BlockRows,
-    blocks: Vec<[T; 12]>,
+    blocks: Vec<Block<T>>,
 }
 
 impl<'a, T: Copy + Default + Send + Sync> Packed<'a, T> {
     /// Copies a matrix, number by number.
     pub fn new(rows: &'a BlockRows, matrix: &Matrix, number: impl Fn(f64) -> T + Sync) -> Packed<'a, T> {
-        let mut blocks = vec![[T::default(); 12]; matrix.values.len()];
+        let mut blocks = vec![Block::<T>::default(); matrix.values.len()];
         blocks.par_chunks_mut(BLOCKS).zip(matrix.values.par_chunks(BLOCKS)).for_each(|(blocks, values)| {
             for (block, value) in blocks.iter_mut().zip(values) {
                 for (c, column) in [value.x_axis, value.y_axis, value.z_axis].into_iter().enumerate() {
