@@ -62,6 +62,10 @@ pub fn choose(place: &Place, asked: Option<&str>) -> Result<(&'static Format, St
     }
     match ALL.iter().find_map(|f| (f.detect)(place).map(|why| (*f, why))) {
         Some(found) => Ok(found),
+        // A camera's folder all the same: that intrinsics are missing is told while reading, unless an option names them.
+        None if !folder::depth_files(place).is_empty() => {
+            Ok((&realsense::FORMAT, "depth images, without intrinsics in JSON".into()))
+        }
         None => {
             let known: Vec<String> = ALL.iter().map(|f| format!("{} ({})", f.name, f.what)).collect();
             refuse(&place.path, format!("is of no format that is read; --format names one of: {}", known.join(", ")))

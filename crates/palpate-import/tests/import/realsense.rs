@@ -65,6 +65,15 @@ fn a_mesh_in_millimetres_is_put_where_the_ball_is() {
 }
 
 #[test]
+fn intrinsics_may_lie_elsewhere() {
+    let bench = Bench::new();
+    folder(&bench);
+    fs::rename(bench.path("rs/intrinsics.json"), bench.path("elsewhere.json")).unwrap();
+    let (imported, ..) = bench.good("rs", &Options { intrinsics: Some(bench.path("elsewhere.json")), ..far() });
+    assert_eq!(imported.images, FRAMES);
+}
+
+#[test]
 fn a_background_a_box_and_a_plane_leave_the_ball() {
     let bench = Bench::new();
     folder(&bench);
@@ -101,7 +110,12 @@ fn a_background_a_box_and_a_plane_leave_the_ball() {
 fn what_contradicts_itself_is_refused() {
     /// A name, what is done to a good folder, and words of the answer.
     type Case<'a> = (&'a str, &'a dyn Fn(&Bench), &'a [&'a str]);
-    let cases: [Case; 10] = [
+    let cases: [Case; 11] = [
+        (
+            "no intrinsics",
+            &|b| fs::remove_file(b.path("rs/intrinsics.json")).unwrap(),
+            &["no JSON file with intrinsics", "--intrinsics FILE"],
+        ),
         (
             "a telescope",
             &|b| drop(b.write("rs/intrinsics.json", intrinsics().replace("150", "1e300"))),
