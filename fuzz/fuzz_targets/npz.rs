@@ -2,8 +2,5 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (_, target) = palpate_fuzz::TARGETS.into_iter().find(|t| t.0 == "npz").expect("it is there");
-    target(dir.path(), data);
-});
+#[path = "../src/guided.rs"]
+mod guided;
