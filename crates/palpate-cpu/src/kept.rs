@@ -5,7 +5,7 @@
 
 use crate::linear::cholesky::RoughFactor;
 use crate::linear::jacobi::BlockJacobi;
-use crate::linear::matrix::{Block, Matrix};
+use crate::linear::matrix::{Matrix, Packed};
 use crate::linear::side_by_side::GROUP;
 use crate::linear::{Purpose, is_direct};
 use crate::terms::{Curvature, Equation, jets};
@@ -74,7 +74,7 @@ pub(crate) fn side_by_side(shared: &Shared, e: &Equation, u: &[DVec3], kept: &Ke
     if !e.needs_matrix(u) {
         return most;
     }
-    let matrix = size_of::<Block<f64>>() * shared.pattern.blocks.columns.len();
+    let matrix = Packed::<f64>::bytes(&shared.pattern.blocks);
     (kept.factor.bytes() / matrix).clamp(1, most)
 }
 

@@ -34,7 +34,7 @@ const FEW: usize = 1024;
 const ROWS: usize = 128;
 
 /// A block with its columns padded to four numbers, one vector register each.
-pub type Block<T> = [T; 12];
+type Block<T> = [T; 12];
 
 /// A copy of a matrix for many products, in padded blocks.
 ///
@@ -44,6 +44,13 @@ pub type Block<T> = [T; 12];
 pub struct Packed<'a, T> {
     rows: &'a BlockRows,
     blocks: Vec<Block<T>>,
+}
+
+impl<T> Packed<'_, T> {
+    /// Memory of the copy of a matrix with these blocks [B].
+    pub fn bytes(rows: &BlockRows) -> usize {
+        size_of::<Block<T>>() * rows.columns.len()
+    }
 }
 
 impl<'a, T: Copy + Default + Send + Sync> Packed<'a, T> {

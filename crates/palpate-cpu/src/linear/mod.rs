@@ -16,7 +16,7 @@ use coarse::{Coarsening, Level, TwoLevel};
 use conjugate_gradient::{CgEnd, Precondition};
 use glam::DVec3;
 use jacobi::BlockJacobi;
-use matrix::{Block, Matrix, Operator, Packed};
+use matrix::{Matrix, Operator, Packed};
 use palpate_model::scene::LinearSolver;
 use palpate_model::space::body::Body;
 use palpate_model::space::pattern::{BlockRows, Pattern};
@@ -137,7 +137,7 @@ impl Need {
     /// Of what [`Solvers::prepare`] may choose.
     pub fn of(choice: LinearSolver, body: &Body, pattern: &Pattern, purpose: Purpose) -> Need {
         let rows = &pattern.blocks;
-        let copy = rows.columns.len() * size_of::<Block<f64>>();
+        let copy = Packed::<f64>::bytes(rows);
         // Where something cannot be analysed the solve says so.
         if is_direct(choice, rows.len(), purpose)
             && let Ok(analysis) = Analysis::new(rows)
