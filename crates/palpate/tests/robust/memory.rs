@@ -4,6 +4,14 @@ use super::{BLOCK, Place, run};
 use std::fs;
 use std::process::Command;
 
+/// Runs palpate on two threads of the CPU with so many addresses [KiB]; what it writes is in `out`.
+fn run_within(limit: u32, place: &Place, command: &str) -> (Option<i32>, String, String) {
+    let line = format!("ulimit -v {limit}; exec \"$0\" {command} --backend cpu --out \"$1\"");
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_palpate")).arg(place.at("out"));
+    run(shell.env("RAYON_NUM_THREADS", "2"))
+}
+
 #[test]
 fn short_memory_is_said_before_it_is_taken() {
     let place = Place::new();
@@ -13,14 +21,11 @@ fn short_memory_is_said_before_it_is_taken() {
     let tetrahedra = place.write("tetrahedra.toml", &tetrahedra);
     // Too little for the body, just enough, and of cells enough for it but not for a simulation.
     for (scene, limits, hint) in [
-        (&cells, &["600000", "850000", "1050000", "1400000"][..], "take coarser cells"),
-        (&tetrahedra, &["600000", "1700000"], "take larger tetrahedra: object.edge_length"),
+        (&cells, &[600_000, 850_000, 1_050_000, 1_400_000][..], "take coarser cells"),
+        (&tetrahedra, &[600_000, 1_700_000], "take larger tetrahedra: object.edge_length"),
     ] {
         for limit in limits {
-            let line = format!("ulimit -v {limit}; exec \"$0\" simulate \"$1\" --backend cpu --out \"$2\"");
-            let mut command = Command::new("sh");
-            command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_palpate")).arg(scene).arg(place.at("out"));
-            let (code, _, err) = run(command.env("RAYON_NUM_THREADS", "2"));
+            let (code, _, err) = run_within(*limit, &place, &format!("simulate \"{}\"", scene.display()));
             let last = err.lines().last().unwrap_or_default();
             assert_eq!(code, Some(1), "{limit}: {err}");
             for word in ["error: ", " takes about ", " of memory are left (limit of the shell, ulimit -v", "hint: ", hint] {
@@ -35,10 +40,7 @@ fn under_limits(place: &Place, command: &str, file: &str) {
     // How much more each time [KiB]: less than a product of matrices reserves.
     let mut refused = 0;
     for limit in (400_000..8_000_000).step_by(60_000) {
-        let line = format!("ulimit -v {limit}; exec \"$0\" {command} --backend cpu --out \"$1\"");
-        let mut command = Command::new("sh");
-        command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_palpate")).arg(place.at("out"));
-        let (code, _, err) = run(command.env("RAYON_NUM_THREADS", "2"));
+        let (code, _, err) = run_within(limit, place, command);
         if code == Some(0) {
             break;
         }
