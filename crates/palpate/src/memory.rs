@@ -145,8 +145,10 @@ pub(crate) fn members_on_cpu(plan: &Plan, demand: &Demand, threads: usize) -> Re
     let (members, memory) = demand.on_cpu(plan, threads);
     let what = format!("a simulation of {} nodes", plan.body.nodes.len());
     // One is asked for where no more fit, unless somebody said how many.
-    let hint =
-        ["take coarser cells", "take coarser cells, or fewer simulations at once (--batch)"][usize::from(demand.asked.is_some())];
+    let hint = match demand.asked {
+        Some(_) => "take coarser cells, or fewer simulations at once (--batch)",
+        None => "take coarser cells",
+    };
     require(memory.total(), room, &what, hint)?;
     GRANTED.fetch_max(memory.total(), Ordering::Relaxed);
     Ok(members)

@@ -97,13 +97,12 @@ impl Limits {
 
     /// What a hypothesis by itself ends with: where memory is short that is no fault of the hypothesis.
     pub fn alone(&self, e: LabError) -> LabError {
-        match &e {
-            LabError::Failed(cause) => match cause.downcast_ref() {
-                Some(Error::Memory(why)) => self.break_off(why.clone()),
-                _ => e,
-            },
-            _ => e,
+        if let LabError::Failed(cause) = &e
+            && let Some(Error::Memory(why)) = cause.downcast_ref()
+        {
+            return self.break_off(why.clone());
         }
+        e
     }
 
     /// The device failed, or memory is short: nothing more can be computed. The first reason counts; what follows is its consequence.
